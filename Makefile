@@ -1,4 +1,4 @@
-# make site    the environment, the tool and the course in public/
+# make site    the environment, the tool, the course in public/ and the manual in docs/public/
 # make quick   the tests that need no browser, no lab engine and no whole site
 # make test    all set-up, then every test of a change
 # make fuzz    inputs that nobody wrote, for TIME seconds
@@ -23,7 +23,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # What an installation depends on. It is editable: a change of Python code or of a template needs
 # none. Folders are listed because they change when a file in them is removed.
-BUILD_INPUTS := pyproject.toml requirements.txt requirements-build.txt hatch_build.py $(wildcard site/.npmrc site/*.json site/*.mjs site/*.py) \
+BUILD_INPUTS := pyproject.toml requirements-course.txt requirements-build.txt hatch_build.py $(wildcard site/.npmrc site/*.json site/*.mjs site/*.py) \
   $(shell find site/css site/js 2>/dev/null)
 
 # An environment does not outlive a move of its folder, whose path is in its scripts, nor the Python
@@ -32,10 +32,11 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(VENV)/.made),$(CURDIR))
 .PHONY: $(VENV)/.made
 endif
 
-.PHONY: help site serve quick test test-slow test-oldest fuzz lint format types dist vscode lock npm system clean distclean
+.PHONY: help site pages serve quick test test-slow test-oldest fuzz lint format types dist vscode lock npm system clean distclean
 
 help:
-	@echo 'make site       make the environment, install, build the course into public/'
+	@echo 'make site       make the environment, install, build the course into public/, the manual into docs/public/'
+	@echo 'make pages      build both anew, with their addresses, as they are published: into build/pages/'
 	@echo 'make serve      the same, then serve it and rebuild on every change'
 	@echo 'make quick      run the tests that need no browser, no lab engine and no whole site'
 	@echo 'make test       do all set-up and run every test (PYTEST_ARGS=..., WORKERS=$(WORKERS))'
@@ -51,6 +52,31 @@ help:
 
 site: $(VENV)/.site
 	$(BIN)/coursebuild build
+	$(BIN)/coursebuild -C docs build
+
+# What is published: the course, and the manual in docs/ below it. Where it will be is said in
+# coursebuild/__init__.py; if nothing is said there, what needs an address is left out.
+PAGES := build/pages
+pages: $(VENV)/.site
+	rm -rf $(PAGES) build/sources
+	mkdir -p build/sources
+	git archive HEAD content docs lib matplotlibrc models runs | tar -x -C build/sources
+	cd build/sources && ../../$(BIN)/python -c "$$ADDRESSES"
+	$(BIN)/coursebuild -C build/sources build --strict
+	$(BIN)/coursebuild -C build/sources/docs build --strict
+	mv build/sources/public $(PAGES)
+	mv build/sources/docs/public $(PAGES)/docs
+
+define ADDRESSES
+from pathlib import Path
+from coursebuild import MANUAL, REPOSITORY, SITE
+for name, address in (("content", SITE), ("docs/content", MANUAL)):
+    map_file = Path(name, "course.toml")
+    links = {"base_url": address, "repository": REPOSITORY}
+    lines = "".join(f'{key} = "{link}"\n' for key, link in links.items() if link)
+    map_file.write_text(map_file.read_text().replace("[course]\n", f"[course]\n{lines}", 1))
+endef
+export ADDRESSES
 
 serve: $(VENV)/.site
 	$(BIN)/coursebuild serve
@@ -78,8 +104,8 @@ OF_THIS_ENGINE := tests/core/text/test_format_mistakes.py tests/mjcourse/test_ag
 
 test-oldest: $(VENV)/.dev npm
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(OLDEST)
-	$(BIN)/uv pip compile --quiet --resolution lowest-direct pyproject.toml --extra lsp -o $(OLDEST)/packages.txt
-	$(BIN)/uv pip install --quiet --python $(OLDEST) -c $(OLDEST)/packages.txt --group dev --editable '.[lsp]'
+	$(BIN)/uv pip compile --quiet --resolution lowest-direct pyproject.toml --extra lsp --extra figures --extra measure -o $(OLDEST)/packages.txt
+	$(BIN)/uv pip install --quiet --python $(OLDEST) -c $(OLDEST)/packages.txt --group dev --editable '.[figures,lsp,measure]'
 	PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(OLDEST)/bin/python -m pytest $(QUICK) \
 	  $(addprefix --deselect ,$(OF_THIS_ENGINE))
 
@@ -108,8 +134,9 @@ dist: $(VENV)/.dev
 
 lock: $(VENV)/.dev
 	$(LOCK) pyproject.toml -o requirements.txt
+	$(LOCK) pyproject.toml --extra figures --extra measure -c requirements.txt -o requirements-course.txt
 	$(LOCK) --group build -c requirements.txt -o requirements-build.txt
-	$(LOCK) pyproject.toml --extra cache --extra lsp --group dev -c requirements.txt -c requirements-build.txt \
+	$(LOCK) pyproject.toml --all-extras --group dev -c requirements-course.txt -c requirements-build.txt \
 	  -o requirements-dev.txt
 
 clean:
@@ -133,7 +160,7 @@ $(VENV)/.made:
 
 $(VENV)/.site: $(VENV)/.made $(BUILD_INPUTS)
 	@echo 'installing coursebuild and what it needs (the first time takes minutes)'
-	@$(INSTALL) --require-hashes -r requirements.txt -r requirements-build.txt
+	@$(INSTALL) --require-hashes -r requirements-course.txt -r requirements-build.txt
 	@$(INSTALL) --no-deps --no-build-isolation --editable .
 	@touch $@
 

@@ -1,10 +1,10 @@
 """Build hook of the Python package: the browser's half and the templates go into the wheel.
 
-Entry point: `BrowserHook`, which hatchling finds here. In a wheel, the files of site/dist become
-coursebuild/assets/, templates/ becomes coursebuild/templates/, and docs/reference/rules.md goes
-with them. A source distribution holds site/dist, so that a wheel can be made of it without Node and
-npm. An editable install only gets an up-to-date site/dist, and compiled modules: there the tool
-reads all this where it is. The work is done by site/bundle.py.
+Entry points: `BrowserHook` and `LinkHook`, which hatchling finds here. In a wheel, the files of
+site/dist become coursebuild/assets/, templates/ becomes coursebuild/templates/, and
+docs/reference/rules.md goes with them. A source distribution holds site/dist, so that a wheel can
+be made of it without Node and npm. An editable install only gets an up-to-date site/dist, and
+compiled modules: there the tool reads all this where it is. The work is done by site/bundle.py.
 """
 
 import compileall
@@ -14,10 +14,29 @@ from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 # A build environment doesn't have the project on its path.
+sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent / "site"))
 import bundle
+
+from coursebuild import MANUAL, REPOSITORY, SITE
+
+
+class LinkHook(MetadataHookInterface):
+    """Gives the package the links that are known."""
+
+    PLUGIN_NAME = "custom"
+
+    def update(self, metadata: dict[str, Any]) -> None:
+        """Adds the links to the package's metadata."""
+        links = {"Homepage": SITE or REPOSITORY, "Documentation": MANUAL}
+        if REPOSITORY:
+            links["Source"] = REPOSITORY
+            links["Changelog"] = f"{REPOSITORY}/blob/main/CHANGELOG.md"
+            links["Issues"] = f"{REPOSITORY}/issues"
+        metadata["urls"] = {name: address for name, address in links.items() if address}
 
 
 class BrowserHook(BuildHookInterface[Any]):

@@ -1,9 +1,15 @@
 """Evaluate the exact motion that a course gives for a model: `exact.py FILE REQUEST`.
 
-`models/NAME.exact.py` defines `motion(time, qpos, qvel)`: the positions at a time in s, from the
-positions and velocities at the beginning; or a pair of positions and velocities. Or it defines
-`acceleration(time, qpos, qvel)`, of coordinates whose rates are `qvel`: these equations are
-integrated. The request is JSON in the last argument, the answer JSON on standard output.
+`models/NAME.exact.py` defines one or more of
+
+- `motion(time, qpos, qvel)`: the positions at a time in s, from the positions and velocities at the
+  beginning; or a pair of positions and velocities;
+- `acceleration(time, qpos, qvel)`, of coordinates whose rates are `qvel`: these equations are
+  integrated;
+- `expected(qpos, qvel)`: quantities that theory knows, by name.
+
+The request is JSON in the last argument; the answer on standard output is a JSON object with what
+there is: the states of `motion` and of `acceleration`, and the quantities of `expected`.
 """
 
 import contextlib
@@ -20,19 +26,24 @@ def main(file: str, request: str) -> None:
     """Answer a request: the states at its `times`, from its initial `qpos` and `qvel`."""
     query = json.loads(request)
     begin = [np.array(query[name]) for name in ("qpos", "qvel")]
-    states = []
-    answer = sys.stdout
+    answer: dict[str, Any] = {}
     with contextlib.redirect_stdout(sys.stderr):  # what the file prints is no part of the answer
         names = runpy.run_path(file)
-        if "acceleration" in names and "motion" not in names:
-            json.dump(integrate(names["acceleration"], query["times"], *begin), answer)
-            return
-        motion = names["motion"]
-        for time in query["times"]:
-            result = motion(time, *(values.copy() for values in begin))
-            parts = result if isinstance(result, tuple) else (result,)
-            states.append([np.asarray(part, dtype=float).ravel().tolist() for part in parts])
-    json.dump(states, sys.stdout)
+        if "motion" in names:
+            states = []
+            for time in query["times"]:
+                result = names["motion"](time, *(values.copy() for values in begin))
+                parts = result if isinstance(result, tuple) else (result,)
+                states.append([np.asarray(part, dtype=float).ravel().tolist() for part in parts])
+            answer["motion"] = states
+        if "acceleration" in names:
+            answer["acceleration"] = integrate(names["acceleration"], query["times"], *begin)
+        if "expected" in names:
+            quantities = names["expected"](*(values.copy() for values in begin))
+            answer["expected"] = {name: float(value) for name, value in quantities.items()}
+        if not answer:
+            raise KeyError("motion")
+    json.dump(answer, sys.stdout)
 
 
 def integrate(

@@ -5,6 +5,7 @@ usage. Heavy imports happen in the command that needs them, and here in `main`, 
 Ctrl-C end this process without a word.
 
 - `unchanged`: a command that has nothing to do, for which little is loaded
+- `handover`: a command that a running `serve` does (`command_server`)
 - `commands`: the list of commands, and how one is run, to its end or until a signal comes; each of
   the core has a module (`build`, `check`, …), and features have further ones
 - `pytest_plugin`: checks of a course as tests of pytest
@@ -48,6 +49,12 @@ def main(arguments: list[str] | tuple[str, ...] | None = None) -> int:
         while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
             pass
         os.close(number)
+        if alone:
+            from coursebuild.cli.handover import hand_over
+
+            status = hand_over(directory, words)
+            if status is not None:
+                return status
         from coursebuild.cli.commands import run
     except MemoryError:
         return say(FAILURE, "coursebuild: there is not enough memory to begin")

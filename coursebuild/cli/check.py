@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
+from msgspec.structs import replace
+
 from coursebuild.cli.arguments import (
     add_format,
     add_lessons,
@@ -29,6 +31,7 @@ examples:
   coursebuild check                      the whole course
   coursebuild check 4.2                  one lesson
   coursebuild check -v                   why each script runs
+  coursebuild check --fix                mend what can be mended in one way
   coursebuild check --format github      annotations in GitHub Actions
   coursebuild check --strict             in CI: warnings are errors
   coursebuild check --sandbox            somebody else's branch
@@ -60,6 +63,14 @@ def declare(parser: argparse.ArgumentParser) -> None:
     add_sandbox(parser)
     add_strict(parser)
     parser.add_argument(
+        "--fix",
+        action="store_true",
+        help="mend the mistakes that have one right cure; `undo` takes it back",
+    )
+    parser.add_argument(
+        "--unsafe", action="store_true", help="with --fix: also what is only likely to be meant"
+    )
+    parser.add_argument(
         "--sensitivity",
         action="store_true",
         help="repeat what was recorded, move initial states and halve timesteps, and say which "
@@ -81,9 +92,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Print what is wrong."""
     if arguments.against is not None:
         return _compare_with_version(arguments)
+    if arguments.unsafe and not arguments.fix:
+        raise UsageError("--unsafe says how much --fix may change, which is not given")
+    if arguments.fix:
+        return _fix(arguments)
 
     def work(options: Options) -> Report:
-        return check(
+        report = check(
             options,
             tuple(arguments.lessons),
             shard=read_shard(arguments.shard, arguments.timings),
@@ -91,6 +106,9 @@ def run(arguments: argparse.Namespace) -> int:
             sensitivity=arguments.sensitivity,
             truth=arguments.truth,
         )
+        safe = sum(diagnostic.safe for diagnostic in report.diagnostics)
+        hint = f"`coursebuild check --fix` mends {safe} of {len(report.diagnostics)}"
+        return replace(report, remarks=(*report.remarks, *([hint] if safe else [])))
 
     # Other formats say how long it took, which the report of before would not.
     if arguments.format != "text" or arguments.long or _special_options(arguments):
@@ -105,6 +123,17 @@ def _special_options(arguments: argparse.Namespace) -> list[str]:
     return [f"--{name.replace('_', '-')}" for name in names if getattr(arguments, name)]
 
 
+def _fix(arguments: argparse.Namespace) -> int:
+    """Mend what can be mended, and say what is left."""
+    from coursebuild.pipeline.fix import fix
+
+    if conflicts := _special_options(arguments):
+        raise UsageError(f"--fix cannot be combined with {conflicts[0]}")
+    options = options_of(arguments)
+    report = fix(options, tuple(arguments.lessons), unsafe=arguments.unsafe)
+    return print_report(report, arguments.format, options)
+
+
 def _compare_with_version(arguments: argparse.Namespace) -> int:
     """Say what the scripts do with another version of MuJoCo; no difference is a mistake."""
     from coursebuild.pipeline.other_version import compare_with_version
@@ -112,7 +141,7 @@ def _compare_with_version(arguments: argparse.Namespace) -> int:
 
     conflicts = [] if arguments.format in ("text", "json") else [f"--format {arguments.format}"]
     conflicts += _special_options(arguments)
-    conflicts += [f"--{name}" for name in ("sandbox", "strict") if getattr(arguments, name)]
+    conflicts += [f"--{name}" for name in ("sandbox", "strict", "fix") if getattr(arguments, name)]
     if conflicts:
         raise UsageError(f"--against cannot be combined with {conflicts[0]}")
     options = options_of(arguments)

@@ -22,6 +22,7 @@ import signal
 import threading
 from typing import TYPE_CHECKING, NoReturn
 
+from coursebuild import MANUAL
 from coursebuild.cli.output import CLEAN, FAILURE, USAGE, fail, say, write
 from coursebuild.core.files.errors import (
     EffectError,
@@ -70,8 +71,11 @@ commands:
 anywhere on the line:
   -C DIR         the course's folder (default: the nearest one with content/course.toml)
 
-`coursebuild help COMMAND` says what a command takes, `coursebuild --version` which version this is.
+`coursebuild help COMMAND` says what a command takes, `coursebuild explain RULE` what a message
+means, `coursebuild --version` which version this is.
 """
+if MANUAL:
+    _OVERVIEW += f"The manual: {MANUAL}\n"
 
 
 def run(directory: str | None, words: list[str], *, alone: bool) -> int:

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
+import os
 import re
 import socket
 import sys
@@ -22,6 +24,9 @@ from typing import NoReturn
 import segno
 
 from coursebuild.cli.arguments import add_running, options_of, style_of
+from coursebuild.cli.command_server import CommandServer
+from coursebuild.cli.handover import ask_preview
+from coursebuild.cli.output import CLEAN, say
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.preview.live_course import LiveCourse
 from coursebuild.preview.server import PreviewServer
@@ -34,13 +39,16 @@ examples:
 """
 
 
+_PORT = 8000
+
+
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_running(parser)
     parser.add_argument(
         "--port",
         type=_parse_port,
-        default=8000,
+        default=_PORT,
         help="default: %(default)s; 0: any free one",
     )
     parser.add_argument(
@@ -60,15 +68,28 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(arguments: argparse.Namespace) -> NoReturn:
-    """Build, serve, rebuild and reload on change, until it is interrupted."""
+def run(arguments: argparse.Namespace) -> int:
+    """Build, serve, rebuild and reload on change, until it is interrupted.
+
+    Where the course is served so already, only say where.
+    """
+    options = options_of(arguments)
+    served = ask_preview(str(options.root))
+    if served is not None and arguments.host == served["host"] and not arguments.embed:
+        link = served["links"][0]
+        if arguments.port in (_PORT, 0, served["port"]):
+            say(CLEAN, f"serving {link} already (process {served['process']})")
+            if arguments.open:
+                webbrowser.open(link)
+            return CLEAN
     serve(
-        options_of(arguments),
+        options,
         arguments.host,
         arguments.port,
         tuple(arguments.embed),
         style_of(sys.stderr),
         browse=arguments.open,
+        takes_commands=served is None,
     )
 
 
@@ -92,11 +113,12 @@ def serve(
     style: Style,
     *,
     browse: bool,
+    takes_commands: bool,
 ) -> NoReturn:
     """Serve until interrupted.
 
     `embed`: origins whose pages may show the preview in a frame. `style`: how mistakes are printed.
-    `browse`: open a browser.
+    `browse`: open a browser. `takes_commands`: do what is given in other terminals.
     """
     live_course = LiveCourse(options, style)
     try:
@@ -104,10 +126,16 @@ def serve(
     except OSError as error:
         message = f"port {port} of {host} cannot be used: {error.strerror or error}"
         raise UsageError(message, help=_propose_port(host, port, error)) from None
+    links = server.links
+    preview = {"host": host, "port": server.access.port, "links": links, "process": os.getpid()}
+    # Now, while this process has no threads.
+    commands = CommandServer(options.root, preview) if takes_commands else None
     try:
         live_course.start()
         server.start()
-        links = server.links
+        if commands is not None:
+            follow = functools.partial(commands.follow, live_course.tell_command)
+            threading.Thread(target=follow, name="commands", daemon=True).start()
         draw = options.progress.live
         first, *other_links = links
         print(f"serving {first} (stop with Ctrl-C)", file=sys.stderr, flush=True)
@@ -121,6 +149,8 @@ def serve(
             ).start()
         live_course.rebuild()
     finally:
+        if commands is not None:
+            commands.close()
         server.stop()
         live_course.close()
 

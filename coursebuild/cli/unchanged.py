@@ -23,7 +23,7 @@ import os
 import stat
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from coursebuild.cli.output import terminal_style
 from coursebuild.core.files.course_root import DECISIVE, FOLDERS, find_course_root, is_dropping
@@ -181,22 +181,39 @@ def _state(root: str, input_paths: list[str], began: int | None = None) -> str:
             changed after `began`, or so shortly before that its time proves nothing.
         OSError: something cannot be read.
     """
+    course = (os.path.join(root, name) for name in FOLDERS)
+    variables = (os.environ.get(name, "") for name in _VARIABLES)
+    return _hash((sys.executable, *variables), (*course, *_tool(), *input_paths), began)
+
+
+def tool_state() -> str | None:
+    """A hash over the tool, Python and the installed packages; `None` where it is not reliable."""
+    try:
+        return _hash((), _tool(), None)
+    except (OSError, _UnclearError):
+        return None
+
+
+def _tool() -> list[str]:
+    """The folders with installed packages, and those of the tool itself."""
+    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    source = os.path.dirname(package)
+    tool = [*(folder for folder in sys.path if folder.endswith(_PACKAGES)), package]
+    if os.path.isdir(os.path.join(source, "site", "dist")):
+        tool += (os.path.join(source, n) for n in ("mjcourse", "templates", "site/dist"))
+    return tool
+
+
+def _hash(parts: tuple[str, ...], paths: Iterable[str], began: int | None) -> str:
     digest = hashlib.blake2b(digest_size=32)
 
     def add(*parts: object) -> None:
         digest.update("\0".join(map(str, (*parts, ""))).encode("utf-8", "surrogateescape") + b"\n")
 
-    add(sys.version, sys.executable, *(os.environ.get(name, "") for name in _VARIABLES))
-    installed = (folder for folder in sys.path if folder.endswith(_PACKAGES))
-    course = (os.path.join(root, name) for name in FOLDERS)
-    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    source = os.path.dirname(package)
-    tool = [package]
-    if os.path.isdir(os.path.join(source, "site", "dist")):
-        tool += (os.path.join(source, n) for n in ("mjcourse", "templates", "site/dist"))
-    for path in (*installed, *course, *tool, *input_paths):
-        for parts in _rows(path, began):
-            add(*parts)
+    add(sys.version, *parts)
+    for path in paths:
+        for row in _rows(path, began):
+            add(*row)
     return digest.hexdigest()
 
 

@@ -41,7 +41,7 @@ from coursebuild.core.model.results import (
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import ExportContext, PageContext, SiteContext
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import PageInputs
+from coursebuild.core.pages.page_inputs import Citations, PageInputs
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.run.dependencies import Inputs
@@ -129,6 +129,9 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """What `parse` makes."""
     parse: Callable[[Fence, TextParser], Parsed[B | None]]
     """The block and its diagnostics. Without a block the text is shown as code."""
+    label: str = ""
+    """The prefix of its labels, one of `LABEL_KINDS`; without one it has no number. What it draws
+    and writes shows the number, `PageContext.number`, with the id of the label."""
     nested: bool = False
     """Whether it may be inside a text of another block, where `update` cannot edit lines."""
     values: Callable[[Library, Place, B], Struct] | None = None
@@ -206,6 +209,8 @@ class PageCopy(Struct, frozen=True, kw_only=True):
     """Whether only written lessons have it, and not all pages with text of their own."""
     download: bool = False
     """Whether a browser saves it instead of showing it."""
+    services: Callable[[Course, str], tuple[tuple[str, str], ...]] = lambda course, path: ()
+    """The names of services that can open the copy at a site path, with their addresses."""
 
 
 class PagePart(Struct, frozen=True, kw_only=True):
@@ -278,6 +283,8 @@ class TrialContext(Struct, frozen=True):
     """Diagnostics so far: a block with one need not be tried."""
     static: bool = False
     """Whether pages will be made from the results."""
+    say: Callable[[str], None] = lambda _: None
+    """Tells the user of what takes long."""
 
 
 TrialOutcome: TypeAlias = tuple[tuple[TrialResult, ...], tuple[Diagnostic, ...]]
@@ -323,6 +330,8 @@ class Feature(Struct, frozen=True, kw_only=True):
     reference: Callable[[Course, Store, Interpreter | None], Struct | None] | None = None
     """What it reads of the environment of the scripts, kept in `course.references`; the interpreter
     is `None` where the one of this tool runs them."""
+    citations: Callable[[Library, Place, Document], Citations] | None = None
+    """What a document's page shows of the sources that it cites."""
     code_links: Callable[[Library, Place, Document], Mapping[int, str]] | None = None
     """Addresses of what inline code names, by the offset of the code, for a document's page."""
     against: Callable[[Course, str], Iterable[Diagnostic]] | None = None

@@ -37,6 +37,7 @@ from coursebuild.core.model.results import Mathml, PublishedTrials, Results, Scr
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.page_inputs import Citations
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
@@ -55,6 +56,7 @@ CORE_COMMANDS = {
     "build": "verify everything and publish the site",
     "check": "verify, publish nothing",
     "update": "bring recorded outputs up to date",
+    "undo": "take back what `check --fix` has changed",
     "extract": "write the scripts to examples/",
     "serve": "preview: build, serve, rebuild and reload on change",
     "export": "verify everything and write the course as one file",
@@ -241,6 +243,13 @@ def losses_against(course: Course, python: str) -> tuple[Diagnostic, ...]:
     """What a course would lose with the MuJoCo of another interpreter."""
     finders = (feature.against for feature in features() if feature.against is not None)
     return tuple(diagnostic for find in finders for diagnostic in find(course, python))
+
+
+def citations(library: Library, place: urls.Place, document: Document) -> Citations:
+    """What a document's page shows of the sources that it cites."""
+    finders = (feature.citations for feature in features() if feature.citations is not None)
+    results = (find(library, place, document) for find in finders)
+    return next((citations for citations in results if citations.texts), Citations())
 
 
 def code_links(library: Library, place: urls.Place, document: Document) -> dict[int, str]:

@@ -2,7 +2,8 @@
 
 Entry points: `time_jobs(jobs, baseline, clock)`; `costs(model, scene, settings, …)`, of settings of
 a scene; `scenario_job(model, scenarios, timestep)`, a model's whole scenarios as a job;
-`front(rows)`, rows that know whether they are on the front; `verdict(rows, noticeable)`.
+`mark_luck(rows, …)`, rows that know whether their errors are luck; `front(rows)`, whether they are
+on the front; `verdict(rows, …)`.
 
 1. A job is a scenario from its beginning to its end, so that each setting is timed on its own
    states; what takes little time is repeated.
@@ -14,6 +15,9 @@ a scene; `scenario_job(model, scenarios, timestep)`, a model's whole scenarios a
 5. A setting is dominated where another costs no more and errs no more, and is clearly better in one
    of the two. Costs whose intervals meet do not differ, nor do those within 3 % or errors within
    5 %.
+6. Only an error that falls as more work is done says what a setting does: one that is smaller than
+   that of a shorter timestep, or of more iterations, is luck, and so is one beyond the largest
+   stable timestep. An advantage has to hold from starts nearby too.
 
 The clock is an argument: processor time of the thread serves best, since it stands still while
 others run.
@@ -22,7 +26,8 @@ others run.
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import mujoco
@@ -34,7 +39,7 @@ from coursebuild.numerics.pilot import apply, with_setting
 from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, RowVerdict, WorkPrecisionRow
-from coursebuild.numerics.reports.shown_errors import setting_text
+from coursebuild.numerics.reports.shown_errors import seconds_text, setting_text
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.simulation import STATE, full_state, initial_data, silent
 
@@ -148,7 +153,7 @@ def costs(
         run = scenario_job(variant, [scene.scenario], setting.timestep)
 
         def work() -> None:
-            apply(variant, setting)
+            apply(variant, setting, model)
             run()
 
         return work
@@ -194,6 +199,8 @@ def scenario_job(
 
 COST_SLACK, ERROR_SLACK = 0.03, 0.05
 """Relative: costs repeat to a few per cent only."""
+_WORTH_SAYING = 0.1
+"""An advantage that is smaller in both respects is none on another day."""
 Rows: TypeAlias = Sequence[WorkPrecisionRow]
 
 
@@ -217,18 +224,25 @@ class FrontPoint(Struct, frozen=True):
         return is_separate and self.cost.value * (1 + COST_SLACK) < rival.cost.value
 
 
+def _error(row: WorkPrecisionRow) -> float | None:
+    """The error by which settings are compared; `None` where the row has none."""
+    return row.seen if row.figure is None else row.figure[0]
+
+
 def _place(row: WorkPrecisionRow) -> FrontPoint | None:
     """The cost and error of a setting; `None` where it was lost, or not timed."""
-    if row.cost is None or row.seen is None:
-        return None
-    return FrontPoint(row.cost, row.seen if row.figure is None else row.figure[0])
+    error = _error(row)
+    return None if row.cost is None or error is None else FrontPoint(row.cost, error)
 
 
 def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
-    """Rows that say whether they are on the front, and otherwise which row dominates them."""
+    """Rows that say whether they are on the front, and otherwise which row dominates them.
+
+    A lucky row is on no front, and dominates none.
+    """
     places = {n: place for n, row in enumerate(rows) if (place := _place(row)) is not None}
     better = {
-        n: [m for m, rival in places.items() if rival.beats(own_place)]
+        n: [m for m, rival in places.items() if not rows[m].lucky and rival.beats(own_place)]
         for n, own_place in places.items()
     }
 
@@ -239,14 +253,63 @@ def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
     for n, row in enumerate(rows):
         rivals = better.get(n, [])
         best = min([m for m in rivals if not better[m]] or rivals, key=worth, default=None)
-        placed_rows.append(replace(row, front=n in better and not rivals, dominated_by=best))
+        on_front = n in better and not rivals and not row.lucky
+        placed_rows.append(replace(row, front=on_front, dominated_by=best))
     return tuple(placed_rows)
 
 
-def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
+def mark_luck(
+    rows: Rows, limits: Mapping[str, float], least: float
+) -> tuple[WorkPrecisionRow, ...]:
+    """Rows that say where their errors are luck.
+
+    They are where more work errs more, and beyond the largest stable timestep.
+
+    Args:
+        rows: of a scenario.
+        limits: the largest stable timesteps (s) under the scene's own solver, by integrator.
+        least: errors that are no larger are not resolved.
+    """
+    own_setting = next(row.setting for row in rows if row.own)
+    marked_rows = []
+    for row in rows:
+        setting, place = row.setting, _error(row)
+        limit = limits.get(setting.integrator, math.inf)
+        luck, is_usual = "", setting.solver_settings == own_setting.solver_settings
+        if place is not None and is_usual and setting.timestep > limit * (1 + 1e-9):
+            luck = f"it is beyond its largest stable timestep, {seconds_text(limit, 3)}"
+        for rival in rows:
+            work, error = _more_work(rival.setting, setting), _error(rival)
+            if luck or not work or place is None or error is None:
+                continue
+            if error > max(place * (1 + ERROR_SLACK), least):
+                luck = f"its error rises with {work}"
+        marked_rows.append(replace(row, lucky=luck))
+    return tuple(marked_rows)
+
+
+def _more_work(dear: MeasuredSetting, cheap: MeasuredSetting) -> str:
+    """What a setting takes more of than another, in words; empty unless it is that alone."""
+    if dear == replace(cheap, timestep=dear.timestep) and dear.timestep < cheap.timestep:
+        return "shorter timesteps"
+    if dear == replace(cheap, iterations=dear.iterations) and dear.iterations > cheap.iterations:
+        return "more iterations"
+    return ""
+
+
+def verdict(
+    rows: Rows,
+    noticeable: Sequence[bool | None],
+    least: float = 0.0,
+    holds: Callable[[MeasuredSetting], bool] = lambda _: True,
+) -> RowVerdict:
     """The verdict on the scene's own setting.
 
-    `noticeable`: whether a learner sees the error of a row; `None` where that is not known.
+    Args:
+        rows: of a scenario; they know their place.
+        noticeable: whether a learner sees the error of a row; `None` where that is not known.
+        least: errors that are no larger are not resolved.
+        holds: whether the advantage of another setting holds from starts nearby too.
     """
     own_index = next(number for number, row in enumerate(rows) if row.own)
     row, is_noticeable = rows[own_index], noticeable[own_index]
@@ -254,6 +317,8 @@ def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
         return _verdict_of_lost(rows, row)
     error = None if is_noticeable is None else row.seen
     own_place, remark = _place(row), _describe_error(error)
+    if row.parted is not None:
+        return RowVerdict(False, None, None, None, is_noticeable, _verdict_of_chaos(rows, row))
     if own_place is None:
         text = "nothing was timed, so that no setting can be called better"
         return RowVerdict(False, None, None, None, is_noticeable, text + remark)
@@ -263,6 +328,9 @@ def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
             own_place.cost.value,
             hopeless=all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None),
         )
+    if row.dominated_by is None and row.lucky:
+        text = f"nothing can be said of the scene's own setting: {row.lucky}"
+        return RowVerdict(False, None, None, None, is_noticeable, text + remark)
     if row.dominated_by is None:
         text = "no other setting is cheaper without being less accurate"
         return RowVerdict(True, None, None, None, is_noticeable, text + remark)
@@ -273,8 +341,30 @@ def verdict(rows: Rows, noticeable: Sequence[bool | None]) -> RowVerdict:
         better_place.cost.value / own_place.cost.value,
         better_place.error / own_place.error if own_place.error else 1.0,
     )
-    text = f"{setting_text(better.setting)} is {_describe_ratios(*ratios)}"
+    if min(ratios) > 1 - _WORTH_SAYING or not holds(better.setting):
+        text = (
+            f"no difference that holds: {setting_text(better.setting)} {_describe_ratios(*ratios)}"
+        )
+        text += " here, which is within what such runs differ by"
+        return RowVerdict(True, None, None, None, is_noticeable, text + remark)
+    text = f"{setting_text(better.setting)} is better: it {_describe_ratios(*ratios)}"
+    if better_place.error <= least < own_place.error:
+        text += ", or more: the reference resolves no more"
     return RowVerdict(False, row.dominated_by, *ratios, is_noticeable, text + remark)
+
+
+def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow) -> str:
+    """The verdict on a chaotic scene: how long each setting stays near the exact motion."""
+    text = f"the motion is chaotic: it parts from the exact one at {row.parted:.3g} s"
+    parted = [(r.parted, n) for n, r in enumerate(rows) if r.parted is not None]
+    whole = [r for r in rows if r.status == "ok" and r.parted is None and r.seen is not None]
+    if whole:
+        cheapest = min(whole, key=lambda r: r.cost.value if r.cost else float(r.evaluations))
+        return f"{text}; under {setting_text(cheapest.setting)} not before the horizon"
+    longest, n = max(parted)
+    if longest > row.parted:  # type: ignore[operator]
+        text += f", under {setting_text(rows[n].setting)} at {longest:.3g} s"
+    return text
 
 
 def _cheapest_unseen(rows: Rows, own_cost: float, *, hopeless: bool) -> str:
@@ -288,15 +378,21 @@ def _cheapest_unseen(rows: Rows, own_cost: float, *, hopeless: bool) -> str:
 
 
 def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow) -> RowVerdict:
-    """The verdict on a scene that does not run under its own setting: the best that does."""
+    """The verdict on a scene that does not run under its own setting: what does."""
     text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
     text += "; ".join(row.reasons)
-    candidates = [
-        (p.error, p.cost.value, n) for n, r in enumerate(rows) if r.front and (p := _place(r))
-    ]
-    better = min(candidates)[2] if candidates else None
-    if better is not None:
-        text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
+    candidates = [(p, n) for n, r in enumerate(rows) if r.front and (p := _place(r))]
+    if not candidates:
+        return RowVerdict(False, None, None, None, None, text)
+    better = min(candidates, key=lambda c: (c[0].error, c[0].cost.value, c[1]))[1]
+    text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
+    cheap_place, cheapest = min(candidates, key=lambda c: (c[0].cost.value, c[1]))
+    if cheapest != better:
+        share = (
+            cheap_place.cost.value
+            / candidates[[n for _, n in candidates].index(better)][0].cost.value
+        )
+        text += f", {setting_text(rows[cheapest].setting)} the cheapest, at {share:.2g} of its cost"
     return RowVerdict(False, better, None, None, None, text)
 
 
@@ -306,12 +402,12 @@ def _describe_ratios(cost: float, error: float) -> str:
         exact = f"errs {1 / error:.2g} times less" if 1 / error < 1e4 else "errs far less"
     else:
         exact = "errs no more"
-    return f"better: it {cheap} and {exact}"
+    return f"{cheap} and {exact}"
 
 
 def _describe_error(error: float | None) -> str:
     if error is None:
-        return "; whether a learner would notice its error is not known"
+        return "; whether its error can be seen is not known"
     if error >= 1:
-        return f"; a learner would notice its error, which is {error:.2g} times what can be seen"
-    return f"; a learner would not notice its error, which is {error:.2g} of what can be seen"
+        return f"; its error can be seen: it is {error:.2g} times what an eye can tell"
+    return f"; its error cannot be seen: it is {error:.2g} of what an eye can tell"

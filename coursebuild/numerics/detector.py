@@ -68,6 +68,8 @@ class Peaks(Struct, frozen=True):
     sunk: float = 0.0
     """The same relative to the half thickness of the thinner body, where thicknesses are known: at
     1 its middle is at the other's surface."""
+    overlap: tuple[int, int, float] = (-1, -1, 0.0)
+    """Two geoms that lie deepest in each other, by number, and when, s."""
     energy: float = -math.inf
     """Potential and kinetic, J, where MuJoCo computes it: of the state before the last step."""
     kinetic: float = 0.0
@@ -99,22 +101,24 @@ def update_peaks(data: Any, before: Peaks, thickness: Array | None = None) -> Pe
     `thickness`: half the thickness of every geom (ngeom + 1,), m; the last is for index -1, which
     stands for no geom.
     """
+    penetration, sunk, overlap = before.penetration, before.sunk, before.overlap
+    if data.ncon:
+        geoms, depths = data.contact.geom, -data.contact.dist
+        shares = depths if thickness is None else depths / thickness[geoms].min(axis=1)
+        worst, largest = int(shares.argmax()), float(shares.max())
+        if largest > (penetration if thickness is None else sunk):
+            overlap = (int(geoms[worst][0]), int(geoms[worst][1]), float(data.time))
+        penetration = max(penetration, float(depths.max()))
+        sunk = sunk if thickness is None else max(sunk, largest)
     return Peaks(
         _larger(before.position, data.qpos),
         _larger(before.velocity, data.qvel),
-        max(before.penetration, deepest_contact(data)),
-        before.sunk if thickness is None else max(before.sunk, _sunk(data, thickness)),
+        penetration,
+        sunk,
+        overlap,
         max(before.energy, float(data.energy.sum())),
         max(before.kinetic, float(data.energy[1])),
     )
-
-
-def _sunk(data: Any, thickness: Array) -> float:
-    if data.ncon == 0:
-        return 0.0
-    contact = data.contact
-    half_thickness = thickness[contact.geom].min(axis=1)
-    return max(0.0, float(np.max(-contact.dist / half_thickness)))
 
 
 def _larger(before: float, values: Array) -> float:
@@ -151,10 +155,26 @@ def judge(
         symptoms.append((RunStatus.SLOW_GROWTH, text))
     depth_ratio = max(peaks.penetration / setup.penetration_bound, peaks.sunk)
     if not depth_ratio <= 1.0:
-        text = f"bodies lie {depth_ratio:.3g} times as deep in each other as they may"
+        first, second, time = peaks.overlap
+        names = "bodies"
+        if max(first, second) >= 0:
+            names = " and ".join(_body_of(model, geom) for geom in (first, second))
+        share = f"{depth_ratio:.3g}" if depth_ratio >= 1.005 else "just over 1"
+        text = f"{names} lie {share} times as deep in each other as they may, at {time:.3g} s"
         symptoms.append((RunStatus.DIVERGED, text))
     worst = max((status for status, _ in symptoms), key=list(RunStatus).index, default=RunStatus.OK)
     return RunJudgement(worst, tuple(text for _, text in symptoms))
+
+
+def _body_of(model: Any, geom: int) -> str:
+    """What the body of a geom is called; of one without a name, its nearest ancestor's."""
+    body = int(model.geom_bodyid[geom]) if geom >= 0 else 0
+    inner = ""
+    while body and not model.body(body).name:
+        body, inner = int(model.body_parentid[body]), "a part of "
+    if body:
+        return f"{inner}{model.body(body).name}"
+    return "a body without a name" if inner else "the world"
 
 
 def deepest_contact(data: Any) -> float:

@@ -116,21 +116,8 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
     Raises:
         SceneError: the scenario names a closed form that is not this scene's.
     """
+    reference = _find_computed(model, pilot, quick=quick)
     declaration = pilot.scene.declaration
-    reference, note = None, ""
-    if pilot.smooth and declaration.reference != "self":
-        try:
-            reference = _integrate(model, pilot, quick)
-        except NoConvergenceError as error:
-            note = f"no integration: {error}"
-        if reference is not None and not _engine_agrees(model, pilot, reference):
-            reference, note = None, f"no integration: {_TENDS_ELSEWHERE}"
-            if declaration.reference == "ode":
-                raise _no_integration(_TENDS_ELSEWHERE, declaration)
-    elif declaration.reference == "ode":
-        raise _no_integration(f"there is {' and '.join(pilot.jumps)}", declaration)
-    if reference is None:
-        reference = replace(self_reference(model, pilot, quick=quick), note=note)
     if declaration.closed_form:
         problem, motion = closed_motion(model, pilot.scene, declaration, reference.states.times)
         states = states_of(model, motion, reference.states)
@@ -138,31 +125,83 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         place, source = declaration.place("reference"), problem.reference.source
         return _with_closed_form(model, reference, states, source, floor(problem), subject, place)
     exact = None if declaration.reference else pilot.scene.exact
-    if exact is None:
+    motions = {} if exact is None else _exact_states(model, pilot, exact, reference)
+    if exact is None or not motions:
         return reference
-    states, source = _exact_states(model, pilot, exact, reference), exact.span.path
-    least = _check_exact(model, pilot, exact, states, reference, quick=quick)
+    least, gaps = ROUNDING, []
+    for name, states in motions.items():
+        subject = f"`{exact.span.path}`, `{name}`," if len(motions) > 1 else f"`{exact.span.path}`"
+        precision = _check_exact(model, pilot, (exact, subject), states, reference, quick=quick)
+        least = least.at_least(precision)
+        gaps.append(_gap(model, states, next(iter(motions.values()))))
+    # The formula comes first, and the equations bound it, where there are both.
+    states, source = next(iter(motions.values())), exact.span.path
+    least = least.at_least(gaps[-1])
     return _with_closed_form(model, reference, states, source, least, f"`{source}`", exact.span)
+
+
+def find_nearby(
+    model: Any, pilot: Pilot, declared_reference: KnownMotion, *, quick: bool
+) -> EngineStates | None:
+    """The states of a scene's reference from another start; `None` where nobody knows them.
+
+    `declared_reference`: the reference from the start that is declared, which was checked.
+    """
+    if pilot.scene.declaration.closed_form:
+        return None
+    try:
+        reference = _find_computed(model, pilot, quick=quick)
+    except SceneError:
+        return None
+    exact = pilot.scene.exact if declared_reference.kind == "closed" else None
+    if exact is None:
+        return reference.states
+    return next(iter(_exact_states(model, pilot, exact, reference).values()))
+
+
+def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
+    """The reference without closed forms: an integration, or the engine in small steps.
+
+    Raises:
+        SceneError: the scenario wants an integration, and there is none.
+    """
+    declaration = pilot.scene.declaration
+    reference, note = None, ""
+    if pilot.smooth and declaration.reference != "self":
+        try:
+            reference = _integrate(model, pilot, quick)
+        except NoConvergenceError as error:
+            note = f"no integration: {error}"
+        if reference is not None:
+            setup = _with_duration(pilot.setup, float(reference.states.times[-1]))
+            states, step = reference.states, min(pilot.scene.timesteps)
+            if not tends_to(model, setup, states, step, PARTING_DISTANCE):
+                reference, note = None, f"no integration: {_TENDS_ELSEWHERE}"
+        if reference is None and note.endswith(_TENDS_ELSEWHERE) and declaration.reference == "ode":
+            raise _no_integration(_TENDS_ELSEWHERE, declaration)
+    elif declaration.reference == "ode":
+        raise _no_integration(f"there is {' and '.join(pilot.jumps)}", declaration)
+    if reference is None:
+        reference = replace(self_reference(model, pilot, quick=quick), note=note)
+    return reference
 
 
 def _check_exact(
     model: Any,
     pilot: Pilot,
-    exact: ExactMotion,
+    named_exact: tuple[ExactMotion, str],
     states: EngineStates,
     second: KnownMotion,
     *,
     quick: bool,
 ) -> Sizes:
-    """How well a course's exact motion is known where no integration says it.
+    """How well a course's exact motion, given with its name, is known where no integration says it.
 
     Raises:
         SceneError: it is not the motion of the scene.
     """
-    subject, gap = (
-        f"`{exact.span.path}` is not this scene's motion",
-        _gap(model, states, second.states),
-    )
+    exact, name = named_exact
+    subject, gap = f"{name} is not this scene's motion", _gap(model, states, second.states)
     precision = pilot.scene.declaration.precision or PRECISION
     if second.kind == "ode":
         for part in ("position", "attitude", "velocity"):
@@ -210,15 +249,16 @@ def _stiffen(model: Any, times: float) -> Any:
 
 def _exact_states(
     model: Any, pilot: Pilot, exact: ExactMotion, second: KnownMotion
-) -> EngineStates:
-    """The course's exact motion; where it gives no velocities, with those of the second one."""
+) -> dict[str, EngineStates]:
+    """The course's exact motions; where it gives no velocities, with those of the second one."""
     data, states = initial_data(pilot.scene.scenario, model), second.states
-    qpos, qvel = exact.states(states.times, data.qpos.copy(), data.qvel.copy())
-    course_states = replace(states, qpos=qpos, qvel=states.qvel if qvel is None else qvel)
-    if (course_states.qpos.shape, course_states.qvel.shape) != (
-        states.qpos.shape,
-        states.qvel.shape,
-    ):
+    motions = exact.states(states.times, data.qpos.copy(), data.qvel.copy()).motions
+    course_states = {
+        name: replace(states, qpos=qpos, qvel=states.qvel if qvel is None else qvel)
+        for name, (qpos, qvel) in motions.items()
+    }
+    shapes = (states.qpos.shape, states.qvel.shape)
+    if any((motion.qpos.shape, motion.qvel.shape) != shapes for motion in course_states.values()):
         message = f"`{exact.span.path}` gives other numbers of coordinates than the model has"
         raise SceneError(message, exact.span, "they are those of `qpos`, and perhaps of `qvel`")
     return course_states
@@ -248,11 +288,6 @@ def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
     source = "Bulirsch–Stoer over mj_forward"
     second_states, second = run(dop853), "DOP853 over mj_forward"
     return _combine(model, "ode", source, states, second, second_states)
-
-
-def _engine_agrees(model: Any, pilot: Pilot, reference: KnownMotion) -> bool:
-    setup = _with_duration(pilot.setup, float(reference.states.times[-1]))
-    return tends_to(model, setup, reference.states, min(pilot.scene.timesteps), PARTING_DISTANCE)
 
 
 def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMotion:

@@ -1,8 +1,9 @@
 """The errors of a motion against its reference, the orders that they show, drifts, and contacts.
 
-Entry points: `errors`, `largest_errors`, `fit_orders`; `energy_drift`, `momentum_drift`; from the
-states of a scene `visible_error(model, scene, states, exact)`, `find_sticks` and `measure_slip`;
-`quantity_name`, `quantity_values`, of what a scenario declares to be measured.
+Entry points: `errors`, `largest_errors`, `fit_orders`; `energy_drift`, `momentum_drift`,
+`mean_energy`; from the states of a scene `visible_error(model, scene, states, exact)`,
+`find_sticks` and `measure_slip`; `quantity_name`, `quantity_values`, of what a scenario declares to
+be measured.
 
 1. Errors of position, attitude and velocity stand apart, each at its largest and at the end: RK4 is
    of fourth order in velocity and of second in attitude.
@@ -29,7 +30,7 @@ import numpy as np
 from coursebuild.numerics.problem import Array, Motion, Reference, Sizes
 from coursebuild.numerics.reports.scene_report import FLOORS, Errors, FittedOrder, OrderRow
 from coursebuild.numerics.scene import Scene
-from coursebuild.numerics.simulation import EngineStates, initial_data
+from coursebuild.numerics.simulation import EngineStates, Run, initial_data
 from mjcourse.spatial import angular_distance
 
 _LOWEST, _HIGHEST = 100.0, 0.1
@@ -145,6 +146,14 @@ def energy_drift(energy: Array, scale: float | None = None) -> float | None:
         return None
     changes = (whole - whole[0]) / scale
     return float(changes[np.argmax(np.abs(changes))])
+
+
+def mean_energy(run: Run, horizon: float, expected: float | None) -> float | None:
+    """Mean kinetic energy from the horizon to the end, relative to the expected one, less 1."""
+    energies = run.energy[1:][run.states.times > horizon * (1 + 1e-9), 1]
+    if expected is None or len(energies) < 2 or not np.isfinite(energies).all():
+        return None
+    return float(energies.mean()) / expected - 1
 
 
 def energy_scale(energy: Array) -> float:

@@ -56,14 +56,23 @@ class SceneError(Exception):
         self.help = help
 
 
+class ExactStates(Struct, frozen=True, eq=False):
+    """What a course knows of a motion, at n times."""
+
+    motions: dict[str, tuple[Array, Array | None]] = {}
+    """`qpos` (n, nq) and `qvel` (n, nv), or `None` where the course gives no velocities: by
+    `motion`, a formula, and `acceleration`, equations that were integrated."""
+    expected: dict[str, float] = {}
+    """Quantities that theory knows."""
+
+
 class ExactMotion(Struct, frozen=True, eq=False):
     """A motion that the course knows."""
 
     span: Span
     """Its file."""
-    states: Callable[[Array, Array, Array], tuple[Array, Array | None]]
-    """Times (n,) in s, and `qpos` and `qvel` of the beginning → those at the times, (n, nq) and
-    (n, nv), or `None` where the course gives no velocities."""
+    states: Callable[[Array, Array, Array], ExactStates]
+    """Times (n,) in s, and `qpos` and `qvel` of the beginning → what it says of the times."""
 
 
 class Scene(Struct, frozen=True):

@@ -249,6 +249,17 @@ def run_steps(
     return data
 
 
+def count_iterations(model: Any, scenario: Scenario) -> int:
+    """The iterations of the solver in a scenario, of the last evaluation of each step."""
+    data, count = initial_data(scenario, model), 0
+    for command in scenario.commands(float(model.opt.timestep)):
+        if command:
+            data.ctrl[:] = command
+        advance(model, data)
+        count += int(data.solver_niter.sum())
+    return count
+
+
 def invariants(model: Any, scratch: Any, qpos: Array, qvel: Array) -> Array:
     """Potential and kinetic energy (J) and angular momentum (kg m²/s) of a state: (5,).
 

@@ -1,6 +1,7 @@
 """A model with its parameters at other values: its contacts, solver and cost.
 
-Entry points: `measure_sweep(spec, scene, sweep, …)`; `with_contacts`, what contacts do in a run.
+Entry points: `measure_sweep(spec, scene, sweep, …)`; `measure_expected(model, scene, baseline)`,
+what contacts and sensors do under each integrator, beside what theory knows of it.
 
 1. A parameter is a field of the model's elements as `mujoco.MjSpec` names it, so that all that
    follows from it is compiled anew. One is changed at a time.
@@ -14,7 +15,7 @@ import copy
 import re
 from collections.abc import Iterator
 from itertools import islice
-from typing import Any
+from typing import Any, get_args
 
 import mujoco
 import mujoco.rollout
@@ -22,7 +23,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model.scenarios import DeclaredSweep, SweepValue, Variation
+from coursebuild.core.model.scenarios import DeclaredSweep, Expected, SweepValue, Variation
 from coursebuild.numerics.costs import Clock, Job, scenario_job, time_jobs
 from coursebuild.numerics.measure import (
     Pair,
@@ -32,9 +33,15 @@ from coursebuild.numerics.measure import (
     touching_contacts,
     visible_error,
 )
-from coursebuild.numerics.problem import Scenario, Setup
+from coursebuild.numerics.pilot import with_setting
+from coursebuild.numerics.problem import STANDARD, Scenario, Setup
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.scene_report import SweepReport, SweepRow
+from coursebuild.numerics.reports.scene_report import (
+    FigureLine,
+    MeasuredSetting,
+    SweepReport,
+    SweepRow,
+)
 from coursebuild.numerics.scene import Scene, SceneError, thickness
 from coursebuild.numerics.simulation import (
     EngineStates,
@@ -293,3 +300,65 @@ def _rollouts(
         took, simulated = timing.nanoseconds, batch * steps * step * 1e9
         speed = Interval(simulated / took.value, simulated / took.high, simulated / took.low)
         yield SweepRow(THREADS, f"{count}", own=False, status="ok", throughput=speed)
+
+
+def measure_expected(model: Any, scene: Scene, baseline: MeasuredSetting) -> Iterator[FigureLine]:
+    """What is known in theory, under every integrator at the scene's own timestep."""
+    expected: dict[str, tuple[float, str]] = {
+        name: (value, "as declared") for name, value in scene.declaration.expected.items()
+    }
+    if scene.exact is not None:
+        data = initial_data(scene.scenario, model)
+        quantities = scene.exact.states(np.zeros(1), data.qpos.copy(), data.qvel.copy()).expected
+        unknown = sorted(quantities.keys() - set(get_args(Expected)))
+        if unknown:
+            message = f"`{scene.exact.span.path}` expects `{unknown[0]}`, which is not measured"
+            help = f"known: {', '.join(get_args(Expected))}"
+            raise SceneError(message, scene.exact.span, help)
+        expected |= {name: (value, scene.exact.span.path) for name, value in quantities.items()}
+    for integrator in STANDARD if expected else ():
+        setting = replace(baseline, integrator=integrator.value)
+        variant = with_setting(model, setting)
+        row = SweepRow("integrator", integrator.value, own=False, status="ok")
+        row = with_contacts(scene.scenario, variant, row)
+        readings = _reading_figures(scene, variant) if expected.keys() & _OF_READINGS else {}
+        for name, (exact, source) in expected.items():
+            unit = {"penetration": "m", "slip": "m"}.get(name, "")
+            if name in _OF_READINGS:
+                unit = "s" if name == "crossing" else _UNIT.sub(r"\1", quantity_name(model, scene))
+                value = readings.get(name)
+            elif (value := getattr(row, name)) is None and name != "restitution":
+                value = 0.0  # nothing touched
+            yield FigureLine(name, unit, integrator.value, value, exact, source)
+
+
+_OF_READINGS = frozenset(("crossing", "last", "largest", "smallest"))
+"""Quantities of what a sensor reads at every step."""
+_UNIT = re.compile(r"[^\[]*(?:\[(.*)\])?")
+
+
+def _reading_figures(scene: Scene, model: Any) -> dict[str, float]:
+    """When a sensor's reading first changes its sign, its last value, the largest and smallest."""
+    from scipy.interpolate import CubicSpline
+
+    quantity = scene.declaration.observable
+    if quantity is None or quantity.kind != "sensor" or model.sensor(quantity.name).dim != 1:
+        message = "a quantity of a reading is expected, and `measure` names no sensor of one number"
+        raise SceneError(message, scene.declaration.place("expected"))
+    every_step = replace(scene.scenario, sample=float(model.opt.timestep))
+    run = simulate(Setup(scenario=every_step), model, thickness(model))
+    if not run.judgement.ok:
+        return {}
+    readings = quantity_values(model, replace(scene, scenario=every_step), run.states)[:, 0]
+    figures = {
+        "last": float(readings[-1]),
+        "largest": float(readings.max()),
+        "smallest": float(readings.min()),
+    }
+    changes = np.flatnonzero(readings[:-1] * readings[1:] < 0)
+    if changes.size:
+        part = slice(max(0, int(changes[0]) - 3), int(changes[0]) + 5)
+        times = run.states.times[part]
+        roots = CubicSpline(times, readings[part]).roots(extrapolate=False)
+        figures["crossing"] = float(roots[np.argmin(np.abs(roots - run.states.times[changes[0]]))])
+    return figures

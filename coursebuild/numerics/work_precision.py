@@ -9,13 +9,14 @@ Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
    error of a lost run is not given; no other is below ten floors of the reference. Errors count to
    the horizon, and what should be conserved is watched to the end. Errors are also given as a
    learner sees them: how far bodies are displaced or turned in a picture, where 1 is just visible.
-4. Orders are fitted, stability limits looked for, the front drawn.
+4. Orders are fitted, stability limits looked for, the front drawn. What a verdict says has to hold
+   from starts nearby.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -23,12 +24,20 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from coursebuild.numerics.costs import Clock, costs, front, verdict
+from coursebuild.numerics.costs import (
+    Clock,
+    FrontPoint,
+    costs,
+    front,
+    mark_luck,
+    verdict,
+)
 from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.known_motion import (
     Cone,
     KnownMotion,
     find_conserved,
+    find_nearby,
     find_references,
     mean_late_energy,
 )
@@ -36,6 +45,7 @@ from coursebuild.numerics.measure import (
     energy_drift,
     errors,
     fit_orders,
+    mean_energy,
     measure_slip,
     momentum_drift,
     quantity_name,
@@ -45,36 +55,36 @@ from coursebuild.numerics.measure import (
 from coursebuild.numerics.pilot import PARTING_DISTANCE as CHAOS_DISTANCE
 from coursebuild.numerics.pilot import (
     Pilot,
+    nudges,
     own_setting,
     position_distances,
     run_pilot,
     settings,
     with_setting,
 )
-from coursebuild.numerics.problem import STANDARD, Sizes
+from coursebuild.numerics.problem import STANDARD, Integrator, Sizes
 from coursebuild.numerics.reports.scene_report import (
     FLOORS,
-    Errors,
-    FigureLine,
     MeasuredSetting,
     OrderRow,
     ScenarioReport,
     StableRow,
-    SweepRow,
     WorkPrecisionRow,
 )
-from coursebuild.numerics.reports.shown_errors import setting_text
+from coursebuild.numerics.reports.shown_errors import is_idle, setting_text, solving_parts
 from coursebuild.numerics.scene import Scene, thickness
 from coursebuild.numerics.simulation import (
     EngineStates,
     Run,
+    count_iterations,
+    initial_data,
     motion_of,
     refsafe_active,
     refsafe_from,
     simulate,
 )
 from coursebuild.numerics.stability import run_trial, stable_rows
-from coursebuild.numerics.sweep import with_contacts
+from coursebuild.numerics.sweep import measure_expected
 from mjcourse.spatial import angular_distance
 
 
@@ -91,6 +101,10 @@ class Basis(Struct, frozen=True, eq=False):
     momentum_conserved: bool
     late_energy: float | None
     """Mean kinetic energy after the horizon, J; `None` where it is the end."""
+    least_seen: float
+    """Below this nothing is known of what is seen."""
+    least_figure: float
+    """The same of the declared quantity."""
 
     @property
     def reference(self) -> KnownMotion:
@@ -126,21 +140,25 @@ def measure_scenario(
     reference = cones[baseline.cone].reference
     conserved = find_conserved(model, pilot, reference)
     late_energy = mean_late_energy(model, pilot, reference)
-    basis = Basis(model, pilot, baseline, cones, *conserved, late_energy)
-    measurements = []
-    for setting in settings(model, pilot, quick=quick):
-        tell(f"{scene.name}: {setting_text(setting)}")
-        measurements.append(_measure_setting(basis, setting))
-    rows = tuple(row for row, _ in measurements)
+    leasts = zip(
+        *(_least_known(model, scene, cone.reference) for cone in cones.values()), strict=True
+    )
+    basis = Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
+    measurements = _measure_settings(basis, settings(model, pilot, quick=quick), tell)
+    measured_rows = [row for row, _ in measurements]
+    noticeable = [sees for _, sees in measurements]
+    cost_of = None
     if clock is not None:
         tell(f"{scene.name}: times")
-        rows = _with_costs(basis, rows, clock, quick)
+        measured_rows, cost_of = _with_costs(basis, measured_rows, clock, quick)
     tell(f"{scene.name}: stable timesteps")
     largest = stable_rows(model, pilot, quick=quick)
-    rows = front(rows)
-    judgement = verdict(rows, [noticeable for _, noticeable in measurements])
-    if not any(row.own and row.status == "ok" for row in rows):  # nothing to compare costs with
-        rows = tuple(replace(row, cost=None) for row in rows)
+    limits = {row.integrator: row.largest for row in largest if row.largest is not None}
+    least = basis.least_figure if quantity_name(model, scene) else basis.least_seen
+    rows = front(mark_luck(measured_rows, limits, least))
+    judgement = verdict(
+        rows, noticeable, least, lambda setting: _holds(basis, rows, setting, quick)
+    )
     return ScenarioReport(
         name=scene.name,
         title=scene.title,
@@ -156,36 +174,120 @@ def measure_scenario(
         lyapunov=pilot.lyapunov,
         horizons=None if pilot.lyapunov is None else pilot.horizons,
         smooth=pilot.smooth,
-        notes=_notes(basis, largest),
+        notes=_notes(basis, largest, rows, cost_of),
         figure=quantity_name(model, scene),
         rows=rows,
         orders=_fit_orders(basis, rows) if pilot.smooth else (),
-        figures=tuple(_measure_expected(basis)),
+        figures=tuple(measure_expected(model, scene, baseline)),
         stable=largest,
         verdict=judgement,
+        least_seen=basis.least_seen,
+        least_figure=basis.least_figure,
+        cost_of=cost_of,
     )
 
 
-def _measure_expected(basis: Basis) -> Iterator[FigureLine]:
-    """What the scenario knows in theory, under every integrator at its own timestep."""
-    scene = basis.pilot.scene
-    expected = scene.declaration.expected
-    for integrator in STANDARD if expected else ():
-        setting = replace(basis.baseline, integrator=integrator.value)
-        row = SweepRow("integrator", integrator.value, own=False, status="ok")
-        row = with_contacts(scene.scenario, with_setting(basis.model, setting), row)
-        for name, exact in expected.items():
-            unit = "" if name == "restitution" else "m"
-            value = getattr(row, name)
-            if name != "restitution" and value is None:  # nothing touched
-                value = 0.0
-            yield FigureLine(name, unit, integrator.value, value, exact, "as declared")
+def _measure_settings(
+    basis: Basis, choices: Sequence[MeasuredSetting], tell: Callable[[str], None]
+) -> list[tuple[WorkPrecisionRow, bool | None]]:
+    """The rows of settings in their order, and what is noticed of each.
+
+    What changes no bit at the own timestep is not crossed with others.
+    """
+    baseline, rows_by_setting, idle_solving = basis.baseline, {}, set()
+    base_states: EngineStates | None = None
+    # Other solvers come last, and of them those at the own timestep first.
+    for setting in sorted(
+        choices,
+        key=lambda s: (
+            s != baseline,
+            s.solver_settings != baseline.solver_settings,
+            s.timestep != baseline.timestep,
+        ),
+    ):
+        if setting.solver_settings in idle_solving and setting.timestep != baseline.timestep:
+            continue
+        tell(f"{basis.pilot.scene.name}: {setting_text(setting)}")
+        row, sees, states = _measure_setting(basis, setting)
+        base_states = states if row.own else base_states
+        is_alike = setting == replace(setting, timestep=baseline.timestep)
+        is_alike = is_alike and setting.integrator == baseline.integrator and not row.own
+        if states is not None and base_states is not None and is_alike:
+            pairs = ((states.qpos, base_states.qpos), (states.qvel, base_states.qvel))
+            row = replace(row, same=all(np.array_equal(a, b) for a, b in pairs))
+            idle_solving |= {setting.solver_settings} if row.same else set()
+        rows_by_setting[setting] = row, sees
+    return [rows_by_setting[setting] for setting in choices if setting in rows_by_setting]
 
 
-def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
+def _least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[float, float]:
+    """Below which nothing is known of what is seen, and of the declared quantity."""
+    states, second_states = reference.states, reference.second_states
+    least_seen = FLOORS * visible_error(model, scene, states, second_states)
+    if not quantity_name(model, scene):
+        return least_seen, 0.0
+    gaps = quantity_values(model, scene, states) - quantity_values(model, scene, second_states)
+    return least_seen, FLOORS * float(np.linalg.norm(gaps, axis=1).max())
+
+
+def _holds(
+    basis: Basis, rows: Sequence[WorkPrecisionRow], better: MeasuredSetting, quick: bool
+) -> bool:
+    """Whether another setting is better than the scene's own from starts nearby too."""
+    model, pilot = basis.model, basis.pilot
+    scene, scenario = pilot.scene, pilot.scene.scenario
+    places = [next(row for row in rows if row.setting == s) for s in (better, basis.baseline)]
+    for position, velocity in nudges(model, 2 * (_QUICK_STARTS if quick else _STARTS), _NEARBY):
+        data = initial_data(scenario, model)
+        mujoco.mj_integratePos(model, data.qpos, position, 1.0)
+        start = {"qpos": tuple(data.qpos), "qvel": tuple(data.qvel + velocity)}
+        nudged_scenario = replace(scenario, **start)
+        setup = replace(pilot.setup, scenario=nudged_scenario)
+        near = replace(pilot, scene=replace(scene, scenario=nudged_scenario), setup=setup)
+        points = []
+        for row in places:
+            base = with_setting(model, replace(basis.baseline, cone=row.setting.cone))
+            reference = basis.cones[row.setting.cone].reference
+            exact = find_nearby(base, near, reference, quick=quick)
+            if exact is None:
+                return True
+            run = simulate(setup, with_setting(model, row.setting), thickness(model))
+            if not run.judgement.ok or row.cost is None:
+                return False
+            states = run.states.head(len(exact.times))
+            error = visible_error(model, scene, states, exact)
+            if quantity_name(model, scene):
+                gaps = quantity_values(model, near.scene, states)
+                gaps -= quantity_values(model, near.scene, exact)
+                error = float(np.linalg.norm(gaps, axis=1).max())
+            least = basis.least_figure if quantity_name(model, scene) else basis.least_seen
+            points.append(FrontPoint(row.cost, max(error, least)))
+        if not points[0].beats(points[1]):
+            return False
+    return True
+
+
+_NEARBY = 1e-4
+"""How far starts nearby are off: rad, or relative to the extent; velocities per s."""
+_STARTS, _QUICK_STARTS = 2, 1
+"""From how many random directions starts nearby come, each to both sides."""
+
+
+def _notes(
+    basis: Basis,
+    largest: Sequence[StableRow],
+    rows: Sequence[WorkPrecisionRow],
+    cost_of: MeasuredSetting | None,
+) -> tuple[str, ...]:
     """Remarks for reading the figures."""
     model, pilot, reference = basis.model, basis.pilot, basis.reference
     notes = [reference.note]
+    if cost_of is not None:
+        text = setting_text(cost_of)
+        notes.append(f"costs are relative to {text}, as the scene's own setting does not run")
+    idle = [", ".join(solving_parts(r.setting, basis.baseline)) for r in rows if is_idle(r)]
+    if idle:
+        notes.append(f"no bit of the motion is other, and no time saved, with {'; '.join(idle)}")
     if pilot.jumps:
         reasons = ", ".join(pilot.jumps)
         notes.append(f"errors follow no power of the timestep, because of {reasons}")
@@ -211,20 +313,26 @@ def _notes(basis: Basis, largest: Sequence[StableRow]) -> tuple[str, ...]:
 
 def _with_costs(
     basis: Basis, rows: Sequence[WorkPrecisionRow], clock: Clock, quick: bool
-) -> tuple[WorkPrecisionRow, ...]:
-    """Add the costs of usable settings, relative to the scene's own, or to the first without it."""
+) -> tuple[list[WorkPrecisionRow], MeasuredSetting | None]:
+    """Add the costs of usable settings, relative to the scene's own.
+
+    Where that one was lost they are relative to the longest timestep under its integrator that
+    runs, or else to the first setting that does; this is returned.
+    """
+    timed_rows = list(rows)
     usable = [index for index, row in enumerate(rows) if row.status == "ok"]
     if not usable:
-        return tuple(rows)
-    baseline = next((n for n, index in enumerate(usable) if rows[index].own), 0)
-    settings = [rows[index].setting for index in usable]
+        return timed_rows, None
+    settings, baseline = [rows[index].setting for index in usable], basis.baseline
+    alike = [s for s in settings if s == replace(baseline, timestep=s.timestep)]
+    base = max(alike, key=lambda s: s.timestep, default=settings[0])
+    base = baseline if baseline in settings else base
     scene = basis.pilot.scene
-    timings = costs(basis.model, scene, settings, baseline, clock, quick=quick)
-    timed_rows = list(rows)
+    timings = costs(basis.model, scene, settings, settings.index(base), clock, quick=quick)
     for index, timing in zip(usable, timings, strict=True):
         seconds = timing.nanoseconds.scale(1e-9 / scene.scenario.duration)
         timed_rows[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
-    return tuple(timed_rows)
+    return timed_rows, None if base == baseline else base
 
 
 def _fit_orders(basis: Basis, rows: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, ...]:
@@ -250,11 +358,11 @@ def _fit_orders(basis: Basis, rows: Sequence[WorkPrecisionRow]) -> tuple[OrderRo
 
 def _measure_setting(
     basis: Basis, setting: MeasuredSetting
-) -> tuple[WorkPrecisionRow, bool | None]:
+) -> tuple[WorkPrecisionRow, bool | None, EngineStates | None]:
     """Run a scene under a setting and compare it with its reference; the cost is added later.
 
     The flag says whether a learner sees the error, for the scene's own setting with that of its
-    cone; `None` where the reference is not known well enough.
+    cone; `None` where the reference is not known well enough. The states are those of the run.
     """
     model, pilot, cone = basis.model, basis.pilot, basis.cones[setting.cone]
     variant = with_setting(model, setting)
@@ -268,6 +376,8 @@ def _measure_setting(
         "model_error": cone.model_error,
         "refsafe": pilot.constrained and refsafe_active(variant),
         "steps": steps,
+        "evaluations": steps * (4 if setting.integrator == Integrator.RK4.value else 1),
+        "lucky": "",
         "own": setting == basis.baseline,
         "front": False,
     }
@@ -275,22 +385,26 @@ def _measure_setting(
     try:
         run = simulate(pilot.setup, variant, thickness(model))
     except mujoco.FatalError as error:
-        return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None
+        return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None, None
     row = replace(
         row,
         status=run.judgement.status.value,
         reasons=run.judgement.reasons,
         energy_drift=None if energy is None else energy_drift(run.energy, energy),
         momentum_drift=momentum_drift(run.momentum) if basis.momentum_conserved else None,
-        mean_energy=_mean_energy(run, cone.reference.horizon, basis.late_energy),
+        mean_energy=mean_energy(run, cone.reference.horizon, basis.late_energy),
         penetration=run.penetration,
     )
     if not run.judgement.ok:
         variant = with_setting(model, setting)
         growth = run_trial(pilot.setup, variant, pilot.setup.scenario.duration).growth
         has_grown = math.isfinite(growth) and growth > 1
-        return replace(row, growth=growth if has_grown else None), None
-    return _with_errors(basis, row, run)
+        return replace(row, growth=growth if has_grown else None), None, None
+    if pilot.constrained:
+        # A step of RK4 has four times the iterations of its last evaluation.
+        count = count_iterations(with_setting(model, setting), pilot.scene.scenario)
+        row = replace(row, iterations=count * row.evaluations / steps)
+    return *_with_errors(basis, row, run), run.states
 
 
 def _with_errors(
@@ -302,7 +416,7 @@ def _with_errors(
     states = run.states.head(len(reference.states.times))
     exact = motion_of(model, reference.states)
     run_errors = errors(motion_of(model, states), exact, reference.floor)
-    floor = FLOORS * visible_error(model, scene, reference.states, reference.second_states)
+    floor = basis.least_seen
     visible = visible_error(model, scene, states, reference.states)
     noticeable = None if max(1, visible) <= floor else visible >= 1
     if row.own and cone.visible_model_error >= 1:
@@ -312,8 +426,8 @@ def _with_errors(
         gaps = position_distances(model, states.qpos, reference.states.qpos)
         far = np.flatnonzero(gaps >= CHAOS_DISTANCE)
         if far.size:
-            row = replace(row, parted=float(states.times[far[0]]))
-            run_errors = Errors(None, None, None)
+            # How far apart they are later depends on the last digit of the start.
+            return replace(row, parted=float(states.times[far[0]]), slip=creep), noticeable
     row = replace(
         row,
         **asdict(run_errors),
@@ -324,14 +438,6 @@ def _with_errors(
     return row, noticeable
 
 
-def _mean_energy(run: Run, horizon: float, expected: float | None) -> float | None:
-    """Mean kinetic energy from the horizon to the end, relative to the expected one, less 1."""
-    energies = run.energy[1:][run.states.times > horizon * (1 + 1e-9), 1]
-    if expected is None or len(energies) < 2 or not np.isfinite(energies).all():
-        return None
-    return float(energies.mean()) / expected - 1
-
-
 def _quantity_error(
     basis: Basis, states: EngineStates, reference: KnownMotion
 ) -> tuple[float, float] | None:
@@ -339,9 +445,6 @@ def _quantity_error(
     model, scene = basis.model, basis.pilot.scene
     if not quantity_name(model, scene):
         return None
-    exact, second = (
-        quantity_values(model, scene, s) for s in (reference.states, reference.second_states)
-    )
-    floor = FLOORS * float(np.linalg.norm(exact - second, axis=1).max())
+    exact, floor = quantity_values(model, scene, reference.states), basis.least_figure
     distances = np.linalg.norm(quantity_values(model, scene, states) - exact, axis=1)
     return max(float(distances.max()), floor), max(float(distances[-1]), floor)

@@ -6,7 +6,7 @@ Entry points: `check(options, names)`; `read_and_verify`, which `build` and `exp
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from msgspec import Struct
@@ -19,7 +19,7 @@ from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.judge import depends_on, judge
-from coursebuild.pipeline.load import load
+from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.scripts import measure_sensitivity
@@ -130,14 +130,17 @@ def read_and_verify(
     static: bool = False,
     shard: Shard | None = None,
     repeat: bool = False,
+    texts: Mapping[str, str] = {},
 ) -> CheckedCourse | Report:
     """What `check`, `build` and `export` do: read a course, check it, run it.
 
     Where the map cannot be read, there is only a report. The caller holds the course's lock.
-    `static`: with the static forms of labs, for pages. `repeat`: see `verify`.
+    `static`: with the static forms of labs, for pages. `repeat`: see `verify`. `texts`: those
+    that files are to have, by path, in place of what they hold.
     """
     began = time.monotonic()
-    parsed_course = load(options.root, reader, code="run" if options.sandbox is None else "refuse")
+    code: Code = "run" if options.sandbox is None else "refuse"
+    parsed_course = load(options.root, reader, texts, code=code)
     course = parsed_course.value
     if course is None:
         return judge(None, parsed_course.diagnostics, began, strict=options.strict)

@@ -35,7 +35,7 @@ from coursebuild.core.model import (
     document_inlines,
     local_file,
 )
-from coursebuild.core.model.course import TEMPLATES, Theme
+from coursebuild.core.model.course import BIBLIOGRAPHY, CITATION_STYLE, TEMPLATES, Theme
 from coursebuild.core.model.vocabulary import CALLOUTS, ENGLISH, Words
 from coursebuild.core.pages.materials import words_for
 from coursebuild.core.registry import read_references
@@ -59,7 +59,7 @@ MAP_TEXT = 1_000_000
 """Characters that the course map may have; the map itself says how long other texts may be."""
 
 _TEXTS = tuple(
-    ".css .csv .html .js .json .md .mjs .py .svg .toml .tsv .txt .vtt .xml .yaml .yml".split()
+    ".bib .css .csv .html .js .json .md .mjs .py .svg .toml .tsv .txt .vtt .xml .yaml .yml".split()
 )
 """The ends of names of files in which a merge conflict is looked for."""
 
@@ -153,6 +153,8 @@ class _Loader:
             files=self._files_to_show(course),
             declarations=declarations,
             theme=self._load_theme(course.theme),
+            bibliography=self._read_list(BIBLIOGRAPHY, course.limits.text),
+            citation_style=self._read_list(CITATION_STYLE, course.limits.text),
         )
         environment = course_environment(self.root, course)
         # The map's interpreter is a program of the course, which a mere look must not start.
@@ -249,6 +251,14 @@ class _Loader:
             return file.read_text("utf-8")
         except (OSError, UnicodeDecodeError):
             return None
+
+    def _read_list(self, path: str, limit: int) -> Source | None:
+        """A file beside the map that need not be there."""
+        if not (self.root / path).is_file():
+            return None
+        read = read_sources(self.root, [path], self.open_texts)
+        self.diagnostics += read.diagnostics
+        return next(iter(self._drop_long(limit, read.value)), None)
 
     def _parse_map(self) -> Course | None:
         if self.files.map is None or not self._drop_long(MAP_TEXT, [self.files.map]):

@@ -50,6 +50,8 @@ class Options(Struct, frozen=True):
     """Whether to say of each script why it runs."""
     run_all: RunAll | None = None
     """Runs scripts, where a `ScriptServer` stays warm from run to run."""
+    on_start: Callable[[str, float | None], object] | None = None
+    """Takes the path of each script that begins, and the seconds that it took the last time."""
     on_result: Callable[[ScriptRun], object] | None = None
     """Takes the result of each script that runs, while others run."""
     interpreter: Interpreter | None = None

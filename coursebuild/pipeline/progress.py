@@ -23,6 +23,8 @@ from coursebuild.report.text import clip
 
 _INTERVAL = 0.1
 """Seconds between updates of the live line."""
+_LONG = 1.0
+"""Seconds from which on it is worth saying how long a script took the last time."""
 _ERASE = "\r\x1b[K"
 
 
@@ -40,6 +42,7 @@ class Progress:
         self.live = self._has_readers and self.stream.isatty() and os.environ.get("TERM") != "dumb"
         self._lock = threading.Lock()
         self._running_since: dict[str, float] = {}
+        self._last_seconds: dict[str, float | None] = {}
         self._activities: dict[str, str] = {}
         self._stage = ""
         self._last_line = ""
@@ -71,12 +74,15 @@ class Progress:
                 self._write(_ERASE)
                 self._running_since.clear()
 
-    def start(self, name: str) -> None:
-        """Show that a script runs."""
+    def start(self, name: str, last_seconds: float | None = None) -> None:
+        """Show that a script runs; `last_seconds` is how long it took the last time."""
         with self._lock:
             self._running_since[name] = time.monotonic()
+            self._last_seconds[name] = last_seconds
             if not self.live:
-                self._write(f"  {name}\n")
+                is_long = last_seconds is not None and last_seconds >= _LONG
+                time_text = f" ({last_seconds:.0f} s the last time)" if is_long else ""
+                self._write(f"  {name}{time_text}\n")
 
     def describe(self, name: str, activity: str) -> None:
         """Show what something that runs is doing; only on a terminal."""
@@ -114,8 +120,18 @@ class Progress:
         if not self._total:
             return f"{self._stage}  {now - self._since:.0f} s"
         activities = {name: f" ({activity})" for name, activity in self._activities.items()}
-        running = self._running_since.items()
-        names = [f"{name}{activities.get(name, '')} {now - since:.0f} s" for name, since in running]
+
+        def times(name: str, seconds: float) -> str:
+            last = self._last_seconds.get(name)
+            if last is None or last < _LONG:
+                return f"{seconds:.0f} s"
+            left = f"{last - seconds:.0f} s left, " if seconds < last else ""
+            return f"{seconds:.0f} s ({left}{last:.0f} s the last time)"
+
+        names = [
+            f"{name}{activities.get(name, '')} {times(name, now - since)}"
+            for name, since in self._running_since.items()
+        ]
         return f"{self._stage} {self._ended_count}/{self._total}  {', '.join(names)}"
 
     def _write(self, text: str) -> None:

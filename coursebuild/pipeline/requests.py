@@ -126,6 +126,8 @@ class PageRequest(Struct, frozen=True):
     base_url: str
     templates: Texts
     """The course's own templates."""
+    is_manual: bool
+    """See `Course.is_manual`."""
     key: str
     """The key under which it is stored: a hash of all the others, and of the tool."""
 
@@ -137,11 +139,13 @@ class PageRequest(Struct, frozen=True):
         language: str,
         base_url: str,
         templates: Texts,
+        *,
+        is_manual: bool = False,
     ) -> PageRequest:
         """A request with its key."""
         text_key = "" if text is None else text.key
-        key = step_key("page", language, base_url, templates, inputs, text_key)
-        return cls(inputs, text, language, base_url, templates, key)
+        key = step_key("page", language, base_url, templates, is_manual, inputs, text_key)
+        return cls(inputs, text, language, base_url, templates, is_manual, key)
 
 
 class DrawnPage(Struct, frozen=True):
@@ -174,7 +178,7 @@ def document_fingerprint(document: Document) -> str:
     html = [node.span.text for node in blocks if isinstance(node, HtmlBlock)]
     html += [node.span.text for node in inlines if isinstance(node, RawInline)]
     return fingerprint(
-        (document.blocks, document.footnotes, document.equations, html), _WITHOUT_PLACES
+        (document.blocks, document.footnotes, document.numbered_items, html), _WITHOUT_PLACES
     )
 
 

@@ -208,15 +208,20 @@ def _run(
 
     def on_start(path: str) -> None:
         run_store.note_start(path)
-        progress.start(path)
+        progress.start(path, seconds.get(path))
+        if options.on_start is not None:
+            options.on_start(path, seconds.get(path))
 
     runs: dict[str, ScriptRun] = {}
+    claimed_paths: set[str] = set()
 
     def on_finish(script_run: ScriptRun) -> None:
         if script_run.outcome is Outcome.OK:
             script_run = records.compare(script_run)
         run_store.put_run(inputs[script_run.path], script_run)
         runs[script_run.path] = script_run
+        run_store.unclaim(inputs[script_run.path])
+        claimed_paths.discard(script_run.path)
         progress.finish(script_run.path, script_run.outcome.value, script_run.seconds)
         if options.on_result is not None:
             options.on_result(script_run)
@@ -224,17 +229,38 @@ def _run(
     if options.verbose:
         for job in jobs_to_run:
             progress.say(f"{job.path}: {'; '.join(run_store.reasons(inputs[job.path]))}")
+    busy_elsewhere: set[str] = set()
+
+    def claim(job: ScriptJob) -> ScriptRun | bool:
+        answer = run_store.claim(inputs[job.path])
+        if answer is False and job.path not in busy_elsewhere:
+            busy_elsewhere.add(job.path)
+            progress.say(f"another coursebuild is running {job.path}; waiting for its result")
+        elif answer is True:
+            claimed_paths.add(job.path)
+        elif answer is not False:
+            runs[job.path] = answer
+            progress.skip()
+            if options.on_result is not None:
+                options.on_result(answer)
+        return answer
+
     run_store.begin()
     with ScriptServer(sandbox=options.sandbox) as server, progress.stage(stage, len(jobs_to_run)):
         run_all = options.run_all or server.run
-        run_all(
-            options.root,
-            longest_first(jobs_to_run, seconds),
-            parallel=options.jobs,
-            on_start=on_start,
-            on_finish=on_finish,
-            interpreter=options.interpreter,
-        )
+        try:
+            run_all(
+                options.root,
+                longest_first(jobs_to_run, seconds),
+                parallel=options.jobs,
+                on_start=on_start,
+                on_finish=on_finish,
+                interpreter=options.interpreter,
+                claim=claim,
+            )
+        finally:
+            for path in claimed_paths:
+                run_store.unclaim(inputs[path])
     return runs
 
 

@@ -341,6 +341,7 @@ def page_request(entry: PageEntry, library: Library) -> PageRequest:
         course.language,
         course.base_url,
         course.theme.template_texts,
+        is_manual=course.is_manual,
     )
 
 

@@ -13,6 +13,7 @@ Documents may be summaries. Formulas are not checked here: see `pipeline.reader`
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,6 +25,7 @@ from msgspec import Struct
 
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.features import Trial, TrialContext, TrialOutcome, Trials
+from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course, FeatureBlock, find_blocks
 from coursebuild.core.model.results import (
     CompileResult,
@@ -92,11 +94,13 @@ def verify(
     """
     options.store.listen(options.progress.say)
     options = options.for_course(course)
-    extracted_scripts = extract_scripts(course, options)
+    is_preview = known_runs is not None
+    # A preview holds the lock for no longer, so that other commands need not wait for its scripts.
+    with project_lock(options.root) if is_preview else contextlib.nullcontext():
+        extracted_scripts = extract_scripts(course, options)
     extractions, trials = _select(course, extracted_scripts.runnable, documents, shard)
     models, model_diagnostics = compile_models(course, options)
     run_store = options.run_store()
-    is_preview = known_runs is not None
     run_scripts = functools.partial(
         run,
         course,
@@ -108,7 +112,13 @@ def verify(
     )
     trial_runs = RunStore(options.root, options.store)  # another thread uses it
     context = TrialContext(
-        options.root, course, dict(models), trial_runs, model_diagnostics, static
+        options.root,
+        course,
+        dict(models),
+        trial_runs,
+        model_diagnostics,
+        static,
+        options.progress.say,
     )
     runs, (trial_results, trial_diagnostics) = _run_with_trials(
         run_scripts, trials, context, options.progress
@@ -207,7 +217,7 @@ def _is_doubtful(line: ScriptLine, run_store: RunStore, *, repeat: bool) -> bool
 def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Diagnostic]:
     """Diagnose that there is nothing to publish, or that nothing was verified."""
     place = course.map.span(0, 0)
-    if all(lesson.status == "planned" for lesson in course.lessons):
+    if not course.is_manual and all(lesson.status == "planned" for lesson in course.lessons):
         message = "the course has no written lesson"
         help = "write a file in content/lessons, and give its entry in the map a `status`"
         yield diagnose("no-lessons", place, message, help=help)

@@ -7,5 +7,5 @@ Entry point: `serve.serve`.
 3. `rebuild` does in the background what a build does: it reads everything, runs scripts and labs,
    and makes all files of the site.
 4. `server` serves them (`answers`) to those who may ask (`access`). `messages` tells an open page
-   what is wrong and what its author may accept; `editor` opens a place in the author's editor.
+   what is wrong and what its author may accept.
 """

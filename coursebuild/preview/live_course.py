@@ -17,13 +17,14 @@ folders that are made later. Files elsewhere, such as pages in `docs/guide.md`, 
 from __future__ import annotations
 
 import contextlib
+import os
 import queue
 import stat
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from coursebuild.core.files.course_root import FOLDERS, is_dropping
 from coursebuild.core.files.errors import EffectError, reason
@@ -36,6 +37,8 @@ LOOK = 0.200
 """Seconds between two looks for new and removed folders, and at polled files."""
 _PROBE = "4913"
 """A file that vim makes for a moment, to see whether the folder can be written."""
+_PASSING = (".swp", ".swx", "___jb_tmp___", "___jb_old___")
+"""Ends of the names of files that editors make while they save."""
 _STEP = 2
 """Milliseconds between two looks for events: a save is noticed within two of them."""
 
@@ -50,6 +53,8 @@ class FolderWatcher:
         self._polled_files: dict[str, tuple[int, ...]] = {}
         """Files elsewhere, with their state at the last look."""
         self._events: queue.SimpleQueue[frozenset[str] | OSError] = queue.SimpleQueue()
+        self._new_paths: set[str] = set()
+        """What was made since the last save was taken."""
         self._ready = threading.Event()
         self._thread = threading.Thread(target=self._run, name="watch", daemon=True)
 
@@ -100,6 +105,11 @@ class FolderWatcher:
                 help="the system's limit of watched files may be reached (fs.inotify on Linux)",
             )
         return change
+
+    def drop_passing(self, paths: frozenset[str]) -> frozenset[str]:
+        """The paths of a save without files that came and went, such as `sedXXXXXX`."""
+        new_paths, self._new_paths = self._new_paths, set()
+        return frozenset(p for p in paths if p not in new_paths or os.path.lexists(self._root / p))
 
     def _run(self) -> None:
         try:
@@ -158,7 +168,7 @@ class FolderWatcher:
                 yield frozenset()
                 self._stop.wait(LOOK)
             return
-        from watchfiles import watch
+        from watchfiles import Change, watch
 
         for batch in watch(
             *folders,
@@ -169,13 +179,16 @@ class FolderWatcher:
             rust_timeout=round(1000 * LOOK),
             yield_on_timeout=True,
         ):
-            yield frozenset(Path(path).relative_to(self._root).as_posix() for _, path in batch)
+            names = [(kind, Path(path).relative_to(self._root).as_posix()) for kind, path in batch]
+            self._new_paths.update(name for kind, name in names if kind is Change.added)
+            yield frozenset(name for _, name in names)
 
     def _is_source(self, path: str) -> bool:
         """Whether a path is a file of the course, and not one of an editor's or of Python's."""
         file = Path(path)
         return file.is_relative_to(self._root) and not any(
-            name == _PROBE or is_dropping(name) for name in file.relative_to(self._root).parts
+            name == _PROBE or name.endswith(_PASSING) or is_dropping(name)
+            for name in file.relative_to(self._root).parts
         )
 
 
@@ -201,6 +214,17 @@ class LiveCourse:
         self.session.start()
         self._watcher.start()
         threading.Thread(target=self._take_saves, name="saves", daemon=True).start()
+
+    def tell_command(self, event: Mapping[str, Any]) -> None:
+        """Say that a command for another terminal begins, or how it ended."""
+        process, command = event["process"], f"`coursebuild {event['command']}`"
+        if "status" not in event:
+            self.session.commands.add(process)
+            text = f"for another terminal: {command}"
+        else:
+            self.session.commands.discard(process)
+            text = f"done: {command}, exit status {event['status']} ({event['seconds']:.1f} s)"
+        self.session.options.progress.say(text)
 
     def rebuild(self) -> NoReturn:
         """Do the rest of a build after each save; raise what fails, also while saves are taken."""
@@ -232,6 +256,9 @@ class LiveCourse:
         self.session.calm.clear()
         try:
             paths = _wait_until_complete(self.session.root, self._watcher, paths)
+            paths = self._watcher.drop_passing(paths)
+            if not paths:
+                return
             has_changed = self.session.edit(paths)
             if has_changed is None:  # more than documents changed
                 self.session.take_other_saves()

@@ -1,12 +1,13 @@
 """Messages for an open page: what is wrong, and what its author may accept there.
 
-Entry points: `page_news(session, path)`, as JSON; `accept(session, path, id)`.
+Entry points: `page_news(session, path)`, as JSON; `accept(session, path, ids)`.
 
 1. The mistakes of the course: first those that keep the page from being drawn, then others of its
-   document. Each says whether the page shows it in its place.
+   document. Each says whether the page shows it in its place, and has the fix that its edits are.
 2. For each script of the page its state; for each recorded output or figure that differs, both
    versions; for each bound number that does not hold, the right one.
-3. An offer's id is made from what the file holds and what it would hold. It is accepted only as
+3. The scripts that run now, with how long they took the last time.
+4. An offer's id is made from what the file holds and what it would hold. It is accepted only as
    long as both are unchanged: nothing is ever written that the author has not seen.
 """
 
@@ -40,6 +41,8 @@ from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.scripts.findings import find_instability
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
+from coursebuild.core.text.source import Source
+from coursebuild.pipeline.fix import may_edit
 from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.recordings import read_recorded
 from coursebuild.preview.session import Session
@@ -59,13 +62,15 @@ class Offer(Struct, frozen=True):
     path: str
     old: bytes | None
     new: bytes
+    edits: tuple[Edit, ...] = ()
+    """Those of a text, which may be made together with others."""
 
     @classmethod
-    def of(cls, edit: Edit) -> Offer:
-        """The offer of an edit of a lesson."""
-        source = edit.span.source
-        new = apply_edits(source.text, [edit])
-        return cls(source.path, source.text.encode(), new.encode())
+    def of(cls, *edits: Edit) -> Offer:
+        """The offer of edits of one text."""
+        source = edits[0].span.source
+        new = apply_edits(source.text, edits)
+        return cls(source.path, source.text.encode(), new.encode(), edits)
 
     @property
     def id(self) -> str:
@@ -89,20 +94,31 @@ def page_news(session: Session, path: str) -> str:
         return json.dumps(news, default=id, ensure_ascii=False, separators=(",", ":"))
 
 
-def accept(session: Session, path: str, id: str) -> str:
-    """Write what is offered on a page under this id; return why that failed, or an empty text.
+def accept(session: Session, path: str, ids: str) -> str:
+    """Write what is offered on a page under these ids; return why that failed, or an empty text.
 
-    The lock is held: two browsers cannot accept the same at once.
+    With spaces between them there may be several, of which all or none are still offered. The lock
+    is held: two browsers cannot accept the same at once.
     """
     with session.condition:
         news = _collect_news(session, path)
-        parts = (*news["outputs"], *news["figures"], *news["numbers"])
-        offers = (part["offer"] for part in parts if part.get("offer"))
-        offer = next((offer for offer in offers if offer.id == id), None)
-        if offer is None:
+        parts = (*news["outputs"], *news["figures"], *news["numbers"], *news["problems"])
+        offers = {part["offer"].id: part["offer"] for part in parts if part.get("offer")}
+        accepted_offers = [offers[id] for id in ids.split() if id in offers]
+        if not accepted_offers or len(accepted_offers) < len(ids.split()):
             return "this is no longer what the page offers; look at it again"
+        edits: dict[Source, list[Edit]] = {}
+        for offer in accepted_offers:
+            for edit in offer.edits:
+                edits.setdefault(edit.span.source, []).append(edit)
+        changes = [
+            (source.path, source.text.encode(), apply_edits(source.text, edits_there).encode())
+            for source, edits_there in edits.items()
+        ]
+        changes += [(o.path, o.old, o.new) for o in accepted_offers if not o.edits]
         try:
-            write_atomic(session.root, offer.path, offer.new, expected=offer.old)
+            for file, old, new in changes:
+                write_atomic(session.root, file, new, expected=old)
         except EffectError as error:
             return error.message
         return ""
@@ -119,12 +135,21 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
     diagnostics = sorted(report.diagnostics, key=rank)[:_MAX_DIAGNOSTICS]
     news: dict[str, Any] = {
         "problems": [
-            {**_describe_mistake(d, document_path), "blocks": d in blocking} for d in diagnostics
+            {
+                **_describe_mistake(d, document_path),
+                **_offer_fix(session, d),
+                "blocks": d in blocking,
+            }
+            for d in diagnostics
         ],
         "more": max(0, len(report.diagnostics) - _MAX_DIAGNOSTICS),
         "kept": session.files.is_outdated(path),
         "busy": session.busy,
         "trouble": session.trouble,
+        "running": [
+            {"path": path, "began": round(began, 1), "last": last}
+            for path, (began, last) in sorted(session.runs.running.items())
+        ],
         "scripts": [],
         "outputs": [],
         "figures": [],
@@ -165,6 +190,17 @@ def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, A
         "end": max(end, span.column - 1),
         "inPlace": span.path == document_path and diagnostic.rule in _IN_PLACE,
     }
+
+
+def _offer_fix(session: Session, diagnostic: Diagnostic) -> dict[str, Any]:
+    """Describe the fix of a mistake: the first line that it writes, and the offer."""
+    sources = {edit.span.source for edit in diagnostic.edits}
+    if len(sources) != 1 or not may_edit(session.root, diagnostic.edits[0].span.path):
+        return {}
+    first = min(diagnostic.edits, key=lambda edit: edit.span.start)
+    offer = Offer.of(*diagnostic.edits)
+    line = Source(offer.path, offer.new.decode()).line_text(first.span.line)
+    return {"offer": offer, "fixed": line}
 
 
 # --- scripts and outputs

@@ -94,8 +94,7 @@ class BackgroundRebuild:
         while True:
             self._wait()
             try:
-                with project_lock(self._options.root, self._progress.say):
-                    self.run_once()
+                self.run_once()
                 self._repeat()
             except (SupersededError, RunStoppedError):
                 continue
@@ -134,7 +133,13 @@ class BackgroundRebuild:
         """
         session = self._session
         self._edits = session.edits
-        session.read()
+
+        def tell(text: str) -> None:
+            if not session.commands:  # else it is known who is at work
+                self._progress.say(text)
+
+        with project_lock(self._options.root, tell):
+            session.read()
         with session.condition:
             self._edits = session.edits
         course = session.read_saved_course()
@@ -202,6 +207,7 @@ class BackgroundRebuild:
         options = replace(
             self._options,
             run_all=self._run_unless_edited(course),
+            on_start=self._take_start,
             on_result=lambda run: session.take_run(keys[run.path], run),
         )
         try:
@@ -216,10 +222,18 @@ class BackgroundRebuild:
         except BaseException:
             session.runs.is_all_due |= is_all_due
             raise
+        finally:
+            session.runs.running.clear()
         self._options.store.fresh = False  # with `--no-cache`, everything is made anew only once
         session.take_results(course, verification)
         with contextlib.suppress(RunStoppedError):  # they would have to run anew
             self._find_noise(course, _refuse_runs)
+
+    def _take_start(self, path: str, last_seconds: float | None) -> None:
+        self._session.take_start(path, last_seconds)
+        if not self._progress.live:  # a terminal shows it in its last line
+            last_text = "" if last_seconds is None else f" ({last_seconds:.1f} s the last time)"
+            self._progress.say(f"running {path}{last_text}")
 
     def _run_unless_edited(self, course: Course) -> RunAll:
         """Make a function that runs scripts until one of them is edited while it runs."""

@@ -43,6 +43,10 @@ class RunHistory:
         self.noise: tuple[Diagnostic, ...] = ()
         """Recorded digits that do not hold, of scripts whose initial states were moved."""
 
+        self.running: dict[str, tuple[float, float | None]] = {}
+        """The scripts that run now, by path: when each began, in seconds since 1970, and how long
+        it took the last time."""
+
     def results(self, course: Course) -> Results:
         """What is known of a course's scripts as they are now."""
         keys = script_keys(course)
@@ -60,6 +64,7 @@ class RunHistory:
     def take_run(self, script: ScriptKey, run: ScriptRun) -> None:
         """Take the result of one script, while others run."""
         self._runs[run.path] = script, run
+        self.running.pop(run.path, None)
 
     def known_runs(self, course: Course) -> dict[str, ScriptRun]:
         """The runs of a course's scripts, by path; none where a script has changed since."""

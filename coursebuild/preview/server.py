@@ -10,10 +10,10 @@ Entry point: `PreviewServer`.
    so that a page that was disconnected misses nothing.
 4. A published site's service worker is replaced by one that removes itself: a browser may have seen
    such a site at this address before.
-5. `POST /.coursebuild/accept` accepts an output, a figure or a number for the author;
+5. `POST /.coursebuild/accept` accepts outputs, figures and numbers for the author;
    `POST /.coursebuild/open` opens a place where something is wrong in the author's editor: that of
    `$VISUAL` or `$EDITOR` if it opens a window, as the terminal is the preview's; otherwise the
-   first installed one that is known.
+   first installed one that is known. Where there is none, pages link to `vscode://file/…`.
 6. Where a request ends is never in doubt: a proxy before the preview may send those of others over
    the same connection. So a head is read strictly, and a connection goes on only after a request
    without a body that was answered.
@@ -32,6 +32,7 @@ import socket
 import socketserver
 import subprocess
 import threading
+import time
 from collections.abc import Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -87,6 +88,10 @@ class PreviewServer(ThreadingHTTPServer):
         self._port = int(self.server_address[1])
         token = "" if self._address.is_loopback else secrets.token_urlsafe(12)
         self.access = Access(self._port, token, embed)
+        is_local = not token and not _find_editor()
+        self.linked_folder = str(session.root) if is_local else ""
+        """The folder of the files that pages link to for VS Code, where no editor can be started
+        here; empty where the browser may be another machine's."""
         self._thread = threading.Thread(
             target=self.serve_forever, kwargs={"poll_interval": 0.05}, name="preview", daemon=True
         )
@@ -270,7 +275,8 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _follow(self, page: str) -> None:
         server, session = self.server, self.server.session
-        self._send_event("hello", json.dumps({"tool": server.answers.tool}))
+        hello = {"tool": server.answers.tool, "now": time.time(), "folder": server.linked_folder}
+        self._send_event("hello", json.dumps(hello))
         version, page_digest, news = -1, None, None
 
         def has_news() -> bool:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import gc
 import sys
 import threading
+import time
 from collections.abc import Callable, Collection, Iterable, Mapping
 
 from msgspec.structs import replace
@@ -73,6 +74,8 @@ class Session:
         self.calm.set()
         self.busy = "reading the course"
         """What is being done in the background, in words; empty when everything is done."""
+        self.commands: set[int] = set()
+        """The processes of commands that are being done for other terminals."""
         self.trouble = ""
         """Why background work could not be done, if it could not."""
         self._is_map_broken = False
@@ -307,6 +310,12 @@ class Session:
             self.runs.take(course, verification, trials)
             if self.course is not None:
                 self._show(self.course)
+            self.notify()
+
+    def take_start(self, path: str, last_seconds: float | None) -> None:
+        """Take that a script begins, which took so long the last time."""
+        with self.condition:
+            self.runs.running[path] = time.time(), last_seconds
             self.notify()
 
     def take_run(self, script: ScriptKey, run: ScriptRun) -> None:

@@ -12,7 +12,7 @@ from coursebuild.core.model.results import TrialLine
 from coursebuild.core.model.sensitivity import Sensitivity
 from coursebuild.core.text.characters import clean_xml
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.core.text.rules import HELP, RULES
+from coursebuild.core.text.rules import RULES, rule_address
 from coursebuild.core.text.source import Span
 from coursebuild.report.text import Style as Style
 from coursebuild.report.text import diagnostic_text as diagnostic_text
@@ -113,15 +113,17 @@ def _add_case(suite: Element, group: str, name: str, seconds: float) -> Element:
 def to_sarif(report: Report) -> str:
     """The report as SARIF 2.1.0; columns count code points."""
     rule_names = sorted({d.rule for d in report.diagnostics})
-    rules = [
+    rules: list[dict[str, Any]] = [
         {
             "id": name,
             "shortDescription": {"text": RULES[name].summary},
-            "helpUri": HELP.format(name),
             "defaultConfiguration": {"level": RULES[name].severity},
         }
         for name in rule_names
     ]
+    for rule in rules:
+        if address := rule_address(rule["id"]):
+            rule["helpUri"] = address
     run = {
         "tool": {"driver": {"name": "coursebuild", "rules": rules}},
         "columnKind": "unicodeCodePoints",
@@ -148,18 +150,43 @@ def _result(d: Diagnostic, rule: int) -> dict[str, Any]:
         for note in d.notes
         if note.span is not None
     ]
-    return result | ({"relatedLocations": related_locations} if related_locations else {})
+    if related_locations:
+        result["relatedLocations"] = related_locations
+    if d.edits:
+        changes: dict[str, list[dict[str, Any]]] = {}
+        for edit in d.edits:
+            replacement = {
+                "deletedRegion": _region(edit.span),
+                "insertedContent": {"text": edit.text},
+            }
+            changes.setdefault(edit.span.path, []).append(replacement)
+        fix = {
+            "description": {"text": d.help or f"write `{d.edits[0].text}`"},
+            "artifactChanges": [
+                {"artifactLocation": _artifact(path), "replacements": replacements}
+                for path, replacements in changes.items()
+            ],
+            "properties": {"safe": d.safe},
+        }
+        result["fixes"] = [fix]
+    return result
 
 
 def _location(span: Span) -> dict[str, Any]:
-    region = {
+    return {"physicalLocation": {"artifactLocation": _artifact(span.path), "region": _region(span)}}
+
+
+def _artifact(path: str) -> dict[str, str]:
+    return {"uri": path, "uriBaseId": "ROOT"}
+
+
+def _region(span: Span) -> dict[str, int]:
+    return {
         "startLine": span.line,
         "startColumn": span.column,
         "endLine": span.end_line,
         "endColumn": span.end_column,
     }
-    file = {"uri": span.path, "uriBaseId": "ROOT"}
-    return {"physicalLocation": {"artifactLocation": file, "region": region}}
 
 
 def _message(d: Diagnostic) -> str:

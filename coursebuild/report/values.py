@@ -157,6 +157,8 @@ def plain(value: object, **names: str) -> Any:
                 "label": value.label,
                 "help": value.help,
                 "notes": plain(value.notes),
+                "edits": plain(value.edits),
+                "safe": value.safe,
             }
         case Struct():
             fields: dict[str, Any] = {}

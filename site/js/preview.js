@@ -10,6 +10,7 @@ import { needsLoad, takeHead } from './preview/head.js'
 import { Marks } from './preview/marks.js'
 import { Panel } from './preview/panel.js'
 import { holdPlace } from './preview/place.js'
+import { setClock } from './preview/times.js'
 import { Twin } from './preview/twin.js'
 import { dismissWorkers } from './preview/workers.js'
 import { say } from './progress/words.js'
@@ -28,8 +29,9 @@ let tool = null
 let latestNews = null
 let head = document.cloneNode(true)
 const twin = new Twin(document.body)
-const panel = new Panel(sayHere, (place) => ask('open', { place }))
-const marks = new Marks(sayHere, (id) => ask('accept', { page, id }))
+const accept = (id) => ask('accept', { page, id })
+const panel = new Panel(sayHere, (place) => ask('open', { place }), accept)
+const marks = new Marks(sayHere, accept)
 
 /** Bring the page to the server's state, again and again while that changes. */
 async function take() {
@@ -79,7 +81,8 @@ connect(page, {
   hello(greeting) {
     if (tool !== null && tool !== greeting.tool) location.reload() // another version of the preview itself
     tool = greeting.tool
-    panel.setState({ lost: false })
+    setClock(greeting.now)
+    panel.setState({ lost: false, folder: greeting.folder })
   },
   page(newState) {
     target = newState

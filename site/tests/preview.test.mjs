@@ -3,8 +3,9 @@
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { align, inOrder } from '../js/preview/align.js'
-import { summary } from '../js/preview/panel.js'
+import { editorLink, summary } from '../js/preview/panel.js'
 import { difference } from '../js/preview/text.js'
+import { setClock, timesOf } from '../js/preview/times.js'
 
 const same = (a, b) => a === b
 const alike = (a, b) => a[0] === b[0]
@@ -90,11 +91,27 @@ test('no half of a character is left', () => {
 test('the button says how things stand', () => {
   const say = (key, { n } = {}) => (n === undefined ? key : `${n} ${key}`)
   const text = (...state) => summary(say, ...state)
-  const news = (severities, more = {}) => ({ problems: severities.map((severity) => ({ severity })), busy: '', trouble: '', ...more })
+  const news = (severities, more = {}) => ({ problems: severities.map((severity) => ({ severity })), busy: '', trouble: '', running: [], ...more })
   assert.equal(text(news([])), '')
   assert.equal(text(news(['error'])), '1 errors')
   assert.equal(text(news(['error', 'warning', 'error'])), '2 errors, 1 warnings')
   assert.equal(text(news([], { busy: 'running scripts' })), 'running scripts …')
   assert.equal(text(news(['warning'], { busy: 'trying labs' }), true), 'lost, 1 warnings')
   assert.equal(text(news([], { trouble: 'x' }), false, true), 'gone, trouble')
+})
+
+test('what is left of a script is told by its last time and the clock of the server', () => {
+  const now = Date.now() / 1000 + 500
+  setClock(now)
+  assert.deepEqual(timesOf({ began: now - 4, last: 17.2 }), { last: 17, left: 13 })
+  assert.deepEqual(timesOf({ began: now - 40, last: 17.2 }), { last: 17, left: 0 })
+  assert.equal(timesOf({ began: now, last: 0.4 }), null)
+  assert.equal(timesOf({ began: now, last: null }), null)
+  const say = (key, values = {}) => `${key} ${values.path} ${values.left}`
+  const running = [4, 17.2, null].map((last, index) => ({ path: `${index}.py`, began: now - 4, last }))
+  assert.equal(summary(say, { problems: [], busy: 'running scripts', trouble: '', running }), 'left 1.py 13')
+})
+
+test('a link to an editor names any file', () => {
+  assert.equal(editorLink('/home/a b', 'content/x#1%.md:3:5'), 'vscode://file/home/a%20b/content/x%231%25.md:3:5')
 })

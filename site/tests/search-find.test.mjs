@@ -34,6 +34,13 @@ test('words in headings of lessons come before the same in other pages', async (
   assert.deepEqual((await titles('inertia tensor')).slice(0, 2), ['Mass and inertia', 'Writing lessons'])
 })
 
+test('a planned lesson comes last, however well it fits', async () => {
+  const planned = { kind: 'stub', name: '4.5', title: 'Inertia tensor', sections: [['', '', 0, [['t', 'The inertia tensor.']], '']] }
+  const { source } = indexed([...COURSE, planned])
+  const { pages } = await findPages('inertia tensor', source)
+  assert.deepEqual(pages.map(({ page }) => page), [0, 3, 2, 5])
+})
+
 test('a page is found by its number before those that mention it', async () => {
   assert.deepEqual(await titles('4.2'), ['Mass and inertia', 'Free rotation'])
   assert.equal(await first('lesson 4.2'), 'Mass and inertia')

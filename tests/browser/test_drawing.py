@@ -10,6 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from support.built_sites import Site
+from support.fixture_cases import fixture_text
 from support.lab_page import PAGE, lab, until, watch_page
 
 pytestmark = pytest.mark.browser
@@ -21,33 +22,7 @@ LESSON = "lessons/1.1-one.html"
 WINDOW: Any = {"width": 600, "height": 500}
 """A small one, since pictures with shadows take long without a graphics processor."""
 
-COMPARE = """async (n) => {
-  const lab = document.querySelectorAll('.lab')[n]
-  const live = lab.querySelector('canvas.lab-still')
-  const recorded = new Image()
-  recorded.src = lab.querySelector('.lab-static img').src
-  await recorded.decode()
-  const { width, height } = live
-  const pixels = (source, w) => {
-    const canvas = Object.assign(document.createElement('canvas'), { width, height })
-    const context = canvas.getContext('2d', { willReadFrequently: true })
-    context.fillStyle = 'white'
-    context.fillRect(0, 0, width, height)
-    context.drawImage(source, (width - w) / 2, 0, w, height)
-    return context.getImageData(0, 0, width, height).data
-  }
-  const wide = (recorded.width * height) / recorded.height
-  const [a, b] = [pixels(live, width), pixels(recorded, wide)]
-  const differences = []
-  for (let y = 2; y < height - 2; y++) {
-    for (let x = Math.ceil(Math.max(0, (width - wide) / 2)) + 2; x < Math.min(width, (width + wide) / 2) - 2; x++) {
-      for (let c = 0; c < 3; c++) differences.push(Math.abs(a[4 * (y * width + x) + c] - b[4 * (y * width + x) + c]))
-    }
-  }
-  differences.sort((p, q) => p - q)
-  const at = (share) => differences[Math.floor(share * (differences.length - 1))]
-  return { middle: at(0.5), most: at(0.9) }
-}"""  # noqa: E501
+COMPARE = fixture_text("scripts/compare_pictures.js")
 
 REDS = """(n) => {
   const canvas = document.querySelectorAll('.lab')[n].querySelector('canvas.lab-still')

@@ -12,6 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page, Route
 
 from support.built_sites import Site
+from support.fixture_cases import fixture_text
 from support.lab_page import becomes, until
 
 pytestmark = pytest.mark.browser
@@ -20,25 +21,7 @@ NAMES = ("full", pytest.param("real", marks=pytest.mark.slow))
 """Courses; what is tried is the largest lesson of one."""
 MAX_STOPS = 1000
 
-FOCUSED_ELEMENT = """() => {
-  const at = document.activeElement
-  if (!at || at === document.body || at === document.documentElement) return null
-  window.stops ??= []
-  const before = window.stops.at(-1)
-  const { DOCUMENT_POSITION_FOLLOWING: after } = Node
-  const follows = !before || (before.compareDocumentPosition(at) & after) !== 0
-  window.stops.push(at)
-  const box = at.getBoundingClientRect()
-  const style = getComputedStyle(at)
-  const name = at.closest('label')?.textContent || at.ariaLabel || at.textContent || at.title || ''
-  const inWindow = box.bottom > 0 && box.top < innerHeight && box.right > 0 && box.left < innerWidth
-  const kind = [at.localName, at.type ?? '', ...at.classList, at.parentElement.className].join(' ')
-  return {
-    kind, follows, inWindow, name: name.trim().slice(0, 60) || at.id,
-    size: [box.width, box.height], box: [box.x, box.y, box.width, box.height],
-    tabindex: at.tabIndex, opacity: style.opacity, visibility: style.visibility,
-  }
-}"""
+FOCUSED_ELEMENT = fixture_text("scripts/focused_element.js")
 """Where the focus is; `null` where it has left the page."""
 FOCUS_IS_VISIBLE = """(() => {
   const at = document.activeElement

@@ -18,6 +18,7 @@ from coursebuild.preview.answers import PREFIX, Answers
 from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
 from support.built_sites import Site
+from support.fixture_cases import fixture_text
 from support.lab_page import PAGE, becomes, lab, until, wait_for_condition, watch_page
 from support.scratch_course import Folder
 from support.static_host import Host
@@ -36,24 +37,7 @@ ServiceWorker.prototype.postMessage = function (...message) {
   return post.apply(this, message)
 }
 """
-SLOW_STORE = """
-// The first time that the page opens what is kept takes longer than all that its worker has to do.
-const Channel = window.MessageChannel
-let last
-const done = new Promise((resolve) => { last = resolve })
-window.MessageChannel = class extends Channel {
-  constructor() {
-    super()
-    this.port1.addEventListener('message', ({ data }) => data.end && setTimeout(last, 200))
-  }
-}
-const open = CacheStorage.prototype.open
-let openCalls = 0
-CacheStorage.prototype.open = async function (name) {
-  if (++openCalls === 1) await done
-  return open.call(this, name)
-}
-"""
+SLOW_STORE = fixture_text("scripts/slow_store.js")
 QUIET = """async () => {
   // The worker answers one after the other: when this is answered, everything before it is done.
   const { active } = await navigator.serviceWorker.ready

@@ -31,6 +31,7 @@ import pytest
 from playwright.sync_api import BrowserContext, CDPSession, Page, Route
 
 from support.built_sites import Site
+from support.fixture_cases import fixture_text
 from support.lab_page import (
     PAGE,
     SWING,
@@ -75,20 +76,7 @@ COPY = """(number) => {
 }"""
 
 # Every lab lives as long as it takes to be there, drawn and running.
-COME_AND_GO = """async (times) => {
-  const place = document.getElementById('tried')
-  const script = new URL(place.dataset.script, document.baseURI).href
-  const { mountLab } = await import(script)
-  const picture = () => new Promise(requestAnimationFrame)
-  for (let i = 0; i < times; i++) {
-    const made = await mountLab(place, (key) => key)
-    while (made.view.frame === null) await picture()
-    made.simulation.play()
-    while (made.state !== 'playing') await picture()
-    await picture()
-    made.dispose()
-  }
-}"""
+COME_AND_GO = fixture_text("scripts/come_and_go.js")
 
 
 DRAW = """(n) => new Promise((done) => {

@@ -11,6 +11,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Locator, Page, Route, expect
 
 from support.chromium import OpenAddress
+from support.fixture_cases import fixture_text
 from support.lab_page import becomes, until, wait_for_condition
 from support.reader_page import (
     FALL_PAGE,
@@ -100,18 +101,7 @@ def test_lesson_read_to_its_end_counts_as_read_and_what_the_reader_says_holds(
     expect(page.locator(":focus")).to_have_text("Mark as read")
 
 
-DRAWN_FIRST = """
-const shifts = []
-const inMain = (node) => node?.parentElement?.closest('main')
-const add = ({ sources }) => shifts.push(...sources.map(({ node }) => node).filter(inMain))
-const see = (entries) => entries.forEach(add)
-const observer = new PerformanceObserver((list) => see(list.getEntries()))
-observer.observe({ type: 'layout-shift', buffered: true })
-window.moved = () => {
-  see(observer.takeRecords())
-  return shifts.map((node) => node.outerHTML ?? node.textContent)
-}
-"""
+DRAWN_FIRST = fixture_text("scripts/drawn_first.js")
 MOVED_AFTER_DRAWING = """() => new Promise((done) => {
   const drawn = (then) => requestAnimationFrame(() => requestAnimationFrame(then))
   drawn(() => drawn(() => done(window.moved())))

@@ -13,6 +13,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from support.axe import violations
 from support.built_sites import Site
+from support.fixture_cases import fixture_text
 from support.lab_page import (
     becomes,
     has_been,
@@ -303,19 +304,7 @@ def test_a_page_from_the_right_is_mirrored_and_its_code_is_not(open_page: OpenPa
     assert directions == ["ltr"] * 5
 
 
-POSITIONS = """(selector) => {
-  const box = document.querySelector(selector)
-  const walker = document.createTreeWalker(box, NodeFilter.SHOW_TEXT)
-  const found = []
-  for (let node = walker.nextNode(); node; node = walker.nextNode())
-    for (let at = 0; at < node.length; at++) {
-      const range = document.createRange()
-      range.setStart(node, at)
-      range.setEnd(node, at + 1)
-      found.push([node.data[at], range.getBoundingClientRect().left])
-    }
-  return found
-}"""
+POSITIONS = fixture_text("scripts/positions.js")
 
 
 QUANTITIES = {

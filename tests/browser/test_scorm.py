@@ -16,6 +16,7 @@ import pytest
 from playwright.sync_api import BrowserContext, FrameLocator, Locator, Page, expect
 
 from support.axe import violations
+from support.fixture_cases import fixture_text
 from support.lab_page import becomes, until
 from support.scratch_course import ROOT
 from support.static_host import Host
@@ -23,25 +24,7 @@ from support.static_host import Host
 pytestmark = pytest.mark.browser
 
 RUNTIME = ROOT / "site/node_modules/scorm-again/dist/scorm12.min.js"
-PLATFORM = """<!DOCTYPE html><html lang="en"><title>Platform</title>
-<script src="/runtime.js"></script><script>
-var refused = [];
-var API = new Scorm12API({autocommit: false, logLevel: 5, onLogMessage() {}});
-API.on('LMSInitialize LMSFinish', () => {});
-const set = API.LMSSetValue;
-API.LMSSetValue = (name, value) => {
-  const answer = set.call(API, name, value);
-  if (String(answer) !== 'true') refused.push([name, value, API.LMSGetLastError()]);
-  return answer;
-};
-var kept = JSON.parse(localStorage.getItem('platform') ?? 'null');
-if (kept) { kept.core.entry = 'resume'; API.loadFromJSON(kept, ''); }
-API.cmi.core.student_id = new URLSearchParams(location.search).get('who') ?? 'ada';
-API.on('LMSFinish', () => localStorage.setItem('platform', JSON.stringify(API.cmi)));
-function leave() { document.querySelector('iframe').remove(); }
-</script>
-<body style="margin:0"><iframe title="SCO" src="sco/1.1-one.html"
- style="border:0;width:100vw;height:90vh"></iframe></body></html>"""
+PLATFORM = fixture_text("documents/platform.html")
 
 
 @pytest.fixture(scope="module")

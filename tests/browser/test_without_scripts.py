@@ -14,6 +14,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from support.built_sites import Site
+from support.fixture_cases import fixture_text
 
 pytestmark = pytest.mark.browser
 
@@ -24,28 +25,7 @@ def page(browsers: Mapping[str, Browser]) -> Iterator[Page]:
         yield context.new_page()
 
 
-HIDDEN_CONTENT = """async () => {
-  // What a window of another width shows, what is for paper or for screen readers, a form that
-  // needs a script, and the contents of a document that only a code host shows.
-  const ELSEWHERE =
-    'annotation, template, noscript, nav, form, .graph-narrow, .plot-narrow, .lab-paper, ' +
-    'svg title, svg desc, .prose > div[hidden]'
-  for (const one of document.querySelectorAll('main details')) one.open = true
-  const words = ({ data }) => /\\S/.test(data ?? '')
-  const texts = [...document.querySelectorAll('main *')].filter((one) =>
-    [...one.childNodes].some(words) && !one.closest(ELSEWHERE) &&
-    !(one.checkVisibility({ visibilityProperty: true }) && one.getClientRects().length))
-  const pictures = [...document.querySelectorAll('main img')].filter((one) => one.checkVisibility())
-  for (const one of pictures) {
-    one.loading = 'eager'
-    await one.decode()
-  }
-  const LAB = 'main :is([data-kind="simlab"], [data-kind="mjcf"])'
-  const labs = [...document.querySelectorAll(LAB)].filter((lab) =>
-    !lab.querySelector('img, svg')?.checkVisibility())
-  return [...texts, ...pictures.filter((one) => !one.naturalWidth), ...labs]
-    .map((one) => one.outerHTML.slice(0, 99))
-}"""
+HIDDEN_CONTENT = fixture_text("scripts/hidden_content.js")
 """Texts, pictures and labs that nobody sees."""
 EXPECTED_TEXTS = {
     "progress": "Progress is kept by a script",

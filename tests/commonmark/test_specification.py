@@ -11,8 +11,7 @@ import pytest
 
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from support.formatting import check_formatting
-from support.plain_html import plain_html
+from support.plain_html import check_formatting, plain_html
 
 ROOT = Path(__file__).parents[2]
 SPECIFICATION = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"

@@ -115,7 +115,13 @@ def test_every_command_exists() -> None:
 def test_links_lead_where_the_repository_is_read() -> None:
     other_files = [*ROOT.glob("plugins/*/README.md"), ROOT / "benchmarks/README.md"]
     lost = []
-    for path in [README, *DOCS.rglob("*.md"), *other_files]:
+    for path in [
+        README,
+        ROOT / "CONTRIBUTING.md",
+        *PAGES,
+        DOCS / "reference/rules.md",
+        *other_files,
+    ]:
         for url in links(path):
             name, _, anchor = unquote(url).partition("#")
             target = path.parent / name if name else path
@@ -125,14 +131,30 @@ def test_links_lead_where_the_repository_is_read() -> None:
     assert lost == []
 
 
-def test_every_document_is_a_page_without_mistakes() -> None:
-    """They are pages of the course: the tool checks their links, anchors and everything else."""
-    parsed_course = load(ROOT)
+def test_every_document_is_a_page_of_the_manual_without_mistakes() -> None:
+    """The manual is a course: the tool checks its links, anchors and everything else."""
+    parsed_course = load(DOCS)
     assert parsed_course.value is not None
     pages = {page.path for page in parsed_course.value.pages}
-    documents = {path.relative_to(ROOT).as_posix() for path in DOCS.rglob("*.md")}
-    assert documents - pages == set()
-    assert [d for d in parsed_course.diagnostics if d.span.path in documents] == []
+    names = git("ls-files", "--cached", "--others", "--exclude-standard", "*.md").splitlines()
+    assert set(names) - pages == set()
+    assert parsed_course.diagnostics == ()
+
+
+def git(*words: str) -> str:
+    """What Git says of docs/."""
+    return subprocess.run(["git", *words], cwd=DOCS, capture_output=True, text=True).stdout
+
+
+def test_course_and_manual_link_to_no_placeholder() -> None:
+    """Who owns the repository is said in coursebuild/__init__.py alone."""
+    lines = git(
+        "grep", "-nE", "//[^ ]*(OWNER|/example.org)", ":/*.toml", ":/*.py", ":/*.yml", ":/README.md"
+    )
+    examples = ("tests/", "benchmarks/", "docs/")
+    assert [
+        line for line in lines.splitlines() if not line.removeprefix("../").startswith(examples)
+    ] == []
 
 
 def test_the_picture_is_there_and_small() -> None:
@@ -140,6 +162,14 @@ def test_the_picture_is_there_and_small() -> None:
     data = picture.read_bytes()
     assert data.startswith(b"\x89PNG\r\n\x1a\n")
     assert 20_000 < len(data) < PICTURE_LIMIT
+
+
+@pytest.mark.site
+def test_the_moving_picture_is_what_the_commands_print(tmp_path: Path) -> None:
+    picture = DOCS / "images/refused.svg"
+    script = [sys.executable, DOCS / "moving_picture.py", tmp_path / picture.name]
+    subprocess.run(script, capture_output=True, check=True)
+    assert (tmp_path / picture.name).read_text("utf-8") == picture.read_text("utf-8")
 
 
 @pytest.mark.slow
@@ -200,7 +230,12 @@ def test_modules_that_a_text_names_are_there() -> None:
     name = re.compile(
         rf"`(?:coursebuild[/.])?((?:{folders})(?:/\w+)+\.py|(?:{folders})(?:\.[a-z_]+)+)`"
     )
-    texts = [*(DOCS / "explanation").glob("*.md"), *package.rglob("*.py"), ROOT / "SECURITY.md"]
+    texts = [
+        *(DOCS / "explanation").glob("*.md"),
+        DOCS / "design.md",
+        *package.rglob("*.py"),
+        ROOT / "SECURITY.md",
+    ]
     places = [
         (path, match[1]) for path in texts for match in name.finditer(path.read_text("utf-8"))
     ]

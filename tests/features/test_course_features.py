@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core import features
+from support.fixture_cases import fixture_text
 from support.live_course import Live
 from support.live_course import live as live
 from support.markdown_files import DOCS, fences
@@ -21,40 +22,7 @@ CODE = [fence for fence in fences(DOCS / "how-to/features.md") if fence.kind == 
 EXAMPLES = [fence.text for fence in CODE if not fence.words]
 STEPS = [fence.text for fence in CODE if fence.is_("fragment")]
 
-SHOUT = '''"""Text in capitals."""
-
-from markupsafe import Markup, escape
-
-from coursebuild.core.features import Feature, FenceKind
-from coursebuild.core.text.diagnostics import Parsed
-from coursebuild.core.model import FeatureBlock
-from coursebuild.core.text.rules import Rule
-
-
-class Shout(FeatureBlock, frozen=True):
-    text: str
-
-
-def parse(fence, texts):
-    return Parsed(Shout(fence.span, fence.body.text.strip()))
-
-
-FEATURE = Feature(
-    name="shout",
-    fences=(
-        FenceKind(
-            name="shout",
-            block=Shout,
-            parse=parse,
-            draw=lambda page, block: Markup(f"<p>{escape(block.text.upper())}</p>"),
-            markdown=lambda writer, block: block.text.upper(),
-            index=lambda reader, block: reader.add("text", block.text),
-        ),
-    ),
-    rules=(Rule("shout", "error", "What is shouted is no shout."),),
-    style=".shout { color: red }\\n",
-)
-'''
+SHOUT = fixture_text("scripts/shout_feature.txt")
 LESSON = "## Hello\n\n```shout\nlisten <now>\n```\n"
 PAGE = "public/lessons/1.1-one.html"
 MAP = "content/course.toml"

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from support.archives import entries
+from support.fixture_cases import fixture_text
 from support.markdown_files import DOCS, fences
 from support.scratch_course import GOOD, Folder
 
@@ -42,47 +43,7 @@ def test_example_of_the_docs_writes_the_lessons_as_a_table(course: Folder) -> No
 def test_exporter_may_pack_files_draw_documents_warn_and_find_its_blocks(course: Folder) -> None:
     course.write(
         "features/lessons.py",
-        """
-from coursebuild.core.features import Exporter, Feature, FenceKind
-from coursebuild.core.model import FeatureBlock, document_blocks
-from coursebuild.core.model.results import OutputFile
-from coursebuild.core.text.diagnostics import Parsed, diagnose
-from coursebuild.core.text.rules import Rule
-
-
-class Note(FeatureBlock, frozen=True):
-    text: str
-
-    def summary(self):
-        return self
-
-
-def make(context):
-    for lesson in context.course.lessons:
-        page = context.page(lesson.document)
-        yield OutputFile(f"{lesson.id}.html", page.blocks(page.document.blocks[:1]).encode())
-        yield diagnose("bare", lesson.document.blocks[0].span, f"{lesson.id} has no frame")
-        notes = (b.text for b in document_blocks(lesson.document) if isinstance(b, Note))
-        yield OutputFile(f"{lesson.id}.txt", "".join(notes).encode())
-    yield from (file for path, file in context.site().items() if path.endswith(".css"))
-    yield OutputFile("map.toml", context.read("content/course.toml"))
-
-
-def parse(fence, texts):
-    return Parsed(Note(fence.span, fence.body.text))
-
-
-def text(page, block):
-    return block.text
-
-
-FEATURE = Feature(
-    name="bare",
-    fences=(FenceKind(name="note", block=Note, parse=parse, draw=text, markdown=text),),
-    rules=(Rule("bare", "warning", "A page has no frame."),),
-    exporters=(Exporter(name="bare", summary="s", file="b.zip", mark="map.toml", make=make),),
-)
-""",
+        fixture_text("scripts/exporter_feature.txt"),
     )
     course.write("content/lessons/1.2-two.md", "## Two\n\n```note\nmine\n```\n")
     result = course.main("export", "bare", "--out", "sub/b.zip")

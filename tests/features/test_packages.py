@@ -13,39 +13,14 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from support.axe import violations
+from support.fixture_cases import fixture_text
 from support.scratch_course import GOOD, ROOT, CommandResult, Folder
 from support.static_host import Host
 
 pytestmark = pytest.mark.site
 
 
-LESSON = """## Two ways
-
-~~~tabs
-=== Energy & more
-The energy is $E = m g h$, see [below](#below).
-
-### Inside
-
-=== Code
-```python
-energy = m * g * h
-```
-
-> [!note]
-> In **SI**.
-
-=== Third
-Nothing else.
-~~~
-
-## Below
-
-```mermaid alt="A lesson is read, and <run>"
-flowchart LR
-  read --> run
-```
-"""
+LESSON = fixture_text("documents/packaged.md")
 PAGE = "public/lessons/1.1-one.html"
 
 

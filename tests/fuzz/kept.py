@@ -27,7 +27,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source
 from coursebuild.core.values import DAMAGE, decode, encode
-from coursebuild.features.lab.export.trial import LabExport
+from coursebuild.features.lab.export.script import LabExport
 from coursebuild.features.search.index import IndexPlan, join_slices, read_slices, sort_terms
 from fuzz.texts import PATH, lessons
 from support.random_lessons import KINDS

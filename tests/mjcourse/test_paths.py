@@ -9,6 +9,7 @@ import pytest
 
 import mjcourse
 from mjcourse import ModelNotFoundError
+from support.fixture_cases import fixture_text
 
 PACKAGE = Path(mjcourse.__file__).parents[1]
 ASK = "from mjcourse import model_path\nprint(model_path('box'))\n"
@@ -196,26 +197,7 @@ def test_a_helper_outside_the_course_acts_for_the_script(course: Path, tmp_path:
     assert script["found"] == course / "models" / "box.xml"
 
 
-SCRIPT = """
-import concurrent.futures, multiprocessing, os, sys, threading
-import sibling
-from mjcourse import model_path
-
-def main():
-    found = [model_path("box"), sibling.load(), *map(model_path, ["box"])]
-    os.chdir("/")
-    found.append(model_path("box"))
-    with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        found += pool.map(model_path, ["box", "box"])
-    for method in multiprocessing.get_all_start_methods():
-        with multiprocessing.get_context(method).Pool(1) as pool:
-            found += pool.map(model_path, ["box"])
-            found += pool.map(sibling.load_named, ["box"])
-    print(*found)
-
-if __name__ == "__main__":
-    main()
-"""
+SCRIPT = fixture_text("scripts/paths.txt")
 SIBLING = """
 from mjcourse import model_path
 

@@ -8,7 +8,16 @@ from collections.abc import Callable
 import mujoco
 import pytest
 
-from coursebuild.numerics.costs import MIN_ROUNDS, FrontPoint, Job, costs, front, time_jobs, verdict
+from coursebuild.numerics.costs import (
+    MIN_ROUNDS,
+    FrontPoint,
+    Job,
+    costs,
+    front,
+    mark_luck,
+    time_jobs,
+    verdict,
+)
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, WorkPrecisionRow
 from coursebuild.numerics.scene import scenes
@@ -180,7 +189,7 @@ def test_errors_of_zero_and_nothing_at_all() -> None:
 
 OWN_BEST = "no other setting is cheaper without being less accurate"
 OWN_FAILS = "the scene does not run under its own setting, Euler at 2 ms: the state is not finite"
-ERROR_SEEN = "a learner would notice its error, which is 2.5 times what can be seen"
+ERROR_SEEN = "its error can be seen: it is 2.5 times what an eye can tell"
 
 
 @pytest.mark.parametrize(
@@ -189,7 +198,7 @@ ERROR_SEEN = "a learner would notice its error, which is 2.5 times what can be s
         (
             ((1, 1e-3), (4, 1e-7)),
             None,
-            f"{OWN_BEST}; a learner would not notice its error, which is 0.001 of what can be seen",
+            f"{OWN_BEST}; its error cannot be seen: it is 0.001 of what an eye can tell",
         ),
         (
             ((1, 2.5), (0.94, 2.5e-6)),
@@ -223,4 +232,75 @@ def test_a_verdict_where_an_error_is_not_known_or_nothing_was_timed() -> None:
     judgement = verdict(front([row(own=True, cost=None, seen=0.5)]), [False])
     assert judgement.text.startswith(
         "nothing was timed, so that no setting can be called better; a "
+    )
+
+
+def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:
+    """Rows of Euler at 4, 2, 1, … ms with these errors, each twice as dear as the one before."""
+    rows = [
+        row("Euler", 0.004 / 2**n, cost=2.0 ** (n - own_number), seen=error, own=n == own_number)
+        for n, error in enumerate(errors)
+    ]
+    return mark_luck(rows, {"Euler": 0.0025}, 1e-6)
+
+
+def test_errors_that_do_not_fall_or_belong_to_no_stable_run_are_luck() -> None:
+    assert [bool(row.lucky) for row in ladder(8e-3, 4e-3, 2e-3, 1e-3)] == [
+        True,
+        False,
+        False,
+        False,
+    ]
+    rows = ladder(8e-3, 1e-4, 2e-3, 1e-3)
+    assert rows[0].lucky == "it is beyond its largest stable timestep, 2.5 ms"
+    assert rows[1].lucky == "its error rises with shorter timesteps"
+    assert [row.front for row in front(rows)] == [False, False, True, True]
+    # Below the floor of the reference nothing rises.
+    assert [bool(row.lucky) for row in ladder(8e-3, 1e-7, 1e-6)] == [True, False, False]
+
+
+def test_fewer_iterations_that_err_less_are_luck() -> None:
+    solving = {"solver": "Newton", "cone": "elliptic"}
+    few, many = (
+        row("Euler", 0.002, iterations=n, seen=error, cost=cost, own=n == 100, **solving)
+        for n, error, cost in ((1, 1e-4, 0.8), (100, 1.4e-4, 1.0))
+    )
+    few, many = front(mark_luck((few, many), {}, 0.0))
+    assert few.lucky == "its error rises with more iterations" and not few.front and many.front
+    judgement = verdict((few, many), [False, False])
+    assert judgement.on_front and judgement.text.startswith("no other setting is cheaper")
+
+
+def test_verdicts_claim_only_what_holds() -> None:
+    rows = front(ladder(8e-3, 4e-3, 2e-3, 1e-3, own_number=3)[1:])
+    assert verdict(rows, [False] * 3).on_front
+    small = (
+        row("Euler", 0.002, cost=1.0, seen=1e-3, own=True),
+        row("implicit", 0.002, cost=0.93, seen=0.94e-3),
+    )
+    text = verdict(front(small), [False] * 2).text
+    assert text.startswith("no difference that holds: implicit at 2 ms takes 0.93 of the time")
+    large = (small[0], row("RK4", 0.008, cost=0.5, seen=1e-6))
+    assert verdict(front(large), [False] * 2).better == 1
+    assert "errs 1e+03 times less, or more: " in verdict(front(large), [False] * 2, 1e-6).text
+    judgement = verdict(
+        front(large), [False] * 2, holds=lambda setting: setting.integrator != "RK4"
+    )
+    assert judgement.better is None and "no difference that holds" in judgement.text
+
+
+def test_where_the_own_setting_is_lost_the_others_are_weighed() -> None:
+    rows = rows_with_front(None, (2, 1e-5), (0.5, 1e-3))
+    text = verdict(rows, [None] * 3).text
+    assert "is the most accurate that does, RK4 at 10 ms the cheapest, at 0.25 of its cost" in text
+
+
+def test_chaotic_scene_is_judged_by_how_long_runs_last() -> None:
+    rows = (
+        row("Euler", 0.002, cost=1.0, seen=None, own=True, parted=2.4),
+        row("RK4", 0.002, cost=4.0, seen=None, parted=12.4),
+    )
+    text = verdict(rows, [True, True]).text
+    assert text == (
+        "the motion is chaotic: it parts from the exact one at 2.4 s, under RK4 at 2 ms at 12.4 s"
     )

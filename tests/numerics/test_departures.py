@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import BenchTable
 from coursebuild.numerics.reports.case_report import BoundaryLine
-from coursebuild.numerics.reports.departures import Departure, case_departures, scene_departures
+from coursebuild.numerics.reports.records import Departure, case_departures, scene_departures
 from coursebuild.numerics.reports.scene_report import (
     FigureLine,
     FittedOrder,
@@ -127,11 +127,14 @@ def test_no_error_is_known_better_than_the_worse_of_both_references() -> None:
 
 
 def test_settings_and_scenarios_that_come_and_go() -> None:
-    departures = departures_between(scenario([row("Euler")]), scenario([row("RK4", solver="CG")]))
+    new = scenario([row("RK4", solver="CG")])
+    departures = departures_between(scenario([row("Euler", evaluations=500)]), new)
     assert [(d.setting, d.figure, d.recorded, d.measured) for d in departures] == [
         ("Euler at 2 ms", "setting", "there", "nothing"),
         ("RK4 at 2 ms, CG", "setting", "nothing", "there"),
     ]
+    (departure,) = departures_between(scenario([row("Euler")]), new)
+    assert departure.setting == "Euler at 2 ms", "recorded before there was more"
     departures = departures_between(scenario([]), scenario([], name="other"))
     assert [(d.where, d.recorded, d.measured) for d in departures] == [
         ("swing", "there", "nothing"),

@@ -14,6 +14,7 @@ from coursebuild.numerics.cases import measure
 from coursebuild.numerics.detector import Peaks, RunStatus, driving_force, judge
 from coursebuild.numerics.problem import Integrator, Scenario, Setup
 from coursebuild.numerics.problems import all_problems
+from coursebuild.numerics.scene import thickness
 from coursebuild.numerics.simulation import advance, compile_model, simulate
 from coursebuild.numerics.stability import attempt
 
@@ -83,6 +84,19 @@ def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:
     assert run.judgement.status is RunStatus.DIVERGED
     assert len(run.judgement.reasons) == 1
     assert "as deep in each other" in run.judgement.reasons[0]
+
+
+def test_bodies_deep_in_each_other_are_named_with_the_time() -> None:
+    text = """<mujoco><worldbody><body name="torso"><geom name="t" size=".2"/></body>
+      <body name="leg" pos="0 0 .3"><joint type="slide" axis="0 0 1"/><geom size=".02" mass="9"
+      contype="0" conaffinity="0"/><body>
+      <geom size=".05" mass="0" solref=".5 1" priority="1"/></body></body>
+      </worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    run = simulate(Setup(scenario=Scenario(0.5, 0.1)), model, thickness(model))
+    (reason,) = run.judgement.reasons
+    assert reason.startswith("torso and a part of leg lie ")
+    assert " times as deep in each other as they may, at 0." in reason and reason.endswith(" s")
 
 
 def test_no_error_is_given_for_a_run_that_was_lost() -> None:

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import BenchTable
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.departures import scene_departures
+from coursebuild.numerics.reports.records import scene_departures
 from coursebuild.numerics.reports.report_plots import sweep_svg
 from coursebuild.numerics.reports.scene_report import SweepReport, SweepRow, shown_figures
 from coursebuild.numerics.scene import SceneError, scenes

@@ -188,6 +188,32 @@ def test_chaos_has_a_horizon_and_then_statistics() -> None:
     assert own_row.energy_drift is not None
 
 
+TWO_POINTS = """\
+<mujoco>
+  <option timestep="0.0005"><flag contact="disable"/></option>
+  <worldbody><body><joint axis="0 1 0"/>
+    <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/>
+    <body pos="0 0 -1"><joint axis="0 1 0"/>
+      <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/></body></body></worldbody>
+  <keyframe><key qpos="2 0.5"/></keyframe>
+</mujoco>
+"""
+
+
+@pytest.mark.slow
+def test_chaotic_settings_have_the_horizons_that_extended_precision_gives() -> None:
+    """In 34 digits the angles are 0.1 apart at 2.4 s under Euler, and at 13.4 s under RK4."""
+    toml = '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 16\nsample = 0.02\n'
+    toml += "timesteps = [0.0005]\n"
+    (report,) = measure(mujoco.MjModel.from_xml_string(TWO_POINTS), toml, quick=True)
+    horizons = {row.setting.integrator: row.parted for row in report.rows}
+    for name in ("Euler", "implicit", "implicitfast", "discrete"):
+        assert horizons[name] == pytest.approx(2.4, abs=0.05)
+    assert horizons["RK4"] == pytest.approx(13.4, abs=0.3)
+    assert all(row.seen is None and row.position is None for row in report.rows)
+    assert "it parts from the exact one at 2.42 s, under RK4 at 500 µs at 13" in report.verdict.text
+
+
 BLOCK = """\
 <mujoco>
   <option timestep="0.002" gravity="2 0 -9.6"/>
@@ -209,6 +235,7 @@ def test_a_block_that_sticks_creeps_alike_in_each_measurement() -> None:
     assert repeated == (report,)
     assert (report.reference, report.smooth, report.orders) == ("self", False, ())
     assert report.notes == (
+        "no bit of the motion is other, and no time saved, with 4 iterations",
         "errors follow no power of the timestep, because of contact",
         "beyond 0.01 s refsafe softens constraints: stable, but another model",
     )

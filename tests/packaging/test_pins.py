@@ -11,7 +11,12 @@ from packaging.utils import canonicalize_name
 
 EXACT = re.compile(r"\d+\.\d+\.\d+")
 LOCKED = re.compile(r"^(\S+ ?;?.*?) \\\n    --hash=sha256:[0-9a-f]{64}", re.MULTILINE)
-LOCKS = ("requirements.txt", "requirements-build.txt", "requirements-dev.txt")
+LOCKS = (
+    "requirements.txt",
+    "requirements-build.txt",
+    "requirements-course.txt",
+    "requirements-dev.txt",
+)
 
 
 def read_lock(root: Path, name: str) -> Iterator[Requirement]:
@@ -54,7 +59,7 @@ def test_packages_are_asked_for_between_two_bounds(pyproject: dict) -> None:
 def test_locks_hold_what_is_declared_and_what_is_installed(root: Path, pyproject: dict) -> None:
     """After a change of pyproject.toml: make lock."""
     all_versions = versions(root, "requirements-dev.txt")
-    for name in LOCKS[:2]:
+    for name in LOCKS[:3]:
         assert versions(root, name).items() <= all_versions.items()
     for requirement in map(Requirement, declared_requirements(pyproject)):
         version = all_versions[canonicalize_name(requirement.name)]

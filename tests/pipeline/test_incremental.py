@@ -91,6 +91,9 @@ def test_an_edit_draws_the_pages_that_show_it(course: Course) -> None:
         ("1.2", "Prose", "By [](lesson:1.1#eq:one). Prose", {second, first}),
         ("1.1", "Other prose", equation, {first, second}),  # their number has changed
         ("1.1", "E = 1\n$$ {#eq:one}", "E = 11\n$$ {#eq:one}", {first}),
+        ("1.1", "Prose", "Prose\n\n```bash {#lst:run}\nls\n```\n\n", {first}),
+        ("1.2", "Prose", "By [](lesson:1.1#lst:run). Prose", {second}),
+        ("1.1", "```bash {#lst", "```bash {#lst:one}\nls\n```\n\n```bash {#lst", {first, second}),
         ("1.2", "> [!note]", QUIZ + "> [!note]", {second, *lists}),
         ("1.2", "Why?", "Why not?", {second}),  # its key is the same
         ("1.2", '"why"', '"why-not"', {second, *lists}),

@@ -348,6 +348,9 @@ TEXT = "".join(
         ' "feedback": ["![f](f.png)", ""]}]}\n```\n\n',
         "```io\ninput: [i](lesson:3.3)\nprocess: `5`{out}\noutput: o\n```\n\n",
         "    indented\n\n",
+        "Table: *So* {#tab:a}\n\n| a |\n| - |\n| `6`{out} |\n\n",
+        "By [](#tab:a), [](lesson:1.2#fig:a).\n\n",
+        "Figure: ![a](p.png) It. {#fig:a}\n\n```bash {#lst:a}\nls\n```\n\n",
         "$$\n\\frac{a}{b}\n$$\n\n",
         "***\n\n",
     ]
@@ -359,6 +362,8 @@ VISIBLE_CHANGES = [
     ('href="#gone"', 'href="#raw"'),
     ("[thing]{term}", "[thing]{term=sing}"),
     ("{#eq:a}", "{#eq:b}"),
+    ("{#tab:a}", "{#tab:b}"),
+    ("{#lst:a}", "{#lst:b}"),
     ("print(2)", "print(3)"),
     ("| x | 1 |", "| x | 2 |"),
     ("<mujoco/>", "<mujoco />"),

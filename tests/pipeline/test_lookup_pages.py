@@ -31,7 +31,17 @@ By [](#eq:tensor) and [it](term:inertia-tensor), $\\dot q${symbol="rate <i>" uni
 
 $$\\dot q = 1 \\tag{*}$$ {#eq:rate}
 
-and $$a$$ {#eq:a}.
+and $$a$$ {#eq:a}. By [](#lst:run) and [](#tab:sizes).
+
+Table: Sizes & *names*. {#tab:sizes}
+
+| a |
+| --- |
+| b |
+
+```bash {#lst:run}
+ls
+```
 
 ### Detail
 
@@ -42,7 +52,7 @@ A $w${symbol="width"}.
 SECOND = """## Uses
 
 The [tensor](term:inertia-tensor), the [](lesson:1.1#eq:tensor), the [](lesson:1.1#eq:rate), the
-[rate](lesson:1.1#eq:rate) and $V${symbol="voltage"}, $z$.
+[rate](lesson:1.1#eq:rate) and $V${symbol="voltage"}, $z$. See [](lesson:1.1#tab:sizes).
 
 > [!note] Note
 > An [Äther]{term} is no thing; see [here](lesson:1.1).
@@ -137,6 +147,17 @@ def test_formulas_have_ids_numbers_and_references(site: dict[str, str]) -> None:
     assert '<a href="1.1-one.html#eq%3Atensor">(1) of Lesson 1.1</a>' in second
     assert '<a href="1.1-one.html#eq%3Arate">(*) of Lesson 1.1</a>' in second
     assert '<a href="1.1-one.html#eq%3Arate">rate</a>' in second
+
+
+def test_tables_and_listings_have_numbers_of_their_lesson(site: dict[str, str]) -> None:
+    first, second = site["lessons/1.1-one.html"], site["lessons/1.2-two.html"]
+    caption = '<span class="numbered">Table 1.1.1</span> Sizes &amp; <em>names</em>.'
+    assert f'<figure class="captioned" id="tab:sizes">\n<figcaption>{caption}</figcaption>' in first
+    assert '<span class="numbered">Listing 1.1.1</span></figcaption>' in first
+    assert (
+        'By <a href="#lst:run">Listing 1.1.1</a> and <a href="#tab:sizes">Table 1.1.1</a>' in first
+    )
+    assert '<a href="1.1-one.html#tab%3Asizes">Table 1.1.1</a>' in second
 
 
 def test_the_index_of_symbols(site: dict[str, str]) -> None:

@@ -115,7 +115,24 @@ def gone_for_a_moment(path: Path, text: str) -> None:
     path.write_text(text)
 
 
-SAVES = (in_place, in_pieces, with_a_backup, by_renaming, gone_for_a_moment)
+def as_vim(path: Path, text: str) -> None:
+    probe = path.with_name("4913")
+    probe.touch()
+    probe.unlink()
+    path.with_name(f".{path.name}.swp").touch()
+    path.with_name(f"{path.name}.swx").touch()
+    with_a_backup(path, text)
+
+
+def as_sed(path: Path, text: str) -> None:
+    """By a file whose name is like any other, which is there for a moment."""
+    fresh = path.with_name("sedA1b2C3")
+    fresh.touch()
+    fresh.write_text(text)
+    fresh.rename(path)
+
+
+SAVES = (in_place, in_pieces, with_a_backup, by_renaming, gone_for_a_moment, as_vim, as_sed)
 
 
 def test_saves_of_every_editor_and_a_switched_branch_count_once_each(make: Make) -> None:
@@ -341,6 +358,41 @@ def test_output_is_accepted(make: Make) -> None:
         assert folder.read(folder.lesson()) == before.replace(b"hello 3\r", b"hello 3.14159\r")
         events.wait_until_settled()
         assert events.news["outputs"][0]["state"] == "verified"
+
+
+def test_several_offers_are_accepted_at_once_or_not_at_all(make: Make) -> None:
+    lesson = "## Two\n\n" + block("a.py", "print(1)", "2") + block("b.py", "print(3)", "4")
+    folder = make(lesson)
+    with serve_preview(folder) as preview, preview.events() as events:
+        events.until(lambda page: sum(bool(o.get("offer")) for o in page.news["outputs"]) == 2)
+        ids = [output["offer"] for output in events.news["outputs"]]
+        for bad_ids in ("", " ", f"{ids[0]} {'0' * 24}"):
+            assert preview.accept_offer(bad_ids)[0] == 409
+        assert folder.text(folder.lesson()) == lesson
+        assert preview.accept_offer(" ".join(ids)) == (200, {"message": ""})
+        changed = lesson.replace("```text\n2\n", "```text\n1\n").replace(
+            "```text\n4\n", "```text\n3\n"
+        )
+        assert folder.text(folder.lesson()) == changed
+        events.wait_until_settled()
+
+
+def test_what_runs_is_told_with_the_time_that_it_took(make: Make) -> None:
+    slow = "import time\ntime.sleep(1.2)\nprint(1)"
+    folder = make("## Slow\n\n" + block("slow.py", slow, "1"))
+    assert folder.run("check").status == 0
+    with serve_preview(folder) as preview, preview.events() as events:
+        events.wait_until_settled()
+        assert events.news["running"] == []
+        folder.replace(folder.lesson(), "1.2", "1.3")
+        events.until(lambda page: bool(page.news["running"]))
+        (script,) = events.news["running"]
+        assert (script["path"], 1.0 < script["last"] < 100) == ("examples/slow.py", True)
+        assert abs(events.hello["now"] - script["began"]) < 1000  # by the same clock
+        events.wait_until_settled()
+        assert events.news["running"] == []
+        line = preview.wait_for_line("running examples/slow.py (")
+        assert line.endswith(" s the last time)")
 
 
 def test_what_changed_since_is_not_written(make: Make) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from support.png_files import read_png
+from support.model_files import read_png
 
 ROOT = Path(__file__).resolve().parents[2]
 ICON = (ROOT / "templates" / "icon.svg").read_text(encoding="utf-8")

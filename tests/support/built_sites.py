@@ -22,7 +22,7 @@ from support.static_host import Host
 _KIND = re.compile(rb'<body class="on-([a-z-]+)"')
 
 
-_BASES = {"real": "/mujoco-course/", "full": "/constructs/", "nasty": "/c/", "arabic": "/c/"}
+_BASES = {"full": "/constructs/", "nasty": "/c/", "arabic": "/c/"}
 """The paths of the base addresses in the courses' maps."""
 
 

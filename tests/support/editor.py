@@ -119,9 +119,11 @@ class Editor:
         params = types.CompletionParams(self.identifier(path), self.place(path, needle))
         return {i.label: i for i in self.request("completion", params)}
 
-    def actions(self, path: str, needle: str) -> dict[str, types.CodeAction]:
+    def actions(
+        self, path: str, needle: str, only: list[types.CodeActionKind] | None = None
+    ) -> dict[str, types.CodeAction]:
         place = self.place(path, needle)
-        context = types.CodeActionContext([])
+        context = types.CodeActionContext([], only)
         params = types.CodeActionParams(self.identifier(path), types.Range(place, place), context)
         return {a.title: a for a in self.request("code_action", params)}
 

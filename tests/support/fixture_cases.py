@@ -2,7 +2,8 @@
 
 Entry points: `check_cases(path, render)`; `read_cases(path)`, and `rewrite(path, cases)`, which
 writes them again. Lines before a title that are empty or begin with `#` are for readers of the
-file. `check_text(path, text)` is for a file that only holds an expected text.
+file. `check_text(path, text)` is for a file that only holds an expected text, `fixture_text` for
+one that only holds an input, such as a whole lesson.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
+FIXTURES = Path(__file__).parents[1] / "fixtures"
 _LINE = re.compile(r"[^\n]*\n|[^\n]+")
 
 
@@ -86,6 +88,11 @@ def check_text(path: Path, text: str, *, rewriting: bool) -> None:
     if rewriting:
         path.write_text(text, encoding="utf-8", newline="\n")
     assert text == path.read_text(encoding="utf-8"), path.name
+
+
+def fixture_text(name: str) -> str:
+    """The text of a file in `tests/fixtures`, with its line ends."""
+    return (FIXTURES / name).read_bytes().decode()
 
 
 def text_lines(text: str) -> list[str]:

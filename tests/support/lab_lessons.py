@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import GOOD, Folder
 
 BALL = """<mujoco><worldbody><body name="ball" pos="0 0 1"><freejoint/><geom size="0.1" mass="1"/>
@@ -33,28 +34,4 @@ def run_check(folder: Folder, *names: str, status: int | None = None) -> dict[st
     return {"status": result.status, **json.loads(result.out)}
 
 
-RIGHT = '''{
-  "title": "All of it", "model": "ball", "key": "start", "camera": {"azimuth": 30},
-  "toggles": ["frames"], "seed": 3, "stopAt": 1, "trail": "tip",
-  "setup": "ctx.n = 0; ctx.r = lib.random()",
-  "controller": "ctx.n += 1; data.qfrc_applied[2] = ctx.lift",
-  "controls": [
-    {"label": "lift", "unit": "N", "min": 0, "max": 9, "value": 1, "param": "lift"},
-    {"label": "mass", "min": 0.5, "max": 2, "value": 1, "set": "model.body_mass[1]"},
-    {"label": "g", "type": "select", "options": [["earth", -9.81], ["moon", -1.6]],
-     "set": "model.opt.gravity[2]", "reset": true},
-    {"label": "kick", "type": "button", "run": "data.qvel[0] = 1"}
-  ],
-  "readouts": [{"label": "height", "expr": "data.qpos[2]"},
-               {"label": "state", "expr": "sim.time < 0.5 ? 'early' : 'late'"}],
-  "plots": [{"ylabel": "z (m)", "traces": [{"label": "z", "expr": "data.qpos[2]"}]}],
-  "expect": [
-    {"t": 0, "expr": "data.qpos[2]", "min": 2, "max": 2},
-    {"t": 1, "expr": "ctx.n", "min": 500, "max": 500},
-    {"after": "kick", "t": 0.5, "expr": "data.qpos[0]", "min": 0.4999, "max": 0.5001},
-    {"after": {"g": -1.6}, "t": 0.5, "expr": "data.qpos[2]", "min": 1.9, "max": 2},
-    {"after": {"g": -1.6, "lift": 0}, "t": 0.5, "expr": "data.qpos[2]", "min": 1.79, "max": 1.81},
-    {"after": [{"g": -1.6}, "kick"], "t": 0.5, "expr": "data.qpos[0]", "min": 0.499, "max": 0.501},
-    {"after": ["kick", {"g": -1.6}], "t": 0.5, "expr": "data.qpos[0]", "min": 0, "max": 0}
-  ]
-}'''  # fmt: skip
+RIGHT = fixture_text("documents/right_lab.json")  # fmt: skip

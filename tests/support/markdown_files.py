@@ -19,7 +19,12 @@ from markdown_it.token import Token
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-PAGES = sorted(path for path in DOCS.rglob("*.md") if path.name != "rules.md")
+PAGES = sorted(
+    path
+    for folder in ("", "how-to", "reference", "explanation")
+    for path in (DOCS / folder).glob("*.md")
+    if path.name != "rules.md"
+)
 """The pages written by hand; the page of the rules is generated."""
 
 

@@ -1,9 +1,11 @@
-"""Files that models are made of."""
+"""Files that models are made of, and pictures as PNG, read back by Pillow."""
 
 from __future__ import annotations
 
 import io
 
+import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
@@ -15,3 +17,10 @@ def png(level: int = 0) -> bytes:
     data = io.BytesIO()
     Image.frombytes("RGB", (4, 4), pixels).save(data, "PNG")
     return data.getvalue()
+
+
+def read_png(data: bytes) -> NDArray[np.uint8]:
+    """Rows of pixels in red, green, blue and opacity; there is nothing else in the file."""
+    with Image.open(io.BytesIO(data), formats=["PNG"]) as picture:
+        assert picture.info == {}, "no time, no text"
+        return np.asarray(picture.convert("RGBA"))

@@ -1,12 +1,9 @@
-"""Documents as CommonMark's own HTML, without a course and without what is only ours.
-
-Entry points: `plain_html`, a document; `plain_blocks`, some blocks; `PlainWriter`, which
-knows no course.
-"""
+"""Documents as plain HTML, and what must stay the same when a text is formatted."""
 
 from __future__ import annotations
 
 import html
+import json
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -17,6 +14,13 @@ from markupsafe import Markup
 from coursebuild.core import model
 from coursebuild.core.pages.markup import HtmlWriter, SpecialBlock
 from coursebuild.core.pages.strings import Strings, parse_strings
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.diagnostics import Parsed
+from coursebuild.core.text.source import Source
+from coursebuild.features.authoring.format import format_document
+from coursebuild.features.lab.model import Lab
+from coursebuild.features.quiz.model import Quiz
+from support.random_lessons import KINDS
 
 ENGLISH = Path(__file__).parents[2] / "templates/strings/en.toml"
 WORDS = parse_strings(ENGLISH.read_text("utf-8"))
@@ -67,7 +71,7 @@ class PlainWriter(HtmlWriter):
         anchor = getattr(target, "anchor", None)
         return f"{SCHEMES[type(target)]}:{name}" + (f"#{anchor}" if anchor else "")
 
-    def figure(self, image: model.Image, caption: Markup) -> Markup:
+    def figure(self, block: model.Paragraph, image: model.Image, caption: Markup) -> Markup:
         return Markup(f"<p>{self.inlines((image,))}\n{caption}</p>\n")
 
     def code(self, language: str, text: str) -> Markup:
@@ -92,3 +96,27 @@ class PlainWriter(HtmlWriter):
                 return self.render_blocks(block.child_blocks())
             case _:
                 return self.code(type(block).__name__, block.code.text)
+
+
+def format_text(text: str, width: int, lesson: bool = True) -> Parsed[str]:
+    source = Source("content/lessons/1.1-a.md", text)
+    return format_document(source, KINDS, lesson=lesson, width=width)
+
+
+def check_formatting(text: str, width: int, lesson: bool) -> None:
+    """Check that a reader sees the same, and that formatting once more changes nothing."""
+    result = format_text(text, width, lesson)
+    if result.diagnostics:
+        assert result.value == text
+    else:
+        assert reader_view(result.value, lesson) == reader_view(text, lesson)
+        assert format_text(result.value, width, lesson) == Parsed(result.value)
+
+
+def reader_view(text: str, lesson: bool) -> list[object]:
+    """Return the page as HTML, with white space folded outside of code, and the JSON in fences."""
+    document = parse_document(Source("content/lessons/1.1-a.md", text), KINDS, lesson=lesson).value
+    parts = re.split(r"(<pre.*?</pre>)", str(plain_html(document)), flags=re.DOTALL)
+    html = [part if part.startswith("<pre") else " ".join(part.split()) for part in parts]
+    fences = [b.span.text.split("\n", 1)[1] for b in document.blocks if isinstance(b, Lab | Quiz)]
+    return [html, *(json.loads(text[:-3]) for text in fences if text.startswith("{"))]

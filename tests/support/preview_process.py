@@ -117,7 +117,7 @@ class Events:
 
     def __init__(self, stream: Iterator[tuple[str, str]]) -> None:
         self.stream = stream
-        self.hello: dict[str, str] = {}
+        self.hello: dict[str, Any] = {}
         self.state = ""
         self.pages = 0
         self.news: dict[str, Any] = {}

@@ -47,60 +47,12 @@ from coursebuild.core.text.source import Source
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.site import Site
+from support.fixture_cases import fixture_text
 from support.made_courses import documents_of, with_documents
 
 ROOT = Path(__file__).parents[2]
 
-MAP = r"""
-[course]
-title = "Bodies & <axes>"
-summary = "A \"short\" course."
-language = "en"
-base_url = "https://example.org/course/"
-repository = "https://example.org/repo"
-licence = "CC-BY-4.0"
-engine = "3.14.0"
-
-[[page]]
-id = "about"
-title = "About"
-file = "content/pages/about.md"
-
-[[level]]
-id = "0"
-title = "Start"
-summary = "First things."
-
-[[level.lesson]]
-id = "0.1"
-slug = "falling"
-title = "Falling"
-status = "complete"
-summary = "A body falls."
-aliases = ["free fall", "drop"]
-objectives = ["Say what falls", "Measure it"]
-minutes = 20
-
-[[level]]
-id = "1"
-title = "More"
-
-[[level.lesson]]
-id = "1.1"
-slug = "spinning"
-title = "Spinning <fast>"
-status = "draft"
-prerequisites = ["0.1"]
-
-[[level.lesson]]
-id = "1.2"
-slug = "later"
-title = "Later"
-status = "planned"
-summary = "Comes later."
-prerequisites = ["1.1"]
-minutes = 1
-"""
+MAP = fixture_text("documents/rendered_course.toml")
 
 BOX = '<mujoco model="box">\n  <worldbody/>\n</mujoco>\n'
 

@@ -23,6 +23,7 @@ import msgspec
 from msgspec import Struct
 
 from coursebuild.core.model.results import Outcome, ScriptRun
+from support.fixture_cases import fixture_text
 
 SECRET = "hush"
 """What nobody in the sandbox may print."""
@@ -51,59 +52,7 @@ CALLS = {
     }.items()
 }
 """The numbers of system calls on this machine."""
-_HELPERS = """
-import ctypes, fcntl, glob, mmap, os, platform, resource, signal, socket, struct, sys
-
-libc = ctypes.CDLL(None, use_errno=True)
-
-
-def call(name, *arguments):
-    if name in CALLS:
-        arguments, function = (CALLS[name], *arguments), libc.syscall
-    else:
-        function = libc[name] if isinstance(name, str) else libc.syscall
-        arguments = arguments if isinstance(name, str) else (name, *arguments)
-    kinds = {int: ctypes.c_long}
-    result = function(*(kinds.get(type(a), lambda a: a)(a) for a in arguments))
-    if result == -1:
-        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
-    return result
-
-
-def attempt(what):
-    try:
-        print(ascii(what()))
-    except BaseException as error:
-        print(type(error).__name__, error)
-
-
-def by_old_interrupt():
-    # getpid as a 32-bit program calls it: mov eax, 20; int 0x80; ret
-    if platform.machine() != "x86_64":
-        return -38
-    code = mmap.mmap(-1, 4096, flags=mmap.MAP_PRIVATE, prot=7)
-    code.write(b"\\xb8\\x14\\0\\0\\0\\xcd\\x80\\xc3")
-    return ctypes.CFUNCTYPE(ctypes.c_int)(ctypes.addressof(ctypes.c_char.from_buffer(code)))()
-
-
-def say(path, kind, text=b"x"):
-    with socket.socket(socket.AF_UNIX, kind) as unix:
-        unix.connect(path)
-        unix.send(text)
-
-
-def say_by_pair(path, kind):
-    for end in socket.socketpair(socket.AF_UNIX, kind):
-        end.sendto(b"x", path)
-
-
-def poke(path, flags):
-    os.write(os.open(path, flags | os.O_NONBLOCK), b"x")
-
-
-def peek(path):
-    return os.read(os.open(path, os.O_RDONLY | os.O_NONBLOCK), 9)
-"""
+_HELPERS = fixture_text("scripts/probe_helpers.txt")
 """What a script defines that tries the attempts."""
 
 

@@ -10,6 +10,7 @@ from coursebuild.core.model.scenarios import Declarations, Keep
 from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.costs import Clock
+from coursebuild.numerics.pruning.candidates import SETTINGS
 from coursebuild.numerics.pruning.comparison import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
 from coursebuild.numerics.pruning.readers import read_code
@@ -18,7 +19,6 @@ from coursebuild.numerics.reports.diet_report import Finding
 from support.bench_reports import MACHINE
 
 PATH = "models/a.xml"
-SETTINGS = ("cone", "island", "sleep", "solver")
 PENDULUM = """<body name="bob" pos="0 0 1"><joint name="pivot" axis="0 1 0"/>
       <geom name="ball" size=".05" pos=".3 0 0"/></body>"""
 

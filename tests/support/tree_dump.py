@@ -22,7 +22,7 @@ from coursebuild.core.model import (
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Excerpt, Span
 
-HIDDEN_FIELDS = {"span", "children", "blocks", "items", "header", "rows"}
+HIDDEN_FIELDS = {"span", "children", "blocks", "items", "header", "rows", "caption"}
 
 
 def format_span(span: Span) -> str:
@@ -65,6 +65,9 @@ def _node(node: Block | Inline | ListItem, depth: int) -> Iterator[str]:
             for cell in cells:
                 yield f"{indent}  Cell {format_span(cell.span)} {cell.text.text!r}"
                 yield from _nodes(cell.children, depth + 2)
+        if node.caption:
+            yield f"{indent}  caption:"
+            yield from _nodes(node.caption, depth + 2)
         return
     for name in ("title", "caption", "input", "process", "output"):
         content = getattr(node, name, None)

@@ -14,6 +14,7 @@ Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, mo
 
 from __future__ import annotations
 
+import contextlib
 import re
 import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -34,7 +35,15 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.model.scenarios import DURATION, MOST_STEPS, DeclaredSweep
 from coursebuild.core.registry import features, kind_of_block
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, nearest
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Edit,
+    Fix,
+    Note,
+    diagnose,
+    did_you_mean,
+    nearest,
+)
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 INCLUDED_ROOT = re.compile(r"\s*+(?:<(?:\?.*?\?|!--.*?--)>\s*+)*+<mujocoinclude\b", re.DOTALL)
@@ -137,8 +146,15 @@ def diagnose_model(
     if result.timeout:
         return _diagnose_timeout(span, f"the model `{model.name}`", result)
     message = f"the model `{model.name}` does not compile: {readable(result.error)}"
-    notes = _note_opening(model.source.excerpt(), 0, result.error)
-    return diagnose("model-error", span, message, notes=notes)
+    notes, help = _note_opening(model.source.excerpt(), 0, result.error), ""
+    text, closing = model.source.text, "</mujoco>\n"
+    if closing.rstrip() not in text:
+        with contextlib.suppress(expat.ExpatError):
+            closing = closing if text.endswith("\n") else f"\n{closing}"
+            expat.ParserCreate().Parse(f"{text}{closing}".encode(), True)
+            edit = Edit(model.source.span(len(text), len(text)), closing)
+            help = Fix("end it with `</mujoco>`", edits=(edit,), safe=True)
+    return diagnose("model-error", span, message, help=help, notes=notes)
 
 
 def _diagnose_timeout(span: Span, subject: str, result: CompileResult) -> Diagnostic:

@@ -24,7 +24,15 @@ from coursebuild.core.model import (
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.registry import features
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Fix,
+    Note,
+    diagnose,
+    did_you_mean,
+    nearest,
+    propose,
+)
 from coursebuild.core.text.source import Excerpt, Span
 
 
@@ -176,10 +184,26 @@ def check_formulas(
         if result.position is not None:
             at = min(result.position, len(tex.text) - 1)
             span = tex.span(at, at + 1)
-        diagnostics.append(
-            diagnose("math-syntax", span, f"the formula does not parse: {result.message}")
-        )
+        message, help = f"the formula does not parse: {result.message}", ""
+        if command := re.search(r"unknown command \\([A-Za-z]+)", result.message):
+            at = tex.text.find(command[1])
+            place = span if at < 0 else tex.span(at, at + len(command[1]))
+            likely = nearest(command[1], _COMMANDS, cutoff=0.75)
+            if likely is not None:
+                help = propose(command[1], likely, _COMMANDS).at(place)
+        diagnostics.append(diagnose("math-syntax", span, message, help=help))
     return tuple(diagnostics)
+
+
+def _stands_in_fence(place: Span) -> bool:
+    """Whether a place is inside a fenced block, as far as its lines above show."""
+    opening = ""
+    for match in re.finditer(r"^[ \t>]*(`{3,}|~{3,})", place.source.text[: place.start], re.M):
+        if not opening:
+            opening = match[1]
+        elif match[1].startswith(opening):
+            opening = ""
+    return bool(opening)
 
 
 def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnostic]:
@@ -189,12 +213,15 @@ def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnosti
         if letters[0] in commands:
             message = f"`{letters[0]}` would be shown as a product of letters"
             help = f"write `\\{letters[0]}`, or `\\mathrm{{{letters[0]}}}` for a name"
-            yield diagnose("math-command", tex.span(*letters.span()), message, help=help)
+            place = tex.span(*letters.span())
+            is_string = _stands_in_fence(place)  # there a backslash may need another
+            fix = Fix(help, None if is_string else f"\\{letters[0]}")
+            yield diagnose("math-command", place, message, help=fix)
     if (prime := re.search(r"(?:^|[(\[=+,;&-])\s*(')", text)) is not None:
         message, help = "this prime follows nothing", "write the letter before it"
         yield diagnose("math-syntax", tex.span(*prime.span(1)), message, help=help)
     if (at := text.find("`")) >= 0:
-        message, help = "a backtick would be shown in this formula", "delete it"
+        message, help = "a backtick would be shown in this formula", Fix("delete it", "", safe=True)
         yield diagnose("math-syntax", tex.span(at, at + 1), message, help=help)
     if _INTERVAL.search(text):
         return

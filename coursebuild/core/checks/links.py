@@ -50,7 +50,16 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.model.addresses import recorded_figures
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, nearest
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Edit,
+    Fix,
+    Note,
+    diagnose,
+    did_you_mean,
+    nearest,
+    propose,
+)
 from coursebuild.core.text.source import Span
 
 _NamedTarget: TypeAlias = (
@@ -163,8 +172,10 @@ def _check_link(
     if name not in names:
         if isinstance(target, LessonTarget) and target.id in targets.levels:
             help = f"{target.id} is a level: {_link_help('level', target.id)}"
+            help = Fix(help, edits=_rename_kind(span, "Lesson", "Level"))
         elif isinstance(target, LevelTarget) and target.id in targets.lessons:
             help = f"{target.id} is a lesson: {_link_help('lesson', target.id)}"
+            help = Fix(help, edits=_rename_kind(span, "Level", "Lesson"))
         else:
             help = _suggest_lesson(target, targets) or did_you_mean(name, names)
         yield diagnose(rule, span, missing, help=help)
@@ -197,26 +208,32 @@ def _link_help(kind: str, id: str) -> str:
     return f"link to `{kind}:{id}`"
 
 
+def _rename_kind(span: Span, old: str, new: str) -> tuple[Edit, ...]:
+    """The edit of the word before the number in a mention."""
+    start = span.start - len(old) - 1
+    place = span.source.span(start, start + len(old)) if start >= 0 else span
+    return (Edit(place, new),) if place.text == old else ()
+
+
 _LESSON_NAME = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
 """A file name or an address that begins with the id of a lesson, as in `4.2-inertia.md`."""
 
 
 def _suggest_lesson(target: _NamedTarget, targets: LinkTargets) -> str:
-    """A help text: the lesson whose file or slug the link names, or those of its level."""
+    """A help: the lesson whose file or slug the link names, or those of its level."""
     if not isinstance(target, LessonTarget):
         return ""
     match = _LESSON_NAME.fullmatch(target.id)
     if match and match[1] in targets.lessons:
-        return f"did you mean `lesson:{match[1]}`?"
+        return Fix(f"did you mean `lesson:{match[1]}`?", match[1], target.id, safe=True)
     paths = ((id, d.source.path) for id, d in targets.lessons.items() if d is not None)
     ids = [id for id, path in paths if path.endswith(f"-{target.id}.md")]
     if len(ids) == 1:
-        return f"did you mean `lesson:{ids[0]}`?"
+        return Fix(f"did you mean `lesson:{ids[0]}`?", ids[0], target.id, safe=True)
     level = target.id.rpartition(".")[0]
     ids_of_level = [id for id in targets.lessons if level and id.rpartition(".")[0] == level]
-    return (
-        f"level {level} has " + ", ".join(f"`{id}`" for id in ids_of_level) if ids_of_level else ""
-    )
+    names = ", ".join(f"`{id}`" for id in ids_of_level)
+    return f"level {level} has {names}" if names else ""
 
 
 def _look_up(target: _NamedTarget, targets: LinkTargets) -> tuple[str, str, Collection[str], str]:
@@ -292,33 +309,45 @@ def _check_url(
         if route is not None and route[2] in ids[route[1]]:
             message = f"`{url}` is an address of another tool"
             help = _link_help(route[1], route[2])
+            if route[1] != "level":
+                help = Fix(help, f"{route[1]}:{route[2]}", safe=True)
             yield diagnose("link-anchor", span, message, help=help)
             return
         yield from _check_document_anchor(span, parts.fragment, document, "this page")
         return
     path = local_file(url, document.source.path)
     if path not in targets.files:
-        yield diagnose("link-file", span, f"no file `{path}`", help=_suggest_file(path, targets))
+        yield diagnose(
+            "link-file",
+            span,
+            f"no file `{path}`",
+            help=_suggest_file(path, url, document.source.path, targets),
+        )
 
 
 _ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
 """The fragment by which a site of a single page names a lesson, as in `#/lesson/4.2`."""
 
 
-def _suggest_file(path: str, targets: LinkTargets) -> str:
+def _suggest_file(path: str, url: str, source_path: str, targets: LinkTargets) -> str:
     name = posixpath.basename(path)
     match = _LESSON_NAME.fullmatch(name)
     if name.endswith((".md", ".html")) and match and match[1] in targets.lessons:
-        return f"link to the lesson by its id: `lesson:{match[1]}`"
+        help, new = "link to the lesson by its id: `{}`", f"lesson:{match[1]}"
+        return Fix(help.format(new), new, url.partition("#")[0], safe=True)
     if name.endswith(".md"):
         return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
     if name.endswith(".xml") and name[:-4] in targets.models:
-        return f"link to a model by its name: `model:{name[:-4]}`"
+        help, new = "link to a model by its name: `{}`", f"model:{name[:-4]}"
+        return Fix(help.format(new), new, url.partition("#")[0], safe=True)
     files = {posixpath.basename(file): file for file in targets.files if not file.endswith(".md")}
     likely = nearest(name, files)
-    return (
-        f"did you mean `{files[likely]}`?" if likely else "files that pages may use lie in content/"
-    )
+    if likely is None:
+        return "files that pages may use lie in content/"
+    new = posixpath.relpath(files[likely], posixpath.dirname(source_path))
+    fix = propose(name, likely, files)
+    help = f"did you mean `{files[likely]}`?"
+    return Fix(help, fix.new and new, url.partition("#")[0], safe=fix.safe)
 
 
 def _check_media(
@@ -333,7 +362,12 @@ def _check_media(
         return
     path = local_file(url, document.source.path)
     if path not in targets.files:
-        yield diagnose("link-file", span, f"no file `{path}`", help=_suggest_file(path, targets))
+        yield diagnose(
+            "link-file",
+            span,
+            f"no file `{path}`",
+            help=_suggest_file(path, url, document.source.path, targets),
+        )
 
 
 def urlsplit_or_none(url: str) -> SplitResult | None:

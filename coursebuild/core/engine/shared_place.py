@@ -11,7 +11,7 @@ from urllib.parse import unquote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.errors import EffectError, reason, require
 from coursebuild.core.files.trust import replace_file
 
 _VERSION = "coursebuild-1"
@@ -121,13 +121,9 @@ def shared_place(address: str, key: bytes = b"") -> SharedPlace:
         return SharedPlace(address, FolderFiles(Path(address).expanduser().absolute()), key)
     if scheme == "file":
         return SharedPlace(address, FolderFiles(Path(unquote(urlsplit(address).path))), key)
-    try:
-        from fsspec.core import url_to_fs
-    except ImportError:
-        raise EffectError(
-            f"the cache {address} needs the package fsspec",
-            help="run `pip install 'coursebuild[cache]'`",
-        ) from None
+    require("fsspec", "cache", f"the cache {address}")
+    from fsspec.core import url_to_fs
+
     try:
         files, top = url_to_fs(address, use_listings_cache=False)
     except ImportError as error:

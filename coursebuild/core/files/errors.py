@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
+from importlib.util import find_spec
 
 
 class EffectError(Exception):
@@ -39,6 +40,17 @@ class UsageError(Exception):
 
     def __init__(self, message: str, *, help: str = "") -> None:
         super().__init__(f"{message}; {help}" if help else message)
+
+
+def require(package: str, extra: str, purpose: str) -> None:
+    """Do nothing where a package of an extra is installed.
+
+    Raises:
+        EffectError: it is not; `purpose` is what needs it, as in "the language server".
+    """
+    if find_spec(package) is None:
+        help = f"run `pip install 'coursebuild[{extra}]'`"
+        raise EffectError(f"{purpose} needs the package {package}", help=help)
 
 
 def reason(error: OSError) -> str:

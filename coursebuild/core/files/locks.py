@@ -1,7 +1,8 @@
 """Locks that vanish with the process that holds them, and temporary folders, which are locked.
 
-Entry points: `project_lock`, held by a command that writes into a course; `folder_lock`, held while
-a site is swapped; `try_lock` and `is_abandoned`, which tell whether the writer of a temporary file
+Entry points: `project_lock`, held by a command that writes into a course; `claim` and `unclaim`, of
+work that no other process should do at the same time; `folder_lock`, held while a site is swapped;
+`try_lock` and `is_abandoned`, which tell whether the writer of a temporary file
 is alive; `temporary_folder`, `remove_folder`.
 
 A lock is an flock: killing its holder frees it at once, so no lock can be stale. Where a file
@@ -73,6 +74,38 @@ def project_lock(
     named_file = path.with_name(f"{name}-held")
     with _hold_if_possible(lambda: _lock_file(root, path, on_wait), named_file, on_wait):
         yield
+
+
+def claim(folder: Path, key: str) -> bool:
+    """Claim a piece of work, named by a hash; return `False` while another process does it.
+
+    It is a lock of one byte of a file in the folder, at a place that the hash gives. Where there
+    are no locks, everything can be claimed.
+    """
+    try:
+        fcntl.lockf(_claims(folder), fcntl.LOCK_EX | fcntl.LOCK_NB, 1, int(key[:15], 16))
+    except OSError as error:
+        return error.errno not in _BUSY
+    return True
+
+
+def unclaim(folder: Path, key: str) -> None:
+    """Let others claim a piece of work."""
+    with contextlib.suppress(OSError):
+        fcntl.lockf(_claims(folder), fcntl.LOCK_UN, 1, int(key[:15], 16))
+
+
+def _claims(folder: Path) -> int:
+    """The file of claims, open: closing it anywhere in this process would end all of them."""
+    with contextlib.suppress(KeyError, OSError):
+        if os.fstat(_open_claims[folder]).st_nlink:
+            return _open_claims[folder]
+    flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
+    _open_claims[folder] = os.open(folder / "claims", flags, 0o600)
+    return _open_claims[folder]
+
+
+_open_claims: dict[Path, int] = {}
 
 
 @contextlib.contextmanager

@@ -1,7 +1,8 @@
 """Writing files of a course: one, whole or not at all, or several together, all or none.
 
 Entry points: `write_atomic`, `check_writable`, `check_unchanged`, `remove_leftovers`;
-`change_files(root, changes)`; `undo_changes(root)`, before a command reads a course.
+`change_files(root, changes)`; `undo_changes(root)`, before a command reads a course; `take_back`,
+what a command that kept its journal has changed.
 
 1. The new bytes go into a temporary file in the same folder, locked as long as its writer is alive.
 2. They are synced to the disk, with the permissions and the owner of the file that they replace.
@@ -14,7 +15,8 @@ next run removes. Of several files,
 1. A journal records the old and the new content of each. It lies in the user's own state folder, so
    that no course can bring one along, and is sealed.
 2. The files are written and removed one after the other, each whole.
-3. The journal is removed, which completes the change.
+3. The journal is removed, or put beside as the last change that can be taken back, which completes
+   the change.
 
 If step 2 fails, the changes so far are undone. If the process was killed, the next command undoes
 them: a file with the new content gets the old one back; one that was edited since stays. Where the
@@ -223,9 +225,15 @@ class FileChange(Struct, frozen=True):
 
 
 def change_files(
-    root: Path, changes: Sequence[FileChange], on_wait: Callable[[str], None] | None = None
-) -> None:
-    """Make all changes, or none; `on_wait` gets a message if another command must end first.
+    root: Path,
+    changes: Sequence[FileChange],
+    on_wait: Callable[[str], None] | None = None,
+    *,
+    keep: bool = False,
+) -> bool:
+    """Make all changes, or none; return whether `take_back` can undo them, as with `keep` it can.
+
+    `on_wait` gets a message if another command must end first.
 
     Raises:
         EffectError: a file cannot be written, or has changed since it was read.
@@ -250,8 +258,47 @@ def change_files(
             if journal is not None:  # it stays if not all could be restored
                 journal.unlink()
             raise
-        if journal is not None:
+        if journal is not None and keep:
+            journal.replace(_undo_journal(journal))
+        elif journal is not None:
             journal.unlink()
+    return keep and journal is not None
+
+
+def take_back(
+    root: Path, on_wait: Callable[[str], None] | None = None
+) -> tuple[list[str], list[str]] | None:
+    """Undo the last changes that were kept; return the paths of the files that are as before.
+
+    The second list has those that were edited since, which stay. `None`: nothing was kept.
+
+    Raises:
+        EffectError: a file cannot be written; then none is.
+    """
+    journal = journal_path(root)
+    try:
+        data = _undo_journal(journal).read_bytes() if journal is not None else b""
+        changes = msgspec.msgpack.decode(
+            unseal(_NAME, data, store_key(str(root))) or b"", type=tuple[FileChange, ...]
+        )
+    except (*DAMAGE, FileNotFoundError):
+        return None
+    unedited, edited_paths = [], []
+    for change in changes:
+        try:
+            check_unchanged(_check_path(root, change), change.path, change.new)
+            unedited.append(FileChange(change.path, change.new, change.old))
+        except FileChangedError:
+            edited_paths.append(change.path)
+    change_files(root, unedited, on_wait)
+    if journal is not None and unedited:
+        _undo_journal(journal).unlink()
+    return [change.path for change in unedited], edited_paths
+
+
+def _undo_journal(journal: Path) -> Path:
+    """Where the journal of changes lies that can be taken back."""
+    return journal.with_name(f"{journal.name}.last")
 
 
 def undo_changes(root: Path, tell: Callable[[str], None] | None = None) -> None:

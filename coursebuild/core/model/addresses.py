@@ -20,11 +20,11 @@ from msgspec import Struct
 from coursebuild.core.model.blocks import (
     Block,
     Document,
-    Equation,
     FeatureBlock,
     FigureName,
     Heading,
     HtmlBlock,
+    NumberedItem,
     Paragraph,
     Recording,
     Script,
@@ -33,6 +33,7 @@ from coursebuild.core.model.course import Course
 from coursebuild.core.model.inlines import (
     Image,
     Inline,
+    Label,
     LessonTarget,
     PageTarget,
     RawInline,
@@ -47,6 +48,7 @@ from coursebuild.core.model.walk import (
     document_blocks,
     document_scripts,
     find_blocks,
+    labelled_blocks,
     output_numbers,
     walk_inlines,
 )
@@ -80,7 +82,7 @@ def resolve(target: Target, course: Course, document_path: str) -> Target:
     return target
 
 
-AnchorOwner: TypeAlias = Block | Inline | DisplayFormula | Equation | Source
+AnchorOwner: TypeAlias = Block | Inline | Label | DisplayFormula | NumberedItem | Source
 """What an anchor of a document leads to; a source for the title of a page."""
 
 _HTML_ID = re.compile(r"""<[^<>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
@@ -94,17 +96,18 @@ _NO_MARKUP = re.compile(
 def document_anchors(document: Document) -> Iterator[tuple[str, AnchorOwner, Span]]:
     """The ids that a link may name in a document, with what they lead to and its place.
 
-    Ids of its title, headings, blocks of features, listings, outputs, formulas and terms, and those
-    in raw HTML; not those of single lines of listings.
+    Ids of its title, headings, blocks of features, listings, outputs, formulas, labels and terms,
+    and those in raw HTML; not those of single lines of listings.
     """
     source = document.source
     if document.title_anchor:
         yield document.title_anchor, source, source.span(0, 0)
-    # A summary does not say where formulas stand.
-    yield from ((formula.id, formula, source.span(0, 0)) for formula in document.equations)
+    # A summary does not say where formulas and tables stand.
+    yield from ((item.id, item, source.span(0, 0)) for item in document.numbered_items)
     if document.summaries is None:
         for displayed in filter(lambda formula: formula.id, display_formulas(document)):
             yield displayed.id, displayed, source.span(displayed.start, displayed.start)
+        yield from ((label.id, label, block.span) for block, label in labelled_blocks(document))
     numbers = output_numbers(document)
     for block in document_blocks(document):
         if isinstance(block, Heading):

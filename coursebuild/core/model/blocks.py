@@ -19,6 +19,12 @@ from coursebuild.core.text.source import Excerpt, Source, Span
 _TITLE = re.compile(r"\ufeff?# +(.*\S)")
 
 
+class Labelled(Struct, frozen=True, kw_only=True):
+    """What a label can give a number to."""
+
+    label: Label | None = None
+
+
 class Heading(Struct, frozen=True):
     """A heading; `anchor` is unique in its document."""
 
@@ -36,7 +42,7 @@ class Heading(Struct, frozen=True):
         return "further" in self.classes
 
 
-class Paragraph(Struct, frozen=True):
+class Paragraph(Labelled, frozen=True):
     """A paragraph; a `tight` one, in a tight list, gets no `<p>`."""
 
     span: Span
@@ -81,7 +87,7 @@ class Callout(Struct, frozen=True):
     blocks: tuple[Block, ...]
 
 
-class CodeBlock(Struct, frozen=True):
+class CodeBlock(Labelled, frozen=True):
     """A fenced or indented code block that has no meaning of its own here.
 
     `info` is the raw info string, `language` its first word.
@@ -118,7 +124,7 @@ class ThematicBreak(Struct, frozen=True):
     span: Span
 
 
-class MathBlock(Struct, frozen=True):
+class MathBlock(Labelled, frozen=True):
     """`$$…$$` on lines of its own."""
 
     display: ClassVar[bool] = True
@@ -126,7 +132,6 @@ class MathBlock(Struct, frozen=True):
 
     span: Span
     tex: Excerpt
-    label: Label | None = None
 
 
 class Cell(Struct, frozen=True):
@@ -137,13 +142,15 @@ class Cell(Struct, frozen=True):
     children: tuple[Inline, ...]
 
 
-class Table(Struct, frozen=True):
+class Table(Labelled, frozen=True):
     """A table; `align` has one entry per column."""
 
     span: Span
     align: tuple[Literal["left", "right", "center"] | None, ...]
     header: tuple[Cell, ...]
     rows: tuple[tuple[Cell, ...], ...]
+    caption: tuple[Inline, ...] = ()
+    """The rest of a paragraph `Table: …` above it."""
 
 
 class FigureName(Struct, frozen=True):
@@ -153,7 +160,7 @@ class FigureName(Struct, frozen=True):
     span: Span
 
 
-class Script(Struct, frozen=True):
+class Script(Labelled, frozen=True):
     """A complete script: ```` ```python file=examples/x.py ````."""
 
     span: Span
@@ -257,7 +264,7 @@ class Recording(Struct, frozen=True):
     """Whether the fence's way of comparing is valid; if not, nothing is compared."""
 
 
-class Mjcf(Struct, frozen=True):
+class Mjcf(Labelled, frozen=True):
     """A model or fragment in MJCF.
 
     `fragment` names the element that it belongs into, `error` the message it must fail with.
@@ -283,7 +290,7 @@ class SourcePart(Struct, frozen=True):
     """The text before each line in the lesson."""
 
 
-class PlainCode(Struct, frozen=True):
+class PlainCode(Labelled, frozen=True):
     """A Python block without `file=`, shown but not run; a `fragment` need not parse."""
 
     span: Span
@@ -292,7 +299,7 @@ class PlainCode(Struct, frozen=True):
     source: SourcePart | None = None
 
 
-class FeatureBlock(Struct, frozen=True):
+class FeatureBlock(Labelled, frozen=True):
     """A block that a feature adds; its methods answer what the rest of the tool must know.
 
     A block without something need not override the method.
@@ -373,15 +380,20 @@ class Footnote(Struct, frozen=True):
     blocks: tuple[Block, ...]
 
 
-class Equation(Struct, frozen=True):
-    """A formula on a line of its own."""
+class NumberedItem(Struct, frozen=True):
+    """What a label has given a number, and any formula on a line of its own."""
 
     id: str
     """Its anchor."""
     number: str = ""
-    """The number that references show, such as `3`; empty where it has no label."""
+    """The number among those of its kind, such as `3`; empty for a formula without a label."""
     has_margin_number: bool = False
-    """Whether its page writes the number beside it, as the formula itself does not show one."""
+    """Whether its page writes the number beside it, as a formula may show one itself."""
+
+    @property
+    def kind(self) -> str:
+        """One of `LABEL_KINDS`."""
+        return self.id.partition(":")[0]
 
 
 def title_line(source: Source) -> Span | None:
@@ -400,7 +412,7 @@ class Document(Struct, frozen=True, dict=True):
     """The anchor of the title that a page opens with; empty where a heading has the same."""
     unclaimed: tuple[CodeBlock | Table, ...] = ()
     """Texts and tables below a script that may show its output, and that are not marked as such."""
-    equations: tuple[Equation, ...] = ()
-    """Set in a summary only, which lacks the formulas themselves."""
+    numbered_items: tuple[NumberedItem, ...] = ()
+    """Set in a summary only, which lacks formulas and tables themselves."""
     summaries: Mapping[str, Struct] | None = None
     """Set in a summary only: those that features made of the text, by their names."""

@@ -147,6 +147,9 @@ class Level(Struct, frozen=True):
     lessons: tuple[Lesson, ...]
 
 
+BIBLIOGRAPHY, CITATION_STYLE = "content/references.bib", "content/references.csl"
+
+
 class Page(Struct, frozen=True):
     """A page that is not a lesson."""
 
@@ -159,6 +162,8 @@ class Page(Struct, frozen=True):
     """Whether it is in the menu of every page."""
     names: bool = True
     """Whether names in its inline code have to be known."""
+    section: str = ""
+    """The heading under which it stands among the pages; empty where it is in no list."""
 
     @property
     def is_home(self) -> bool:
@@ -217,6 +222,29 @@ class NamedPath(Struct, frozen=True):
 
     path: str
     span: Span
+
+
+class Launch(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where readers can run the notebooks of lessons, which lie in a repository of the site."""
+
+    repository: Annotated[
+        fields.WebPlace | None,
+        Meta(description="with the built site; without it, that of `[course]`"),
+    ] = None
+    branch: Annotated[fields.Text, Meta(description="the branch with the built site")] = "gh-pages"
+    folder: Annotated[
+        str, Meta(description="the folder of the built site in it, as in `docs`; else the top")
+    ] = ""
+    colab: Annotated[bool, Meta(description="a button for Google Colab; needs GitHub")] = False
+    binder: Annotated[
+        fields.WebPlace | None,
+        Meta(description="a button for this Binder, as in `https://mybinder.org`"),
+    ] = None
+    jupyterhub: Annotated[
+        fields.WebPlace | None,
+        Meta(description="a button for this JupyterHub, which needs nbgitpuller"),
+    ] = None
+    codespaces: Annotated[bool, Meta(description="a button for GitHub Codespaces")] = False
 
 
 class Limits(Struct, frozen=True, forbid_unknown_fields=True):
@@ -297,9 +325,17 @@ class Course(Struct, frozen=True):
     """The columns to which `fmt` wraps text; 0 leaves the author's lines."""
     html: Literal["none", "safe", "trusted"] = "safe"
     """The raw HTML that lessons and pages may have."""
+    folds: Literal["open", "closed"] = "open"
+    """Whether what authors fold is printed in full."""
     limits: Limits = Limits()
+    launch: Launch | None = None
+    """Where notebooks can be run; its `repository` is set."""
     theme: Theme = Theme()
     words: Words = Words()
+    bibliography: Source | None = None
+    """The list of sources, `BIBLIOGRAPHY`."""
+    citation_style: Source | None = None
+    """The course's own style for them, `CITATION_STYLE`."""
 
     @property
     def key(self) -> str:
@@ -321,6 +357,11 @@ class Course(Struct, frozen=True):
     def lessons(self) -> tuple[Lesson, ...]:
         """All lessons in the order of the map."""
         return tuple(lesson for level in self.levels for lesson in level.lessons)
+
+    @property
+    def is_manual(self) -> bool:
+        """Whether it is made of pages alone, in sections."""
+        return not self.lessons and any(page.section for page in self.pages)
 
     @property
     def written_levels(self) -> tuple[Level, ...]:
@@ -356,4 +397,5 @@ class Course(Struct, frozen=True):
         """Every text: the map, the documents, the models and their declarations."""
         holders: tuple[Document | MjcfModel | Declarations, ...]
         holders = (*self.documents, *self.models, *self.declarations)
-        return (self.map, *(holder.source for holder in holders))
+        lists = filter(None, (self.bibliography, self.citation_style))
+        return (self.map, *(holder.source for holder in holders), *lists)

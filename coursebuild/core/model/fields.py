@@ -1,7 +1,7 @@
 """Types of fields that several declarations share.
 
 Entry points: `Text`, `Blocks`, `Inlines`, `OptionalBlocks`, `Positive`, `NotNegative`, `Digits`,
-`Slug`, `matching`.
+`Slug`, `WebPlace`, `matching`.
 
 `Meta` holds what a type adds to its plain Python type: bounds and patterns, which the decoder and
 the JSON Schemas both read, and in `extra` two remarks for the decoder only: `text` ("blocks" or
@@ -48,6 +48,13 @@ def matching(pattern: str, expects: str) -> Meta:
     return Meta(pattern=pattern, extra={"expects": expects})
 
 
+WebPlace: TypeAlias = Annotated[
+    str,
+    matching(
+        r"^https?://[^\s/@?#]+(/[^\s?#]*)?$",
+        "an address that begins with `https://` or `http://`, without a user, `?` and `#`",
+    ),
+]
 Slug: TypeAlias = Annotated[
     str,
     matching(

@@ -63,11 +63,22 @@ class NumberBinding(Struct, frozen=True):
     """Its source from `{given="…"}`, perhaps empty; `None` where a script has printed it."""
 
 
+LABEL_KINDS = {
+    "eq": "a formula",
+    "fig": "a figure",
+    "tab": "a table",
+    "lst": "a listing",
+    "lab": "a lab",
+}
+"""What can have a label, by the prefix of the label's id."""
+
+
 class Label(Struct, frozen=True):
-    """`{#eq:euler}` after a formula on a line of its own: its id, colon included."""
+    """`{#eq:euler}` after a formula on a line of its own, `{#fig:flip}` at the end of a caption."""
 
     span: Span
     id: str
+    """With its prefix and colon."""
     source: str | None = None
     """The source of its numbers from `given="…"`, perhaps empty; `None` where none is given."""
     check: Span | None = None
@@ -241,6 +252,25 @@ class FootnoteRef(Struct, frozen=True):
     occurrence: int
 
 
+class CitedWork(Struct, frozen=True):
+    """`see @euler1758, p. 12` in a citation."""
+
+    span: Span
+    """That of the key."""
+    key: str
+    before: str
+    """What stands before it: `see`."""
+    locator: str
+    """The place in the work, or other words after it."""
+
+
+class Citation(Struct, frozen=True):
+    """`[@euler1758, p. 12; @lagrange1788]`: sources in `content/references.bib`."""
+
+    span: Span
+    works: tuple[CitedWork, ...]
+
+
 Inline: TypeAlias = (
     Text
     | Emphasis
@@ -256,6 +286,7 @@ Inline: TypeAlias = (
     | SoftBreak
     | HardBreak
     | FootnoteRef
+    | Citation
 )
 
 
@@ -284,8 +315,8 @@ def without_links(
 ) -> tuple[Inline, ...]:
     """Inlines as they may stand inside a link or on another page.
 
-    They lose links, terms, footnotes, raw HTML, pictures and line ends. `reference` makes the text
-    of a link that has none.
+    They lose links, terms, footnotes, citations, raw HTML, pictures and line ends. `reference`
+    makes the text of a link that has none.
     """
     plain: list[Inline] = []
     for inline in inlines:
@@ -300,7 +331,7 @@ def without_links(
                 plain.append(Text(inline.span, inline.alt))
             case SoftBreak() | HardBreak():
                 plain.append(Text(inline.span, " "))
-            case RawInline() | FootnoteRef():
+            case RawInline() | FootnoteRef() | Citation():
                 pass
             case _:
                 plain.append(inline)

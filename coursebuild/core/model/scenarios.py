@@ -62,6 +62,12 @@ class Measured(Struct, frozen=True):
     name: str
 
 
+Expected: TypeAlias = Literal[
+    "restitution", "penetration", "slip", "crossing", "last", "largest", "smallest"
+]
+"""Quantities of a motion that theory may know."""
+
+
 class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     """What happens to the model: initial state, duration, commands."""
 
@@ -120,10 +126,11 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
         Meta(description="seconds, by integrator: the largest stable timestep in theory"),
     ] = {}
     expected: Annotated[
-        dict[Literal["restitution", "penetration", "slip"], float],
+        dict[Expected, float],
         Meta(
             description="in theory: of the hardest hit the speed after it over that before; "
-            "the deepest contact and the longest slide, m"
+            "the deepest contact and the longest slide, m; of the sensor that `measure` names when "
+            "it first changes its sign, s, its last reading, the largest and the smallest"
         ),
     ] = {}
     precision: Annotated[
@@ -140,6 +147,10 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     stable_for: Annotated[
         fields.Positive | None,
         Meta(description="seconds over which a timestep has to be stable; else the duration"),
+    ] = None
+    energy_bound: Annotated[
+        float | None,
+        Meta(description="J; the most potential and kinetic energy that the motion can have"),
     ] = None
     search: Annotated[
         tuple[fields.Positive, fields.Positive] | None,

@@ -2,10 +2,10 @@
 
 Entry points: `document_blocks`, `document_inlines`; `find_blocks`, `find_inlines` for those of one
 type; `find_formulas`; `document_scripts`, `output_numbers`, `sibling_groups`; `walk_blocks`,
-`walk_inlines` and `block_formulas`; `is_blank`, `is_comment`; `display_formulas`, those on lines of
-their own. A formula has the id that its author gives it, or one made from its TeX, which stays the
-same when the text around it changes. A formula in a heading, a quiz or a lab has none, since those
-are shown on other pages too.
+`walk_inlines` and `block_formulas`; `is_blank`, `is_comment`; `labelled_blocks`;
+`display_formulas`, those on lines of their own. A formula has the id that its author gives it, or
+one made from its TeX, which stays the same when the text around it changes. A formula in a heading,
+a quiz or a lab has none, since those are shown on other pages too.
 
 `without_prose(document)` is what the rest of a course must know of a document, as a document of the
 same type. Walking it meets, in the same order, everything that other pages or checks look at, and
@@ -14,7 +14,8 @@ scripts, recorded outputs, bound numbers, blocks of features, MJCF, callouts, li
 pictures, raw HTML.
 
 1. Blocks come out of their containers, since no other page asks what contains what.
-2. Of inlines only links, without their text, pictures, bound numbers, terms and raw HTML stay.
+2. Of inlines only links, without their text, citations, pictures, bound numbers, terms and raw HTML
+   stay.
 3. Formulas are left out, except those in recorded tables: they are checked in the whole document.
 4. If only prose was left out, a thematic break stands for it, so that the summary is not blank.
 """
@@ -38,6 +39,7 @@ from coursebuild.core.model.blocks import (
     Heading,
     HtmlBlock,
     HtmlFlow,
+    Labelled,
     ListBlock,
     MathBlock,
     Mjcf,
@@ -49,6 +51,7 @@ from coursebuild.core.model.blocks import (
     ThematicBreak,
 )
 from coursebuild.core.model.inlines import (
+    Citation,
     Emphasis,
     Image,
     Inline,
@@ -98,7 +101,8 @@ def block_inlines(block: Block) -> tuple[Inline, ...]:
             return block.title
         case Table():
             rows = (block.header, *block.rows)
-            return tuple(inline for row in rows for cell in row for inline in cell.children)
+            cells = (inline for row in rows for cell in row for inline in cell.children)
+            return (*block.caption, *cells)
         case Recording():
             return block.caption
         case _:
@@ -246,7 +250,7 @@ def find_inlines(document: Document, kind: type[AnyInline]) -> Iterator[AnyInlin
     return (inline for inline in document_inlines(document) if isinstance(inline, kind))
 
 
-_SUMMARY_INLINES = frozenset((Link, Image, NumberBinding, RawInline, Term))
+_SUMMARY_INLINES = frozenset((Citation, Link, Image, NumberBinding, RawInline, Term))
 
 
 def without_prose(document: Document) -> Document:
@@ -303,6 +307,13 @@ def _summary_inlines(block: Block) -> tuple[Inline, ...]:
         for inline in walk_inlines(block_inlines(block))
         if type(inline) in _SUMMARY_INLINES
     )
+
+
+def labelled_blocks(document: Document) -> Iterator[tuple[Block, Label]]:
+    """The blocks with a label, but for formulas: these are among `display_formulas`."""
+    for block in document_blocks(document):
+        if isinstance(block, Labelled) and block.label and not isinstance(block, MathBlock):
+            yield block, block.label
 
 
 class DisplayFormula(NamedTuple):

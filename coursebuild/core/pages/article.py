@@ -71,7 +71,7 @@ def article(page: PageContext, document: Document) -> Markup:
         parts.append(
             page.template("partials/further.html", heading=heading, text=text) if further else text
         )
-    return Markup("\n").join((*parts, page.footnotes()))
+    return Markup("\n").join(filter(None, (*parts, page.footnotes(), page.references())))
 
 
 class _Group(Struct, frozen=True):

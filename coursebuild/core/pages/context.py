@@ -17,13 +17,16 @@ from urllib.parse import unquote
 
 from markupsafe import Markup
 from msgspec import Struct
+from msgspec.structs import asdict
 
 from coursebuild.core.model import (
     Block,
+    Citation,
     CodeSpan,
     Course,
     Document,
-    Equation,
+    Label,
+    NumberedItem,
     Recording,
     Script,
     Target,
@@ -35,9 +38,9 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import SiteFile
 from coursebuild.core.pages import formulas, urls
 from coursebuild.core.pages.assets import Assets, Names
-from coursebuild.core.pages.formulas import number_equations
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.markup import HtmlWriter
+from coursebuild.core.pages.numbering import item_name, number_items
 from coursebuild.core.pages.page_inputs import DocumentInputs
 from coursebuild.core.pages.references import ids_and_addresses
 from coursebuild.core.pages.renderer import Renderer
@@ -71,9 +74,16 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
         return outputs
 
     @cached_property
-    def equations(self) -> Mapping[int, Equation]:
-        """Formulas on lines of their own, by offset."""
-        return number_equations(self.document, self.renderer.mathml)
+    def numbered_items(self) -> Mapping[int, NumberedItem]:
+        """What has a number, and other formulas on lines of their own, by offset."""
+        return number_items(self.document, self.renderer.mathml)
+
+    @cached_property
+    def _names(self) -> Mapping[str, str]:
+        """The names of numbered items by their ids."""
+        prefix = self.inputs.number_prefix
+        items = self.numbered_items.values()
+        return {item.id: item_name(item, prefix, self.words) for item in items}
 
     # what the writer of HTML needs
 
@@ -101,17 +111,30 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     def display(self, tex: str, start: int) -> Markup:
         """A formula on a line of its own, which scrolls if it is too wide."""
         mathml = self.renderer.mathml(tex, True)
-        equation = self.equations.get(start)
-        return self.template("blocks/formula.html", mathml=mathml, equation=equation)
+        item = self.numbered_items.get(start)
+        return self.template("blocks/formula.html", mathml=mathml, equation=item)
+
+    def number(self, label: Label | None) -> str:
+        """The name that a label gives, such as "Figure 4.2.3"; empty without one."""
+        return self._names.get(label.id, "") if label is not None else ""
 
     def reference(self, target: Target) -> str:
-        """The text of a link without one: the number of the formula that it leads to."""
+        """The text of a link without one: the number of what it leads to."""
         if isinstance(target, UrlTarget) and target.url.startswith("#"):
-            name = unquote(target.url[1:])
-            numbers = (e.number for e in self.equations.values() if e.id == name)
-            number = next(numbers, "")
-            return f"({number})" if number else ""
-        return self.inputs.equations.get(target, "")
+            return self._names.get(unquote(target.url[1:]), "")
+        return self.inputs.names.get(target, "")
+
+    def citation(self, citation: Citation) -> Markup:
+        """A citation, with links to the references below the text."""
+        texts = self.inputs.citations.texts
+        return texts.get(citation.span.start) or super().citation(citation)
+
+    def references(self) -> Markup:
+        """The sources that the document cites; empty if there are none."""
+        citations = self.inputs.citations
+        if not citations.entries:
+            return Markup()
+        return self.template("blocks/references.html", **asdict(citations))
 
     def code_href(self, code: CodeSpan) -> str:
         """The address of what inline code names."""

@@ -16,10 +16,10 @@ from coursebuild.core import model
 from coursebuild.core.model import Document, Lesson, Level, Owner, document_scripts
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.formulas import equations_of
 from coursebuild.core.pages.frame import lesson_data
 from coursebuild.core.pages.graph import neighbourhood
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.numbering import name_elsewhere, number_prefix
 from coursebuild.core.pages.page_inputs import (
     DocumentInputs,
     PageHead,
@@ -27,16 +27,16 @@ from coursebuild.core.pages.page_inputs import (
     ShownRun,
     ShownVerdict,
 )
-from coursebuild.core.registry import code_links, kind_of_block, page_copies, page_kind
+from coursebuild.core.registry import citations, code_links, kind_of_block, page_copies, page_kind
 from coursebuild.core.text.characters import visible
 
 
 def document_inputs(
-    library: Library, place: urls.Place, document: model.Document
+    library: Library, place: urls.Place, document: model.Document, number_prefix: str = ""
 ) -> DocumentInputs:
     """Everything that the document's page shows besides the document itself.
 
-    The summary of the document is enough.
+    The summary of the document is enough. Numbers of a lesson have a prefix.
     """
     path = document.source.path
     blocks = tuple(model.document_blocks(document))
@@ -47,7 +47,7 @@ def document_inputs(
     targets = dict.fromkeys((*link_targets, *map(model.ModelTarget, models)))
     bindings = model.find_inlines(document, model.NumberBinding)
     named_scripts: dict[str, set[int]] = {b.script: set() for b in bindings if b.script}
-    names = {target: equation_name(library, path, target) for target in targets}
+    names = {target: name_elsewhere(library, path, target) for target in targets}
     verdicts = ((block.span.start, library.verdict(block)) for block in recordings)
     trials = ((block.span.start, library.trial_value(block)) for block in feature_blocks)
     values = ((block, kind_of_block(block).values) for block in feature_blocks)
@@ -55,7 +55,8 @@ def document_inputs(
         engine=library.results.engine,
         python=library.results.python,
         hrefs={target: address(library, place, path, target) for target in targets},
-        equations={target: name for target, name in names.items() if name},
+        names={target: name for target, name in names.items() if name},
+        number_prefix=number_prefix,
         callouts={b.kind: library.callout(b.kind) for b in blocks if isinstance(b, model.Callout)},
         runs={
             path: _shown_run(library.runs[path], lines)
@@ -65,6 +66,7 @@ def document_inputs(
         verdicts={start: ShownVerdict(v.status, v.comparison) for start, v in verdicts if v},
         trials={start: value for start, value in trials if value is not None},
         blocks={b.span.start: make(library, place, b) for b, make in values if make is not None},
+        citations=citations(library, place, document),
         code_links=code_links(library, place, document),
         keyframes={n: library.facts[n].keyframes for n in models if n in library.facts},
         address=urls.absolute(library.course.base_url, place.path),
@@ -119,28 +121,6 @@ def address(library: Library, place: urls.Place, path: str, target: model.Target
             assert_never(target)
 
 
-def equation_name(library: Library, path: str, target: model.Target) -> str:
-    """The name of a numbered formula on another page; empty for other targets."""
-    target = model.resolve(target, library.course, path)
-    if not isinstance(target, model.LessonTarget | model.PageTarget) or not target.anchor:
-        return ""
-    if not target.anchor.startswith("eq:"):
-        return ""
-    lesson = isinstance(target, model.LessonTarget)
-    owner = library.lessons[target.id] if lesson else library.pages[target.id]
-    if owner.document is None:
-        return ""
-    equations = equations_of(owner.document, library.mathml)
-    number = next((e.number for e in equations if e.id == target.anchor), "")
-    if not number:
-        return ""
-    if owner.document.source.path == path:
-        return f"({number})"
-    if lesson:
-        return library.words("equation.of_lesson", number=number, id=owner.id)
-    return library.words("equation.of_page", number=number, title=owner.title)
-
-
 MAX_LINKS = 12
 """The most links that a list shows; it says how many more there are."""
 
@@ -167,9 +147,9 @@ def owner_link(place: urls.Place, owner: Owner, anchor: str = "") -> OwnerLink:
     return OwnerLink(place.href(urls.owner_path(owner), anchor or None), id, owner.title)
 
 
-def owner_links(place: urls.Place, owners: Sequence[Owner]) -> OwnerLinks:
-    """The links to lessons and pages."""
-    visible = tuple(owner_link(place, owner) for owner in owners[:MAX_LINKS])
+def owner_links(place: urls.Place, owners: Sequence[Owner], anchor: str = "") -> OwnerLinks:
+    """The links to lessons and pages, or to an anchor that each of them has."""
+    visible = tuple(owner_link(place, owner, anchor) for owner in owners[:MAX_LINKS])
     return OwnerLinks(visible, max(0, len(owners) - MAX_LINKS))
 
 
@@ -254,6 +234,11 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
             (copy.text, place.href(urls.copy_path(place.path, copy.ending)), copy.download)
             for copy in page_copies()
         ),
+        "services": tuple(
+            service
+            for copy in page_copies()
+            for service in copy.services(library.course, urls.copy_path(place.path, copy.ending))
+        ),
         "edit": edit_address(library, lesson.path),
     }
     data = lesson_data(library, lesson)
@@ -261,7 +246,7 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
         PageHead(place.path, "lesson", lesson.title, lesson.summary, data),
         "lesson.html",
         values,
-        document_inputs=document_inputs(library, place, document),
+        document_inputs=document_inputs(library, place, document, number_prefix(lesson.id)),
     )
 
 
@@ -288,6 +273,10 @@ def stub_inputs(library: Library, lesson: Lesson) -> PageInputs:
 def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, object]:
     """The values that the pages of written and planned lessons share."""
     order, position = library.order, library.positions[lesson.id]
+    # A reader is led to what can be read.
+    earlier = (x for x in reversed(order[:position]) if x.document is not None)
+    later = (x for x in order[position + 1 :] if x.document is not None)
+    previous, following = next(earlier, None), next(later, None)
     return {
         "lesson": lesson_link(library, place, lesson, whole=True),
         "level": level_view(library, place, library.levels[lesson.level]),
@@ -297,10 +286,8 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         ),
         "graph": neighbourhood(library, place, lesson),
         "referrers": owner_links(place, library.referrers.get(lesson.id, ())),
-        "previous": lesson_link(library, place, order[position - 1]) if position else None,
-        "following": lesson_link(library, place, order[position + 1])
-        if position + 1 < len(order)
-        else None,
+        "previous": previous and lesson_link(library, place, previous),
+        "following": following and lesson_link(library, place, following),
     }
 
 

@@ -11,10 +11,6 @@ A browser never breaks a line inside a `math` element, but may do so on either s
 3. a formula is kept together with adjacent punctuation, and with a unit after a no-break space;
 4. an operator at an end of a formula, next to a space of the text, gets no space of its own, as in
    TeX.
-
-Formulas with a label are numbered, in the order of the text (`number_equations`; `equations_of`,
-for other pages). LaTeX's numbered environments count too: the style sheet writes their numbers,
-continuing ours. A formula with such numbers of its own, or with a `\tag`, gets no other.
 """
 
 from __future__ import annotations
@@ -23,10 +19,6 @@ import functools
 import re
 from collections.abc import Iterator
 from html import escape, unescape
-
-from coursebuild.core.model import Document, Equation
-from coursebuild.core.model.results import Mathml
-from coursebuild.core.model.walk import display_formulas
 
 LONG = 20
 """Characters; a shorter formula is not split."""
@@ -168,33 +160,3 @@ def _glue_formula(before: str, formula: str, after: str) -> str:
 
 def _glued(html: str) -> str:
     return f"{_GLUE_START}{html}{_GLUE_END}"
-
-
-_COUNTER_CLASS = 'class="tml-eqn"'
-_TAG_CLASS = 'class="tml-tag"'
-_NUMBER = re.compile(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
-
-
-def number_equations(document: Document, mathml: Mathml) -> dict[int, Equation]:
-    """The formulas of a document that have an id, by offset."""
-    equations: dict[int, Equation] = {}
-    count = 0
-    for formula in display_formulas(document):
-        html = mathml(formula.tex, True)
-        styled_count = html.count(_COUNTER_CLASS)
-        tag = _NUMBER.search(html) if _TAG_CLASS in html else None
-        number, has_margin_number = "", False
-        if formula.label is not None and formula.id:
-            has_margin_number = not styled_count and tag is None
-            number = unescape(tag[1]) if tag is not None and not styled_count else str(count + 1)
-        count += styled_count + has_margin_number
-        if formula.id:
-            equations[formula.start] = Equation(formula.id, number, has_margin_number)
-    return equations
-
-
-def equations_of(document: Document, mathml: Mathml) -> tuple[Equation, ...]:
-    """The formulas of a document, or of its summary, that have an id."""
-    if document.summaries is not None:
-        return document.equations
-    return tuple(number_equations(document, mathml).values())

@@ -131,6 +131,8 @@ class FrameInputs(Struct, frozen=True):
     python: str
     templates: Texts
     """The course's own."""
+    is_manual: bool
+    """See `Course.is_manual`."""
     names: Names
 
     @classmethod
@@ -149,6 +151,7 @@ class FrameInputs(Struct, frozen=True):
             engine=results.engine,
             python=results.python,
             templates=course.theme.template_texts,
+            is_manual=course.is_manual,
             names=names,
         )
 
@@ -167,7 +170,9 @@ class PageFrame(Struct, frozen=True):
         first.
         """
         inputs, names, kind = self.inputs, self.inputs.names, page_kind(head.kind)
-        renderer = renderer_for(self.assets, inputs.language, inputs.templates)
+        renderer = renderer_for(
+            self.assets, inputs.language, inputs.templates, is_manual=inputs.is_manual
+        )
         place = place_of(inputs.base_url, head.path)
         looks = ("figure-light", "figure-dark") if names.logo and names.logo_dark else ("", "")
         logos = zip((names.logo, names.logo_dark), looks, strict=True)

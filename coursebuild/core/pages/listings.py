@@ -224,27 +224,37 @@ def find_imports(code: str) -> frozenset[str]:
 @functools.lru_cache(maxsize=1024)
 def _analyse(code: str) -> tuple[tuple[Part, ...], frozenset[str]]:
     """The parts and the modules; both are needed, as a lesson is read and as it is drawn."""
+    nodes = python_nodes(code)
+    lines = code.removesuffix("\n").split("\n")
+    parts: tuple[Part, ...] = (Part(1, len(lines), folded=False),)
+    if len(lines) > LONG and nodes:
+        parts = _fold_long(nodes[0].body, lines)  # type: ignore[attr-defined]  # of a module
+    modules: set[str] = set()
+    for node in nodes:
+        if type(node) is ast.Import:
+            modules.update(alias.name.partition(".")[0] for alias in node.names)
+        elif type(node) is ast.ImportFrom and node.module and not node.level:
+            modules.add(node.module.partition(".")[0])
+    return parts, frozenset(modules)
+
+
+@functools.lru_cache(maxsize=8)
+def python_nodes(code: str) -> tuple[ast.AST, ...]:
+    """All nodes of a Python text, the module first, level by level; none if it does not parse."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            body = ast.parse(code).body
+            nodes: list[ast.AST] = [ast.parse(code)]
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        body = []
-    lines = code.removesuffix("\n").split("\n")
-    parts = _fold_long(body, lines) if len(lines) > LONG else (Part(1, len(lines), folded=False),)
-    modules: set[str] = set()
-    stack: list[ast.AST] = [*body]
-    while stack:
-        node = stack.pop()
-        if isinstance(node, ast.Import):
-            modules.update(alias.name.partition(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            if node.module and not node.level:
-                modules.add(node.module.partition(".")[0])
-        else:
-            for name in ("body", "orelse", "finalbody", "handlers", "cases"):
-                stack += getattr(node, name, None) or ()
-    return parts, frozenset(modules)
+        return ()
+    for node in nodes:  # grows in the loop; as `ast.walk`, in half the time
+        for name in node._fields:
+            part = getattr(node, name, None)
+            if type(part) is list:
+                nodes += [item for item in part if isinstance(item, ast.AST)]
+            elif isinstance(part, ast.AST):
+                nodes.append(part)
+    return tuple(nodes)
 
 
 def _fold_long(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:

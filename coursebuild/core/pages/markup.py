@@ -89,8 +89,12 @@ class HtmlWriter:
         """The address of an image that is written as `url`."""
         return url
 
-    def figure(self, image: model.Image, caption: Markup) -> Markup:
-        """An image with a caption, with its line end."""
+    def number(self, label: model.Label | None) -> str:
+        """The name that a label gives, such as "Figure 4.2.3"; empty without one."""
+        return ""
+
+    def figure(self, block: model.Paragraph, image: model.Image, caption: Markup) -> Markup:
+        """The image of a figure with its caption, with its line end."""
         return Markup()
 
     def math(self, tex: str) -> Markup:
@@ -100,6 +104,10 @@ class HtmlWriter:
     def display(self, tex: str, start: int) -> Markup:
         """A formula on a line of its own, at an offset in the document."""
         return Markup(rf'<span class="math">\[{escape(tex)}\]</span>')
+
+    def citation(self, citation: model.Citation) -> Markup:
+        """A citation of sources."""
+        return Markup(escape(citation.span.text))
 
     def code_href(self, code: model.CodeSpan) -> str:
         """The address of what inline code names; mostly empty."""
@@ -199,7 +207,7 @@ class HtmlWriter:
             case model.BlockQuote():
                 return f"<blockquote>\n{self._blocks(block.blocks)}</blockquote>\n"
             case model.CodeBlock():
-                return self.code(block.language, block.code.text)
+                return self._captioned(block, (), self.code(block.language, block.code.text))
             case model.HtmlBlock():
                 return raw_html(block, self.url)
             case model.HtmlFlow():
@@ -210,7 +218,9 @@ class HtmlWriter:
                 return f"{self.display(block.tex.text, block.span.start)}\n"
             case model.Table():
                 return self._table(block)
-            case model.Callout() | model.Mjcf() | model.PlainCode():
+            case model.PlainCode():
+                return self._captioned(block, (), self.block(block))
+            case model.Callout() | model.Mjcf():
                 return self.block(block)
             case model.Recording() | model.Script() | model.FeatureBlock():
                 return self.block(block)
@@ -221,7 +231,7 @@ class HtmlWriter:
         """An image with the rest of its paragraph as its caption."""
         image = next(inline for inline in paragraph.children if isinstance(inline, model.Image))
         words = self._inlines(inline for inline in paragraph.children if inline is not image)
-        return self.figure(image, Markup(words.removeprefix("Figure:").strip()))
+        return self.figure(paragraph, image, Markup(words.removeprefix("Figure:").strip()))
 
     def _heading(self, heading: model.Heading) -> str:
         inner, name = self._inlines(heading.children), f"h{heading.level}"
@@ -257,13 +267,26 @@ class HtmlWriter:
         return f'<input type="checkbox" disabled{state} aria-label="{label}"> '
 
     def _table(self, table: model.Table) -> str:
-        """A table; its columns are aligned by class."""
+        """A table, below its caption; its columns are aligned by class."""
         head = self._row(table.header, table, 'th scope="col"')
         rows = "".join(self._row(row, table, "td") for row in table.rows)
         body = f"<tbody>\n{rows}</tbody>\n" if rows else ""
         html = f"<table>\n<thead>\n{head}</thead>\n{body}</table>\n"
         label = escape(self.words("markup.table"))
-        return f'<div class="table" role="group" aria-label="{label}" tabindex="0">\n{html}</div>\n'
+        html = f'<div class="table" role="group" aria-label="{label}" tabindex="0">\n{html}</div>\n'
+        return self._captioned(table, table.caption, html)
+
+    def _captioned(
+        self, block: model.Labelled, caption: tuple[model.Inline, ...], html: str
+    ) -> str:
+        """A block below its number and its caption, if it has one of the two."""
+        if block.label is None and not caption:
+            return html
+        id = "" if block.label is None else f' id="{escape(block.label.id)}"'
+        number = escape(self.number(block.label))
+        parts = (number and f'<span class="numbered">{number}</span>', self._inlines(caption))
+        head = f"<figcaption>{' '.join(filter(None, parts))}</figcaption>"
+        return f'<figure class="captioned"{id}>\n{head}\n{html}</figure>\n'
 
     def _row(self, cells: tuple[model.Cell, ...], table: model.Table, tag: str) -> str:
         parts = ["<tr>\n"]
@@ -310,6 +333,8 @@ class HtmlWriter:
                 return self.binding(inline)
             case model.FootnoteRef():
                 return self._reference(inline)
+            case model.Citation():
+                return self.citation(inline)
             case _:
                 assert_never(inline)
 

@@ -29,7 +29,11 @@ def make_library(
 ) -> Library:
     """The library of a course; `trials` are what is published of trials, if it is known already."""
     renderer = renderer_for(
-        assets, course.language, course.theme.template_texts, dict(results.formulas)
+        assets,
+        course.language,
+        course.theme.template_texts,
+        dict(results.formulas),
+        is_manual=course.is_manual,
     )
     trials = trials or publish_trials(results, assets)
     course_trials = feature_trials(course) if trials.values else {}
@@ -47,10 +51,16 @@ def renderer_for(
     language: str,
     course_templates: Texts = (),
     formulas: Mapping[Formula, str | MathError] = {},
+    *,
+    is_manual: bool = False,
 ) -> Renderer:
-    """The renderer of pages in a language, with the templates of a course and of the tool."""
+    """The renderer of pages in a language, with the templates of a course and of the tool.
+
+    A course of pages alone is spoken of in the words of `manual`.
+    """
     templates = templates_of(assets.templates, assets.compiled_templates, course_templates)
-    return Renderer(strings_for(assets.templates, language), templates, formulas)
+    words = strings_for(assets.templates, language)
+    return Renderer(words.prefer("manual.") if is_manual else words, templates, formulas)
 
 
 def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> Strings:

@@ -41,6 +41,26 @@ class ShownVerdict(Struct, frozen=True):
     comparison: Comparison
 
 
+class CitedEntry(Struct, frozen=True):
+    """A source that a document cites."""
+
+    id: str
+    """Its anchor; `citation` is that of its first citation."""
+    citation: str
+    html: Markup
+
+
+class Citations(Struct, frozen=True):
+    """What the page of a document shows of sources."""
+
+    texts: Mapping[int, Markup] = field(default_factory=dict)
+    """The text of each citation, by its offset."""
+    entries: tuple[CitedEntry, ...] = ()
+    """The sources, in the order of the style."""
+    page: str = ""
+    """The address of the page of all sources of the course."""
+
+
 class DocumentInputs(Struct, frozen=True):
     """What the page of a document shows of the rest of the course and of its results.
 
@@ -52,8 +72,10 @@ class DocumentInputs(Struct, frozen=True):
     python: str = ""
     hrefs: Mapping[Target, str] = field(default_factory=dict)
     """Addresses of links, relative to the page."""
-    equations: Mapping[Target, str] = field(default_factory=dict)
-    """The texts of links to formulas on other pages that have none of their own."""
+    names: Mapping[Target, str] = field(default_factory=dict)
+    """The texts of links to numbered items of other pages that have none of their own."""
+    number_prefix: str = ""
+    """What stands before the numbers of figures: `4.2.` in a lesson."""
     callouts: Mapping[str, CalloutKind] = field(default_factory=dict)
     runs: Mapping[str, ShownRun] = field(default_factory=dict)
     """By path of the script."""
@@ -64,6 +86,7 @@ class DocumentInputs(Struct, frozen=True):
     """The values that features show with their blocks (`FenceKind.values`)."""
     code_links: Mapping[int, str] = field(default_factory=dict)
     """Addresses of what inline code names."""
+    citations: Citations = Citations()
     keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the keyframes of models, by the model's name."""
     address: str = ""

@@ -203,7 +203,6 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
         "galleries": tuple(galleries),
         "levels": tuple(level_view(library, place, level, whole=True) for level in course.levels),
         "start": lesson_link(library, place, written_lessons[0]) if written_lessons else None,
-        "total": len(library.order),
         "written": len(written_lessons),
         "models": len(course.models),
         "gallery": place.href(library.gallery) if library.gallery else "",
@@ -335,10 +334,25 @@ def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
 def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
     """The inputs of a page that is not a lesson; its document's summary is enough."""
     place = urls.Place(urls.page_path(page))
+    pages = [p for p in library.course.pages if p.section and not p.is_home] if page.section else []
+    links = {p.id: NamedLink(place.href(urls.page_path(p)), p.title) for p in pages}
+    order = list(links)
+    position = order.index(page.id) if page.id in order else 0
+    values = {
+        "title": page.title,
+        "edit": edit_address(library, page.path),
+        "current": page.id,
+        "sections": tuple(
+            (title, tuple((p.id, links[p.id]) for p in pages if p.section == title))
+            for title in dict.fromkeys(p.section for p in pages)
+        ),
+        "previous": links[order[position - 1]] if position else None,
+        "following": links[order[position + 1]] if position + 1 < len(order) else None,
+    }
     return PageInputs(
         PageHead(place.path, "page", page.title, ""),
         "page.html",
-        {"title": page.title, "edit": edit_address(library, page.path)},
+        values,
         document_inputs=document_inputs(library, place, document),
     )
 

@@ -14,6 +14,7 @@ from typing import assert_never
 
 from markupsafe import Markup, escape
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.model import (
     Callout,
@@ -23,6 +24,7 @@ from coursebuild.core.model import (
     Mjcf,
     Mode,
     NumberBinding,
+    Paragraph,
     PlainCode,
     Recording,
     Script,
@@ -72,6 +74,7 @@ def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) 
     return page.template(
         "blocks/script.html",
         script=block,
+        number=page.number(block.label),
         parts=tuple(
             CodePart(
                 numbered_lines(lines[part.first - 1 : part.last], block.path, part.first),
@@ -107,7 +110,7 @@ def plain_code(page: PageContext, block: PlainCode) -> Markup:
     return page.template("blocks/source_part.html", path=block.source.path, code=code_html)
 
 
-def figure(page: PageContext, image: Image, caption: Markup) -> Markup:
+def figure(page: PageContext, block: Paragraph, image: Image, caption: Markup) -> Markup:
     """An image with its caption; a script's figure links to the script and its data."""
     files = [file for file in recorded_figures(page.document) if file.span == image.url_span]
     recorded, data = (*files, None, None)[:2]
@@ -115,6 +118,8 @@ def figure(page: PageContext, image: Image, caption: Markup) -> Markup:
         "blocks/figure.html",
         image=image,
         caption=caption,
+        label=block.label,
+        number=page.number(block.label),
         href=page.url(image.url),
         figure=recorded,
         dark=recorded and recorded.has_dark and page.place.href(urls.dark_path(recorded.path)),
@@ -142,6 +147,7 @@ def mjcf(page: PageContext, block: Mjcf) -> Markup:
     return page.template(
         "blocks/mjcf.html",
         mjcf=block,
+        number=page.number(block.label),
         html=page.highlight("xml", block.code.text.rstrip("\n")),
         engine=page.inputs.engine,
     )
@@ -180,13 +186,18 @@ class OutputView(Struct, frozen=True):
 
 
 def _output(page: PageContext, block: Recording) -> OutputView:
-    numbers = output_numbers(page.document)
+    numbers, table = output_numbers(page.document), block.body
+    caption = page.inlines(block.caption) or Markup(escape(page.words("code.caption")))
+    if isinstance(table, Table) and table.label is not None:
+        number = Markup('<span class="numbered" id="{}">{}</span> {}')
+        caption = number.format(table.label.id, page.number(table.label), caption)
+        table = replace(table, label=None)
     return OutputView(
-        caption=page.inlines(block.caption) or Markup(escape(page.words("code.caption"))),
+        caption=caption,
         path=block.script or "",
         anchor=output_anchor(block.script, numbers[block.span.start]) if block.script else "",
-        text=None if isinstance(block.body, Table) else visible(block.body.text).rstrip("\n"),
-        table=page.blocks((block.body,)) if isinstance(block.body, Table) else None,
+        text=None if isinstance(table, Table) else visible(table.text).rstrip("\n"),
+        table=page.blocks((table,)) if isinstance(table, Table) else None,
         receipt=output_receipt(page, block),
     )
 
@@ -291,9 +302,9 @@ def _fold_label(words: Strings, part: Part) -> str:
 class PageWriter(PageContext, frozen=True):
     """A page that can be written whole: its special blocks are drawn here, or by their feature."""
 
-    def figure(self, image: Image, caption: Markup) -> Markup:
+    def figure(self, block: Paragraph, image: Image, caption: Markup) -> Markup:
         """An image with its caption, its script and its data."""
-        return figure(self, image, caption) + Markup("\n")
+        return figure(self, block, image, caption) + Markup("\n")
 
     def code(self, language: str, text: str) -> Markup:
         """A code block that is only shown, not run."""

@@ -114,6 +114,20 @@ def hoist_styles(html: str) -> tuple[str, frozenset[str]]:
 
     Most pages have some in their formulas only, and then nothing else is looked at.
     """
+    parts = FORMULA.split(html)
+    if "style" in "".join(parts[::2]).lower():
+        return _hoist_all.__wrapped__(html)
+    declarations: set[str] = set()
+    for at in range(1, len(parts), 2):
+        if "style" in parts[at].lower():
+            parts[at], formula_declarations = _hoist_all(parts[at])
+            declarations |= formula_declarations
+    return "".join(parts), frozenset(declarations)
+
+
+@functools.lru_cache(maxsize=512)
+def _hoist_all(html: str) -> tuple[str, frozenset[str]]:
+    """The same, wherever they stand; kept for formulas, which pages repeat."""
     declarations: set[str] = set()
 
     def replace(piece: re.Match[str]) -> str:
@@ -124,11 +138,7 @@ def hoist_styles(html: str) -> tuple[str, frozenset[str]]:
             declarations.add(declaration)
         return tag
 
-    parts = FORMULA.split(html)
-    if "style" in "".join(parts[::2]).lower():
-        return _PIECE.sub(replace, html), frozenset(declarations)
-    parts[1::2] = (_PIECE.sub(replace, f) if "style" in f.lower() else f for f in parts[1::2])
-    return "".join(parts), frozenset(declarations)
+    return _PIECE.sub(replace, html), frozenset(declarations)
 
 
 @functools.lru_cache(maxsize=4096)

@@ -56,6 +56,13 @@ class Strings(Struct, frozen=True):
         name = "other" if isinstance(n, str) else category(self.language, n)
         return self.texts.get(f"{key}.{name}", self.texts.get(f"{key}.other"))
 
+    def prefer(self, prefix: str) -> Strings:
+        """The texts in which one of the key `prefix` + KEY replaces that of KEY."""
+        preferred = {
+            k.removeprefix(prefix): t for k, t in self.texts.items() if k.startswith(prefix)
+        }
+        return Strings(dict(sorted((dict(self.texts) | preferred).items())), self.language)
+
     def has(self, key: str) -> bool:
         """Whether there is a text of this key."""
         return key in self.texts

@@ -7,6 +7,7 @@ one; `dark_colours`, the dark colours that a style sheet pairs with light ones.
 
 from __future__ import annotations
 
+import colorsys
 import functools
 import io
 import re
@@ -128,6 +129,7 @@ _PAIR = re.compile(r"light-dark\((#[0-9a-f]{6}), ?(#[0-9a-f]{6})\)")
 _COLOUR = re.compile(
     r"""(?<![\w-])(?P<name>fill|stroke|color|stop-color)(?P<is>\s*[:=]\s*"?)(?P<value>[^;"{}<>]+)"""
 )
+_FUNCTION = re.compile(r"(?P<name>rgb|hsl)a?\((?P<numbers>[\d.,% ]+)\)")
 _ROOT = re.compile(r"<svg\b[^>]*>")
 
 
@@ -141,20 +143,40 @@ def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
 
     A colour without a pair keeps its hue, but its lightness is inverted.
     """
-    from PIL import ImageColor
 
     def dark(match: re.Match[str]) -> str:
         value = match["value"]
-        try:
-            red, green, blue = ImageColor.getrgb(value.strip())[:3]
-        except ValueError:  # `none`, a reference, or an unknown name
+        channels = _channels(value.strip().lower())
+        if channels is None:
             return match[0]
+        red, green, blue = channels
         light = f"#{red:02x}{green:02x}{blue:02x}"
         shift = round(255 - 2 * (0.2126 * red + 0.7152 * green + 0.0722 * blue))
         inverted = bytes(min(max(channel + shift, 0), 255) for channel in (red, green, blue))
         return f"{match['name']}{match['is']}{paired_colours.get(light) or f'#{inverted.hex()}'}"
 
     return _COLOUR.sub(dark, _ROOT.sub(_with_fill, svg, count=1))
+
+
+def _channels(colour: str) -> tuple[int, int, int] | None:
+    """Red, green and blue of a colour of CSS; `None` of `none`, a reference and unknown names."""
+    import webcolors  # needed only by a site with drawings
+
+    try:
+        if (function := _FUNCTION.fullmatch(colour)) is None:
+            is_hex, digits = colour.startswith("#"), 6 if len(colour) > 5 else 3
+            parse = webcolors.hex_to_rgb if is_hex else webcolors.name_to_rgb
+            return tuple(parse(colour[: 1 + digits] if is_hex else colour))
+        numbers = [part.strip() for part in function["numbers"].split(",")[:3]]
+        a, b, c = (
+            min(float(number.rstrip("%")) / (100 if number.endswith("%") else 255), 1.0)
+            for number in numbers
+        )
+        if function["name"] == "hsl":
+            a, b, c = colorsys.hls_to_rgb(float(numbers[0]) / 360, c, b)
+    except ValueError:
+        return None
+    return round(255 * a), round(255 * b), round(255 * c)
 
 
 def _with_fill(root: re.Match[str]) -> str:

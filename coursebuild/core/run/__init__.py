@@ -7,7 +7,7 @@
   `script_main`
 - what a script looks at: `tracing` (with `mujoco_tracing`, `mujoco_files`) notes it, `run_record`
   makes a trace and what is stored of the notes, `dependencies` what a result depends on
-- `memory`: results stored with these, and found again
+- `run_store`: results stored with these, and found again
 - `script_environment`, `packages`: where scripts run, and what results depend on, as it is now
 - `v8` (with `typeset.js`): scripts with limits on time and memory; formulas to MathML
 - `mjcf` (with its child `compile_main`): MuJoCo's compiler, and a memory of what it said

@@ -119,16 +119,13 @@ class _Watch:
         self._data_by_id[id(data)] = data
         size = sum(int(item.nbuffer) for item in list(self._data_by_id.values())[:_MOST_NOTES])
         if len(self._data_by_id) > self._release_limit or size > _MOST_HELD:
-            self._release_unused()
+            # Check and release data that nothing else refers to
+            baseline = _count_references({0: object()}, 0)
+            for key in list(self._data_by_id):
+                if _count_references(self._data_by_id, key) <= baseline:
+                    self._check_finally(self._data_by_id.pop(key))
+                    self._noted = {entry for entry in self._noted if entry[0] != key}
             self._release_limit = max(2, 2 * len(self._data_by_id))
-
-    def _release_unused(self) -> None:
-        """Check and release data that nothing else refers to."""
-        baseline = _count_references({0: object()}, 0)
-        for key in list(self._data_by_id):
-            if _count_references(self._data_by_id, key) <= baseline:
-                self._check_finally(self._data_by_id.pop(key))
-                self._noted = {entry for entry in self._noted if entry[0] != key}
 
     def _before_reset(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         if self._checks < _MOST_CHECKS:

@@ -141,7 +141,16 @@ def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str
     decode = functools.partial(msgspec.json.decode, type=dict[str, str])
     names = store.peek("installed", key, decode)
     if names is None:
-        names = _scan(folders)
+        names_by_module: dict[str, set[str]] = {}
+        seen_names: set[str] = set()
+        for distribution in importlib.metadata.distributions(path=list(folders)):
+            name = distribution.metadata["Name"] or ""
+            if name in seen_names or name == _TOOL_PACKAGE:  # the first on the path counts
+                continue
+            seen_names.add(name)
+            for module in _modules(distribution):
+                names_by_module.setdefault(module, set()).add(f"{name} {distribution.version}")
+        names = {module: ", ".join(sorted(names)) for module, names in names_by_module.items()}
         store.put_value("installed", key, names)
     return names
 
@@ -152,19 +161,6 @@ def _names(folder: str) -> list[str]:
         return sorted(os.listdir(folder))  # noqa: PTH208
     except OSError:
         return []
-
-
-def _scan(folders: Sequence[str]) -> dict[str, str]:
-    names_by_module: dict[str, set[str]] = {}
-    seen_names: set[str] = set()
-    for distribution in importlib.metadata.distributions(path=list(folders)):
-        name = distribution.metadata["Name"] or ""
-        if name in seen_names or name == _TOOL_PACKAGE:  # the first on the path counts
-            continue
-        seen_names.add(name)
-        for module in _modules(distribution):
-            names_by_module.setdefault(module, set()).add(f"{name} {distribution.version}")
-    return {module: ", ".join(sorted(names)) for module, names in names_by_module.items()}
 
 
 def _modules(distribution: importlib.metadata.Distribution) -> set[str]:
@@ -241,16 +237,8 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
     Raises:
         EffectError: it cannot be made.
     """
-    parts = [sys.version, sys.base_prefix, site_folders()]
-    name = f"mujoco-{engine}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
-    state = state_folder(str(root))
-    if state is None:
-        raise EffectError(
-            f"there is no place for an environment with MuJoCo {engine}",
-            help="HOME or XDG_STATE_HOME gives one, outside of the course",
-        )
-    folder = Path(state, _FOLDER)
-    prefix = folder / name
+    prefix = environment_prefix(root, engine)
+    folder = prefix.parent
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with folder_lock(folder):
@@ -260,11 +248,15 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
                 say(f"installing MuJoCo {engine} into {prefix}")
                 _create_environment(prefix, engine)
             os.utime(prefix)
-            _remove_unused(folder, prefix)
+            # Remove all environments except those that were used last
+            rest = [path for path in folder.iterdir() if path != prefix]
+            rest.sort(key=lambda path: path.stat().st_mtime, reverse=True)
+            for path in rest[_MAX_ENVIRONMENTS - 1 :]:
+                shutil.rmtree(path, ignore_errors=True)
     except OSError as error:
         raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
     return Interpreter(
-        name,
+        prefix.name,
         f"{prefix}/bin/python",
         str(prefix),
         sys.base_prefix,
@@ -272,6 +264,23 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
         engine,
         (str(_packages(prefix)), *site_folders()),
     )
+
+
+def environment_prefix(root: Path, engine: str) -> Path:
+    """Where the environment with a version of MuJoCo is, or would be.
+
+    Raises:
+        EffectError: there is no place for it.
+    """
+    parts = [sys.version, sys.base_prefix, site_folders()]
+    name = f"mujoco-{engine}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
+    state = state_folder(str(root))
+    if state is None:
+        raise EffectError(
+            f"there is no place for an environment with MuJoCo {engine}",
+            help="HOME or XDG_STATE_HOME gives one, outside of the course",
+        )
+    return Path(state, _FOLDER, name)
 
 
 def _packages(prefix: Path) -> Path:
@@ -369,11 +378,3 @@ def _run(command: Sequence[str]) -> tuple[int, str]:
                 os.killpg(process.pid, signal.SIGKILL)
             raise
     return process.returncode, output
-
-
-def _remove_unused(folder: Path, current: Path) -> None:
-    """Remove all environments except those that were used last."""
-    rest = [path for path in folder.iterdir() if path != current]
-    rest.sort(key=lambda path: path.stat().st_mtime, reverse=True)
-    for path in rest[_MAX_ENVIRONMENTS - 1 :]:
-        shutil.rmtree(path, ignore_errors=True)

@@ -169,26 +169,23 @@ class _Perturbation:
         def rollout(*args: Any, **keywords: Any) -> Any:
             """As MuJoCo's, from states that were moved."""
             with contextlib.suppress(Exception):  # MuJoCo says what is wrong with its arguments
-                args = self._move_rollout(args)
+                models, initial = args[1], args[5]
+                states = self._numpy.array(initial, dtype=float, copy=True)
+                rows = states.reshape(-1, states.shape[-1])
+                models = models if isinstance(models, list) else [models]
+                for i, row in enumerate(rows):
+                    model = models[min(i, len(models) - 1)]
+                    nq, nv, na = int(model.nq), int(model.nv), int(model.na)
+                    qpos, qvel = row[1 : 1 + nq], row[1 + nq : 1 + nq + nv]  # the time comes first
+                    act = row[1 + nq + nv : 1 + nq + nv + na]
+                    fields = (qpos, qvel, act)
+                    masks = [self._find_new(k, array, None, True) for k, array in enumerate(fields)]
+                    if self._get_plan(model).move(*fields, masks, True):
+                        mujoco_tracing.note("p")
+                args = (*args[:5], states, *args[6:])
             return real(*args, **keywords)
 
         return rollout
-
-    def _move_rollout(self, args: tuple[Any, ...]) -> tuple[Any, ...]:
-        models, initial = args[1], args[5]
-        states = self._numpy.array(initial, dtype=float, copy=True)
-        rows = states.reshape(-1, states.shape[-1])
-        models = models if isinstance(models, list) else [models]
-        for i, row in enumerate(rows):
-            model = models[min(i, len(models) - 1)]
-            nq, nv, na = int(model.nq), int(model.nv), int(model.na)
-            qpos, qvel = row[1 : 1 + nq], row[1 + nq : 1 + nq + nv]  # the time comes first
-            act = row[1 + nq + nv : 1 + nq + nv + na]
-            fields = (qpos, qvel, act)
-            masks = [self._find_new(k, array, None, True) for k, array in enumerate(fields)]
-            if self._get_plan(model).move(*fields, masks, True):
-                mujoco_tracing.note("p")
-        return (*args[:5], states, *args[6:])
 
     # --- the end
 

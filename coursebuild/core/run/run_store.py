@@ -7,7 +7,9 @@ Entry point: `RunStore`.
    the shared cache.
 2. `put_run`: after a run, the state of everything in its trace is read and stored with the result.
    If something changed while it ran, the script may have seen another state, and nothing is stored.
-3. How a script's last run ended is noted under its path, whether it is remembered or not: for
+3. `claim`: of several processes that need the same result one runs the script, and the others get
+   its result. So `serve` and other commands can run scripts at the same time.
+4. How a script's last run ended is noted under its path, whether it is remembered or not: for
    `explain`, and for the order in which scripts run.
 """
 
@@ -31,6 +33,7 @@ from coursebuild.core.engine.digests import (
     modules_in,
 )
 from coursebuild.core.engine.store import Store
+from coursebuild.core.files.locks import claim, unclaim
 from coursebuild.core.files.trust import FOLDER
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run.dependencies import (
@@ -162,6 +165,23 @@ class RunStore:
         if record is not None:
             self._note(record)
         return record
+
+    def claim(self, inputs: Inputs) -> ScriptRun | bool:
+        """Claim the run of a script; `False` while another process has it.
+
+        Where that has just ended, this is its result.
+        """
+        if not claim(self.store.folder, group_key(inputs)):
+            return False
+        record = None if self.fresh else self.get_record(inputs)
+        if record is None:
+            return True
+        self.unclaim(inputs)
+        return record.restore(self.states.places)
+
+    def unclaim(self, inputs: Inputs) -> None:
+        """Let other processes run a script."""
+        unclaim(self.store.folder, group_key(inputs))
 
     def records(self, inputs: Inputs) -> Iterator[RunRecord]:
         """All results kept on this machine for these inputs, newest first."""

@@ -188,7 +188,12 @@ class ScriptProcess:
         job, preloaded = self.job, self._preloaded
         arguments = [job["path"], *job["args"]]
         sys.argv, sys.orig_argv[1:] = arguments, arguments
-        self._set_paths()
+        os.environ["TMPDIR"] = self._environment["TMPDIR"]  # the rest is as it was at the start
+        library = self._environment.get("PYTHONPATH")
+        if library is not None and "PYTHONPATH" not in os.environ:
+            os.environ["PYTHONPATH"] = library
+            sys.path[:0] = library.split(os.pathsep)
+        sys.path.insert(0, os.path.dirname(self.path))  # noqa: PTH120
         self.names |= {
             "__builtins__": builtins,
             "__file__": self.path,
@@ -219,14 +224,6 @@ class ScriptProcess:
         tracer.install()
         tracer.begin(standard)
         return compile(text, self.path, "exec", dont_inherit=True)
-
-    def _set_paths(self) -> None:
-        os.environ["TMPDIR"] = self._environment["TMPDIR"]  # the rest is as it was at the start
-        library = self._environment.get("PYTHONPATH")
-        if library is not None and "PYTHONPATH" not in os.environ:
-            os.environ["PYTHONPATH"] = library
-            sys.path[:0] = library.split(os.pathsep)
-        sys.path.insert(0, os.path.dirname(self.path))  # noqa: PTH120
 
     def _tracer(self) -> Tracer:
         installed, root, library = _installed_folders(), self.job["root"], self.job["library"]

@@ -54,6 +54,8 @@ OnStart: TypeAlias = Callable[[str], object]
 """Called with the path of a script that begins."""
 OnFinish: TypeAlias = Callable[[ScriptRun], object]
 """Called with the result of a script, however it ended."""
+Claim: TypeAlias = Callable[[ScriptJob], ScriptRun | bool]
+"""Whether a script may begin, or its result; `False` while another process runs it."""
 RunAll: TypeAlias = Callable[..., tuple[ScriptRun, ...]]
 """Runs scripts, as `ScriptServer.run` does."""
 
@@ -64,6 +66,10 @@ class RunStoppedError(Exception):
 
 def _ignore(value: object) -> None:
     pass
+
+
+def _allow(job: ScriptJob) -> ScriptRun | bool:
+    return True
 
 
 _PATIENCE = 0.1
@@ -116,6 +122,7 @@ class ScriptServer:
         on_finish: OnFinish = _ignore,
         interpreter: Interpreter | None = None,
         is_unwanted: Callable[[frozenset[str]], bool] | None = None,
+        claim: Claim = _allow,
     ) -> tuple[ScriptRun, ...]:
         """Run scripts; only one run at a time.
 
@@ -127,6 +134,7 @@ class ScriptServer:
             on_finish: likewise.
             interpreter: another interpreter that is to run them.
             is_unwanted: called regularly with the paths of what runs; whether to stop.
+            claim: called before a script begins.
 
         Returns:
             What each did, in the order of the jobs.
@@ -139,7 +147,14 @@ class ScriptServer:
             return ()
         with temporary_folder() as scratch:
             work = _Work(
-                root.resolve(), jobs, on_start, on_finish, interpreter, self._sandbox, scratch
+                root.resolve(),
+                jobs,
+                on_start,
+                on_finish,
+                claim,
+                interpreter,
+                self._sandbox,
+                scratch,
             )
             self._run(work, parallel, is_unwanted)
         return tuple(work.runs[i] for i in range(len(jobs)))
@@ -152,12 +167,15 @@ class ScriptServer:
         log = work.root / _LOG
         had_log = os.path.lexists(log)
         try:
-            for _ in range(min(max(parallel, 1), len(work.jobs))):
-                self._start(busy, work)
-            patience = None if is_unwanted is None else _PATIENCE
-            patience = patience if self._sandbox is None else _VIGILANCE
-            while busy:
-                for ready in wait(busy, patience):
+            while True:
+                while len(busy) < max(parallel, 1) and (index := work.take_job()) is not None:
+                    worker = self._get_worker(work)
+                    busy[worker.reports] = worker
+                    work.give(worker, index)
+                if not busy and not work.pending:
+                    break
+                patience = None if is_unwanted is None and not work.pending else _PATIENCE
+                for ready in wait(busy, patience if self._sandbox is None else _VIGILANCE):
                     self._handle_report(busy[ready], busy, work)  # type: ignore[index]
                 for worker in busy.values():
                     work.enforce_limits(worker)
@@ -172,11 +190,6 @@ class ScriptServer:
                 with contextlib.suppress(OSError):
                     log.unlink()
 
-    def _start(self, busy: dict[int, Worker], work: _Work) -> None:
-        worker = self._get_worker(work)
-        busy[worker.reports] = worker
-        work.give_next_job(worker)
-
     def _handle_report(self, worker: Worker, busy: dict[int, Worker], work: _Work) -> None:
         is_alive = work.read_report(worker)
         if is_alive and worker.job is not None:
@@ -184,10 +197,8 @@ class ScriptServer:
         del busy[worker.reports]
         if is_alive and self._sandbox is None:
             self._idle.append(worker)
-            return
-        worker.close()
-        if work.pending:
-            self._start(busy, work)
+        else:
+            worker.close()
 
     def _get_worker(self, work: _Work) -> Worker:
         """A supervisor that waits for a job: an idle or a new one."""
@@ -214,6 +225,7 @@ class _Work:
         jobs: Sequence[ScriptJob],
         on_start: OnStart,
         on_finish: OnFinish,
+        claim: Claim,
         interpreter: Interpreter | None,
         sandbox: Sandbox | None,
         scratch: str,
@@ -222,6 +234,7 @@ class _Work:
         self.jobs = jobs
         self.on_start = on_start
         self.on_finish = on_finish
+        self.claim = claim
         clean = clean_environment(os.environ)
         self.environment = clean if interpreter is None else interpreter.environment(clean)
         self.environment |= dict(jobs[0].environment)
@@ -254,11 +267,20 @@ class _Work:
         files += [self.root / job.path for job in jobs]
         self.packages = wanted_packages(files)
 
-    def give_next_job(self, worker: Worker) -> None:
-        """Hand over the next job, if there is one."""
-        if not self.pending:
-            return
-        index = self.pending.pop(0)
+    def take_job(self) -> int | None:
+        """Take the next job that no other process does, if there is one."""
+        for index in [*self.pending]:
+            answer = index in self.announced_jobs or self.claim(self.jobs[index])
+            if answer is False:
+                continue
+            self.pending.remove(index)
+            if answer is True:
+                return index
+            self.runs[index] = answer
+        return None
+
+    def give(self, worker: Worker, index: int) -> None:
+        """Hand over a job."""
         if index not in self.announced_jobs:
             self.announced_jobs.add(index)
             self.on_start(self.jobs[index].path)
@@ -309,8 +331,8 @@ class _Work:
             run = replace(run, trace=replace(run.trace, opaque=reason))
         worker.job, worker.is_reused = None, False
         self._finish(index, run)
-        if self.sandbox is None:
-            self.give_next_job(worker)
+        if self.sandbox is None and (next_index := self.take_job()) is not None:
+            self.give(worker, next_index)
 
     def running_paths(self, busy: Iterable[Worker]) -> frozenset[str]:
         """The paths of the scripts that these supervisors run."""

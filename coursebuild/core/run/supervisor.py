@@ -39,7 +39,7 @@ import struct
 import subprocess
 import sys
 import traceback
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from coursebuild.core.engine.lifetime import end_with_parent
@@ -87,7 +87,16 @@ def main(arguments: Sequence[str], initial_modules: Collection[str]) -> ScriptPr
     `initial_modules` are the modules that every Python has from its start.
     """
     if len(arguments) == 1:
-        return _make_script(json.loads(arguments[0]), initial_modules)
+        # The script that this process was started for
+        job = json.loads(arguments[0])
+        preloaded = PreloadedPackages()
+        shadowed = _sibling_names(job) & preloaded.names()
+        if not shadowed:
+            preloaded.load(job["packages"])
+        for name in [name for name in sys.modules if name.partition(".")[0] in shadowed]:
+            if name not in initial_modules:
+                del sys.modules[name]
+        return ScriptProcess(job, os.environ, None, preloaded)
     jobs, reports, fork = map(int, arguments)
     os.set_inheritable(jobs, False)
     os.set_inheritable(reports, False)
@@ -107,18 +116,6 @@ def main(arguments: Sequence[str], initial_modules: Collection[str]) -> ScriptPr
     if supervisor.scratch and has_ended(tool):
         remove_folder(supervisor.scratch)
     os._exit(status)
-
-
-def _make_script(job: Job, initial_modules: Collection[str]) -> ScriptProcess:
-    """The script that this process was started for."""
-    preloaded = PreloadedPackages()
-    shadowed = _sibling_names(job) & preloaded.names()
-    if not shadowed:
-        preloaded.load(job["packages"])
-    for name in [name for name in sys.modules if name.partition(".")[0] in shadowed]:
-        if name not in initial_modules:
-            del sys.modules[name]
-    return ScriptProcess(job, os.environ, None, preloaded)
 
 
 class _Supervisor:
@@ -216,7 +213,15 @@ class _Supervisor:
         try:
             prepare = functools.partial(self._prepare_script, job, stdout, stderr, os.getpid())
             if not self._can_fork(job):
-                pid = _spawn(job, environment, prepare)
+                # Start this program for one script
+                process = subprocess.Popen(
+                    [sys.executable, PROGRAM, json.dumps(job)],
+                    env=environment,
+                    stdin=subprocess.DEVNULL,
+                    preexec_fn=prepare,  # safe: there is no other thread
+                )
+                process.returncode = 0  # `RunningScript` reaps it
+                pid = process.pid
                 return RunningScript(pid, (out, err), None, job["timeout"], self.awake)
             shared = _shared_memory(environment["TMPDIR"])
             gc.freeze()  # else a script's garbage collector would touch, and so copy, our memory
@@ -271,18 +276,6 @@ def _sibling_names(job: Job) -> frozenset[str]:
         with contextlib.suppress(OSError):
             names.update(name.partition(".")[0] for name in os.listdir(folder))  # noqa: PTH208
     return frozenset(names)
-
-
-def _spawn(job: Job, environment: Mapping[str, str], prepare: Callable[[], None]) -> int:
-    """Start this program for one script."""
-    process = subprocess.Popen(
-        [sys.executable, PROGRAM, json.dumps(job)],
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        preexec_fn=prepare,  # safe: there is no other thread
-    )
-    process.returncode = 0  # `RunningScript` reaps it
-    return process.pid
 
 
 def _special_names(folder: str, names: Sequence[str]) -> list[str]:

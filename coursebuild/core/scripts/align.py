@@ -127,16 +127,13 @@ def _line_pairs(
             return MATCH
         if matcher.alike(lines[i], texts[j]):
             return _ALIKE_WEIGHT
-        return _likeness(words[lines[i]], words[texts[j]])
+        a = words[lines[i]]
+        b = words[texts[j]]
+        most = max(a.total(), b.total())
+        shared = (a & b).total()
+        return 1 + 3 * (2 * shared - most) // most if shared and 2 * shared >= most else 0
 
     return pair(lines, texts, weight, is_free)
-
-
-def _likeness(a: Counter[str], b: Counter[str]) -> int:
-    """From 1 to 4 for lines that share half to all of their words, else 0."""
-    most = max(a.total(), b.total())
-    shared = (a & b).total()
-    return 1 + 3 * (2 * shared - most) // most if shared and 2 * shared >= most else 0
 
 
 def _gap_steps(

@@ -55,7 +55,7 @@ from coursebuild.core.scripts.bound_numbers import (
 )
 from coursebuild.core.scripts.lines import canonicalize
 from coursebuild.core.scripts.numbers import Number, difference
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
 
 _SILENT_OUTCOMES = (
@@ -259,6 +259,8 @@ def _orphan_diagnostic(
     else:
         target = f" to `{path}`, which is not a script of the course"
         help = did_you_mean(path, outputs.scripts)
+        if isinstance(help, Fix):
+            help = help.at(binding.span)
     message = f"`{binding.text}` is bound{target}"
     return diagnose("binding-orphan", binding.text_span, message, help=help)
 
@@ -314,7 +316,7 @@ def _mismatch(
             "binding-mismatch",
             binding.text_span,
             f"`{path}` printed no `{stray}` beside the number in `{binding.text}`",
-            help=f"take the `{stray}` away",
+            help=Fix(f"take the `{stray}` away", "", stray),
         )
     label, better = _propose(bound_text, lines, list(map(PrintedLine, before)))
     return diagnose(
@@ -322,8 +324,7 @@ def _mismatch(
         binding.text_span,
         f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown",
         label=label,
-        help=f"write `{better}`" if better else "",
-        edits=[Edit(binding.text_span, better)] if better else [],
+        help=Fix(f"write `{better}`", better, safe=True) if better else "",
     )
 
 

@@ -47,7 +47,7 @@ from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.tables import compare_table
 from coursebuild.core.scripts.varying import varying_times
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 
@@ -227,19 +227,18 @@ def instability_diagnostic(
     ]
     if (rest := len(different_steps) - _MAX_NOTES) > 0:
         notes.append(Note(f"and {rest} more {'line' if rest == 1 else 'lines'}"))
-    help, edits = (_TABLE_HELP if isinstance(recording.body, Table) else _HELP), []
+    help = _TABLE_HELP if isinstance(recording.body, Table) else _HELP
     if isinstance(recording.body, Excerpt) and (
         pattern := varying_times(first, second, comparison)
     ):
-        help = f'a time varies: say `volatile="{pattern}"` on the fence'
-        edits = [_make_volatile(recording, pattern)]
+        edit = _make_volatile(recording, pattern)
+        help = Fix(f'a time varies: say `volatile="{pattern}"` on the fence', edits=(edit,))
     return diagnose(
         "output-unstable",
         recording.caption_span,
         "two runs of the script printed different lines",
         help=help,
         notes=notes,
-        edits=edits,
     )
 
 

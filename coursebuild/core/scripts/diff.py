@@ -146,14 +146,8 @@ def _token_differences(recorded: str, printed: str, matcher: LineMatcher) -> tup
         elif a.text != b.text:
             differences.append(Difference(a.start, a.end, b.start, b.end))
         at, printed_at = a.end, b.end
-    return _merge_differences(differences, recorded, printed)
 
-
-def _merge_differences(
-    differences: list[Difference], recorded: str, printed: str
-) -> tuple[Difference, ...]:
-    """Drop white space where anything else differs; join texts with only white space between."""
-
+    # Drop white space where anything else differs; join texts with only white space between
     def is_blank(d: Difference) -> bool:
         return not (
             recorded[d.start : d.end].strip() or printed[d.printed_start : d.printed_end].strip()

@@ -56,7 +56,7 @@ from coursebuild.core.scripts.lines import (
 )
 from coursebuild.core.scripts.numbers import Number, round_like
 from coursebuild.core.scripts.tables import RowCell, RowMatch, TableMatcher, table_rows
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 
 _FENCE = re.compile(r"`{3,}|~{3,}")
@@ -390,8 +390,11 @@ def check_source_parts(course: Course, read: ReadText) -> Iterator[Diagnostic]:
                 label=f"it has `{file_lines[first].strip()}` here"
                 if first < len(file_lines)
                 else "",
-                help="run `coursebuild update`, which copies it here",
-                edits=[whole_lines(source.body_span, source.prefix, file_lines)],
+                help=Fix(
+                    "run `coursebuild update`, which copies it here",
+                    edits=(whole_lines(source.body_span, source.prefix, file_lines),),
+                    safe=True,
+                ),
             )
 
 

@@ -27,7 +27,7 @@ from coursebuild.core.model import Recording
 from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outcome, ScriptRun, Sign
 from coursebuild.core.scripts.diff import shorten
 from coursebuild.core.scripts.extract import Extraction
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, propose
 from coursebuild.core.text.source import Span
 
 _FRAME = re.compile(r'File "(?P<path>[^"\n]+)", line (?P<line>\d{1,9})')
@@ -141,6 +141,10 @@ def failure_diagnostic(
         label = shorten(error, _LABEL)
         matches = ((pattern.match(error), advice) for pattern, advice in _HELPS)
         help = next((match.expand(advice) for match, advice in matches if match), "")
+        slip = re.search(r"'(\w+)'(?: is not defined)?\. Did you mean: '(\w+)'\?", error)
+        if slip is not None:
+            fix = propose(slip[1], slip[2])
+            help = Fix(help, fix.new, slip[1])
         missing = _MISSING_MODULE.search(error)
         file = find_module(missing[1]) if missing else ""
         folder = file.removesuffix("/__init__.py").rpartition("/")[0] or "."
@@ -309,7 +313,7 @@ def _lost_simulations(run: ScriptRun) -> tuple[Divergence, ...]:
 def _false_claim(extraction: Extraction, rule: str, key: str, reason: str) -> Diagnostic:
     fence = extraction.script.span.first_line()
     message = f"`{extraction.path}` says `{key}`, and {reason}"
-    return diagnose(rule, fence, message, help=f"take `{key}` away")
+    return diagnose(rule, fence, message, help=Fix(f"take `{key}` away", "", f" {key}", safe=True))
 
 
 def _incident_diagnostic(

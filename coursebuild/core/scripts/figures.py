@@ -24,6 +24,7 @@ import re
 import struct
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
 
 from coursebuild.core.drawing.safe_svg import SVG, XLINK, read_svg
 from coursebuild.core.model import Course
@@ -174,7 +175,11 @@ def _svg_difference(old_data: bytes, new_data: bytes) -> str:
     old_words, new_words = list(_words(old_root)), list(_words(new_root))
     if len(old_words) != len(new_words):
         return f"it has {len(new_words)} parts where {len(old_words)} are recorded"
-    size = _size(old_root)
+    # The longer side of a drawing, in its own units
+    box = [float(n) for n in _NUMBER.findall(old_root.get("viewBox", ""))]
+    lengths = (_NUMBER.match(old_root.get(side, "")) for side in ("width", "height"))
+    sides = box[2:4] or [float(number[0]) for number in lengths if number is not None]
+    size = max([side for side in sides if math.isfinite(side) and side > 0], default=1.0)
     numbers, texts, worst = 0, 0, 0.0
     for old_word, new_word in zip(old_words, new_words, strict=True):
         if old_word == new_word:
@@ -200,19 +205,13 @@ def _words(root: ET.Element) -> Iterator[str]:
         yield " ".join(f"{element.text or ''} {element.tail or ''}".split())
 
 
-def _size(root: ET.Element) -> float:
-    """The longer side of a drawing, in its own units."""
-    box = [float(n) for n in _NUMBER.findall(root.get("viewBox", ""))]
-    lengths = (_NUMBER.match(root.get(side, "")) for side in ("width", "height"))
-    sides = box[2:4] or [float(number[0]) for number in lengths if number is not None]
-    return max([side for side in sides if math.isfinite(side) and side > 0], default=1.0)
-
-
 # --- PNG
 
 
 def _png_size(data: bytes) -> tuple[int, int] | str:
     """Width and height of a PNG; or why it cannot be shown, in words."""
+    if find_spec("PIL") is None:
+        return "needs the package Pillow: run `pip install 'coursebuild[figures]'`"
     from PIL import Image
 
     width, height = (int.from_bytes(data[at : at + 4], "big") for at in (16, 20))
@@ -238,12 +237,12 @@ def _png_drawing(data: bytes) -> bytes:
 
 
 def _png_difference(old: bytes, new: bytes) -> str:
-    from PIL import Image, ImageChops, ImageStat
-
     old, new = _png_drawing(old), _png_drawing(new)
     old_size, new_size = _png_size(old), _png_size(new)
     if isinstance(old_size, str) or isinstance(new_size, str):
         return f"the recorded file {old_size}" if isinstance(old_size, str) else str(new_size)
+    from PIL import Image, ImageChops, ImageStat
+
     if old_size != new_size:
         return "it has {}×{} pixels where {}×{} are recorded".format(*new_size, *old_size)
     images = [Image.open(io.BytesIO(data)).convert("RGBA") for data in (old, new)]

@@ -38,7 +38,7 @@ from coursebuild.core.scripts.failures import (
 from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.numbers import Number, scan
 from coursebuild.core.scripts.tables import TableMatcher, table_rows
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.source import Excerpt
 
 _MAX_NOTES = 3
@@ -170,12 +170,9 @@ def _unmarked_diagnostic(block: CodeBlock | Table, path: str, word: str) -> Diag
         return diagnose("output-unmarked", block.span.first_line(), message, help=help)
     help = "an output is of kind `output`; if it is none, write `text illustration`"
     head = _FENCE_HEAD.match(block.span.text)
-    edits = []
     if head is not None:
-        start = block.span.start
-        edits.append(Edit(block.span.source.span(start, start + head.end()), f"{head[1]}output"))
-    place = block.span.first_line()
-    return diagnose("output-unmarked", place, message, help=help, edits=edits)
+        help = Fix(help, f"{head[1]}output", head[0])
+    return diagnose("output-unmarked", block.span.first_line(), message, help=help)
 
 
 _FENCE_HEAD = re.compile(r"(`{3,}|~{3,})[ \t]*[^\s`]*")

@@ -1,8 +1,9 @@
 """Attributes in braces after inline content and headings, and the anchors of a document.
 
-Entry points: `TERM`, `SYMBOL` and `LABEL`, which find braces, also on the next line; `read_term`,
-`read_meaning` and `read_label`, which read them; `read_attributes` (`## Title {#id .class}`),
-`Anchors` (unique ids), `slug`, `check_heading`. A value with spaces stands in quotes.
+Entry points: `TERM`, `SYMBOL` and `LABEL`, which find braces, also on the next line, as does
+`split_label`; `read_pairs`, `read_term` and `read_meaning`, which read them; `read_attributes`
+(`## Title {#id .class}`), `Anchors` (unique ids), `slug`, `check_heading`. A value with spaces
+stands in quotes.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ from msgspec import Struct, field
 from coursebuild.core.model import (
     Image,
     Inline,
-    Label,
     Meaning,
     NumberBinding,
     Text,
@@ -26,11 +26,14 @@ from coursebuild.core.model import (
 from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
+    Edit,
+    Fix,
     Note,
     Parsed,
     diagnose,
     did_you_mean,
     misspelt,
+    propose,
 )
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
@@ -44,16 +47,14 @@ SYMBOL = re.compile(
 LABEL = re.compile(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 """The attributes of a term, a symbol or a formula; group 1 is the braces, the last of which may be
 missing."""
+_LAST_LABEL = re.compile(r"(?:^|(?<=\s))\{#[^{}$\n]{0,200}\}?$")
 _PAIR = re.compile(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
-_ID = re.compile(r"\{#(eq:[\w-]+)(?=[\s}])")
 _SPACES = re.compile(r"\s+")
 _NUMBER = re.compile(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` if the glossary should name it differently'
 _SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the unit may be left out'
 _VALUE_HELP = 'write `value=9.81 given="its source"`, or `value=9.81 out=examples/x.py`'
-_LABEL_HELP = "write `{#eq:name}`, of letters, digits, `-` and `_`"
-_MARK_HELP = 'write `{#eq:name check}`, or `{#eq:name given="its source"}`'
 
 
 def collapse_spaces(text: str) -> str:
@@ -61,7 +62,7 @@ def collapse_spaces(text: str) -> str:
     return _SPACES.sub(" ", text).strip()
 
 
-def _read_pairs(
+def read_pairs(
     braces: Excerpt, keys: tuple[str, ...], rule: str, help: str
 ) -> dict[str, Excerpt | None] | Diagnostic:
     """The values by key, `None` for a key alone; or a diagnostic of the first mistake."""
@@ -78,7 +79,9 @@ def _read_pairs(
             return diagnose(rule, rest.span(), message, help=help)
         key, span = pair[1], braces.span(*pair.span(1))
         if key not in keys:
-            suggestion = did_you_mean(key, keys) if len(keys) > 1 else ""
+            suggestion = did_you_mean(key, keys)
+            if len(keys) == 1:
+                suggestion = Fix(help, keys[0] if misspelt(key, keys) else None, key, safe=True)
             return diagnose(rule, span, f"`{key}` is not a known key here", help=suggestion or help)
         if key in values:
             return diagnose(rule, span, f"`{key}` is given twice", help=help)
@@ -90,7 +93,7 @@ def _read_pairs(
 
 def read_term(braces: Excerpt, report: Report) -> str | None:
     """The name given to a term; empty if that is the term's own text, `None` after a mistake."""
-    values = _read_pairs(braces, ("term",), "term-attribute", _TERM_HELP)
+    values = read_pairs(braces, ("term",), "term-attribute", _TERM_HELP)
     if isinstance(values, Diagnostic):
         report(values)
         return None
@@ -99,7 +102,7 @@ def read_term(braces: Excerpt, report: Report) -> str | None:
         message = "the name of the term is empty"
         report(diagnose("term-attribute", braces.span(), message, help=_TERM_HELP))
         return None
-    return _value_text(name)
+    return value_text(name)
 
 
 def read_meaning(
@@ -107,16 +110,16 @@ def read_meaning(
 ) -> tuple[Meaning | None, str | None, NumberBinding | None]:
     """The meaning of a symbol, the source of given numbers, and its value, if they are there."""
     keys = ("symbol", "unit", "value", "given", "out")
-    values = _read_pairs(braces, keys, "symbol-attribute", _SYMBOL_HELP)
+    values = read_pairs(braces, keys, "symbol-attribute", _SYMBOL_HELP)
     if isinstance(values, Diagnostic):
         report(values)
         return None, None, None
-    source = _value_text(values["given"]) if "given" in values else None
+    source = value_text(values["given"]) if "given" in values else None
     value = values.get("value")
     number: NumberBinding | None = None
     if value is not None and _NUMBER.fullmatch(value.text) and not {"out", "given"} <= {*values}:
         is_bound = "out" in values
-        script = _value_text(values.get("out")) or None
+        script = value_text(values.get("out")) or None
         origin = None if is_bound else source or ""
         number = NumberBinding(braces.span(), value.text, value.span(), script, origin)
     elif "value" in values or "out" in values:
@@ -131,7 +134,7 @@ def read_meaning(
         return None, source, None
     if not values.keys() & {"symbol", "unit"}:
         return None, source, number
-    meaning, unit = _value_text(values.get("symbol")), _value_text(values.get("unit"))
+    meaning, unit = value_text(values.get("symbol")), value_text(values.get("unit"))
     if not meaning or ("unit" in values and not unit):
         missing = "unit is empty" if meaning else "meaning of the symbol is missing"
         report(diagnose("symbol-attribute", braces.span(), f"the {missing}", help=_SYMBOL_HELP))
@@ -141,28 +144,17 @@ def read_meaning(
     return Meaning(braces.span(), meaning, unit), source, number
 
 
-def _value_text(value: Excerpt | None) -> str:
+def value_text(value: Excerpt | None) -> str:
+    """The text of a value on one line; empty for none."""
     return "" if value is None else collapse_spaces(value.text)
 
 
-def read_label(braces: Excerpt, report: Report) -> Label | None:
-    """The label of a formula; `None` after a mistake."""
-    is_closed = braces.text.endswith("}")
-    match = _ID.match(braces.text) if is_closed else None
+def split_label(text: Excerpt) -> tuple[Excerpt, Excerpt | None]:
+    """A caption or an info string, and the label in braces at its end, if there is one."""
+    match = _LAST_LABEL.search(text.text) if "{#" in text.text else None
     if match is None:
-        message = "the label of this formula is never closed"
-        if is_closed:
-            message = f"`{braces.text}` is not a label of a formula"
-        report(diagnose("equation-label", braces.span(), message, help=_LABEL_HELP))
-        return None
-    end = match.end()
-    values = _read_pairs(braces.slice(end - 1), ("check", "given"), "equation-label", _MARK_HELP)
-    if isinstance(values, Diagnostic):
-        report(values)
-        values = {}
-    source = _value_text(values["given"]) if "given" in values else None
-    check = braces.span(end, len(braces.text) - 1) if "check" in values else None
-    return Label(braces.span(2, end), match[1], source, check)
+        return text, None
+    return trim(text.slice(0, match.start())), text.slice(match.start())
 
 
 _CANDIDATE = re.compile(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
@@ -193,13 +185,15 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
         return Parsed(Attributes(content))
     title, braces = trim(content.slice(0, match.start())), trim(content.slice(match.start()))
     if not match[1]:
-        return _reject(title, braces, "the attributes of this heading are never closed")
+        fix = Fix(_HELP, braces.text + "}", safe=True)
+        return _reject(title, braces, "the attributes of this heading are never closed", fix)
     name, classes, inner = None, list[str](), braces.slice(1, len(braces.text) - 1)
     for word in (inner.slice(*match.span()) for match in _WORD.finditer(inner.text)):
         if _WHOLE_ID.fullmatch(word.text) and name is None:
             name = word
         elif misspelt(word.text, [".further"]):
-            return _reject(title, word, f"no class `{word.text}`", "did you mean `.further`?")
+            fix = propose(word.text, ".further")
+            return _reject(title, word, f"no class `{word.text}`", fix)
         elif _CLASS.fullmatch(word.text):
             classes.append(word.text[1:])
         elif word.text.startswith("#") and name is not None:
@@ -297,16 +291,29 @@ def check_heading(
         diagnostics.append(diagnose("front-matter", span.first_line(), message, help=help))
     if lesson and level == 1:
         help = "the title comes from the course map; begin with `## `"
+        help = Fix(help, edits=_deepen(span, 1))
         if span.text.rstrip().endswith("\n======="):
             help = "a merge conflict may have left the line of `=` behind: delete it"
         message = "a lesson has no heading of level 1"
         diagnostics.append(diagnose("heading-top", span, message, help=help))
     elif level == 1 and previous is not None and previous > 1:
-        message, help = "a heading of level 1 stands below others", "begin it with `## `"
+        message = "a heading of level 1 stands below others"
+        help = Fix("begin it with `## `", edits=_deepen(span, 1), safe=True)
         diagnostics.append(diagnose("heading-top", span, message, help=help))
     if previous is not None and level > previous + 1:
         message = f"a heading of level {level} follows one of level {previous}"
         if lesson and previous == 1:
             message = f"a heading of level {level} comes before any of level 2"
-        diagnostics.append(diagnose("heading-skip", span, message))
+        help = f"begin it with `{'#' * (previous + 1)} `"
+        fix = Fix(help, edits=_deepen(span, previous + 1 - level))
+        diagnostics.append(diagnose("heading-skip", span, message, help=fix))
     return diagnostics
+
+
+def _deepen(heading: Span, levels: int) -> tuple[Edit, ...]:
+    """The edit that gives a heading so many more levels, if it begins with `#`."""
+    marks = re.match("#+", heading.text)
+    if marks is None:
+        return ()
+    place = heading.source.span(heading.start, heading.start + marks.end())
+    return (Edit(place, "#" * (marks.end() + levels)),)

@@ -11,13 +11,10 @@ Entry points: `read_block`; `parse_python`. Fences of features are read by the f
 
 from __future__ import annotations
 
-import ast
 import re
 import shlex
 import sys
-import warnings
-from collections.abc import Iterator, Sequence
-from functools import lru_cache
+from collections.abc import Iterator
 
 from coursebuild.core.model import (
     Block,
@@ -38,11 +35,13 @@ from coursebuild.core.syntax.fence import (
     find_likely_start,
     split_words,
 )
+from coursebuild.core.syntax.labels import label_block
 from coursebuild.core.syntax.parsing_state import ParsingState
+from coursebuild.core.syntax.python_syntax import check_syntax, find_windows
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
 from coursebuild.core.syntax.unread_markup import check_kind
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, Parsed, diagnose, write
+from coursebuild.core.text.source import Excerpt
 
 DEFAULT_TIMEOUT, MAX_TIMEOUT = 60.0, 86400.0
 """Seconds."""
@@ -59,7 +58,6 @@ _PATH = re.compile(r"\w[\w.-]*(?:/\w[\w.-]*)*")
 _RESERVED_FOLDERS = ("content", "models", "examples", "features", "public")
 _FIGURE = re.compile(r"[A-Za-z0-9][\w-]*(?:\.[\w-]+)*\.(?:svg|png|csv)", re.ASCII)
 _ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
-_LINE_REFERENCE = re.compile(r"\b(on|at) line ([0-9]+)")
 
 
 def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
@@ -82,7 +80,7 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
         message = "a block shows a part of a file, or it is a script or a fragment of its own"
         diagnostics.append(diagnose("fence-key-value", show.span, message))
     elif show is None and (fragment is None or has_file):
-        diagnostics += _check_syntax(fence.body, script=has_file)
+        diagnostics += check_syntax(fence.body, script=has_file)
     script = None if file is None else _build_script(fence, file, keys.value, diagnostics)
     source = None if show is None or has_file else _read_source_part(fence, show, diagnostics)
     code = PlainCode(fence.span, fence.body, fragment is not None and file is None, source)
@@ -110,6 +108,8 @@ def _build_script(
     if fence.nested:
         mistake, help = "a text of a quiz or lab cannot hold a script", ""
     if mistake:
+        if "is not below" in mistake and not fence.nested:
+            help = Fix(help, f"examples/{path.rpartition('/')[2]}", path)
         diagnostics.append(diagnose("script-path", file.value_span, mistake, help=help))
     timeout = _read_timeout(keys.get("timeout"), diagnostics)
     requires = _read_modules(keys.get("requires"), diagnostics)
@@ -118,11 +118,11 @@ def _build_script(
     record = keys.get("record")
     if record is not None and record.value != "once":
         message = f"`{record.value}` is not a way to record"
-        help = "write `record=once`"
+        help = Fix("write `record=once`", "once")
         diagnostics.append(diagnose("fence-key-value", record.value_span, message, help=help))
     figures = tuple(_read_figures(keys.get("figure"), diagnostics))
     if keys.get("figure") is None and keys.get("norun") is None:
-        diagnostics += _find_windows(fence.body)
+        diagnostics += find_windows(fence.body)
     if mistake:
         return None
     return Script(
@@ -161,7 +161,9 @@ def _read_timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
     message = f"`{word.value}` is not a number of seconds above 0"
     if seconds > MAX_TIMEOUT:
         message = f"`{word.value}` s is more than a day"
-    diagnostics.append(diagnose("fence-key-value", word.value_span, message))
+    seconds_text = re.fullmatch(rf"({_NUMBER.pattern})\s?s(?:ec)?", word.value)
+    help = "" if seconds_text is None else write(seconds_text[1])
+    diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
     return DEFAULT_TIMEOUT
 
 
@@ -248,112 +250,6 @@ def path_mistake(path: str) -> str:
     return ""
 
 
-_SHOWS = re.compile(
-    r"(?:matplotlib\.pyplot|plotly\.io)\.show|mediapy\.show_\w+|IPython\.display\.(?:display|Image|Video)"
-)
-"""Functions that show a picture in a window or a notebook."""
-
-
-def _find_windows(code: Excerpt) -> Iterator[Diagnostic]:
-    """Report the first picture that a script without figures shows and does not save."""
-    if not re.search("matplotlib|plotly|mediapy|IPython", code.text):
-        return
-    try:
-        tree = ast.parse(code.text)
-    except (SyntaxError, ValueError, MemoryError, RecursionError):
-        return
-    nodes = list(ast.walk(tree))
-    names: dict[str, str] = {}
-    for node in nodes:
-        if isinstance(node, ast.Import):
-            names |= {a.asname: a.name for a in node.names if a.asname}
-        elif isinstance(node, ast.ImportFrom):
-            names |= {a.asname or a.name: f"{node.module}.{a.name}" for a in node.names}
-    for call in nodes:
-        if not isinstance(call, ast.Call):
-            continue
-        name = ast.unparse(call.func)
-        first, dot, rest = name.partition(".")
-        if _SHOWS.fullmatch(f"{names.get(first, first)}{dot}{rest}"):
-            row = code.lines()[call.lineno - 1]
-            at = max(row.text.find(name), 0)
-            message = f"`{name}` opens a window, so the page has no figure"
-            help = (
-                'save it, `plt.savefig("x.svg")`, say `figure=x.svg` on the fence, and write '
-                "`Figure: what it shows` below"
-            )
-            yield diagnose("figure-window", row.span(at, at + len(name)), message, help=help)
-            return
-
-
-def _check_syntax(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
-    """Report where and why a piece of Python does not parse, if it does not."""
-    error = _compile_error(code.text)
-    if error is None:
-        return
-    rows = code.lines()
-    line = min(error.lineno or 1, len(rows))
-    row = rows[line - 1]
-    start = min(max((error.offset or 1) - 1, 0), len(row.text))
-    indentation = len(row.text) - len(row.text.lstrip())
-    start = max(start, indentation)  # Python may point into the white space before the code
-    end = len(row.text)
-    if error.end_lineno in (None, error.lineno):
-        end = max((error.end_offset or 0) - 1, 0)
-    end = max(start, min(max(end, start + 1), len(row.text)))
-
-    def lesson_line(match: re.Match[str]) -> str:
-        return f"{match[1]} line {rows[int(match[2]) - 1].span().line}"
-
-    if isinstance(error, IndentationError) and (tab := _find_mixed_tab(rows)) is not None:
-        message = "this line is indented by a tab, and others by blanks"
-        yield diagnose("python-syntax", tab, message, help="indent all lines by blanks")
-        return
-    message, _, help = _LINE_REFERENCE.sub(lesson_line, error.msg).partition(". ")
-    if row.text.lstrip().startswith(("%", "!")):
-        help = f"`{row.text.split()[0]}` is a command of Jupyter: leave it out"
-    if not help and not script:
-        help = "write `fragment` after `python` if it is not meant to be complete"
-    message, help = _lower_first(message), _lower_first(help)
-    yield diagnose("python-syntax", row.span(start, end), message, help=help)
-
-
-def _find_mixed_tab(rows: Sequence[Excerpt]) -> Span | None:
-    """The first tab before code of which other lines are indented by blanks."""
-    indentations = [re.match(r"[ \t]*", row.text) for row in rows]
-    if not any(match and match[0].startswith(" ") for match in indentations):
-        return None
-    for row, match in zip(rows, indentations, strict=True):
-        if match and "\t" in match[0]:
-            at = match[0].index("\t")
-            return row.span(at, at + 1)
-    return None
-
-
-def _lower_first(sentence: str) -> str:
-    """A sentence of Python as part of ours: without its capital, unless that is a name."""
-    if sentence[1:2].islower():
-        return sentence[:1].lower() + sentence[1:]
-    return sentence
-
-
-@lru_cache(maxsize=64)
-def _compile_error(code: str) -> SyntaxError | None:
-    """The first error of Python in a text; kept, as a preview parses unchanged blocks again."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            compile(code, "<lesson>", "exec", dont_inherit=True)
-    except SyntaxError as error:
-        return error.with_traceback(None)
-    except (ValueError, MemoryError, RecursionError, OverflowError) as error:
-        message = f"the code cannot be compiled: {error}"
-        syntax_error = SyntaxError(message if str(error) else "the code is nested too deeply")
-        syntax_error.end_offset = 1
-        return syntax_error
-    return None
-
-
 _HEAD_RULES = frozenset(
     {"fence-info", "fence-key-repeated", "fence-key-unknown", "fence-key-value", "script-path"}
 )
@@ -361,6 +257,14 @@ _HEAD_RULES = frozenset(
 
 
 def read_block(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
+    """The block of a fence, with its label."""
+    block = _read_kind(fence, state, texts)
+    if fence.label is None or not fence.is_closed:
+        return block
+    return label_block(block, fence.label, fence, state)
+
+
+def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
     """The block of a fence; recorded outputs are read in `recording`."""
     if not fence.is_closed or fence.inner is not None:
         return _read_unclosed(fence, state)
@@ -415,6 +319,11 @@ def _read_unclosed(fence: Fence, state: ParsingState) -> CodeBlock:
     likely_start = None if fence.info.text else find_likely_start(fence.head)
     if likely_end is not None:
         notes.append(Note("its block seems to end here", likely_end))
+        source, end = likely_end.source, likely_end.end
+        edit = Edit(source.span(end, end), f"\n{fence.prefix}{marks}")
+        if not likely_end.text.strip("`~ "):  # marks that are too few
+            edit = Edit(likely_end, marks)
+        help = Fix(help, edits=(edit,))
     if likely_start is not None:
         notes.append(Note("or a block that begins here has lost its first line", likely_start))
     state.report(diagnose("fence-unclosed", fence.head, message, help=help, notes=notes))

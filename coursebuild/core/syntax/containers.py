@@ -21,9 +21,12 @@ from msgspec import Struct
 
 from coursebuild.core import model
 from coursebuild.core.model import Cell, Inline, Table
+from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.syntax.spans import PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
+    Edit,
+    Fix,
     Note,
     Parsed,
     diagnose,
@@ -66,6 +69,7 @@ def read_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None
         start = match.start(3)
         message = f"`{match[3][0]}` cannot follow the kind of a callout"
         help = "write `[!kind] Title`, or `[!kind]- Title` for a callout that starts folded"
+        help = Fix(help, "" if match[3][0] == "+" else None, safe=True)  # it starts unfolded
         place = paragraph.span(start, start + 1)
         diagnostic = diagnose("callout-unknown", place, message, help=help)
     elif name.text.lower() in kinds:
@@ -94,8 +98,34 @@ def _read_broken_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head
     place = trim(paragraph.slice(0, match.start(4)))
     head = Head(kind, place.span(), title, False, trim(paragraph.slice(match.end())))
     help = f"write `> [!{kind}] Title`, or a backslash before the bracket that is meant to be seen"
+    follows = paragraph.text[len(paragraph.text[: match.start(4)].rstrip()) :]
+    blank = "" if not title.text or follows[:1].isspace() else " "
+    fix = Fix(help, f"[!{kind}]{blank}", safe=True)
     message = f"`{place.text}` does not begin a callout"
-    return Parsed(head, (diagnose("callout-unknown", place.span(), message, help=help),))
+    return Parsed(head, (diagnose("callout-unknown", place.span(), message, help=fix),))
+
+
+def quote_admonition(head: Span, kind: str) -> tuple[Edit, ...]:
+    """The edits that make a quotation of an admonition of MkDocs, whose lines are indented."""
+    source, number = head.source, head.line
+    start, text = source.line_start(number), source.line_text(number)
+    match = re.fullmatch(r'(!!!|\?\?\?\+?)[ \t]*[\w-]+(?:[ \t]+"([^"]*)")?[ \t]*', text)
+    if match is None or kind not in CALLOUTS:
+        return ()
+    title = f"> [!{kind}]{'-' if match[1] == '???' else ''} {match[2] or ''}".rstrip()
+    edits, empty_lines = [Edit(source.span(start, start + len(text)), title)], list[Span]()
+    for line in range(number + 1, len(source.line_starts) + 1):
+        start, text = source.line_start(line), source.line_text(line)
+        indentation = re.match(r" {4}|\t", text)
+        if not text.strip():
+            empty_lines.append(source.span(start, start + len(text)))
+        elif indentation is None:
+            break
+        else:
+            edits += [Edit(empty, ">") for empty in empty_lines]
+            edits.append(Edit(source.span(start, start + indentation.end()), "> "))
+            empty_lines = []
+    return tuple(edits) if len(edits) > 1 else ()
 
 
 _PIPE = re.compile(r"\\?\|")
@@ -211,7 +241,7 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
             start = source.line_start(line)
             message = f"`{slip[1]}` would be shown as written: this line continues a quotation"
             place = source.span(start + slip.start(1), start + slip.end(1))
-            help = "begin the line with `> `"
+            help = Fix("begin the line with `> `", ">", safe=True)
             yield diagnose("markup-unread", place, message, help=help)
 
 
@@ -227,7 +257,7 @@ def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterat
     gap = Span(source, before.span.end, block.span.start)
     if isinstance(block, model.Heading) and block.span.text.strip() == before.span.text.strip():
         place, message = block.span.first_line(), "this heading stands here twice"
-        yield diagnose("text-repeated", place, message, help="delete it once")
+        yield diagnose("text-repeated", place, message, help=Fix("delete it once", ""))
     if isinstance(before, model.Callout) and isinstance(block, model.BlockQuote):
         last = before.span.text.rstrip(" \t\r\n>")[-1:]
         text = f"{before.span.text}\n{block.span.text}"
@@ -247,6 +277,7 @@ def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterat
             place = source.span(before.span.start, before.span.start + number.end())
             message = f"`{number[0]}` would be shown as written: no item of a list begins here"
             help = f"write `{number[0]}.`, as the list below goes on with {block.start}"
+            help = Fix(help, f"{number[0]}.", safe=True)
             yield diagnose("markup-unread", place, message, help=help)
         column, list_column = (
             part.start - source.line_start(part.line) for part in (before.span, block.span)
@@ -284,7 +315,7 @@ def check_item(span: Span) -> Iterator[Diagnostic]:
         elif match := re.match(rf"{re.escape(prefix)}({slip})", text):
             place = source.span(start, start + len(match[1]))
             message = f"`{match[1]}` would be shown as written: no item of a list begins here"
-            help = f"begin the line with `{mark} `"
+            help = Fix(f"begin the line with `{mark} `", mark, safe=True)
             yield diagnose("markup-unread", place, message, help=help)
 
 

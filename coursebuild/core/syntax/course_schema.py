@@ -1,7 +1,8 @@
 """The tables and fields of course.toml.
 
 Entry points: `CourseFile`; `slug_of`, a slug made of a title; of the table `[theme]`, `theme`,
-its value, with files not read yet, and `check_contrast`.
+its value, with files not read yet, and `check_contrast`; of the table `[launch]`, `launch` and
+`check_launch`.
 
 The decoder checks the file against `CourseFile`, and the JSON Schema for editors is made from it;
 ids that must be unique and prerequisites that must exist are checked in `coursemap`.
@@ -15,6 +16,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeAlias
 
 from msgspec import Meta, Struct
+from msgspec.structs import replace
 
 from coursebuild.core.drawing.contrast import (
     GROUNDS_DARK,
@@ -24,10 +26,10 @@ from coursebuild.core.drawing.contrast import (
     legible,
 )
 from coursebuild.core.model import Filter, LessonTable, Limits, Pace, Silence
-from coursebuild.core.model.course import PICTURES, FontFamily, Theme, ThemeFile
+from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
 from coursebuild.core.model.fields import NotNegative, Slug, Text, matching
-from coursebuild.core.syntax.nodes import ObjectNode
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.syntax.nodes import ObjectNode, format_name
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 
 
 def _file_field(noun: str, endings: str, example: str) -> Meta:
@@ -104,11 +106,58 @@ def check_contrast(node: ObjectNode, theme: Theme) -> Iterator[Diagnostic]:
             message = f"on {scheme} pages `{colour}` has a contrast of {ratio:.2f} : 1"
             nearest = legible(colour, grounds)
             help = f"text needs {REQUIRED_CONTRAST} : 1; `{nearest}` is the nearest that reaches it"
-            yield diagnose("theme-contrast", node.place(name), message, help=help)
+            fix = Fix(help, nearest, colour)
+            yield diagnose("theme-contrast", node.place(name), message, help=fix)
 
 
 def _theme_files(node: ObjectNode, name: str, paths: tuple[str, ...]) -> tuple[ThemeFile, ...]:
     return tuple(map(ThemeFile, paths, (item.span for item in node.items(name))))
+
+
+# --- where notebooks run
+
+
+_GITHUB = re.compile(r"https?://(?i:github\.com)/[\w-]+/[\w.-]+/?", re.ASCII)
+"""A repository on GitHub."""
+_NO_BRANCH = re.compile(
+    r"[\x00-\x20\x7f~^:?*\[\\]|\.\.|//|@\{|(^|/)\.|^[-/]|[./]$|\.lock(/|$)|^@?$"
+)
+"""What git-check-ref-format(1) forbids in the name of a branch."""
+_SERVICES = ("colab", "binder", "jupyterhub", "codespaces")
+
+
+def launch(fields: Launch | None, settings: CourseTable) -> Launch | None:
+    """Where notebooks can be run, with its repository."""
+    if fields is None:
+        return None
+    return replace(fields, repository=fields.repository or settings.repository)
+
+
+def check_launch(node: ObjectNode, fields: Launch, repository: str | None) -> Iterator[Diagnostic]:
+    """Check what the types of the table cannot say; `repository` is that of `[course]`."""
+    has_service = any(getattr(fields, name) for name in _SERVICES)
+    if not has_service and node.members.keys() <= {*Launch.__struct_fields__}:
+        message = "`[launch]` names no place to run notebooks"
+        help = "set at least one of `colab`, `binder`, `jupyterhub` and `codespaces`"
+        yield diagnose("field-missing", node.mark, message, help=help)
+    place = fields.repository or repository
+    if not place:
+        message = "`[launch]` needs `repository`, as `[course]` has none"
+        yield diagnose("field-missing", node.mark, message)
+    else:
+        for name, service in (("colab", "Colab"), ("codespaces", "Codespaces")):
+            if getattr(fields, name) and not _GITHUB.fullmatch(place):
+                message = f"{service} opens repositories on GitHub only"
+                help = "expected: a `repository` as in `https://github.com/owner/name`"
+                yield diagnose("field-value", node.place(name), message, help=help)
+    if _NO_BRANCH.search(fields.branch):
+        message = f"{format_name(fields.branch)} cannot be the name of a branch"
+        yield diagnose("field-value", node.place("branch"), message)
+    parts = fields.folder.split("/")
+    if fields.folder and ({"", ".", ".."} & {*parts} or not fields.folder.isprintable()):
+        message = f"{format_name(fields.folder)} is not a folder of a repository"
+        help = "expected: its path from the top, as in `docs`"
+        yield diagnose("field-value", node.place("folder"), message, help=help)
 
 
 Url: TypeAlias = Annotated[
@@ -177,6 +226,10 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
         tuple[FeaturePath, ...],
         Meta(description="features of the course's own, as files in `features/`"),
     ] = ()
+    folds: Annotated[
+        Literal["open", "closed"],
+        Meta(description="whether folded parts are printed in full, in `export page` and `pdf`"),
+    ] = "open"
     packages: Annotated[
         tuple[FolderPath, ...],
         Meta(
@@ -259,6 +312,13 @@ class PageTable(Struct, frozen=True, forbid_unknown_fields=True):
     id: Annotated[Slug, Meta(description="the page's name in links and in its address")]
     title: Annotated[Text, Meta(description="plain text")]
     file: Annotated[Text, Meta(description="its Markdown file, anywhere in the project")]
+    section: Annotated[
+        str,
+        Meta(
+            description="the heading under which it stands in a list of pages beside it; "
+            "without one it has no such list"
+        ),
+    ] = ""
     menu: Annotated[bool, Meta(description="whether it is in the menu of every page")] = True
     names: Annotated[bool, Meta(description="whether names in its code have to be known")] = True
 
@@ -284,6 +344,7 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
     format: FormatTable | None = None
     security: SecurityTable = SecurityTable()
     limits: Limits = Limits()
+    launch: Launch | None = None
     pace: Pace | None = None
     callouts: Annotated[
         dict[str, Text | CalloutTable],

@@ -34,6 +34,7 @@ from coursebuild.core.model import (
     Page,
     Silence,
 )
+from coursebuild.core.model.course import Launch
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.syntax.course_schema import (
     CalloutTable,
@@ -43,6 +44,8 @@ from coursebuild.core.syntax.course_schema import (
     ThemeTable,
     VerifyTable,
     check_contrast,
+    check_launch,
+    launch,
     theme,
 )
 from coursebuild.core.syntax.decode import Decoding, check_unique, decode
@@ -119,6 +122,7 @@ def _build_course(
         base_url=settings.base_url or "",
         repository=settings.repository or "",
         licence=settings.licence,
+        folds=settings.folds,
         id=settings.id or "",
         engine=settings.engine,
         engine_span=table.place("engine"),
@@ -130,7 +134,9 @@ def _build_course(
         silences=fields.silence,
         levels=levels,
         pages=tuple(
-            Page(node.span, page.id, page.title, page.file, None, page.menu, page.names)
+            Page(
+                node.span, page.id, page.title, page.file, None, page.menu, page.names, page.section
+            )
             for node, page in zip(root.objects("page"), fields.page, strict=True)
         ),
         models=(),
@@ -141,6 +147,7 @@ def _build_course(
         width=fields.format.width if fields.format is not None else 0,
         html=fields.security.html,
         limits=fields.limits,
+        launch=launch(fields.launch, settings),
         theme=theme(root.object("theme"), fields.theme or ThemeTable()),
         python=NamedPath(verify.python, gate.place("python")) if verify.python else None,
         strict=verify.strict,
@@ -309,6 +316,10 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
             for member in tolerances:
                 message = f'`{member.key.value}` counts only with `compare = "rtol"`'
                 yield diagnose("field-value", member.key.span, message)
+    for node, places in decoding.find_structs(Launch):
+        repository = root.object("course").get("repository")
+        address = repository.value if isinstance(repository, StringNode) else None
+        yield from check_launch(node, places, address)
     for node, filter in decoding.find_structs(Filter):
         if (mistake := pattern_mistake(filter.pattern)) is not None:
             message = f"the pattern does not compile: {mistake[0]}"

@@ -42,7 +42,14 @@ from coursebuild.core.syntax.nodes import (
     type_help,
     wrong_type_message,
 )
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, nearest
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Note,
+    diagnose,
+    did_you_mean,
+    nearest,
+    propose,
+)
 from coursebuild.core.text.source import Span
 
 S = TypeVar("S", bound=Struct)
@@ -255,7 +262,7 @@ class _Decoder:
             owners = _variants_with_field(key.value, variants)
             if likely is not None:
                 misspelt.add(likely)
-                help = f"did you mean `{likely}`?"
+                help: str = propose(key.value, likely, fields)
             elif owners:
                 names = " and ".join(f'`"{type.tag_field}": "{owner}"`' for owner in owners)
                 help = f"it is a field of {names}"
@@ -288,7 +295,7 @@ class _Decoder:
         for key, member in node.members.items():
             if not owners[key] and nearest(key, [tag], cutoff=0.7):
                 message, place = f"unknown field {format_name(key)}", member.key.span
-                return self.report("field-unknown", place, message, f"did you mean `{tag}`?")
+                return self.report("field-unknown", place, message, propose(key, tag))
         help = did_you_mean("", variants)
         implied = next((t for t, v in variants.items() if getattr(v.cls, "implied", False)), None)
         if implied is not None:

@@ -23,6 +23,7 @@ from coursebuild.core.model import (
     Document,
     FeatureBlock,
     Heading,
+    Label,
     NumberBinding,
     Paragraph,
     Recording,
@@ -45,7 +46,15 @@ from coursebuild.core.syntax.recording import ILLUSTRATION
 from coursebuild.core.syntax.spans import read_markdown
 from coursebuild.core.syntax.tree import TextReader
 from coursebuild.core.text.conflicts import find_conflict
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, sort_diagnostics
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Edit,
+    Fix,
+    Note,
+    Parsed,
+    diagnose,
+    sort_diagnostics,
+)
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 _YAML = re.compile(
@@ -84,7 +93,10 @@ def parse_document(
     if len({stands_before for stands_before, _ in state.stars}) == 1:  # else it is a footnote
         state.diagnostics += (diagnostic for _, diagnostic in state.stars)
     if (at := source.text.find("\0")) >= 0:
-        message, help = "the text contains a NUL character", "delete it; readers would see `\ufffd`"
+        message = "the text contains a NUL character"
+        places = [match.start() for match in re.finditer("\0", source.text)]
+        edits = tuple(Edit(source.span(place, place + 1), "") for place in places)
+        help = Fix("delete it; readers would see `\ufffd`", edits=edits, safe=True)
         state.report(diagnose("control-character", source.span(at, at + 1), message, help=help))
     return Parsed(document, sort_diagnostics(state.diagnostics))
 
@@ -96,7 +108,8 @@ def _remove_front_matter(text: Excerpt, state: ParsingState) -> Excerpt:
     subject = "lesson" if state.lesson else "page"
     message = f"a {subject} has no front matter"
     help = "its title and everything else about it are in content/course.toml; begin with the text"
-    state.report(diagnose("front-matter", text.span(0, 3), message, help=help))
+    fix = Fix(help, edits=(Edit(text.span(0, match.end()), ""),))
+    state.report(diagnose("front-matter", text.span(0, 3), message, help=fix))
     return text.slice(match.end())
 
 
@@ -157,7 +170,9 @@ def _check_placement(document: Document) -> tuple[Diagnostic, ...]:
             help = "label formulas of the text, but not those of quizzes, labs and headings"
             formulas = block_formulas(block)
             labels = (formula.label.span for formula in formulas if formula.label is not None)
-            diagnostics += [diagnose("equation-label", span, message, help=help) for span in labels]
+            diagnostics += [
+                diagnose("label-attribute", span, message, help=help) for span in labels
+            ]
     return tuple(diagnostics)
 
 
@@ -189,7 +204,7 @@ def _is_reported(first: AnchorOwner, second: AnchorOwner) -> bool:
     if isinstance(first, FeatureBlock) and isinstance(second, FeatureBlock):
         keys, other_keys = first.progress_keys(), second.progress_keys()
         return keys is not None and other_keys is not None and keys[0] == other_keys[0]
-    labelled_types = Heading | DisplayFormula  # see `attributes.Anchors`
+    labelled_types = Heading | Label | DisplayFormula  # see `attributes.Anchors`
     return (isinstance(first, labelled_types) and isinstance(second, labelled_types)) or (
         isinstance(first, Script | Term) and type(first) is type(second)
     )

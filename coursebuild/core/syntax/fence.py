@@ -23,10 +23,13 @@ from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
 
 from coursebuild.core.model import Block, CodeBlock, Inline
+from coursebuild.core.syntax.attributes import split_label
 from coursebuild.core.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
+    Edit,
+    Fix,
     Note,
     Parsed,
     diagnose,
@@ -73,6 +76,14 @@ class Word(Struct, frozen=True):
     def value_span(self) -> Span:
         """Where the value stands; the word itself when it has none."""
         return self.span if self.value_text is None else self.value_text.span()
+
+    @property
+    def removal(self) -> tuple[Edit]:
+        """The edit that takes the word away, with the blanks before it."""
+        source, start = self.span.source, self.span.start
+        while source.text[start - 1] in " \t":
+            start -= 1
+        return (Edit(source.span(start, self.span.end), ""),)
 
     def parts(self) -> list[Excerpt]:
         """The parts of a value between its commas, without white space at their ends."""
@@ -133,10 +144,16 @@ def read_keys(
             diagnostics.append(diagnose("fence-key-unknown", word.key_span, message, help=help))
         elif key in words_by_key:
             notes = [Note("first given here", words_by_key[key].key_span)]
-            message = f"`{key}` is given twice"
-            diagnostics.append(diagnose("fence-key-repeated", word.key_span, message, notes=notes))
+            message, is_same = f"`{key}` is given twice", words_by_key[key].value == word.value
+            help = Fix("leave one out", edits=word.removal if is_same else (), safe=True)
+            diagnostic = diagnose(
+                "fence-key-repeated", word.key_span, message, help=help, notes=notes
+            )
+            diagnostics.append(diagnostic)
         elif key not in values and word.value is not None:
-            message, help = f"`{key}` takes no value", f"write `{key}` alone"
+            is_yes = (word.value or "").lower() in ("true", "yes", "on", "1", key)
+            message = f"`{key}` takes no value"
+            help = Fix(f"write `{key}` alone", key if is_yes else None, safe=True)
             diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
         elif word.value == "" or (key not in flags and word.value is None):
             message, help = f"`{key}` needs a value", f"write `{key}=…`"
@@ -154,7 +171,8 @@ def check_foreign_key(kind: str, word: Word) -> Diagnostic | None:
     if kind == "python" and help == _NO_TITLE:
         help += "; a script has `file=examples/….py`, which is shown above it"
     message = f"`{kind}` has no key `{word.key}`"
-    return diagnose("fence-key-unknown", word.key_span, message, help=help)
+    fix = Fix(help, edits=word.removal, safe=not help.startswith(_NO_TITLE))
+    return diagnose("fence-key-unknown", word.key_span, message, help=fix)
 
 
 def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
@@ -171,7 +189,11 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
         if spaced_word := _SPACED_OPTION.match(text, at):
             equals, end = spaced_word.start(spaced_word.lastindex or 0), spaced_word.end()
             message = "there is a space beside the `=` of a key"
-            diagnostics.append(diagnose("fence-info", info.span(equals, equals + 1), message))
+            spaced = info.span(at, end)
+            edit = Edit(spaced, re.sub(r"\s*=\s*", "=", spaced.text, count=1))
+            help = Fix("take it away", edits=(edit,), safe=True)
+            place = info.span(equals, equals + 1)
+            diagnostics.append(diagnose("fence-info", place, message, help=help))
         elif end < len(text) and not text[end].isspace():
             diagnostic, end = _diagnose_malformed(info, at, end)
             diagnostics.append(diagnostic)
@@ -192,9 +214,10 @@ def _diagnose_malformed(info: Excerpt, at: int, end: int) -> tuple[Diagnostic, i
     """The diagnostic of a word that cannot be read, and where to go on."""
     text = info.text
     if text[end] == '"' and text.count('"', end) == 1:
-        message, help = "a quoted value is never closed", 'close it with `"`'
         span = info.span(end, len(text))
-        return diagnose("fence-info", span, message, help=help), len(text)
+        edit = Edit(Span(span.source, span.end, span.end), '"')
+        fix = Fix('close it with `"`', edits=(edit,))
+        return diagnose("fence-info", span, "a quoted value is never closed", help=fix), len(text)
     rest = _REST.match(text, end)
     word_end = rest.end() if rest else end
     message = f"`{text[at:word_end]}` cannot be read"
@@ -211,6 +234,17 @@ def _unescape(value: Excerpt) -> Excerpt:
 
 INDENTED_FENCE = re.compile(r"\s*(`{3,}|~{3,})[ \t]*([\w+-]*)[^`\n]*")
 """The first line of an indented block that was surely meant to be a fence."""
+
+
+def outdent(code: Excerpt) -> tuple[Edit, ...]:
+    """The edits that take the white space away by which a block is indented code."""
+    edits = []
+    for line in code.lines():
+        start = line.span().start
+        white = re.search(r"(?:    |\t)$", code.source.text[:start][-4:])
+        if line.text.strip() and white is not None:
+            edits.append(Edit(code.source.span(start - len(white[0]), start), ""))
+    return tuple(edits)
 
 
 class Fence(Struct, frozen=True):
@@ -233,6 +267,8 @@ class Fence(Struct, frozen=True):
     """Whether it stands in a text of a quiz or lab, where no lines can be extracted or updated."""
     inner: Span | None
     """A line inside that was surely meant to begin another fence, which then closed this one."""
+    label: Excerpt | None = None
+    """The label in braces that ends the line, which is not part of the info string."""
 
     @property
     def kind(self) -> str:
@@ -254,7 +290,7 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     """The fence of a `fence` token of the text `base`."""
     info_start = token.start + len(token.markup)
     info_end = info_start + len(token.info)
-    info = trim(base.slice(info_start, info_end))
+    info, label = split_label(trim(base.slice(info_start, info_end)))
     is_closed, body = token.meta["closed"], token.text
     if body is NO_TEXT:
         body = base.slice(info_end + 1, info_end + 1)
@@ -273,7 +309,7 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
         opening = rf"^ {{0,3}}({re.escape(marks[0])}{{{len(marks)},}} *\w[^`\n]*)$"
         if (match := re.search(opening, body.text, re.MULTILINE)) is not None:
             inner = body.span(*match.span(1))
-    return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner)
+    return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner, label)
 
 
 _MOST_LINES = 300

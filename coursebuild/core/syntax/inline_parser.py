@@ -113,6 +113,21 @@ def _footnote_reference(state: StateInline, silent: bool) -> bool:
     return True
 
 
+_CITED = r"(?:[^\[\]{}@;]*\s)?@(?:[\w.:/+-]*\w)(?:[^\S\n]*,[^\[\]{};@]*)?\s*"
+_CITATION = re.compile(rf"\[({_CITED}(?:;{_CITED})*)\](?![\[({{:])")
+
+
+def _citation(state: StateInline, silent: bool) -> bool:
+    """`[see @key, p. 12; @other]`; `content` has what stands between the brackets."""
+    match = _CITATION.match(state.src, state.pos, state.posMax) if "@" in state.src else None
+    if match is None:
+        return False
+    if not silent:
+        state.push("citation", "", 0).content = match[1]
+    state.pos = match.end()
+    return True
+
+
 def _term(state: StateInline, silent: bool) -> bool:
     """`[text]{term}`: tokens `term_open` and `term_close`; `map` of the second has the braces.
 
@@ -191,7 +206,7 @@ _RULES: InlineRules = {
     "*": (_emphasis,),
     "_": (_emphasis,),
     "~": (_emphasis,),
-    "[": (_term, _link, _footnote_reference),
+    "[": (_citation, _term, _link, _footnote_reference),
     "!": (_link,),
     "<": (autolink, html_inline),
     "&": (entity,),

@@ -14,7 +14,7 @@ emphasis, strong, strikethrough, links and terms:
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from markdown_it.common.utils import normalizeReference
 from markdown_it.helpers import parseLinkDestination
@@ -22,6 +22,8 @@ from markdown_it.token import Token
 from msgspec import Struct, field
 
 from coursebuild.core.model import (
+    Citation,
+    CitedWork,
     CodeSpan,
     Emphasis,
     FootnoteRef,
@@ -39,14 +41,15 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.syntax.attributes import (
     collapse_spaces,
-    read_label,
     read_meaning,
     read_term,
     term_id,
 )
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
+from coursebuild.core.syntax.inline_code import check_inline_code
 from coursebuild.core.syntax.inline_parser import inline_tokens
+from coursebuild.core.syntax.labels import take_label
 from coursebuild.core.syntax.mentions import (
     TextPiece,
     check_link_text,
@@ -59,12 +62,11 @@ from coursebuild.core.syntax.mentions import (
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.syntax.unread_markup import (
-    check_inline_code,
     check_unread_markup,
     find_repetitions,
     find_stars,
 )
-from coursebuild.core.text.diagnostics import diagnose
+from coursebuild.core.text.diagnostics import Fix, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 MAX_DEPTH = 60
@@ -134,7 +136,7 @@ class _TokenReader:
                 if token.markup[:1] == "\\" and text in tuple(",;/?@"):
                     place = self.content.span(token.start, token.end)
                     message = f"the backslash before `{text}` is not shown and does nothing"
-                    help = "take it away; write two for one that readers should see"
+                    help = Fix("take it away; write two for one that readers should see", text)
                     self.report(diagnose("markup-unread", place, message, help=help))
                 if text:
                     literal = kind == "text" or text == token.markup
@@ -290,6 +292,8 @@ class _TokenReader:
                 node = HardBreak(span)
             case "footnote_ref":
                 node = self._read_footnote(token, span)
+            case "citation":
+                node = Citation(span, tuple(self._read_works(token)))
             case _:
                 raise AssertionError(f"no inline for token {token.type}")
         if node is not None:
@@ -305,9 +309,7 @@ class _TokenReader:
         braces, report = self.content.slice(*token.meta["braces"]), self.report
         if not display:
             return Math(span, tex, display, None, *read_meaning(braces, report))
-        label = read_label(braces, report)
-        if label is not None:
-            self.state.anchors.take(label.id, label.span)
+        label = take_label(braces, "eq", self.state)
         return Math(span, tex, display, label)
 
     def _read_number(self, token: PositionedToken, span: Span) -> NumberBinding:
@@ -344,6 +346,17 @@ class _TokenReader:
             message = "the image has no text alternative"
             self.report(diagnose("image-alt", span, message, help=help))
         return Image(span, url, alt, str(token.attrs.get("title", "")), place)
+
+    def _read_works(self, token: PositionedToken) -> Iterator[CitedWork]:
+        """The works of a citation."""
+        at = token.start + 1
+        for part in token.content.split(";"):
+            before, _, rest = part.partition("@")
+            key, _, locator = rest.partition(",")
+            start = at + len(before) + 1
+            span = self.content.span(start, start + len(key.rstrip()))
+            yield CitedWork(span, key.strip(), collapse_spaces(before), collapse_spaces(locator))
+            at += len(part) + 1
 
     def _read_footnote(self, token: PositionedToken, span: Span) -> FootnoteRef | None:
         reference = self.state.notes.refer(token.content, span)

@@ -33,7 +33,7 @@ from coursebuild.core.syntax.nodes import (
     shorten,
     tex_word,
 )
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, Parsed, diagnose, write
 from coursebuild.core.text.source import Excerpt, Span
 
 MAX_DEPTH = 64
@@ -117,10 +117,12 @@ class _Reader:
             char = self.text[at : at + 1]
             if comment := _COMMENT.match(self.text, at):
                 first_line = comment[0].split("\n", 1)[0]
-                self.report(at, at + len(first_line), "JSON has no comments", "remove it")
+                self.report(
+                    at, at + len(first_line), "JSON has no comments", self.comment_fix(comment)
+                )
                 self.offset = comment.end()
             elif odd := odd_character(char):
-                help = "replace it by a plain space, or remove it"
+                help = Fix("replace it by a plain space, or remove it", " ", safe=True)
                 self.report(at, at + 1, f"{odd} is not white space in JSON", help)
                 self.offset += 1
             else:
@@ -176,7 +178,7 @@ class _Reader:
     def read_colon(self, key: StringNode) -> None:
         char = self.peek()
         if char == "=":
-            self.report(self.offset, self.offset + 1, "`=` where JSON has `:`", "write `:`")
+            self.report(self.offset, self.offset + 1, "`=` where JSON has `:`", write(":"))
         elif char != ":":
             self.fail_expecting(f"`:` after the key `{shorten(key.value)}`")
         self.offset += 1
@@ -189,15 +191,16 @@ class _Reader:
             self.offset += 1
             while self.peek() == ",":
                 message = "two commas with no value between them"
-                self.report(self.offset, self.offset + 1, message, "remove one")
+                self.report(self.offset, self.offset + 1, message, Fix("remove one", "", safe=True))
                 self.offset += 1
             if self.peek() == closer:
-                self.report(comma, comma + 1, f"a comma before `{closer}`", "remove the comma")
+                self.report(comma, comma + 1, f"a comma before `{closer}`", _COMMA_HELP)
         elif char != closer:
             key = _KEY.match(self.text, self.offset)
             if not (key if closer == "}" else char and char in '"{[-0123456789'):
                 self.fail_expecting(f"`,` or `{closer}`", opening=opening)
-            self.report(end, end, "a comma is missing here", "put `,` between the two values")
+            help = Fix("put `,` between the two values", ",", safe=True)
+            self.report(end, end, "a comma is missing here", help)
         return self.peek() == closer
 
     # ---------------------------------------------------------------------------------- scalars
@@ -218,7 +221,7 @@ class _Reader:
             except ValueError:  # Python converts no more than some thousand digits
                 message, help = f"a number of {end - start} digits is too long", ""
         elif text in _CONSTANTS:
-            message, help = f"`{text}` is not JSON", f"write `{_CONSTANTS[text]}`"
+            message, help = f"`{text}` is not JSON", write(_CONSTANTS[text])
         elif text.lstrip("+-") in _NOT_FINITE:
             message, help = f"JSON has no `{text}`", "write a finite number"
         elif text[0] in "+-.0123456789":
@@ -263,6 +266,40 @@ class _Reader:
         span = self.body.span(start, end)
         self.diagnostics.append(diagnose("json-syntax", span, message, help=help, notes=notes))
 
+    def help_with(self, word: str, expected: str) -> str:
+        """How to mend a word where something else was expected; may be empty."""
+        char, rest = word[0], self.text[self.offset + len(word) :]
+        is_letter = char.isalpha() or char == "_"
+        if char in _CURLY_QUOTES:
+            help = 'JSON knows only the straight quote `"`; replace the curly ones of this block'
+            return Fix(help, edits=self.straight_quotes(), safe=True)
+        if char in "'`":
+            help = 'JSON strings stand between double quotes: `"…"`'
+            return Fix(help, edits=self.straight_quotes(), safe=True)
+        if char == ";":
+            return Fix("JSON separates values by `,`", ",", safe=True)
+        if char == "(":
+            return "a list stands between `[` and `]`"
+        if expected.startswith("`,`") and (char.isalnum() or char == "\\"):
+            return 'a double quote inside a string is written `\\"`'
+        if expected == "a key in double quotes" and is_letter:
+            return write(f'"{shorten(word)}"')
+        if expected == "a value" and is_letter:
+            is_alone = re.match(r"[ \t]*[,\]}\n]", rest)
+            return Fix("text stands between double quotes", f'"{word}"' if is_alone else None)
+        return ""
+
+    def straight_quotes(self) -> tuple[Edit, ...]:
+        """The edits that give each string from here on the quotes of JSON."""
+        matches = (m for m in _QUOTED.finditer(self.text, self.offset) if m[0][0] != '"')
+        places = (at for match in matches for at in (match.start(), match.end() - 1))
+        return tuple(Edit(self.body.span(at, at + 1), '"') for at in places)
+
+    def comment_fix(self, comment: re.Match[str]) -> Fix:
+        """The fix that removes a comment, and its line if that holds nothing else."""
+        edit = Edit(self.body.span(*comment.span()), "")
+        return Fix("remove it", edits=(edit,))
+
     def fail_unclosed(self, opening: int) -> NoReturn:
         end = len(self.text.rstrip())
         notes = (Note("the block ends here", self.body.span(max(end - 1, 0), end)),)
@@ -286,9 +323,20 @@ class _Reader:
                 Note(f"`{text[opening]}` is opened here", self.body.span(opening, opening + 1)),
             )
         name = "a string" if word == '"' else f"`{shorten(word)}`"
-        help = _expectation_help(word, noun)
+        help = self.help_with(word, noun)
         self.report(at, at + len(word), f"expected {noun}, found {name}", help, notes)
         raise _UnreadableError
+
+
+_COMMA_HELP = Fix("remove the comma", "", safe=True)
+_QUOTED = re.compile(
+    r"""
+    "(?:[^"\\\n]|\\.)*"
+    | (?: [“”„‟«»] [^"\\\n]*? [“”„‟«»] | (?P<mark>['‘`]) [^"\\\n]*? (?(mark)['’`]) ) (?=\s*[,:\]}])
+    """,
+    re.VERBOSE,
+)
+"""A string, also one between the quotes of Python or of a word processor."""
 
 
 def _escape_mistake(text: str, match: re.Match[str], char: str) -> tuple[str, str]:
@@ -301,10 +349,10 @@ def _escape_mistake(text: str, match: re.Match[str], char: str) -> tuple[str, st
         name = f"`{escape}`" if len(escape) > 1 else f"U+{ord(char):04X}"
         return f"{name} is half of a character", "write the character itself"
     if escape == "\t":
-        return "a tab inside a string", "write `\\t`, or a space"
+        return "a tab inside a string", Fix("write `\\t`, or a space", " ")
     if len(escape) == 1:
         message = f"the control character U+{ord(escape):04X} inside a string"
-        return message, f"write `\\u{ord(escape):04x}`, or remove it"
+        return message, Fix(f"write `\\u{ord(escape):04x}`, or remove it", "")
     word = tex_word(text, match.start() + 1)
     if escape != "\\u":
         return f"`{escape}` is not an escape of JSON", _backslash_help(word)
@@ -313,28 +361,8 @@ def _escape_mistake(text: str, match: re.Match[str], char: str) -> tuple[str, st
 
 
 def _backslash_help(command: str) -> str:
-    return f"to write a backslash, double it: `\\\\{command}`"
-
-
-def _expectation_help(text: str, expected: str) -> str:
-    """How to mend a text where something else was expected; may be empty."""
-    char = text[0]
-    is_letter = char.isalpha() or char == "_"
-    if char in _CURLY_QUOTES:
-        return 'JSON knows only the straight quote `"`; replace the curly ones of this block'
-    if char in "'`":
-        return 'JSON strings stand between double quotes: `"…"`'
-    if char == ";":
-        return "JSON separates values by `,`"
-    if char == "(":
-        return "a list stands between `[` and `]`"
-    if expected.startswith("`,`") and (char.isalnum() or char == "\\"):
-        return 'a double quote inside a string is written `\\"`'
-    if expected == "a key in double quotes" and is_letter:
-        return f'write `"{shorten(text)}"`'
-    if expected == "a value" and is_letter:
-        return "text stands between double quotes"
-    return ""
+    help = f"to write a backslash, double it: `\\\\{command}`"
+    return Fix(help, "\\\\", "\\", safe=True)
 
 
 def _number_help(text: str) -> str:
@@ -344,5 +372,5 @@ def _number_help(text: str) -> str:
             value = read()
         except ValueError:
             continue
-        return "" if "n" in str(value) else f"write `{shorten(str(value))}`"  # inf, nan
+        return "" if "n" in str(value) else write(str(value))  # inf, nan
     return ""

@@ -1,8 +1,9 @@
 """The kinds of markup that readers would see as it is written.
 
 Entry points: `BROKEN`, markup of ours that is not whole; `FOREIGN`, that of other tools; `IN_HTML`,
-what is unread between tags; `ONCE`. Patterns are searched for in a text in which NUL stands for all
-that was read, so that a mark directly after a NUL stands directly after a link, code and so on.
+what is unread between tags; `ONCE`; `REWRITES`, what to write instead; `LANGUAGES` and
+`PLAIN_TEXTS`, of blocks. Patterns are searched for in a text in which NUL stands for all that was
+read, so that a mark directly after a NUL stands directly after a link, code and so on.
 """
 
 from __future__ import annotations
@@ -68,11 +69,12 @@ FOREIGN = {
         "a formula is `$x$` or stands between two `$$`, and a link to one is `[](#eq:name)`",
     ),
     "attributes": MarkupKind(
-        r"\{:?[ \t]*[.#][A-Za-z][\w:.-]*[^{}\n\0]*\}?|\{:[^{}\n\0]+\}|\{#?eq:[^{}\n\0]*\}?"
+        r"\{:?[ \t]*[.#][A-Za-z][\w:.-]*[^{}\n\0]*\}?|\{:[^{}\n\0]+\}"
+        r"|\{#?(?:eq|fig|lab|lst|tab):[^{}\n\0]*\}?"
         r"|(?<![{\w&\0])[#.][A-Za-z][\w:.-]*\}",
-        "only headings have attributes, and formulas labels: `{#eq:name}`",
-        "in a heading, `## Title {#id .class}` ends the line; write HTML where a text needs a "
-        "class or a size",
+        "only headings have attributes, and only formulas, captions and fences have labels",
+        "in a heading, `## Title {#id .class}` ends the line; a label ends a caption, "
+        "`Figure: … {#fig:name}`, or a fence's first line; write HTML for a class or a size",
     ),
     "reference": MarkupKind(
         r"(?<![\w\]\0\\])\[[^\[\]\n\0]+\]\[[^\[\]\n\0]*\](?!\()",
@@ -86,13 +88,15 @@ FOREIGN = {
     ),
     "citation": MarkupKind(
         r"(?<!\\)\[(?:[^\[\]\n\0@]*[\s-])?@[\w:./-]+[^\[\]\n\0]*\]",
-        "there is no list of sources",
-        "link to the source, or put it into a footnote: `[^name]`",
+        "no source is cited in this way",
+        "a citation is `[@key]` or `[see @key, p. 12; @other]`; the sources are listed in "
+        "content/references.bib",
     ),
     "crossref": MarkupKind(
         r"(?<![\w.@])@(?:fig|tbl|eq|sec|lst|thm)[-:][\w-]+",
         "a cross-reference is not written in this way",
-        "link to a heading or a formula by its id: `[text](#id)`, `[](#eq:name)`",
+        "link to a heading by its id, `[text](#id)`, and to what has a number without a text: "
+        "`[](#fig:name)`, `[](#eq:name)`",
     ),
     "highlight": MarkupKind(
         r"(?<![=\w])==[^\s=](?:[^=\n\0]*[^\s=])?==(?![=\w])",
@@ -229,7 +233,8 @@ BROKEN = {
     "item": MarkupKind(
         r"^\d{1,2}(?:[.)][.,)]|[,;]) (?=(?-i:[A-Z\0]))|^\d{1,2}[.)](?=(?-i:[A-Z][a-z]))"
         r"|\A1 (?=(?:[^\n]*\n)+?2\. )|^-(?=(?-i:[A-Z][a-z]))"
-        r"|^[0=_.)] (?=(?-i:[A-Z][a-z]|\0\0?[A-Z]))",
+        r"|(?:^[=_]|(?<=\n)0) (?=(?-i:[A-Z][a-z]))|^[.)] (?=(?-i:[A-Z][a-z]))"
+        r"|^[0=_] (?=(?-i:\0\0?[A-Z]))",
         "no item of a list begins here",
         "an item is `- text` or `1. text`, with one blank after the mark",
     ),
@@ -282,5 +287,37 @@ IN_HTML = {
     **FOREIGN,
 }
 """What is unread between the tags of HTML, where nothing but formulas is read."""
+REWRITES: dict[str, tuple[tuple[str, str, bool], ...]] = {
+    "contents": ((r"\[TOC\]", "", True),),
+    "entity": ((r"(&\w+)", r"\1;", True),),
+    "heading": ((r"(#{2,6})(?=[^\s#])", r"\1 ", True),),
+    "highlight": ((r"==(.+)==", r"**\1**", False),),
+    "item": ((r"(-|\d{1,2}[.)])(?=\S)", r"\1 ", True),),
+    "latex": (
+        (r"\\\(\s*(.+?)\s*\\\)", r"$\1$", True),
+        (r"\\\[\s*(.+?)\s*\\\]", r"$$\1$$", True),
+        (r"\$`(.+)`\$", r"$\1$", True),
+    ),
+    "link": ((r"(!?\[[^\[\]]*\])[ \t]+(\([^()\s]+\))", r"\1\2", True),),
+    "mention": ((r"Lesson (\d+)[,;:/](\d+)", r"Lesson \1.\2", False),),
+    "script": (
+        (r"~(.+)~", r"<sub>\1</sub>", False),
+        (r"\^(.+)\^", r"<sup>\1</sup>", False),
+    ),
+    "task": ((r"([-*+])\[ ?\]", r"\1 [ ]", True), (r"([-*+])\[([xX])\]", r"\1 [\2]", True)),
+    "binding": (
+        (r"((?:out|given)\b[^{}]*\})", r"{\1", True),
+        (r"([-+\u2212]?\d[\w.,]*)(\{(?:out|given)\b[^{}]*\})", r"`\1`\2", True),
+    ),
+    "wiki": ((r"\[\[(\d+(?:\.\d+)+)(?:-[\w-]*)?\]\]", r"Lesson \1", False),),
+}
+"""What to write instead of markup, in words of `re.sub`, and whether that is surely meant."""
 ONCE = frozenset("link bracket table fence code emphasis character markdown".split())
 """One mistake often leaves several of these marks in a text; the first is reported."""
+LANGUAGES = tuple(
+    "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
+    "toml xml yaml".split()
+)
+"""Languages that texts often show."""
+PLAIN_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
+"""Names of ordinary code and text that no highlighter knows."""

@@ -35,7 +35,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.syntax.attributes import term_id
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, nearest, propose
 from coursebuild.core.text.source import Excerpt, Span
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
@@ -82,8 +82,8 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
     likely = nearest(scheme, (*_COURSE_SCHEMES, "https", "mailto"), cutoff=0.75)
     if likely is None or scheme in _OTHER_SCHEMES:
         return None
-    message, help = f"no link scheme `{match[1]}:`", f"did you mean `{likely}:`?"
-    return diagnose("link-scheme", span, message, help=help)
+    fix = propose(f"{match[1]}:", f"{likely}:", (*_COURSE_SCHEMES, "https", "mailto"))
+    return diagnose("link-scheme", span, f"no link scheme `{match[1]}:`", help=fix)
 
 
 def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:

@@ -22,7 +22,7 @@ from typing import Literal, TypeAlias, assert_never
 import msgspec.inspect as inspect
 from msgspec import Struct
 
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 
@@ -334,19 +334,24 @@ def type_help(node: Node, type: inspect.Type) -> str:
     if isinstance(node, NullNode):
         return "leave the field out"
     if isinstance(node, ObjectNode) and ObjectNode in item_kinds and raw.startswith("["):
-        return f"write its header with two brackets: `[{node.mark.text}]`"
+        header = node.mark.text
+        help = f"write its header with two brackets: `[{header}]`"
+        return Fix(help, f"[{header}]", safe=header.startswith("["))
     if len(raw) > _MAX_LENGTH or "\n" in raw:
         return ""
     if isinstance(node, NumberNode | DateNode | BoolNode):
         if kinds == {StringNode} or (StringNode in kinds and not isinstance(node, BoolNode)):
-            return f'put it between quotes: `"{raw}"`'
+            return Fix(f'put it between quotes: `"{raw}"`', f'"{raw}"', raw, safe=True)
         if StringNode in item_kinds:
-            return f'put it between brackets and quotes: `["{raw}"]`'
+            new = f'["{raw}"]'
+            return Fix(f"put it between brackets and quotes: `{new}`", new, raw, safe=True)
     if isinstance(node, StringNode):
         if NumberNode in kinds and _NUMBER.fullmatch(node.value):
-            return f"write it without quotes: `{node.value}`"
+            help = f"write it without quotes: `{node.value}`"
+            return Fix(help, node.value, raw, safe=True)
         if BoolNode in kinds and node.value.lower() in ("true", "false"):
-            return f"write it without quotes: `{node.value.lower()}`"
+            new = node.value.lower()
+            return Fix(f"write it without quotes: `{new}`", new, raw, safe=True)
     if any(accepts(array.item_type, node) for array in arrays):
-        return f"put it between brackets: `[{raw}]`"
+        return Fix(f"put it between brackets: `[{raw}]`", f"[{raw}]", raw, safe=True)
     return ""

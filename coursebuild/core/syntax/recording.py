@@ -27,11 +27,11 @@ from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.syntax.fence import Fence, FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.unread_markup import is_known_kind
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, misspelt
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, misspelt, propose
 from coursebuild.core.text.patterns import matches_empty_text, pattern_mistake
 from coursebuild.core.text.source import Excerpt, Span
 
-FIGURE, OUTPUT_KIND = "Figure:", "output"
+FIGURE, TABLE, OUTPUT_KIND = "Figure:", "Table:", "output"
 _BODY_KINDS = ("text", OUTPUT_KIND)
 _FIRST_WORD = re.compile(r"([^\s:*`]{3,12})(?![^\s:])[^\S\n]*(:?)")
 _NEAR_CAPTION = re.compile(
@@ -87,7 +87,9 @@ def find_misspelt_caption(
         return None
     message = f"`{content.text[: match.end()].rstrip()}` is not a caption"
     place = content.span(0, len(match[0].rstrip()))
-    return diagnose("recording-misspelt", place, message, help=f"did you mean `{word}:`?")
+    is_safe = is_name or propose(match[1], word, names).safe
+    fix = Fix(f"did you mean `{word}:`?", f"{word}:", safe=is_safe)
+    return diagnose("recording-misspelt", place, message, help=fix)
 
 
 def check_near_caption(
@@ -149,6 +151,7 @@ def record_fence(
     if mark is not None:
         message = "a recorded output is not an illustration"
         help = f"leave `{ILLUSTRATION}` out, or write `text {ILLUSTRATION}` without a caption"
+        help = Fix(help, edits=mark.removal)
         diagnostics.append(diagnose("recording-keys", mark.span, message, help=help))
     own_words = tuple(word for word in keys.value.words if word is not mark)
     comparison = _read_comparison(FenceKeys(None, own_words), diagnostics)

@@ -36,6 +36,9 @@ class PositionedToken(Token):
     text: Excerpt = NO_TEXT
     """The content of a block."""
 
+    def __post_init__(self) -> None:
+        """Take the attributes as they are; a token of markdown-it would take lists of them, too."""
+
 
 class BlockState(StateBlock):
     """The state of the block rules of the text `base`."""

@@ -33,7 +33,7 @@ from coursebuild.core.syntax.nodes import (
     shorten,
     tex_word,
 )
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose, write
 from coursebuild.core.text.source import Excerpt, Source
 
 _LANGUAGE = tree_sitter.Language(tree_sitter_toml.language())
@@ -244,7 +244,8 @@ def error_offset(text: str, message: str) -> int:
 
 def double_backslash(command: str) -> str:
     """How to write a command of TeX in a string."""
-    return f"double the backslash: `\\\\{command}`, or put the text between single quotes"
+    help = f"double the backslash: `\\\\{command}`, or put the text between single quotes"
+    return Fix(help, "\\\\", "\\", safe=True)
 
 
 def diagnose_syntax(body: Excerpt, message: str, rule: str) -> Diagnostic:
@@ -261,9 +262,10 @@ def _describe_mistake(text: str, message: str) -> _Mistake:
     at = error_offset(text, message)
     char, words = text[at : at + 1], _PLACE.sub("", message)
     if odd := "a lone carriage return" if char == "\r" else odd_character(char):
-        help = "remove it" if at == 0 else "replace it by a plain space, or remove it"
-        if at == 0 and char == "\ufeff":
-            help = "save the file as UTF-8 without a byte order mark"
+        help: str = Fix("replace it by a plain space, or remove it", " ", safe=char != "\r")
+        if at == 0:
+            encoding = "save the file as UTF-8 without a byte order mark"
+            help = Fix(encoding if char == "\ufeff" else "remove it", "", safe=True)
         return at, at + 1, f"{odd} is not allowed here in TOML", help
     opening = _innermost_opening(text, at)
     bracket = text[opening] if opening is not None else ""
@@ -283,7 +285,7 @@ def _describe_mistake(text: str, message: str) -> _Mistake:
     if words.startswith(("Expected newline", "Unclosed")):
         closer = "]" if words == "Unclosed array" else "}" if bracket else ""
         return _wrong_end_of_value(text, at, closer)
-    help = "TOML writes `key = value`" if char == ":" else ""
+    help = Fix("TOML writes `key = value`", " =", safe=True) if char == ":" else ""
     help = _QUOTES_HELP if char in _CURLY_QUOTES else help
     if words.startswith("Invalid"):
         return _expected_instead(text, at, "a key", help)
@@ -326,7 +328,7 @@ def _wrong_value(text: str, start: int) -> _Mistake:
 
 def _value_help(text: str) -> str:
     if text in _BOOLEANS:
-        return f"write `{_BOOLEANS[text]}`"
+        return write(_BOOLEANS[text])
     if text in _NULLS:
         return "TOML has no such value; leave the field out"
     if text[0] in _CURLY_QUOTES:
@@ -335,7 +337,8 @@ def _value_help(text: str) -> str:
         return "a number has no leading zeros, and digits on both sides of its point"
     if '"' in text or "'" in text:
         return ""
-    return f'text needs quotes: `"{shorten(text)}"`'
+    new = None if "\\" in text or "#" in text else f'"{text}"'
+    return Fix(f'text needs quotes: `"{shorten(text)}"`', new, safe=True)
 
 
 def _wrong_end_of_value(text: str, at: int, closer: str) -> _Mistake:

@@ -13,9 +13,10 @@ for quizzes and labs.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from functools import partial
+
+from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.syntax.attributes import (
@@ -23,7 +24,7 @@ from coursebuild.core.syntax.attributes import (
     Attributes,
     check_heading,
     read_attributes,
-    read_label,
+    split_label,
 )
 from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.code_blocks import read_block
@@ -36,13 +37,15 @@ from coursebuild.core.syntax.containers import (
     read_head,
     read_table,
 )
-from coursebuild.core.syntax.fence import INDENTED_FENCE, read_fence
+from coursebuild.core.syntax.fence import read_fence
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_tree import read_inlines
+from coursebuild.core.syntax.labels import reject_label, take_label
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
     OUTPUT_KIND,
+    TABLE,
     check_missing_body,
     check_near_caption,
     diagnose_missing_caption,
@@ -54,7 +57,7 @@ from coursebuild.core.syntax.recording import (
     record_table,
 )
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
-from coursebuild.core.syntax.unread_markup import check_unread_markup, is_known_kind
+from coursebuild.core.syntax.unread_markup import check_indented_fence, check_unread_markup
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -135,8 +138,10 @@ class TextReader:
     def _read_paragraph(self, token: PositionedToken) -> model.Block:
         self.index += 2
         content = trim(token.text)
-        children = self.inlines(content)
         span = content.span()
+        if not self.nested and (caption := self._read_labelled_caption(content)) is not None:
+            return caption
+        children = self.inlines(content)
         if not self.nested and self._is_caption(content, children):
             recording = self._read_recording(children, span)
             if recording is not None:
@@ -147,6 +152,40 @@ class TextReader:
             children, shows_image = read_figure(children, span, self.state.figures)
             return model.Paragraph(span, children, token.hidden, shows_image)
         return model.Paragraph(span, children, token.hidden)
+
+    def _read_labelled_caption(self, content: Excerpt) -> model.Block | None:
+        """The block of a caption that ends with a label, or that stands above its table."""
+        caption, braces = split_label(content)
+        span, following = content.span(), self._peek()
+        if caption.text.startswith(TABLE) and following and following.type == "table_open":
+            label = take_label(braces, "tab", self.state)
+            inlines = self.inlines(trim(caption.slice(len(TABLE))))
+            table, self.index = self._table_at(self.index)
+            return replace(table, span=span.to(table.span), label=label, caption=inlines)
+        if braces is None:
+            return None
+        if caption.text.startswith(FIGURE):
+            label = take_label(braces, "fig", self.state)
+            inlines, shows_image = read_figure(self.inlines(caption), span, self.state.figures)
+            if not shows_image:
+                message = "no image stands in the paragraph of this label"
+                reject_label(braces, message, "show one: `![…](file.svg)`", self.state)
+            return model.Paragraph(span, inlines, False, shows_image, label=label)
+        words = (TABLE, *self.state.words.output)
+        if not any(word in caption.text[:24] for word in words):
+            return None
+        inlines, recording = self.inlines(caption), None
+        if is_caption(inlines, self.state.words):
+            recording = self._read_recording(inlines, caption.span())
+        if recording is not None and isinstance(recording.body, model.Table):
+            label = take_label(braces, "tab", self.state)
+            return replace(recording, body=replace(recording.body, label=label))
+        message, help = "no table follows the caption of this label", "put one directly below it"
+        if recording is not None:
+            message = "an output that is no table has no label"
+            help = "write `{#lst:name}` on the first line of its script"
+        reject_label(braces, message, help, self.state)
+        return recording or model.Paragraph(span, inlines)
 
     def _is_caption(self, content: Excerpt, inlines: tuple[model.Inline, ...]) -> bool:
         """Whether a paragraph is the caption of an output; a misspelt one is, with a diagnostic."""
@@ -222,24 +261,10 @@ class TextReader:
 
     def _read_code(self, token: PositionedToken) -> model.CodeBlock:
         code = token.text
-        self._check_indented_fence(code)
+        check_indented_fence(code, self.state)
         return model.CodeBlock(
             self._span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
         )
-
-    def _check_indented_fence(self, code: Excerpt) -> None:
-        """Report a fence that is shown as text because it is indented."""
-        opening = INDENTED_FENCE.match(code.text)
-        if opening is None:
-            return
-        is_closed = re.search(rf"^{opening[1]}\s*\Z", code.text.rstrip(), re.MULTILINE) is not None
-        if is_closed and not is_known_kind(opening[2]):
-            return
-        message = "this fence is indented by a tab or four blanks, so its block is shown as text"
-        help = "take the white space before it away"
-        place = code.span(opening.start(1), opening.end())
-        self.state.report(diagnose("fence-indented", place, message, help=help))
-        self.state.closes_indented = not is_closed
 
     def _read_html(self, token: PositionedToken) -> model.HtmlBlock | model.HtmlFlow:
         """Raw HTML, read as inlines if it holds formulas or is nested."""
@@ -283,15 +308,9 @@ class TextReader:
             self.state.report(diagnose("math-unclosed", place, message, help=help))
         elif not tex.text:
             self.state.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
-        return model.MathBlock(self._span(token), tex, self._read_label(text, end + 2))
-
-    def _read_label(self, text: Excerpt, at: int) -> model.Label | None:
-        """The label after a formula that ends before an offset."""
-        braces = LABEL.match(text.text, at)
-        label = read_label(text.slice(*braces.span(1)), self.state.report) if braces else None
-        if label is not None:
-            self.state.anchors.take(label.id, label.span)
-        return label
+        braces = LABEL.match(text.text, end + 2)
+        label = take_label(text.slice(*braces.span(1)) if braces else None, "eq", self.state)
+        return model.MathBlock(self._span(token), tex, label=label)
 
     # -- containers
 

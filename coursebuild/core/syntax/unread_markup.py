@@ -1,8 +1,7 @@
 """Markup that readers would see as it is written: broken markup of ours, and that of other tools.
 
-Entry points: `check_unread_markup`, for a block's content; `check_inline_code`, for code in a line
-that another tool would compute; `check_kind`, for a fence of a kind that looks misspelt or needs a
-feature that is not installed.
+Entry points: `check_unread_markup`, for a block's content; `check_kind`, for a fence of a kind that
+looks misspelt or needs a feature that is not installed.
 
 Only texts of the parsed content are searched, neither code nor formulas nor escaped characters, so
 a backslash or backticks say that markup is meant to be seen. Everything else is NUL in the searched
@@ -12,24 +11,55 @@ holds is no mistake: prices, `C#`, sets in braces, powers, footnote stars, stars
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterator, Sequence
 
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
-from coursebuild.core.syntax.fence import Fence, check_foreign_key, kind_of, split_words
-from coursebuild.core.syntax.markup_kinds import BROKEN, FOREIGN, IN_HTML, ONCE, MarkupKind
+from coursebuild.core.syntax.containers import quote_admonition
+from coursebuild.core.syntax.fence import (
+    INDENTED_FENCE,
+    Fence,
+    check_foreign_key,
+    kind_of,
+    outdent,
+    split_words,
+)
+from coursebuild.core.syntax.markup_kinds import (
+    BROKEN,
+    FOREIGN,
+    IN_HTML,
+    LANGUAGES,
+    ONCE,
+    PLAIN_TEXTS,
+    REWRITES,
+    MarkupKind,
+)
 from coursebuild.core.syntax.nodes import shorten
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, nearest
+from coursebuild.core.syntax.parsing_state import ParsingState
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Fix,
+    diagnose,
+    misspelt,
+    nearest,
+    propose,
+)
 from coursebuild.core.text.source import Excerpt, Span
 
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
-_SIGNS = re.compile(
-    r"[{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f]|[!?=:._']{2}|:\w|[´‘’]{3}"
-    r"|\((?:out|given)\)|\A_\Z|\A[a-rt-z](?!\w)|^\d{1,2}[.,;)][^\d\s]|^\d{1,2}[,;] |^-[A-Z]"
-    r"|^[0=_.)] |^h\d\. |^[A-Z?!]> |^1 |^import |Lesson \d",
-    re.MULTILINE,
+_MARKS = r"{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f"
+_SIGN = re.compile(
+    rf"[{_MARKS}!?=:._'´‘’(](?:(?<=[{_MARKS}])|(?<=[!?=:._'])[!?=:._']|(?<=:)\w"
+    r"|(?<=[´‘’])[´‘’]{2}|(?<=\()(?:out|given)\))"
 )
-"""What all unread markup has at least once, so that most texts are passed over quickly."""
+_FIRST_SIGN = re.compile(
+    r"\d{1,2}[.,;)][^\d\s]|\d{1,2}[,;] |-[A-Z]|[0=_.)] |h\d\. |[A-Z?!]> |1 |import |_\Z"
+)
+"""What all unread markup has at least once, in a text or where a line of it begins, so that most
+texts are passed over quickly; or it mentions a lesson, or is a letter directly after a formula."""
+_MENTION = re.compile(BROKEN["mention"].pattern)
+_LETTER = re.compile(r"[a-rt-z](?!\w)")
 _DOLLAR = re.compile(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
 """A dollar sign that no amount of money follows."""
 _TEX = re.compile(r"\\[A-Za-z]{2,}|[A-Za-z)}\]][_^](?:[0-9]|\{)")
@@ -43,16 +73,16 @@ _LONE_DOLLAR = re.compile(
 """Dollar signs that were surely meant for a formula, with a character of it."""
 
 
-def _one_pattern(kinds: dict[str, MarkupKind]) -> re.Pattern[str]:
-    """A pattern for all kinds, with a group for each."""
+_KINDS = {**BROKEN, **FOREIGN}
+
+
+@functools.cache
+def _pattern(*, html: bool) -> re.Pattern[str]:
+    """A pattern for all kinds, with a group for each; few courses need it."""
+    kinds = IN_HTML if html else _KINDS
     parts = (f"(?P<{name}>{kind.pattern})" for name, kind in kinds.items())
     return re.compile("|".join(parts), re.MULTILINE | re.IGNORECASE)
 
-
-_KINDS = {**BROKEN, **FOREIGN}
-_ANY_KIND, _ANY_IN_HTML = _one_pattern(_KINDS), _one_pattern(IN_HTML)
-_CELL = re.compile(r"\{[=.]?(?:bash|julia|js|ojs|python|py|r|sql)\}\s|r [A-Za-z_.][\w.]*[($\[]")
-"""How an expression begins that Quarto or R Markdown would compute."""
 
 _STAR = re.compile(
     r"^\*(?:[^\W\d_]{2,}|[aA] )|[^\W\d_]{2,}\*(?![\w*])|[^\W_][.!?]\*(?= [A-Z])"
@@ -60,16 +90,6 @@ _STAR = re.compile(
     re.MULTILINE,
 )
 """A star at the start of a line before a word or after a word, or two after a number in a text."""
-_OPEN_VALUE = re.compile(r'\b([A-Za-z]\w*)=(?:"|[\w.-]+")')
-_ATTRIBUTE = re.compile(r'[A-Za-z][\w:-]*="[^"]*"')
-_NO_EQUALS = re.compile(r'([A-Za-z]\w*)\W?"[\w. -]*"')
-_LONE_DASH = re.compile(r'([A-Za-z]\w*)[-+;]"[^"]*"')
-_LATE_QUOTE = re.compile(r'\b([A-Za-z]\w*)=\.?\d[\d.]*"')
-_PAIR = re.compile(r"\([^()\[\]{}]*\)|\[[^()\[\]{}]*\]|\{[^()\[\]{}]*\}")
-"""A pair of brackets with none inside."""
-_PROSE = re.compile(r"(?<!`)`[,.;:)]\s+\w|(?<!`)`[^`]*\w`{2,}[\s,.;:)]")
-"""Code that begins with a mark of punctuation and a blank, or that holds two backticks."""
-_LETTER_BEFORE, _LETTER_AFTER = re.compile(r"(?:^|(?<=\s))\w\Z"), re.compile(r"\w")
 
 
 def check_unread_markup(
@@ -82,14 +102,14 @@ def check_unread_markup(
     """
     whole = content.text
     has_escaped_bracket = "\\(" in whole or "\\[" in whole
-    if not has_escaped_bracket and not any(_SIGNS.search(text) for _, text in texts):
+    if not has_escaped_bracket and not any(_may_be_unread(whole, *text) for text in texts):
         return
     masked = _mask_all_but(texts, whole)
     dollars = [*_check_dollars(content, texts, masked)]
     yield from dollars
     reported = set[str]()
-    kinds, pattern = (IN_HTML, _ANY_IN_HTML) if html else (_KINDS, _ANY_KIND)
-    for match in pattern.finditer(masked):
+    kinds = IN_HTML if html else _KINDS
+    for match in _pattern(html=html).finditer(masked):
         name = match.lastgroup or ""
         is_of_formula = name == "letter" or re.match(r"\\[A-Za-z]", match[0])
         if name in reported or (dollars and is_of_formula):
@@ -98,6 +118,15 @@ def check_unread_markup(
         if diagnostic is not None:
             reported |= ONCE.intersection([name])
             yield diagnostic
+
+
+def _may_be_unread(whole: str, at: int, text: str) -> bool:
+    return (
+        _SIGN.search(text) is not None
+        or any(map(_FIRST_SIGN.match, text.split("\n")))
+        or ("Lesson " in text and _MENTION.search(text) is not None)
+        or (at > 0 and whole[at - 1] == "$" and _LETTER.match(text) is not None)
+    )
 
 
 def _check_dollars(
@@ -170,6 +199,7 @@ def _diagnose(
         case "callout":
             word = re.sub(r"[^\w-]", "", markup).lower()
             help = help.replace("note", word or "note")
+            help = Fix(help, edits=quote_admonition(span, word), safe=True)
         case "character" if span.text == "\0":
             return None  # it is reported wherever it stands
         case "character":
@@ -185,6 +215,10 @@ def _diagnose(
             pass
     message = f"`{shorten(markup)}` would be shown as written: {kind.reason}"
     rule = "markup-foreign" if name in FOREIGN else kind.rule
+    for pattern, replacement, is_safe in REWRITES.get(name, ()):
+        rewritable = re.compile(pattern).match(whole, at)
+        if rewritable is not None and rewritable[0] == span.text == markup and "\n" not in markup:
+            help = Fix(help, rewritable.expand(replacement), safe=is_safe)
     return diagnose(rule, span, message, help=help)
 
 
@@ -208,10 +242,13 @@ def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
         message = f"`{shorten(markup)}` does not say where the number is from"
         likely = nearest(key.lower(), ("out", "given", "code"))
         help = 'write `{out}`, `{out=examples/x.py}`, `{given}` or `{given="its source"}`'
-        help = help + escaping if likely in (None, key) else f"did you mean `{likely}`?"
-        return diagnose("binding-attribute", span, message, help=help)
+        if likely in (None, key):
+            return diagnose("binding-attribute", span, message, help=help + escaping)
+        fix = propose(key, likely, ("out", "given", "code"))
+        return diagnose("binding-attribute", span, message, help=fix)
     if before == "$":
         help = 'write `{symbol="what it stands for" unit="m/s"}`' + escaping
+        help = Fix(help, "symbol" if misspelt(key, ["symbol"]) else None, key, safe=True)
         message = f"`{shorten(markup)}` says nothing about the formula before it"
         return diagnose("symbol-attribute", span, message, help=help)
     if before not in ("]", ")"):
@@ -219,7 +256,9 @@ def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
     message = f"`{shorten(markup)}` would be shown as written: "
     if before == "]":
         message += "the only attribute of words in brackets is `{term}`"
-        return diagnose("term-attribute", span, message, help="write `[word]{term}`" + escaping)
+        new = "term" if misspelt(key, ["term"]) else None
+        fix = Fix("write `[word]{term}`" + escaping, new, key, safe=True)
+        return diagnose("term-attribute", span, message, help=fix)
     message += "links and images have no attributes"
     help = "write HTML, `<a …>` or `<img …>`, where one needs a class or a size" + escaping
     return diagnose("markup-foreign", span, message, help=help)
@@ -256,48 +295,7 @@ def find_repetitions(content: Excerpt) -> Iterator[Diagnostic]:
         if is_begun and line[0].startswith(half, at) and line[0].count(half.rstrip()) == 2:
             span = content.span(line.start() + at, line.start() + at + len(half))
             message = f"`{shorten(half)}` stands here twice"
-            yield diagnose("text-repeated", span, message, help="delete it once")
-
-
-def check_inline_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[Diagnostic]:
-    """Report code in a line that another tool would compute, or whose backticks are misplaced."""
-    text, span = content.text, content.span(start, end)
-    fence = re.match(r"``(\w+)[^`\n]*\n", text[start:end])
-    if fence is not None and is_known_kind(fence[1]):
-        message = f"a block of kind `{fence[1]}` does not begin here: there are two backticks"
-        opening = content.span(start, start + len(fence[0].rstrip()))
-        yield diagnose("markup-unread", opening, message, help=BROKEN["fence"].help)
-    if _CELL.match(code):
-        message = f"`{shorten(code)}` is shown, and not computed"
-        help = "show the value, bound to what a script printed: `` `4.47`{out} ``"
-        yield diagnose("markup-foreign", span, message, help=help)
-    is_cut = code.startswith("<") and not code.endswith(">")
-    value = _OPEN_VALUE.search(code) if code.count('"') % 2 and not is_cut else None
-    if _ATTRIBUTE.search(code) and not is_cut:
-        value = value or _NO_EQUALS.search(_ATTRIBUTE.sub("", code))
-    if value := value or _LATE_QUOTE.search(code) or _LONE_DASH.fullmatch(code):
-        message = f'the value of `{value[1]}` does not stand between `="` and `"`'
-        help = f'write `{value[1]}="…"`'
-        yield diagnose("markup-unread", span, message, help=help)
-    rest = code if re.fullmatch(r"[A-Za-z][\w.()\[\]{}:-]+", code) else ""
-    while (shorter := _PAIR.sub(lambda pair: "_" * len(pair[0]), rest)) != rest:
-        rest = shorter
-    if bracket := re.search(r"(?<=\w)[()\[\]{}](?=\w)", rest):
-        message = f"`{bracket[0]}` has no bracket that belongs to it"
-        yield diagnose("markup-unread", span, message, help="write the other one, or a blank")
-    # A letter and a backtick change places easily, as in "i`mpratio`" and "`body_mass `while".
-    letter, first = _LETTER_BEFORE.search(text, max(start - 2, 0), start), start - 1
-    if letter is None and text[start:end].endswith(" `"):
-        letter, first = _LETTER_AFTER.match(text, end), start
-    if letter is not None:
-        message = f"`{letter[0]}` stands directly beside a backtick that begins or ends code"
-        help = "move the backtick, or write a blank between them"
-        place = content.span(min(first, letter.start()), letter.end())
-        yield diagnose("markup-unread", place, message, help=help)
-    elif _PROSE.match(text, start, end):
-        message = f"`{shorten(code)}` would be shown as code, and begins or ends as prose does"
-        help = "a backtick is missing or is one too many, here or before it in the paragraph"
-        yield diagnose("markup-unread", span, message, help=help)
+            yield diagnose("text-repeated", span, message, help=Fix("delete it once", ""))
 
 
 def _mask_all_but(texts: Sequence[tuple[int, str]], whole: str) -> str:
@@ -318,14 +316,6 @@ def _mask(text: str) -> str:
 
 # --- fences
 
-_LANGUAGES = tuple(
-    "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
-    "toml xml yaml".split()
-)
-"""Languages that texts often show."""
-_PLAIN_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
-"""Names of ordinary code and text that no highlighter knows."""
-
 _FOREIGN_KINDS = {"math": "a formula on a line of its own stands between two `$$`"}
 """Kinds of blocks that other tools read, with what to write here."""
 
@@ -336,6 +326,21 @@ _OBJECT = re.compile(r'\s*\{\s*"[^"\n]*"\s*:[\s\S]*\}\s*\Z')
 def is_known_kind(kind: str) -> bool:
     """Whether a block of a kind is more than code to be shown."""
     return kind in CORE_FENCES or kind in fence_names()
+
+
+def check_indented_fence(code: Excerpt, state: ParsingState) -> None:
+    """Report a fence that is shown as text because it is indented."""
+    opening = INDENTED_FENCE.match(code.text)
+    if opening is None:
+        return
+    is_closed = re.search(rf"^{opening[1]}\s*\Z", code.text.rstrip(), re.MULTILINE) is not None
+    if is_closed and not is_known_kind(opening[2]):
+        return
+    message = "this fence is indented by a tab or four blanks, so its block is shown as text"
+    help = Fix("take the white space before it away", edits=outdent(code), safe=True)
+    place = code.span(opening.start(1), opening.end())
+    state.report(diagnose("fence-indented", place, message, help=help))
+    state.closes_indented = not is_closed
 
 
 def check_kind(fence: Fence) -> Iterator[Diagnostic]:
@@ -350,7 +355,9 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     yield from (diagnostic for word in words if (diagnostic := check_foreign_key(kind.text, word)))
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"
-        help = "a script is a block of kind `python`"
+        help: str = "a script is a block of kind `python`"
+        if re.fullmatch("i?py(?:thon)?3?", name):
+            help = Fix(help, "python", safe=True)
         yield diagnose("script-kind", kind.span(), message, help=help)
     elif name in _FOREIGN_KINDS or name.startswith("{"):
         message = f"a block of kind `{kind.text}` is shown as code here"
@@ -358,10 +365,12 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     elif "=" in name:
         message = f"the kind of this block is missing before `{kind.text}`"
         help = "the first word says what a block is, as in ```` ```python file=examples/a.py ````"
+        is_script = name.startswith("file=") and name.endswith(".py")
+        help = Fix(help, f"python {kind.text}" if is_script else None, safe=True)
         yield diagnose("fence-info", kind.span(), message, help=help)
     elif (likely := _find_misspelt(name, kinds)) is not None:
         message = f"`{kind.text}` is not a known kind of block"
-        help = f"did you mean `{likely}`?"
+        help = propose(kind.text, likely, kinds)
         yield diagnose("fence-kind-near", kind.span(), message, help=help)
     elif not package and (diagnostic := _check_unread_json(fence)) is not None:
         yield diagnostic
@@ -374,9 +383,9 @@ def _help_with_foreign(name: str) -> str:
         return _FOREIGN_KINDS[name]
     if is_known_kind(language):
         example = " file=examples/….py" if language == "python" else ""
-        return f"write ```` ```{language}{example} ````"
+        return Fix(f"write ```` ```{language}{example} ````", language)
     if language and _is_language(language):
-        return f"code to be shown is of kind `{language}`; scripts are in Python"
+        return Fix(f"code to be shown is of kind `{language}`; scripts are in Python", language)
     return "a callout is a quotation: `> [!note]`, and `> ` before each line"
 
 
@@ -386,7 +395,7 @@ def _find_misspelt(name: str, kinds: Sequence[str]) -> str | None:
         return "lab simlab"
     if name in kinds:
         return name
-    likely = misspelt(name, kinds) or misspelt(name, _LANGUAGES)
+    likely = misspelt(name, kinds) or misspelt(name, LANGUAGES)
     return None if likely is None or _is_language(name) else likely
 
 
@@ -410,4 +419,4 @@ def _is_language(name: str) -> bool:
     try:
         return find_lexer_class_by_name(name) is not None
     except ClassNotFound:
-        return name.lower() in _PLAIN_TEXTS
+        return name.lower() in PLAIN_TEXTS

@@ -1,15 +1,19 @@
 """Messages to the author: diagnostics, their notes and edits, and the `Parsed` values with them.
 
-Entry point: `diagnose(rule, span, message, …)`. A rule is a member of the closed catalogue
-`RULES`; its severity comes from there, so that a rule means the same wherever it
-is raised. A message says what is wrong and where, in lower case without a full stop; `help` says
-how to mend it.
+Entry points: `diagnose(rule, span, message, …)`; `did_you_mean` and `propose`, whose help is an
+edit as well. A rule is a member of the closed catalogue `RULES`; its severity comes from there, so
+that a rule means the same wherever it is raised. A message says what is wrong and where, in lower
+case without a full stop; `help` says how to mend it.
+
+A `Fix` is a help with the edits that follow it. `coursebuild check --fix` makes those that are
+safe, and the others where its user asks for them.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Iterator
 from typing import Generic, TypeVar
 
 from msgspec import Struct
@@ -34,6 +38,53 @@ class Edit(Struct, frozen=True):
     text: str
 
 
+class Fix(str):
+    """A help with the edits that follow it, where it is known what to write.
+
+    With `new`, the edit is the text that replaces what the diagnostic marks; or `old`, if that
+    stands there once, as it does not in a string with escapes. `edits` are of other places. It is
+    `safe` where nothing else can have been meant.
+    """
+
+    new: str | None
+    old: str
+    edits: tuple[Edit, ...]
+    safe: bool
+
+    def __new__(
+        cls,
+        help: str,
+        new: str | None = None,
+        old: str = "",
+        *,
+        edits: tuple[Edit, ...] = (),
+        safe: bool = False,
+    ) -> Fix:
+        """Make a help with its edits."""
+        fix = super().__new__(cls, help)
+        fix.new, fix.old, fix.edits, fix.safe = new, old, edits, safe
+        return fix
+
+    def edits_at(self, place: Span) -> tuple[Edit, ...]:
+        """The edits of a diagnostic at this place."""
+        if self.new is None:
+            return self.edits
+        if self.old and place.text.count(self.old) != 1:
+            return ()
+        start = place.start + place.text.index(self.old)
+        end = start + len(self.old) if self.old else place.end
+        return (Edit(place.source.span(start, end), self.new), *self.edits)
+
+    def at(self, place: Span) -> Fix:
+        """The same for a diagnostic that marks something else than this place."""
+        return Fix(self, edits=self.edits_at(place), safe=self.safe)
+
+
+def write(text: str, old: str = "") -> Fix:
+    """The fix that writes a text, and nothing else can be meant."""
+    return Fix(f"write `{text}`", text, old, safe=True)
+
+
 class Diagnostic(Struct, frozen=True):
     """One mistake or doubt, at one place."""
 
@@ -48,7 +99,9 @@ class Diagnostic(Struct, frozen=True):
     """How to mend it."""
     notes: tuple[Note, ...] = ()
     edits: tuple[Edit, ...] = ()
-    """A correction, where one is certain enough to be offered."""
+    """What mends it, if that is known: all of them, or none."""
+    safe: bool = False
+    """Whether the edits are what its author meant, beyond doubt."""
     strict: bool = False
     """Whether it is an error even if its rule is a warning."""
 
@@ -76,9 +129,8 @@ def diagnose(
     label: str = "",
     help: str = "",
     notes: Iterable[Note] = (),
-    edits: Iterable[Edit] = (),
 ) -> Diagnostic:
-    """A diagnostic of a rule of the catalogue.
+    """A diagnostic of a rule of the catalogue; a `Fix` as its help has the edits as well.
 
     Raises:
         KeyError: there is no such rule.
@@ -88,7 +140,9 @@ def diagnose(
         raise TypeError("the place of a diagnostic is a Span, as `excerpt.span()` gives it")
     if rule not in RULES:
         raise KeyError(f"no rule {rule!r} in the catalogue")
-    return Diagnostic(rule, span, message, label, help, tuple(notes), tuple(edits))
+    edits = help.edits_at(span) if isinstance(help, Fix) else ()
+    is_safe = isinstance(help, Fix) and help.safe and bool(edits)
+    return Diagnostic(rule, span, message, label, str(help), tuple(notes), edits, is_safe)
 
 
 class Parsed(Struct, Generic[T_co], frozen=True):
@@ -116,19 +170,28 @@ def misspelt(word: str, names: Iterable[str]) -> str | None:
 
     A letter may be dropped, added, changed or swapped with the next one, or be a capital.
     """
+    return next((name for name, _ in _misspelt_names(word, names)), None)
+
+
+def _misspelt_names(word: str, names: Iterable[str]) -> Iterator[tuple[str, tuple[int, int]]]:
+    """All names of which a word may be a misspelling, in their order, and how much they differ.
+
+    The first number does not count capitals as letters of their own, the second does.
+    """
+    for name in sorted(set(names) - {word}):
+        difference = _difference(word.lower(), name.lower())
+        if difference <= (1 if len(name) < 5 else 2) and difference < len(name):
+            yield name, (difference, _difference(word, name))
+
+
+def _difference(first: str, second: str) -> int:
     import difflib
 
-    lower = word.lower()
-    for name in sorted(set(names) - {word}):
-        blocks = difflib.SequenceMatcher(None, lower, name.lower(), False).get_matching_blocks()
-        difference = max(len(word), len(name)) - sum(block.size for block in blocks)
-        if difference <= (1 if len(name) < 5 else 2) and difference < len(name):
-            return name
-    return None
+    blocks = difflib.SequenceMatcher(None, first, second, False).get_matching_blocks()
+    return max(len(first), len(second)) - sum(block.size for block in blocks)
 
 
-LETTERS = "abcdefghijklmnopqrstuvwxyz_"
-"""What names are made of."""
+_LETTERS = "abcdefghijklmnopqrstuvwxyz_"
 _ROWS = (
     "1234567890-=", "qwertyuiop[]", "asdfghjkl;'", "zxcvbnm,./", "qwertzuiop", "azertyuiop",
     "ASDFGHJKL", "QWERTYUIOP", "ZXCVBNM<>?",
@@ -163,26 +226,48 @@ def slips_of(name: str) -> frozenset[str]:
         if tail:
             slips.add(head + tail[0] + letter + tail[1:])
         if n or len(name) > 4:
-            slips |= {head + dropped + letter + tail for dropped in (*LETTERS, "-", "/", ".")}
+            slips |= {head + dropped + letter + tail for dropped in (*_LETTERS, "-", "/", ".")}
             slips |= {
                 head + near + tail for near in _NEARBY.get(letter, "") if tail or head[-1] != "e"
             }
-    slips |= {name + letter for letter in LETTERS if letter != "s" or name.endswith("s")}
+    slips |= {name + letter for letter in _LETTERS if letter != "s" or name.endswith("s")}
     return frozenset(slips - {name})
 
 
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:
-    """A help text that proposes the nearest known name, or lists the names if they are few.
+    """The fix that writes the nearest known name instead, or a help that lists them if few.
 
-    Empty where they are many and none is near.
+    It is empty where they are many and none is near.
     """
     names = sorted(set(known_names))
     likely = nearest(name, names)
     if likely is not None:
-        return f"did you mean `{likely}`?"
+        return propose(name, likely, names)
     if names and len(names) <= 12:
         return "known: " + ", ".join(f"`{n}`" for n in names)
     return ""
+
+
+_IDS = re.compile(r"\d+|(?<![^\W_])[^\W\d_](?![^\W_])")
+"""Numbers and single letters."""
+
+
+def propose(
+    name: str, likely: str, names: Iterable[str] = (), form: str = "did you mean `{}`?"
+) -> Fix:
+    """The fix that writes the likely one of `names` for a name.
+
+    It is safe where the name differs from that one by a letter or two, and from others by more.
+    Names that differ in numbers or single letters are of different things: there the help has no
+    edit.
+    """
+    help = form.format(likely)
+    if _IDS.findall(name.lower()) != _IDS.findall(likely.lower()):
+        return Fix(help)
+    candidates = dict(_misspelt_names(name, {*names, likely}))
+    difference = candidates.pop(likely, None)
+    is_safe = difference is not None and all(difference < number for number in candidates.values())
+    return Fix(help, likely, name, safe=is_safe and len(likely) > 2)
 
 
 def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:

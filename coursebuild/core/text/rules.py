@@ -10,9 +10,7 @@ from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
-HELP = "https://github.com/OWNER/coursebuild/blob/main/docs/reference/rules.md#{}"
-"""The address at which a rule is explained."""
-
+from coursebuild import MANUAL
 
 Severity: TypeAlias = Literal["error", "warning"]
 """An error keeps the site from being published; a warning can be silenced, with a reason."""
@@ -25,6 +23,13 @@ class Rule(Struct, frozen=True):
     severity: Severity
     summary: str
     """Its meaning in one sentence, for the catalogue's page."""
+    no_fix: str = ""
+    """Why no diagnostic of it has an edit, in one sentence; empty where one may have."""
+
+
+def rule_address(name: str) -> str:
+    """The address at which the manual explains a rule; empty where that is not known."""
+    return MANUAL and f"{MANUAL}rules.html#{name}"
 
 
 _SUMMARIES = {
@@ -54,7 +59,7 @@ _SUMMARIES = {
     "reason.",
     "unproven-name": "An entry of `unproven` in the course map names no script, or one that "
     "always runs.",
-    "no-lessons": "The course has no lesson to publish.",
+    "no-lessons": "The course has no lesson to publish, and no page in a `section`.",
     "no-scripts": "No script can run here, so nothing is verified.",
     # the theme
     "theme-file": "A file that the theme names is not there, or is not what it must be.",
@@ -88,7 +93,7 @@ _SUMMARIES = {
     "fence-kind-near": "The kind of a code block looks like a misspelt one.",
     "fence-unread": "A code block of a kind that nothing reads holds a JSON object.",
     "feature-broken": "A feature of the course's own cannot be loaded.",
-    "feature-missing": "A fence needs a feature that is not installed.",
+    "feature-missing": "A fence or the list of sources needs something that is not installed.",
     "math-syntax": "A formula does not parse.",
     "math-command": "A command of a formula has lost its backslash.",
     "math-brackets": "A formula has more opening brackets than closing ones, or fewer.",
@@ -101,7 +106,8 @@ _SUMMARIES = {
     "control-character": "A text has a character that no reader can see.",
     "merge-conflict": "A file of the course holds both versions of a merge, with the marks between "
     "them.",
-    "equation-label": "The label of a formula cannot be read, or stands where none may.",
+    "label-attribute": "The label of a formula, figure, table, listing or lab cannot be read, or "
+    "stands where none may.",
     # terms and symbols
     "term-attribute": "The attribute by which a text defines a term cannot be read.",
     "term-place": "A term is defined outside a paragraph of the text.",
@@ -230,7 +236,7 @@ _SUMMARIES = {
     "lab-shared": "A lab changes what all labs of a page share: objects of JavaScript or of the "
     "engine.",
     "lab-timeout": "A lab takes too long, or too much memory, to be tried.",
-    "lab-engine": "An engine ended while a lab was tried, or the two are of different versions.",
+    "lab-engine": "An engine ended while a lab was tried, or refused its model.",
     # quizzes
     "quiz-id-repeated": "Two quizzes of the course have the same id.",
     "question-id-repeated": "Two questions of a quiz have the same id.",
@@ -249,7 +255,45 @@ _WARNINGS = frozenset(
     """.split()
 )
 
+_MEANING = "Only its author knows what was meant."
+_NO_FIX = {
+    _MEANING: """
+    binding-volatile bench-text draft-empty fence-unread field-missing field-repeated figure-unshown
+    footnote-repeated footnote-unused heading-empty html-unbalanced image-alt io-order io-repeated
+    io-stray lesson-planned-file math-brackets math-unclosed math-unread merge-conflict nesting-deep
+    prerequisite-cycle quiz-answer quiz-gate recording-body recording-orphan symbol-formula
+    symbol-repeated table-cells term-place
+    """,
+    "Links may lead to either of the two, so its author chooses the new name.": """
+    anchor-repeated id-repeated question-id-repeated quiz-id-repeated script-repeated term-repeated
+    """,
+    "Numbers of lessons are no words, of which one could be misspelt.": "prerequisite-unknown",
+    "A file has to be written, moved, renamed or saved anew; an edit changes texts only.": """
+    feature-broken file-encoding file-unlisted file-unreadable image-forbidden image-remote
+    figure-unreadable lesson-missing lesson-unlisted link-broken map-missing no-lessons page-missing
+    page-unlisted template-broken template-outdated template-unknown text-long theme-file
+    """,
+    "What a script prints becomes part of a text by `coursebuild update`, once somebody has seen "
+    "it.": "example-edited figure-drift output-drift output-not-updatable recorded-run",
+    "What the code of the course does has to change.": """
+    figure-missing figure-window lab-diverged lab-endless lab-expect lab-far lab-goal lab-parity
+    lab-penetration lab-reset lab-shared lab-timeout lab-value lab-warning mjcf-compiles mjcf-error
+    mjcf-message model-timeout output-noise script-connects script-diverged
+    script-encoding script-killed script-output-limit script-penetration script-silent
+    script-timeout script-unrepeatable script-writes
+    """,
+    "Something has to be installed or run.": """
+    bench-unrecorded engine-version feature-missing lab-engine no-scripts output-unrepeated
+    report-stale script-python script-unproven
+    """,
+    "What a page must not have is left out by its author, or allowed in the map.": """
+    html-forbidden package-reduced
+    """,
+}
+"""Why rules have no edits: a reason, and the names of the rules."""
+_REASONS = {name: reason for reason, names in _NO_FIX.items() for name in names.split()}
+
 RULES: dict[str, Rule] = {
-    name: Rule(name, "warning" if name in _WARNINGS else "error", summary)
+    name: Rule(name, "warning" if name in _WARNINGS else "error", summary, _REASONS.get(name, ""))
     for name, summary in _SUMMARIES.items()
 }

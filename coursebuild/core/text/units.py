@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, nearest
 from coursebuild.core.text.source import Excerpt
 
 Dimension: TypeAlias = tuple[tuple[str, Fraction], ...]
@@ -147,7 +147,8 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
             continue  # Pint takes `rads` for a dose of radiation
         likely = _suggest_unit(word)
         help = "leave it out, and name in words what is counted"
-        help = f"did you mean `{likely}`?" if likely else help
+        if likely:
+            help = Fix(f"did you mean `{likely}`?", likely, safe=_NAMES.get(word) == likely)
         message = f"there is no unit `{word}`"
         yield diagnose("unit-unknown", unit.span(*match.span()), message, help=help)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
@@ -10,7 +11,7 @@ from msgspec import Struct
 from coursebuild.core.features import Feature
 from coursebuild.core.model import Course, Document, find_formulas
 from coursebuild.core.model.results import Mathml, ScriptRun
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import Dimension, find_unit
@@ -43,7 +44,10 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
         for comparison in comparisons.get(tex.span().start, ()):
             span, message = tex.span(comparison.start, comparison.end), comparison.message
             if comparison.kind == "wrong":
-                mistake = diagnose("formula-arithmetic", span, message, help=comparison.help)
+                result = re.match(r"(-?[\d.]+) is the result", message)
+                is_number = re.fullmatch(r"-?[\d.]+", span.text) is not None
+                fix = Fix(comparison.help, result[1] if result and is_number else None)
+                mistake = diagnose("formula-arithmetic", span, message, help=fix)
                 diagnostics.append(mistake)
             elif comparison.kind == "unread":
                 unread.append((span, message))
@@ -103,10 +107,23 @@ FEATURE = Feature(
     unproven=unproven,
     rules=(
         Rule("formula-arithmetic", "error", "A number in a formula is not what comes out."),
-        Rule("formula-identity", "error", "A formula that says `check` does not hold, or may not."),
         Rule(
-            "symbol-value", "error", "A symbol has two values in one section, or cannot have one."
+            "formula-identity",
+            "error",
+            "A formula that says `check` does not hold, or may not.",
+            "Either side may be the wrong one.",
         ),
-        Rule("formula-unread", "warning", "Arithmetic in a formula is not understood."),
+        Rule(
+            "symbol-value",
+            "error",
+            "A symbol has two values in one section, or cannot have one.",
+            "Only its author knows which value holds.",
+        ),
+        Rule(
+            "formula-unread",
+            "warning",
+            "Arithmetic in a formula is not understood.",
+            "Nothing has to be wrong in it.",
+        ),
     ),
 )

@@ -2,8 +2,8 @@
 
 - `init`: writes a small complete course, from the files in `course/`
 - `new`: adds a lesson, level, page or feature to the map (`course_map`), a model, a template
-- `rename`: gives a lesson another id, wherever the course names it (`references`)
-- `fmt`: formats lessons (`format`, with `layout`)
+- `rename`: gives a lesson another id, wherever the course names it (`course_map`)
+- `fmt`: formats lessons (`format`)
 - `doctor`: checks which of the things that courses need work here
 """
 

@@ -149,7 +149,30 @@ class _Layout:
                 yield from self._lay_out_json(read_fence(token, self.base, nested=False))
             elif token.type == "table_open":
                 yield from self._align_table(index)
-        yield from self._trim_white_space()
+        # Remove spaces at line ends and repeated empty lines; end the text with a line end
+        text, starts = self.source.text, self.source.line_starts
+        end = len(text.rstrip(" \t\r\n"))
+        inner = {
+            n
+            for t in self.tokens
+            if t.type == "paragraph_open" and t.map
+            for n in range(t.map[0], t.map[1] - 1)
+        }
+        empty: str | None = ""
+        last = self.source.position(end)[0] - 1
+        for n in range(last):
+            line, bare = self.lines[n], self.lines[n].rstrip(" \t")
+            if n in self.fixed_lines:
+                empty = None
+                continue
+            if bare == empty:
+                yield Edit(self.source.span(starts[n], starts[n + 1]), "")
+            elif bare != line and not (n in inner and line.endswith("  ")):
+                yield Edit(self.source.span(starts[n] + len(bare), starts[n] + len(line)), "")
+            empty = None if bare.strip(" \t>") else bare
+        line_end = self._line_end(last) if end else ""
+        if text[end:] != line_end:
+            yield Edit(self.source.span(end), line_end)
         yield from self._separate_blocks()
 
     def _wrap(self, paragraph: model.Paragraph) -> Iterator[Edit]:
@@ -196,32 +219,6 @@ class _Layout:
         self.fixed_lines.update(range(second - 1, second + len(rows)))
         span = self.base.span(rows[0].start, rows[-1].start + len(texts[-1]))
         yield Edit(span, (self._line_end(second) + prefix).join(lines))
-
-    def _trim_white_space(self) -> Iterator[Edit]:
-        """Remove spaces at line ends and repeated empty lines; end the text with a line end."""
-        text, starts = self.source.text, self.source.line_starts
-        end = len(text.rstrip(" \t\r\n"))
-        inner = {
-            n
-            for t in self.tokens
-            if t.type == "paragraph_open" and t.map
-            for n in range(t.map[0], t.map[1] - 1)
-        }
-        empty: str | None = ""
-        last = self.source.position(end)[0] - 1
-        for n in range(last):
-            line, bare = self.lines[n], self.lines[n].rstrip(" \t")
-            if n in self.fixed_lines:
-                empty = None
-                continue
-            if bare == empty:
-                yield Edit(self.source.span(starts[n], starts[n + 1]), "")
-            elif bare != line and not (n in inner and line.endswith("  ")):
-                yield Edit(self.source.span(starts[n] + len(bare), starts[n] + len(line)), "")
-            empty = None if bare.strip(" \t>") else bare
-        line_end = self._line_end(last) if end else ""
-        if text[end:] != line_end:
-            yield Edit(self.source.span(end), line_end)
 
     def _separate_blocks(self) -> Iterator[Edit]:
         """Separate blocks by empty lines, except near HTML, between footnotes and below titles."""

@@ -155,16 +155,13 @@ class MeasurementsView(Struct, frozen=True):
     """All measurements of a model."""
 
     scenarios: tuple[ScenarioView, ...]
-    unmeasured: tuple[tuple[str, str], ...]
-    """Id and title of scenarios that are declared and not measured."""
+    unmeasured: tuple[str, ...]
+    """The anchors of scenarios that are declared and not measured."""
     machine: str
     """Machine and versions; empty if nothing was measured."""
-    command: str
-    """The command that measures it, again or for the first time."""
     file: str
     """The address of the report; empty if there is none."""
     diet: DietView | None
-    diet_command: str
     numerics: str
     """The address of the hard cases; empty if there are none."""
     sweeps: tuple[ScenarioView, ...]
@@ -177,23 +174,20 @@ def measurements_view(library: Library, place: urls.Place, model: MjcfModel) -> 
     diet: DietReport | None = library.reports.diets.get(name)
     scenarios = () if scene is None else scene.scenarios
     sweeps = () if scene is None else scene.sweeps
-    titles = declared_scenarios(library.course, name)
-    anchors = {scenario: scenario_anchor(scenario) for scenario in titles}
+    anchors = {s: scenario_anchor(s) for s in declared_scenarios(library.course, name)}
     return MeasurementsView(
         scenarios=tuple(
             scenario_view(words, scenario, anchors.get(scenario.name, f"_scenario-{n}"))
             for n, scenario in enumerate(scenarios, 1)
         ),
         unmeasured=tuple(
-            (anchors[scenario], title)
-            for scenario, title in titles.items()
+            anchor
+            for scenario, anchor in anchors.items()
             if scenario not in {report.name for report in scenarios}
         ),
         machine="" if scene is None else machine_text(words, scene.machine),
-        command=BENCH.command(name),
         file="" if scene is None else place.href(urls.file_path(BENCH.path(name))),
         diet=None if diet is None else _diet(words, place, diet),
-        diet_command=DIET.command(name),
         numerics=place.href(urls.NUMERICS) if library.reports.cases else "",
         sweeps=tuple(
             scenario_view(words, sweep, scenario_anchor(f"sweep-{sweep.name}")) for sweep in sweeps
@@ -216,22 +210,21 @@ def measurement_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, st
     """Say what the model is made of, and how fast it runs, as pairs of words."""
     words = library.words
     scene: SceneReport | None = library.reports.scenes.get(model.name)
-    missing = words("measured.not")
 
     def speed(times: float | None) -> str:
-        return missing if times is None else words("measured.times", factor=factor(times))
+        return "" if times is None else words("measured.times", factor=factor(times))
 
     native = browser = None
     if scene is not None and scene.scenarios:
         native = next((row.realtime for row in scene.scenarios[0].rows if row.own), None)
     text = size(len(model.source.text.encode()))
-    facts = {"possible": missing, "touched": missing, "mjcf_file": text}
+    facts = {"mjcf_file": text}
     if scene is not None and (card := scene.card) is not None:
         browser = card.browser
         facts = {"possible": str(card.possible), "touched": str(card.touched)}
         facts |= {"mjcf": size(card.mjcf), "mjb": size(card.mjb)}
     facts |= {"native": speed(native), "browser": speed(browser)}
-    return tuple((words(f"measured.{name}"), fact) for name, fact in facts.items())
+    return tuple((words(f"measured.{name}"), fact) for name, fact in facts.items() if fact)
 
 
 def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
@@ -254,8 +247,8 @@ def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
 
 def _finding(words: Strings, finding: Finding) -> FindingView:
     label = escape(finding.label)
-    if finding.difference:
-        label += Markup(" ({})").format(unbroken(power(finding.difference, 2)))
+    if finding.difference:  # a figure alone where its words were not recorded
+        label += Markup(" ({})").format(finding.shown or unbroken(power(finding.difference, 2)))
     saving = _saving(words, finding.saving)
     return FindingView(finding, sentence(finding.message), label, saving)
 

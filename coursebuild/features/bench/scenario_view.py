@@ -44,6 +44,7 @@ from coursebuild.numerics.reports.shown_errors import (
     Quantity,
     interval_text,
     is_cut_short,
+    is_idle,
     limit_text,
     map_text,
     quantities,
@@ -128,14 +129,15 @@ def _describe(words: Strings, report: ScenarioReport) -> list[str]:
 
 
 def _settings_table(words: Strings, report: ScenarioReport) -> Grid:
-    rows = report.rows
+    rows = [row for row in report.rows if not is_idle(row)]
 
     def error_column(quantity: Quantity) -> tuple[str, list[str]]:
         errors: list[str] = [bounded(quantity.value_of(row), quantity.least) for row in rows]
         key = _QUANTITIES.get(quantity.name)
         return quantity.label if key is None else words(key), errors
 
-    remarks, speed, time = map(words, ("measured.remark", "measured.realtime", "measured.seconds"))
+    names = ("remark", "realtime", "seconds", "evaluations", "iterations")
+    remarks, speed, time, evaluations, iterations = (words(f"measured.{name}") for name in names)
     columns: list[tuple[str, list[str]]] = [
         (
             words("measured.setting"),
@@ -144,6 +146,8 @@ def _settings_table(words: Strings, report: ScenarioReport) -> Grid:
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (speed, [factor(row.realtime) for row in rows]),
         (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
+        (evaluations, [f"{row.evaluations:,}" if row.evaluations else "" for row in rows]),
+        (iterations, ["" if r.iterations is None else f"{r.iterations:,.0f}" for r in rows]),
         *(error_column(quantity) for quantity in quantities(report) if quantity.is_resolved(rows)),
         (
             words("measured.parted"),
@@ -158,7 +162,8 @@ def _settings_table(words: Strings, report: ScenarioReport) -> Grid:
     ]
     own_rows = tuple(n for n, row in enumerate(rows) if row.own)
     label = words("measured.settings", title=report.title or report.name)
-    return grid(label, columns, words=(remarks,), minor=(speed, time), highlights=own_rows)
+    minor = (speed, time, evaluations, iterations)
+    return grid(label, columns, words=(remarks,), minor=minor, highlights=own_rows)
 
 
 def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> str:
@@ -167,7 +172,9 @@ def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> st
         parts.append(status_text(row.status))
     if row.refsafe:
         parts.append("refsafe")
-    if row.front:
+    if row.lucky:
+        parts.append(words("measured.lucky"))
+    elif row.front:
         parts.append(words("measured.front"))
     elif row.dominated_by is not None:
         better = report.rows[row.dominated_by].setting

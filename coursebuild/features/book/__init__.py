@@ -1,8 +1,9 @@
-"""All lessons in one file: as an e-book (EPUB 3), and as one page."""
+"""All lessons in one file: as an e-book (EPUB 3), as one page, and as a PDF of it."""
 
 from coursebuild.core.features import Exporter, Feature
+from coursebuild.features.book.chapters import page_file
 from coursebuild.features.book.epub import epub_files
-from coursebuild.features.book.page import page_file
+from coursebuild.features.book.pdf import MARK, pdf_file
 
 EPUB = Exporter(
     name="epub",
@@ -19,4 +20,12 @@ PAGE = Exporter(
     archive=False,
     make=lambda context: (page_file(context),),
 )
-FEATURE = Feature(name="book", exporters=(EPUB, PAGE))
+PDF = Exporter(
+    name="pdf",
+    summary="the lessons as a PDF, printed by a Chromium of this machine",
+    file="course.pdf",
+    mark=MARK,
+    archive=False,
+    make=lambda context: (pdf_file(context),),
+)
+FEATURE = Feature(name="book", exporters=(EPUB, PAGE, PDF))

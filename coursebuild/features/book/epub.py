@@ -133,9 +133,14 @@ class _Epub:
             licence = OutputFile(f"{_FOLDER}fonts/licence-{number}.txt", family.licence.data)
             yield EpubItem(licence, "text/plain")
         for level in self._course.written_levels:
-            yield _page_item(_level_name(level), self._level(level))
+            body = self._library.render("book/epub-level.html", level=level)
+            page = self._page(f"{level.id} {level.title}", body, "bodymatter")
+            yield _page_item(_level_name(level), page)
             for lesson in level.lessons:
-                chapter = self._chapter(lesson)
+                place = urls.Place(urls.lesson_path(lesson))
+                rules = RewriteRules(place, self._address, self._picture, xml_id)
+                text = render_lesson(self._context, lesson, rules, to_xml, "_top")
+                chapter = self._page(f"{lesson.id} {lesson.title}", text, "bodymatter")
                 properties = [key for key in ("mathml", "svg") if f"<{key[:4]}".encode() in chapter]
                 yield _page_item(_lesson_name(lesson), chapter, " ".join(properties))
         for path, name in self._pictures.items():
@@ -156,12 +161,6 @@ class _Epub:
 
     # --- pages
 
-    def _chapter(self, lesson: Lesson) -> bytes:
-        place = urls.Place(urls.lesson_path(lesson))
-        rules = RewriteRules(place, self._address, self._picture, xml_id)
-        text = render_lesson(self._context, lesson, rules, to_xml, "_top")
-        return self._page(f"{lesson.id} {lesson.title}", text, "bodymatter")
-
     def _page(self, title: str, body: Markup, kind: str) -> bytes:
         return self._render("epub-page", title=title, body=body, kind=kind)
 
@@ -173,10 +172,6 @@ class _Epub:
             **values,
         )
         return visible(text).encode()
-
-    def _level(self, level: Level) -> bytes:
-        body = self._library.render("book/epub-level.html", level=level)
-        return self._page(f"{level.id} {level.title}", body, "bodymatter")
 
     def _cover(self) -> bytes:
         """Draw the title of the course as a picture, with a bar in the accent colour."""

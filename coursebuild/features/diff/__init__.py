@@ -1,7 +1,7 @@
 """The command `diff`, which reports what a change does to a course, for its reviewers.
 
-`report` compares two states of a course, `weight` their sites; `commands` reads them from the disk,
-or an earlier state from git. Nothing is run.
+Two states of a course, and their sites, are read from the disk, or the earlier one from git.
+Nothing is run.
 """
 
 from coursebuild.core.features import Command, Feature

@@ -1,4 +1,8 @@
-"""`coursebuild diff`: say what a change does to the course, as Markdown for those who review it."""
+"""`coursebuild diff`: say what a change does to the course, as Markdown for those who review it.
+
+Entry points besides the command's: `CourseState`, `report(base, old, new)`, of two states of a
+course; `weight_section(old, new)`, of two sites.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +10,313 @@ import argparse
 import contextlib
 import functools
 import io
+import json
 import subprocess
 import tarfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from html import escape
+from itertools import zip_longest
 from pathlib import Path
+from typing import TypeVar
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.cli.arguments import options_of
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.course_root import MAP
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import temporary_folder
-from coursebuild.features.diff.report import CourseState, report, weight_section
+from coursebuild.core.model import Comparison, Course, Recording, find_blocks
+from coursebuild.core.model.addresses import recorded_figures
+from coursebuild.core.pages.html_tree import elements_with
+from coursebuild.core.pages.marks import code_span, escape_text, fence, table
+from coursebuild.core.pages.urls import Place
+from coursebuild.core.registry import feature_trials
+from coursebuild.core.scripts.compare import compare
+from coursebuild.core.scripts.diff import text_diff
+from coursebuild.core.scripts.extract import extract
+from coursebuild.core.scripts.figures import ReadFile, describe_difference
+from coursebuild.core.scripts.findings import classes
+from coursebuild.core.text.source import Excerpt
+from coursebuild.features.truth.claims import Claims, course_claims, sum_claims
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.recordings import read_recorded
+
+_ROWS = 40
+"""Rows of a table: GitHub shows a summary of up to a mebibyte."""
+_SHORT = 40
+"""Characters of a value that is short enough to be shown."""
+
+Row = tuple[str, ...]
+K = TypeVar("K")
+V = TypeVar("V")
+
+
+class CourseState(Struct, frozen=True):
+    """A course, and a function that reads its files."""
+
+    course: Course
+    read: ReadFile
+
+
+class ScriptState(Struct, frozen=True):
+    """A script with its recorded outputs."""
+
+    owner: str
+    """The id of its lesson or page."""
+    code: str
+    outputs: tuple[Recording, ...]
+    """Each with its comparison; tables as their text."""
+
+
+class LabState(Struct, frozen=True):
+    """A lab, or another block that `check` tries."""
+
+    text: str
+    data: Mapping[str, object]
+    """The values in its text, if that is JSON."""
+    models: Mapping[str, str]
+    """The texts of its models, by name."""
+
+
+def report(base: str, old: CourseState, new: CourseState) -> str:
+    """Return a report on the changes of a course since `base`."""
+    before, now = (
+        {owner.id: document.source.text for owner, document in state.course.owned_documents}
+        for state in (old, new)
+    )
+    texts = (
+        ", ".join(f"{escape_text(id)} {change}" for id, change in _changes(before, now))
+        or "no change"
+    )
+    figures = _changes(_figures(old), _figures(new), _describe_figure_change)
+    labs = _changes(_labs(old.course), _labs(new.course), _describe_lab_change)
+    parts = (
+        f"## What this change does\n\nCompared with {base}. Lessons and pages: {texts}.\n",
+        _outputs_section(_scripts(old.course), _scripts(new.course)),
+        section(
+            "Figures",
+            "What scripts draw, as it is recorded.",
+            ("figure", "change"),
+            [(code_span(path), change) for path, change in figures],
+        ),
+        section(
+            "Labs",
+            "What readers run. Whether each does what it promises is what `check` says.",
+            ("in", "lab", "change"),
+            [(*map(escape_text, lab), change) for lab, change in labs],
+        ),
+        _truth_section(old.course, new.course),
+    )
+    return "\n".join(parts)
+
+
+def section(title: str, meaning: str, header: Row, rows: Sequence[Row]) -> str:
+    """Return a heading, an explanation and a table; one line if nothing changed."""
+    if not rows:
+        return f"### {title}\n\nNo change.\n"
+    cells = [[" ".join(cell.replace("|", "\\|").split()) for cell in row] for row in rows[:_ROWS]]
+    cells += [[f"and {len(rows) - _ROWS} more"]] if len(rows) > _ROWS else []
+    return f"### {title}\n\n{meaning}\n\n{table(header, cells)}\n"
+
+
+def _changes(
+    before: Mapping[K, V],
+    now: Mapping[K, V],
+    describe: Callable[[V, V], str] = lambda a, b: "edited",
+) -> Iterator[tuple[K, str]]:
+    """Yield each key with a different value, and the change; `describe` is for keys in both."""
+    for key in dict.fromkeys((*before, *now)):
+        if key not in before or key not in now:
+            yield key, "new" if key in now else "removed"
+        elif before[key] != now[key] and (change := describe(before[key], now[key])):
+            yield key, change
+
+
+# --- outputs
+
+
+def _scripts(course: Course) -> dict[str, ScriptState]:
+    outputs: dict[str | None, list[Recording]] = {}
+    for document in course.documents:
+        for block in find_blocks(document, Recording):
+            body = block.body if isinstance(block.body, Excerpt) else None
+            text = body or Excerpt.of_span(block.body_span)
+            comparison = block.comparison or course.comparison
+            output = replace(block, body=text, comparison=comparison)
+            outputs.setdefault(block.script, []).append(output)
+    return {
+        script.path: ScriptState(script.owner, script.text, tuple(outputs.get(script.path, ())))
+        for script in extract(course).value
+    }
+
+
+def _outputs_section(before: Mapping[str, ScriptState], now: Mapping[str, ScriptState]) -> str:
+    changes = dict(_changes(before, now, _describe_script_change))
+    rows = [
+        (code_span(path), escape_text((now.get(path) or before[path]).owner), changes[path])
+        for path in changes
+    ]
+    meaning = "What scripts print, as it is recorded. Whether they print it is what `check` says."
+    parts = [section("Outputs", meaning, ("script", "in", "change"), rows)]
+    for path in [path for path in changes if path in before and path in now][:_ROWS]:
+        pairs = zip_longest(before[path].outputs, now[path].outputs)
+        lines = "\n".join(filter(None, (text_diff(_text(old), _text(new)) for old, new in pairs)))
+        if lines:
+            summary = f"<summary><code>{escape(path)}</code></summary>"
+            parts.append(f"<details>{summary}\n\n{fence('diff', lines)}\n\n</details>\n")
+    return "\n".join(parts)
+
+
+def _describe_script_change(before: ScriptState, now: ScriptState) -> str:
+    """Describe how a script and its recorded outputs differ."""
+    parts = ["code edited"] if before.code != now.code else []
+    for old, new in zip_longest(before.outputs, now.outputs):
+        if old is None or new is None:
+            parts.append("an output removed" if new is None else "an output added")
+            continue
+        changes = compare(old, Comparison(), _text(new)).changes
+        largest = max((change.relative_error or 0.0 for change in changes), default=0.0)
+        suffix = f" (relative, up to {largest:.1e})" if largest else ""
+        parts += [classes(changes) + suffix] if changes else []
+        if old.comparison != new.comparison:
+            comparisons = (output.comparison for output in (old, new) if output.comparison)
+            modes = dict.fromkeys(comparison.mode.value for comparison in comparisons)
+            parts.append(f"**compared in another way** ({' → '.join(modes)})")
+    return "; ".join(parts)
+
+
+def _text(recording: Recording | None) -> str:
+    return recording.body.text if recording and isinstance(recording.body, Excerpt) else ""
+
+
+# --- figures and labs
+
+
+def _figures(state: CourseState) -> dict[str, tuple[str, bytes]]:
+    """Return the paths and bytes of recorded figures and their data, by path."""
+    documents = state.course.documents
+    paths = (figure.path for document in documents for figure in recorded_figures(document))
+    return {path: (path, data) for path in paths if (data := state.read(path)) is not None}
+
+
+def _describe_figure_change(before: tuple[str, bytes], now: tuple[str, bytes]) -> str:
+    return describe_difference(*before, now[1]) or "less than can be seen"
+
+
+def _labs(course: Course) -> dict[tuple[str, str], LabState]:
+    """Return the labs in texts, by the id of the lesson or page, and their title or name."""
+    texts = {model.name: model.source.text for model in course.models}
+    labs: dict[tuple[str, str], LabState] = {}
+    for _, trial in feature_trials(course).values():
+        text = trial.block.span.text
+        if trial.block.span.path.startswith("models/"):  # the trial of a model that no text shows
+            continue
+        data = _parse_object(text.partition("\n")[2].rpartition("\n")[0])
+        key = trial.owner, str(data.get("title") or trial.name)
+        models = {name: texts.get(name, "") for name in trial.block.models()}
+        labs[(trial.owner, trial.name) if key in labs else key] = LabState(text, data, models)
+    return labs
+
+
+def _parse_object(text: str) -> dict[str, object]:
+    """Parse a JSON object; empty if the text is none."""
+    try:
+        value = json.loads(text)
+    except ValueError:
+        return {}
+    return value if isinstance(value, dict) else {}
+
+
+def _describe_lab_change(before: LabState, now: LabState) -> str:
+    """List the fields of a lab that differ, with their values if short, and the models."""
+    parts = []
+    for name in dict.fromkeys((*before.data, *now.data)):
+        values = [json.dumps(lab.data.get(name), ensure_ascii=False) for lab in (before, now)]
+        if values[0] != values[1]:
+            is_short = max(map(len, values)) <= _SHORT
+            values_text = f" {' → '.join(map(code_span, values))}" if is_short else ""
+            parts.append(code_span(name) + values_text)
+    if before.text != now.text and not parts:
+        parts.append("its text")
+    models = _changes(before.models, now.models)
+    return ", ".join((*parts, *(f"model {code_span(name)} {change}" for name, change in models)))
+
+
+# --- truth
+
+
+def _truth_section(old: Course, new: Course) -> str:
+    before, now = (
+        {owner.id: claims for owner, claims in course_claims(course)} for course in (old, new)
+    )
+    no_claims = Claims(0, 0, 0, ())
+    pairs = {id: (before.get(id, no_claims), now.get(id, no_claims)) for id in {**before, **now}}
+    pairs["all"] = sum_claims(before.values()), sum_claims(now.values())
+    counts = {id: [(*claims.counts, claims.share) for claims in pair] for id, pair in pairs.items()}
+    return section(
+        "Truth",
+        "Numbers in the text, and those that a script prints, a formula computes, or the author"
+        " gives with a source. Whether they hold is what `check` says.",
+        ("in", "numbers", "printed", "computed", "given", "no source", "unproven", "proven"),
+        [
+            (
+                escape_text(id),
+                *(a if a == b else f"{a} → {b}" for a, b in zip(old_row, new_row, strict=True)),
+            )
+            for id, (old_row, new_row) in counts.items()
+            if old_row != new_row
+        ],
+    )
+
+
+_SHARE = 0.01
+"""Pages that change by less are not listed."""
+_WHOLE = "the whole site"
+
+
+def weight_section(old: Path, new: Path) -> str:
+    """Report how the weight of pages changed; `old` and `new` are folders of sites."""
+    for folder in (old, new):
+        if not (folder / "index.html").is_file():
+            return f"### Page weight\n\nNot compared: there is no site in `{folder.name}`.\n"
+    before, now = _weights(old), _weights(new)
+    sizes = {name: (before.get(name, 0), now.get(name, 0)) for name in {**before, **now}}
+    rows = []
+    by_change = sorted(sizes.items(), key=lambda item: -abs(item[1][1] - item[1][0]))
+    for name, (a, b) in sorted(by_change, key=lambda item: item[0] != _WHOLE):
+        if abs(b - a) >= _SHARE * max(a, b) or (name == _WHOLE and a != b):
+            change = f"{b / a - 1:+.1%}" if a and b else "new" if b else "removed"
+            rows.append((name, f"{a / 1000:.1f} kB", f"{b / 1000:.1f} kB", change))
+    return section(
+        "Page weight",
+        "A page with the styles, scripts and pictures that it names, as they lie on the disk; a"
+        f" server sends less. Pages that change by less than {_SHARE:.0%} are not listed.",
+        ("page", "before", "now", "change"),
+        rows,
+    )
+
+
+def _weights(site: Path) -> dict[str, int]:
+    """Return the bytes of each page with the files that its HTML loads, and of all files."""
+    files = [path for path in site.rglob("*") if path.is_file()]
+    sizes = {path.relative_to(site).as_posix(): path.stat().st_size for path in files}
+    pages = {path: {path, *_find_assets(site, path)} for path in sizes if path.endswith(".html")}
+    weights = {path: sum(sizes.get(name, 0) for name in names) for path, names in pages.items()}
+    return {**weights, _WHOLE: sum(sizes.values())}
+
+
+def _find_assets(site: Path, page: str) -> set[str]:
+    html = (site / page).read_text(encoding="utf-8", errors="replace")
+    addresses = {
+        attributes.get("src") or attributes.get("href") or ""
+        for name, attributes in elements_with(html, ("src", "href"))
+        if name in ("script", "img") or attributes.get("rel") == "stylesheet"
+    }
+    targets = (Place(page).target(address)[0] for address in addresses)
+    return {path for path in targets if path is not None}
+
 
 EXAMPLES = """\
 examples:

@@ -1,12 +1,11 @@
 """The terms of a course: how documents define each, and a page that lists all.
 
-1. `terms` finds the terms of a document, each with two sentences of its paragraph.
-2. `page` collects those of all documents.
+`terms` finds the terms of a document, each with two sentences of its paragraph, and collects those
+of all documents.
 """
 
 from coursebuild.core.features import Feature, PageKind
-from coursebuild.features.glossary.page import glossary_values
-from coursebuild.features.glossary.terms import document_terms
+from coursebuild.features.glossary.terms import document_terms, glossary_values
 
 FEATURE = Feature(
     name="glossary",

@@ -1,18 +1,22 @@
-"""Finds the terms of a document with their definitions.
+"""The terms of a document with their definitions, and the page of all terms of the course.
 
-Entry point: `document_terms`. A definition is the sentence with the term and the next one, as HTML.
-If they continue in a displayed formula, the formula is part of it. Links lose their addresses,
-since the glossary is another page; of links to formulas of the document the numbers remain.
+Entry points: `document_terms`; `definition_of(inlines, term)`; `glossary_values`, for the page.
 
-Entry point: `definition_of(inlines, term)`. A sentence ends at a full stop, a question or
-exclamation mark, with closing marks, before white space; not after an initial or a usual
-abbreviation, and not before a small letter. The marks of Chinese and Japanese need no white space.
+A definition is the sentence with the term and the next one, as HTML. If they continue in a
+displayed formula, the formula is part of it. Links lose their addresses, since the glossary is
+another page; of links to formulas of the document the numbers remain.
+
+A sentence ends at a full stop, a question or exclamation mark, with closing marks, before white
+space; not after an initial or a usual abbreviation, and not before a small letter. The marks of
+Chinese and Japanese need no white space.
 """
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Callable, Iterator
+from itertools import groupby
 from urllib.parse import unquote
 
 from markupsafe import Markup
@@ -25,18 +29,28 @@ from coursebuild.core.model import (
     Inline,
     Math,
     MathBlock,
+    Owner,
     Paragraph,
     Target,
     Term,
+    TermTarget,
     UrlTarget,
     sibling_groups,
     walk_inlines,
     without_links,
 )
 from coursebuild.core.model.results import Mathml
-from coursebuild.core.pages import formulas
-from coursebuild.core.pages.formulas import number_equations
+from coursebuild.core.pages import formulas, urls
+from coursebuild.core.pages.document_inputs import (
+    OwnerLink,
+    OwnerLinks,
+    added_page,
+    owner_link,
+    owner_links,
+)
+from coursebuild.core.pages.library import Library, links
 from coursebuild.core.pages.markup import HtmlWriter
+from coursebuild.core.pages.numbering import number_items
 from coursebuild.core.text.diagnostics import Parsed
 
 
@@ -85,8 +99,8 @@ class _ExcerptWriter(HtmlWriter):
 
 def _find_terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
     writer = _ExcerptWriter(mathml)
-    equations = number_equations(document, mathml).values()
-    names = {f"#{e.id}": f"({e.number})" for e in equations if e.number}
+    items = number_items(document, mathml).values()
+    names = {f"#{i.id}": f"({i.number})" for i in items if i.number and i.kind == "eq"}
 
     def reference(target: Target) -> str:
         return names.get(unquote(target.url), "") if isinstance(target, UrlTarget) else ""
@@ -207,3 +221,65 @@ def _slice(
         elif first < last or (not text and start < offset < stop):
             yield inline
         offset += len(text)
+
+
+class TermEntry(Struct, frozen=True):
+    """An entry of the glossary."""
+
+    term: DefinedTerm
+    place: OwnerLink
+    """The lesson or page that defines it."""
+    uses: OwnerLinks
+    """The other lessons and pages that link to it, in the order of the course."""
+
+
+def glossary_values(library: Library) -> dict[str, object]:
+    """Return the values for the template: the entries, grouped by letters."""
+    place = urls.Place("glossary/index.html")
+    entries = sorted(_term_entries(library, place), key=lambda entry: sort_key(entry.term.name))
+    groups = groupby(entries, key=lambda entry: initial(entry.term.name))
+    return {
+        "letters": tuple((letter, tuple(group)) for letter, group in groups),
+        "symbols": added_page(library, place, "symbols"),
+    }
+
+
+def _term_entries(library: Library, place: urls.Place) -> Iterator[TermEntry]:
+    """Yield an entry for each term of the course, for its first definition."""
+    users: dict[str, list[Owner]] = {}
+    for owner, document in library.course.owned_documents:
+        targets = links(library.course, document)
+        for id in {target.id for target in targets if isinstance(target, TermTarget)}:
+            users.setdefault(id, []).append(owner)
+    ids: set[str] = set()
+    for owner, document_terms in library.summaries("glossary"):
+        for term in document_terms.terms:
+            if term.id not in ids:
+                ids.add(term.id)
+                term_users = [user for user in users.get(term.id, ()) if user is not owner]
+                link = owner_link(place, owner, f"term:{term.id}")
+                yield TermEntry(term, link, owner_links(place, term_users))
+
+
+def sort_key(name: str) -> tuple[object, ...]:
+    """Sort digits and signs before Latin letters and others; marks and case count last."""
+    plain = _without_accents(name)
+    first = plain[:1]
+    return (first.isalpha() + (first.isalpha() and not _is_latin(first)), plain, name)
+
+
+def initial(name: str) -> str:
+    """Return the letter under which a name is listed; empty for digits and signs."""
+    first = _without_accents(name)[:1]
+    return first.upper()[:1] if first.isalpha() else ""
+
+
+def _without_accents(name: str) -> str:
+    """Return a name in lower case, without accents and leading signs."""
+    parts = unicodedata.normalize("NFKD", name.casefold())
+    letters = "".join(char for char in parts if not unicodedata.combining(char))
+    return letters.lstrip("$\\{[(\"'“‘ ")
+
+
+def _is_latin(char: str) -> bool:
+    return char.isascii() or unicodedata.name(char, "").startswith("LATIN")

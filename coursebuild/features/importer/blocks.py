@@ -22,10 +22,9 @@ from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.pages.marks import block_quote, fence
 from coursebuild.core.registry import CORE_FENCES, fence_names
 from coursebuild.core.syntax.course_schema import slug_of
-from coursebuild.features.importer.context import LessonContext
-from coursebuild.features.importer.prose import display_formula, rewrite_prose
+from coursebuild.features.importer.prose import LessonContext, display_formula, rewrite_prose
 from coursebuild.features.importer.segments import read_markdown
-from coursebuild.features.importer.values import Segment, read_yaml
+from coursebuild.features.importer.source_files import Segment, read_yaml
 
 _OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULTILINE)
 """An option of a cell, as Quarto and as MyST write it."""
@@ -151,9 +150,9 @@ _QUOTED_KIND = re.compile(r"^((?: {0,3}>)+[ \t]*\[!)([\w-]+)(\])", re.MULTILINE)
 
 def convert_segment(segment: Segment, context: LessonContext) -> str:
     """Return a segment outside cells, or a cell within another block, as Markdown."""
-    context = context.at(segment.place)
+    context, head, text = context.at(segment.place), segment.head, segment.text
     if segment.kind == "prose":
-        text = rewrite_prose(segment.text, context)
+        text = rewrite_prose(text, context)
         return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
     if segment.kind == "cell":
         context.add_leftover("a cell inside another block is shown and not run")
@@ -163,12 +162,32 @@ def convert_segment(segment: Segment, context: LessonContext) -> str:
         return _convert_directive(directive["name"], directive["argument"], segment.text, context)
     match segment.mark[0]:
         case ":":
-            return _convert_div(segment, context)
+            # a callout of Quarto, or a plain division
+            callout = re.search(r"callout-(\w+)", segment.head)
+            if callout is None:
+                return _convert_nested(text, context)
+            attribute = _TITLE.search(segment.head)
+            title = (attribute[1] or attribute[2] or "") if attribute else ""
+            heading = re.match(r"\s*#{1,6}[ \t]+(.*)\n?", text)
+            if not title and heading is not None:
+                title, text = heading[1].strip(), text[heading.end() :]
+            fold_mark = "-" if re.search(r"collapse=\"?true", segment.head) else ""
+            return _write_callout(callout[1], title, text, context, fold_mark=fold_mark)
         case "!" | "?":
             name, _, title = segment.head.partition(" ")
             return _write_callout(name, title.strip().strip('"'), segment.text, context)
         case _:
-            return _convert_fence(segment, context)
+            kind = head.partition(" ")[0]
+            if kind == "lab" and context.camera_is_position:
+                text = _CAMERA.sub(_reverse_camera, text)
+            if kind == "output":  # of a block that is not run here
+                head = "text"
+            elif kind not in (*CORE_FENCES, *fence_names()):
+                head = head.strip("{}. ").partition(" ")[0].rstrip(",}")
+                if head != "json" and _is_json(text):
+                    context.add_leftover(f"a block `{head}`, which is shown as JSON")
+                    head = "json"
+            return fence(head, text)
 
 
 def _convert_nested(text: str, context: LessonContext) -> str:
@@ -196,21 +215,6 @@ def _write_callout(
     title = rewrite_prose(title, context)
     head = f"[!{_callout_kind(kind, context)}]{fold_mark} {title}".rstrip()
     return block_quote(f"{head}\n{_convert_nested(text, context)}".rstrip("\n"))
-
-
-def _convert_div(segment: Segment, context: LessonContext) -> str:
-    """Convert a block between lines of colons: a callout of Quarto, or a plain division."""
-    kind = re.search(r"callout-(\w+)", segment.head)
-    text = segment.text
-    if kind is None:
-        return _convert_nested(text, context)
-    attribute = _TITLE.search(segment.head)
-    title = (attribute[1] or attribute[2] or "") if attribute else ""
-    heading = re.match(r"\s*#{1,6}[ \t]+(.*)\n?", text)
-    if not title and heading is not None:
-        title, text = heading[1].strip(), text[heading.end() :]
-    fold_mark = "-" if re.search(r"collapse=\"?true", segment.head) else ""
-    return _write_callout(kind[1], title, text, context, fold_mark=fold_mark)
 
 
 def _split_options(text: str) -> tuple[Mapping[str, str], str]:
@@ -265,21 +269,6 @@ def _highlighted_languages() -> frozenset[str]:
     from pygments.lexers import get_all_lexers
 
     return frozenset(alias for _, aliases, _, _ in get_all_lexers() for alias in aliases)
-
-
-def _convert_fence(segment: Segment, context: LessonContext) -> str:
-    head, text = segment.head, segment.text
-    kind = head.partition(" ")[0]
-    if kind == "lab" and context.camera_is_position:
-        text = _CAMERA.sub(_reverse_camera, text)
-    if kind == "output":  # of a block that is not run here
-        head = "text"
-    elif kind not in (*CORE_FENCES, *fence_names()):
-        head = head.strip("{}. ").partition(" ")[0].rstrip(",}")
-        if head != "json" and _is_json(text):
-            context.add_leftover(f"a block `{head}`, which is shown as JSON")
-            head = "json"
-    return fence(head, text)
 
 
 def _is_json(text: str) -> bool:

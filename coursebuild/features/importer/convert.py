@@ -34,16 +34,16 @@ from coursebuild.features.importer.blocks import (
     join_outputs,
     runnable_code,
 )
-from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
-from coursebuild.features.importer.prose import find_anchors
-from coursebuild.features.importer.source_files import TEXTS, SourceFiles
-from coursebuild.features.importer.values import (
+from coursebuild.features.importer.prose import LessonContext, find_anchors
+from coursebuild.features.importer.source_files import (
+    TEXTS,
     ImportedCourse,
     ImportedLevel,
     ImportedText,
     Leftover,
     Segment,
+    SourceFiles,
     read_yaml,
     stem_of,
     title_of_file,
@@ -77,7 +77,10 @@ def convert(files: SourceFiles) -> ConvertedCourse:
         course = read_course_json(map_path, files)
     course = read_texts(course, files)
     lessons = [lesson for level in course.levels for lesson in level.lessons]
-    texts, ids = (*lessons, *course.pages), _new_ids(lessons)
+    texts = (*lessons, *course.pages)
+    ids = {lesson.slug: lesson.id for lesson in lessons}
+    ids |= {lesson.id: lesson.id for lesson in lessons}
+    ids |= {lesson.old_id: lesson.id for lesson in lessons if lesson.old_id}
     out, context = _convert_texts(course, texts, ids, files)
     leftovers = context.leftovers
     if map_path is not None:
@@ -141,13 +144,6 @@ def _encode(text: str) -> bytes:
     return text.encode("utf-8", "replace")
 
 
-def _new_ids(lessons: Sequence[ImportedText]) -> dict[str, str]:
-    """Return the new ids of lessons, by their old ids, their new ids and their slugs."""
-    by_old_id = {lesson.old_id: lesson.id for lesson in lessons if lesson.old_id}
-    slugs = {lesson.slug: lesson.id for lesson in lessons}
-    return slugs | {lesson.id: lesson.id for lesson in lessons} | by_old_id
-
-
 def _convert_texts(
     course: ImportedCourse,
     texts: Sequence[ImportedText],
@@ -195,7 +191,8 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
     shown_end = 0
     for number, segment in enumerate(text.segments):
         if number == last:
-            script_path = _script_path(text)
+            words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
+            script_path = f"examples/{'' if words[0].isalpha() else 'l'}{'_'.join(words)}.py"
             script = join_cells(codes.values(), text.title)
             parts[shown_end:] = [fence(f"python file={script_path}", script)]
             output = join_outputs((text.segments[cell], code) for cell, code in codes.items())
@@ -216,11 +213,6 @@ def _write_cell(cell: Segment) -> str:
         return fence(magic[1], cell.text[magic.end() :].strip("\n"))
     text = code_for_readers(cell)
     return fence("python fragment", text) if text else ""
-
-
-def _script_path(text: ImportedText) -> str:
-    words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
-    return f"examples/{'' if words[0].isalpha() else 'l'}{'_'.join(words)}.py"
 
 
 def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator[tuple[str, bytes]]:

@@ -22,12 +22,12 @@ from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
 from coursebuild.features.importer.segments import read_segments
-from coursebuild.features.importer.source_files import SourceFiles
-from coursebuild.features.importer.values import (
+from coursebuild.features.importer.source_files import (
     ImportedCourse,
     ImportedLevel,
     ImportedText,
     Leftover,
+    SourceFiles,
     stem_of,
     title_of_file,
 )

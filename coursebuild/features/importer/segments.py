@@ -10,7 +10,7 @@ import binascii
 import json
 import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from markdown_it import MarkdownIt
@@ -19,7 +19,7 @@ from mdit_py_plugins.admon import admon_plugin
 from msgspec.structs import replace
 
 from coursebuild.core.files.errors import UsageError
-from coursebuild.features.importer.values import Segment, read_yaml
+from coursebuild.features.importer.source_files import Segment, read_yaml
 
 _COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")
 _CELL = re.compile(r"\{code-cell\b.*|\{(?:python|ipython3?)[^}]*\}")
@@ -41,7 +41,20 @@ def read_segments(text: str, name: str) -> tuple[str, list[Segment], dict[str, b
     else:
         metadata, size = _read_front_matter(text)
         segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
-    title, segments = _split_title(segments)
+    # The first heading of level 1, and the segments without it; later ones get level 2
+    titles: list[str] = []
+
+    def shift_heading(heading: re.Match[str]) -> str:
+        titles.append(heading[1])
+        return f"#{heading[0]}" if len(titles) > 1 else ""
+
+    shifted = [
+        replace(segment, text=_TITLE.sub(shift_heading, segment.text))
+        if segment.kind == "prose"
+        else segment
+        for segment in segments
+    ]
+    title, segments = (titles or [""])[0], shifted
     return str(metadata.get("title") or title), segments, pictures
 
 
@@ -108,23 +121,6 @@ def _parse_div(state: StateBlock, start: int, end: int, silent: bool) -> bool:
 
 _PARSER = MarkdownIt("commonmark").use(admon_plugin)
 _PARSER.block.ruler.before("fence", "div", _parse_div, {"alt": ["paragraph", "list", "blockquote"]})
-
-
-def _split_title(segments: Sequence[Segment]) -> tuple[str, list[Segment]]:
-    """Return the first heading of level 1, and the segments without it; later ones get level 2."""
-    titles: list[str] = []
-
-    def shift_heading(heading: re.Match[str]) -> str:
-        titles.append(heading[1])
-        return f"#{heading[0]}" if len(titles) > 1 else ""
-
-    shifted = [
-        replace(segment, text=_TITLE.sub(shift_heading, segment.text))
-        if segment.kind == "prose"
-        else segment
-        for segment in segments
-    ]
-    return (titles or [""])[0], shifted
 
 
 # --- notebooks

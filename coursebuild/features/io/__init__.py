@@ -1,13 +1,141 @@
-"""Io cards: three lines that say what a script takes, does and gives."""
+"""Io cards: three lines that say what a script takes, does and gives.
+
+A line that begins with `INPUT:`, `PROCESS:` or `OUTPUT:` starts a part; the lines after it continue
+it. All three must be there, once, in this order.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
+from msgspec import Struct
 
 from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter
-from coursebuild.features.io.parse import Io, parse_io
+from coursebuild.core.model import FeatureBlock, Inline
+from coursebuild.core.syntax.fence import Fence, TextParser
+from coursebuild.core.syntax.spans import trim
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Edit,
+    Fix,
+    Note,
+    Parsed,
+    diagnose,
+    nearest,
+    propose,
+)
+from coursebuild.core.text.source import Excerpt, Span
+
+LABELS = ("INPUT", "PROCESS", "OUTPUT")
+_LABEL = re.compile(r"\s*(INPUT|PROCESS|OUTPUT):")
+_LIKE_LABEL = re.compile(r"\s*([A-Za-z]+)\s*:")
+
+
+class Io(FeatureBlock, frozen=True):
+    """What a script takes, does and gives."""
+
+    input: tuple[Inline, ...]
+    process: tuple[Inline, ...]
+    output: tuple[Inline, ...]
+
+    def parts(self) -> tuple[tuple[str, tuple[Inline, ...]], ...]:
+        """The three parts with the names of their interface texts, in order."""
+        return ("io.input", self.input), ("io.process", self.process), ("io.output", self.output)
+
+    def child_inlines(self) -> tuple[Inline, ...]:
+        """The lines of all parts."""
+        return (*self.input, *self.process, *self.output)
+
+
+class _Part(Struct, frozen=True):
+    """The lines that stand under a label."""
+
+    label: str
+    span: Span
+    lines: list[Excerpt]
+
+
+def parse_io(fence: Fence, texts: TextParser) -> Parsed[Io]:
+    """Parse an `io` fence."""
+    unlabelled, *labelled_parts = _split_at_labels(fence.body)
+    parts: dict[str, _Part] = {}
+    diagnostics = list(fence.keys().diagnostics)
+    for part in labelled_parts:
+        if (first := parts.setdefault(part.label, part)) is not part:
+            notes = [Note("first given here", first.span)]
+            message = f"`{part.label}:` is given twice"
+            diagnostics.append(diagnose("io-repeated", part.span, message, notes=notes))
+    diagnostics += (*_check_unlabelled(unlabelled), *_check_order(parts))
+    contents: dict[str, tuple[Inline, ...]] = {}
+    for label in LABELS:
+        text = _join_lines(parts[label].lines) if label in parts else None
+        if text is None:
+            all_parts = (unlabelled, *parts.values())
+            diagnostics.append(_diagnose_missing(label, parts, all_parts, fence))
+        else:
+            inlines = texts.inlines(text)
+            contents[label] = inlines.value
+            diagnostics += inlines.diagnostics
+    io = Io(fence.span, *(contents.get(label, ()) for label in LABELS))
+    return Parsed(io, tuple(diagnostics))
+
+
+def _split_at_labels(body: Excerpt) -> list[_Part]:
+    """Split a block into parts; the first holds the lines before the first label."""
+    parts = [_Part("", body.span(), [])]
+    for line in body.lines():
+        label = _LABEL.match(line.text)
+        if label is None:
+            parts[-1].lines.append(line)
+        else:
+            span = line.span(label.start(1), label.end())
+            parts.append(_Part(label[1], span, [line.slice(label.end())]))
+    return parts
+
+
+def _check_unlabelled(part: _Part) -> Iterator[Diagnostic]:
+    for line in [line for line in part.lines if line.text.strip()][:1]:
+        help = "begin with a line `INPUT: …`"
+        span, message = trim(line).span(), "this text belongs to no line of the io block"
+        yield diagnose("io-stray", span, message, help=help)
+
+
+def _check_order(parts: Mapping[str, _Part]) -> Iterator[Diagnostic]:
+    expected = [label for label in LABELS if label in parts]
+    swaps = [(label, first) for label, first in zip(parts, expected, strict=True) if label != first]
+    for label, first in swaps[:1]:
+        message = f"`{label}:` comes before `{first}:`"
+        help = "the order is `INPUT:`, `PROCESS:`, `OUTPUT:`"
+        yield diagnose("io-order", parts[label].span, message, help=help)
+
+
+def _diagnose_missing(
+    label: str, parts: Mapping[str, _Part], all_parts: Iterable[_Part], fence: Fence
+) -> Diagnostic:
+    """Say that a part is missing or empty, and point at lines whose label looks misspelt."""
+    if label in parts:
+        return diagnose("io-missing", parts[label].span, f"nothing follows `{label}:`")
+    notes, fix = [], Fix("")
+    for line in (line for part in all_parts for line in part.lines):
+        word = _LIKE_LABEL.match(line.text)
+        if word is not None and nearest(word[1].upper(), LABELS, cutoff=0.75) == label:
+            span = line.span(word.start(1), word.end())
+            notes.append(Note(f"`{word[1]}:` is read as text", span))
+            place = line.span(*word.span(1))
+            is_safe = propose(word[1].upper(), label, LABELS).safe or word[1].upper() == label
+            fix = Fix(f"write `{label}:`", edits=(Edit(place, label),), safe=is_safe)
+    message = f"the io block has no line `{label}:`"
+    return diagnose("io-missing", fence.head, message, help=fix, notes=notes)
+
+
+def _join_lines(lines: list[Excerpt]) -> Excerpt | None:
+    """Join the lines of a part without indentation and empty lines; `None` if none is left."""
+    texts = [trim(line) for line in lines if line.text.strip()]
+    return Excerpt.join(texts, "\n") if texts else None
+
 
 if TYPE_CHECKING:
     from coursebuild.core.pages.context import PageContext

@@ -1,10 +1,9 @@
 """Labs: simulations that a learner plays with, tried when the course is verified.
 
-A `lab` fence holds JSON (`schema`). `parse` makes a `Lab` of it (`model`), `checks` compares it
-with the course and its models, `page` and `markdown` show it. `trial` runs it in the engine that
-browsers use and natively; `picture` draws what was recorded, and `export` writes the lab as a
-Python script. Labs of formulas and equations, which need no engine, are read and tried in
-`equations`.
+A `lab` fence holds JSON (`schema`). `parse` makes a `Lab` of it (`model`), `relations` compares
+it with the course and its models, `page` shows it. `trial` runs it in the engine that browsers use
+and natively; `picture` draws what was recorded, and `export` writes the lab as a Python script.
+Labs of formulas and equations, which need no engine, are read and tried in `equations`.
 """
 
 from __future__ import annotations
@@ -19,20 +18,20 @@ from coursebuild.core.features import (
     Trials,
 )
 from coursebuild.features.lab.equations.declared import OdeLab, PlotLab
-from coursebuild.features.lab.files import publish_labs
 from coursebuild.features.lab.inputs import lab_trials, trial_inputs
-from coursebuild.features.lab.markdown import lab_markdown
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.page import (
     draw_lab,
     draw_model,
     index_lab,
+    lab_markdown,
     lab_picture,
     model_picture,
     model_view,
 )
 from coursebuild.features.lab.parse import parse_fence
 from coursebuild.features.lab.relations import check_labs, check_model_names
+from coursebuild.features.lab.reply import publish_labs
 from coursebuild.features.lab.schema import SimLab, refine_schema
 
 
@@ -58,6 +57,7 @@ FEATURE = Feature(
             name="lab",
             block=Lab,
             parse=parse_fence,
+            label="lab",
             draw=draw_lab,
             markdown=lab_markdown,
             index=index_lab,

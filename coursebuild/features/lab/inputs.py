@@ -7,17 +7,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from importlib.metadata import version
 from typing import Any
 
 from coursebuild.core.features import Trial
 from coursebuild.core.model import Course, find_blocks
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.dependencies import Inputs
-from coursebuild.core.run.script_environment import engine_version
+from coursebuild.core.run.script_environment import package_version
 from coursebuild.core.text.source import key_of
 from coursebuild.features.lab.compile import LabModule, compile_lab
 from coursebuild.features.lab.engines.native import (
+    LAB_ENGINE,
     engine_digest,
     equation_script_digest,
     lab_digest,
@@ -57,7 +57,7 @@ def inputs_of(lab: Lab, module: LabModule) -> Inputs:
         lab.xml.text if lab.xml is not None else f"models/{lab.fields.model}.xml",
     )
     conditions = (
-        ("MuJoCo", engine_version()),
+        ("MuJoCo", LAB_ENGINE),
         ("how a lab is repeated natively", lab_digest("engines/native_worker.py")[:12]),
         ("the browser's engine and its trial", engine_digest()[:12]),
     )
@@ -67,7 +67,7 @@ def inputs_of(lab: Lab, module: LabModule) -> Inputs:
 def equation_inputs(lab: Lab, name: str) -> Inputs:
     """Return what the trial of a lab without an engine depends on."""
     conditions = (
-        ("SciPy", version("scipy")),
+        ("SciPy", package_version("scipy")),
         ("how a lab without an engine is tried", lab_digest("equations")[:12]),
         ("the page's own code", equation_script_digest()[:12]),
     )

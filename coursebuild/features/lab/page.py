@@ -1,10 +1,10 @@
 """Labs as a page shows them before they run: their subject, controls, displays and recording.
 
-Entry points: `draw_lab(page, block)`, `index_lab`; `page_view` and `lab_view`, the values of the
-template; `gallery_labs(course)`, the labs made for models that no text shows; `model_view`,
-`draw_model`, `model_picture`, of the first lab of a model in a text, or of the one made for it. No
-control is drawn, as none would work yet: the page's script puts the live instrument into `data-lab`
-when it starts, and reads its configuration there.
+Entry points: `draw_lab(page, block)`, `index_lab`; `lab_markdown`, the same as plain Markdown;
+`page_view` and `lab_view`, the values of the template; `gallery_labs(course)`, the labs made for
+models that no text shows; `model_view`, `draw_model`, `model_picture`, of the first lab of a model
+in a text, or of the one made for it. No control is drawn, as none would work yet: the page's script
+puts the live instrument into `data-lab` when it starts, and reads its configuration there.
 """
 
 from __future__ import annotations
@@ -28,12 +28,22 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import BY_LAB, Library
+from coursebuild.core.pages.marks import (
+    code_span,
+    escape_line,
+    escape_marks,
+    fence,
+    link,
+    picture,
+    table,
+)
 from coursebuild.core.pages.quantities import number
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.pages.urls import Place
-from coursebuild.features.lab.files import LabRecord, PublishedLab
+from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
+from coursebuild.features.lab.reply import LabRecord, PublishedLab
 from coursebuild.features.lab.schema import Control, Overlay, Plot, Select, SimLab, Slider
 
 if TYPE_CHECKING:
@@ -61,6 +71,9 @@ class LabView(Struct, frozen=True):
     subject: str
     """What it is of, in words that the name of its model may follow."""
     title: str
+    number: str
+    """As in "Lab 4.2.1"; like `label`, its id, empty without one."""
+    label: str
     key: str
     """Its name in the course; like `config` and `script` (addresses), empty if it cannot run."""
     config: str
@@ -101,14 +114,15 @@ def page_view(page: PageContext, block: Lab) -> LabView:
     """The view of a lab of a document on its page."""
     trial, model = page.inputs.trials.get(block.span.start), block.fields.model
     live = trial if isinstance(trial, PublishedLab) else None
-    view = lab_view(page.renderer.words, page.place, block, live, page.inputs.engine)
+    view = lab_view(page.renderer.words, page.place, block, live)
     href = "" if model is None else page.href(ModelTarget(model))
-    return replace(view, model_href=href, start=_start(page, block))
+    view = replace(view, model_href=href, start=_start(page, block))
+    if block.label is None:
+        return view
+    return replace(view, number=page.number(block.label), label=block.label.id)
 
 
-def lab_view(
-    words: Strings, place: Place, block: Lab, live: PublishedLab | None, engine: str
-) -> LabView:
+def lab_view(words: Strings, place: Place, block: Lab, live: PublishedLab | None) -> LabView:
     """The view of a lab for the page at a place; `live` is the lab as it was published."""
     fields = block.fields
     title = fields.title or words("lab.untitled")
@@ -117,6 +131,8 @@ def lab_view(
         kind=block.kind,
         subject=words(_SUBJECTS.get(block.kind, model_subject)),
         title=title,
+        number="",
+        label="",
         key=live.name if live is not None else "",
         config=place.href(live.config) if live is not None else "",
         script=place.href(live.script) if live is not None else "",
@@ -128,7 +144,7 @@ def lab_view(
         readouts=tuple(readout.label for readout in fields.readouts),
         plots=tuple(_plot(words, plot) for plot in fields.plots),
         overlays=tuple(words(f"overlay.{name}") for name in fields.toggles),
-        recorded=_recorded_view(words, place, title, live, engine),
+        recorded=_recorded_view(words, place, title, live),
     )
 
 
@@ -166,7 +182,7 @@ def index_lab(reader: IndexReader, lab: Lab) -> None:
 
 
 def _recorded_view(
-    words: Strings, place: Place, title: str, live: PublishedLab | None, engine: str
+    words: Strings, place: Place, title: str, live: PublishedLab | None
 ) -> RecordedView | None:
     """Describe what the trial recorded; `None` if it did not come to its end."""
     record = live.record if live is not None else None
@@ -187,7 +203,7 @@ def _recorded_view(
         words("lab.picture", title=title, t=number(record.time, 4)),
         f"{number(record.scale[0])} m",
         words("lab.at", t=number(round(record.end, 3))),
-        words("lab.proven", engine=engine, tried=str(live.attempt_count), parity=live.parity),
+        words("lab.proven", engine=LAB_ENGINE, tried=str(live.attempt_count), parity=live.parity),
     )
 
 
@@ -275,7 +291,7 @@ def model_view(library: Library, place: urls.Place, model: MjcfModel) -> LabView
     lab, publication = _find_lab(library, model)
     if publication is None or publication.record is None:
         return None
-    view = lab_view(library.words, place, lab, publication, library.results.engine)
+    view = lab_view(library.words, place, lab, publication)
     return replace(view, model_href=place.href(place.path))
 
 
@@ -311,3 +327,63 @@ def qr_svg(text: str, label: str) -> Markup:
         return Markup()
     svg = code.svg_inline(omitsize=True, svgclass="qr", lineclass=None)
     return Markup(svg.replace("<svg", f'<svg role="img" aria-label="{escape(label)}"', 1))
+
+
+if TYPE_CHECKING:
+    from coursebuild.core.features import MarkdownWriter
+
+
+def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
+    """Write a lab as its trial recorded it, with a link to where it runs."""
+    words, view = writer.words, page_view(writer.page, lab)
+    parts = [f"**{words('lab.label')}: {escape_marks(view.title)}**"]
+    if view.recorded is not None:
+        parts += _write_recording(writer, view.recorded)
+    if lab.goal:
+        parts.append(f"**{words('lab.goal')}:** {writer.inlines(lab.goal)}")
+    parts.append(_describe(writer, view))
+    if lab.kind == MJCF and lab.xml is not None:
+        parts.append(fence("xml", lab.xml.text))
+    if view.controls:
+        rows = [(escape_line(label), escape_line(values)) for label, values in view.controls]
+        parts.append(table((words("lab.control"), words("lab.range")), rows))
+    displays = (
+        f"- {escape_marks(name)}: {escape_marks(', '.join(labels))}"
+        for name, labels in _list_displays(writer, view)
+    )
+    parts.append("\n".join(displays))
+    parts += [writer.blocks(lab.note), link(words("exports.run_lab"), writer.live)]
+    return "\n\n".join(filter(None, parts))
+
+
+def _write_recording(writer: MarkdownWriter, recorded: RecordedView) -> Iterator[str]:
+    """Write the picture, and the readouts at the end."""
+    yield picture(recorded.alt, writer.locate(recorded.picture))
+    if readouts := recorded.record.readouts:
+        yield f"{escape_marks(recorded.at)}:"
+        rows = [(escape_line(label), escape_line(value)) for label, value in readouts]
+        yield table((writer.words("lab.readouts"), ""), rows)
+
+
+def _describe(writer: MarkdownWriter, view: LabView) -> str:
+    """Say what is simulated, from which start, and until when."""
+    words = writer.words
+    text = f"{escape_marks(view.subject)}."
+    if view.model is not None:
+        name = link(escape_marks(view.model), writer.locate(view.model_href))
+        text = f"{escape_marks(view.subject)} {name}."
+    if view.start:
+        text += f" {words('lab.start')} {code_span(view.start)}."
+    if view.stop is not None:
+        text += f" {words('lab.stops', t=view.stop)}"
+    return text
+
+
+def _list_displays(writer: MarkdownWriter, view: LabView) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield what the lab shows while it runs: its name, and its parts."""
+    texts = writer.page.renderer.words
+    if view.readouts and view.recorded is None:
+        yield texts("lab.readouts"), view.readouts
+    yield from view.plots
+    if view.overlays:
+        yield texts("lab.overlays"), view.overlays

@@ -254,19 +254,18 @@ def check_model_names(
     for lab in (lab for document in course.documents for lab in find_blocks(document, Lab)):
         facts = facts_of(lab)
         if facts is not None:
-            yield from _check_names(lab, facts)
-
-
-def _check_names(lab: Lab, facts: ModelFacts) -> Iterator[Diagnostic]:
-    key = lab.fields.key
-    if isinstance(key, int) and not 0 <= key < len(facts.keyframes):
-        count = f"it has {len(facts.keyframes) or 'none'}"
-        message = f"the model has no keyframe {key}: {count}, counted from 0"
-        yield diagnose("lab-name", lab.place(("key",)), message)
-    for field, element, name, names in (
-        ("key", "keyframe", key, [name for name in facts.keyframes if name]),
-        ("trail", "site", lab.fields.trail, facts.sites),
-    ):
-        if isinstance(name, str) and name not in names:
-            message, help = f"the model has no {element} `{name}`", did_you_mean(name, names)
-            yield diagnose("lab-name", lab.place((field,)), message, help=help)
+            key = lab.fields.key
+            if isinstance(key, int) and not 0 <= key < len(facts.keyframes):
+                count = f"it has {len(facts.keyframes) or 'none'}"
+                message = f"the model has no keyframe {key}: {count}, counted from 0"
+                yield diagnose("lab-name", lab.place(("key",)), message)
+            for field, element, name, names in (
+                ("key", "keyframe", key, [name for name in facts.keyframes if name]),
+                ("trail", "site", lab.fields.trail, facts.sites),
+            ):
+                if isinstance(name, str) and name not in names:
+                    message, help = (
+                        f"the model has no {element} `{name}`",
+                        did_you_mean(name, names),
+                    )
+                    yield diagnose("lab-name", lab.place((field,)), message, help=help)

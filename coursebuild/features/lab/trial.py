@@ -18,7 +18,7 @@ from __future__ import annotations
 import functools
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -44,16 +44,16 @@ from coursebuild.features.lab.equations.equation_trial import (
     add_points,
     run_trial,
 )
-from coursebuild.features.lab.export.trial import LabExport, export_lab, record_for_export
-from coursebuild.features.lab.files import LabOutput
+from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.inputs import equation_inputs, inputs_of, trial_data
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
-from coursebuild.features.lab.names import name_diagnostics, references
-from coursebuild.features.lab.reply import MainRun, TrialReply, read_reply, reply_bytes
+from coursebuild.features.lab.reply import LabOutput, MainRun, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 from coursebuild.features.lab.verdict import (
     code_diagnostic,
     failure_diagnostics,
+    name_diagnostics,
+    references,
     remark_diagnostics,
 )
 
@@ -69,8 +69,13 @@ _TRANSIENT = ("timeout", "engine")
 class Engines:
     """The browser's engine and the native one; each starts when it is first needed."""
 
-    def __init__(self, root: Path, limits: Limits = LIMITS) -> None:
-        self.native = NativeEngine(root, memory=limits.memory, compiling=limits.models)
+    def __init__(
+        self,
+        root: Path,
+        limits: Limits = LIMITS,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self.native = NativeEngine(root, memory=limits.memory, compiling=limits.models, say=say)
         self.browser = LabEngine(limits.memory)
         self.equations = EquationEngine(limits.memory)
 
@@ -100,7 +105,7 @@ class LabTrials:
         """`seconds`: the processor time that a trial may take; by default, what the map says."""
         self._context = context
         self._seconds = seconds or context.course.limits.lab
-        self._engines = engines or Engines(context.root, context.course.limits)
+        self._engines = engines or Engines(context.root, context.course.limits, context.say)
 
     def run(self, trials: Sequence[Trial]) -> TrialOutcome:
         """Run the trials in turn, and end the engines."""
@@ -266,7 +271,9 @@ class _LabTrial(Struct, frozen=True):
             diagnostic = diagnose("lab-engine", lab.place(()), f"native MuJoCo {error}")
             return self._fail(module, [diagnostic])
         reply, failures = evaluation.reply, evaluation.failures
-        export = LabExport(None) if failures else self._export(reply)
+        export = LabExport(None)
+        if not failures and reply.main is not None and self.lab.kind != MJCF:
+            export = export_lab(self.context, self.engines.native, self.trial, self.lab, reply.main)
         files = model_files(self.context.root, self.model.path, self.model.text)
         self.context.run_store.note_trial(
             inputs,
@@ -326,7 +333,14 @@ class _LabTrial(Struct, frozen=True):
         remarks, main = tuple(remark_diagnostics(lab, reply)), reply.main
         output = LabOutput(module.code, _add_camera(module.config, main))
         if self.context.static and not failures and main is not None:
-            picture = self._draw_picture(key, main)
+            # Draw the start of the main run
+            from coursebuild.features.lab.picture.static import draw_picture
+
+            picture_key = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
+            store = self.context.run_store.store
+            picture = store.get_or_make(
+                "pictures", picture_key, lambda: draw_picture(self.lab, main)
+            )
             output = replace(output, record=lab_record(lab, main), picture=picture)
         return _Evaluation(reply, failures, remarks, output)
 
@@ -385,19 +399,6 @@ class _LabTrial(Struct, frozen=True):
         if self.lab.verify.rtol is not None:
             return steps
         return min(steps, max(1, round(_PARITY_SECONDS / float(main["timestep"]))))
-
-    def _export(self, trial: TrialReply) -> LabExport:
-        if trial.main is None or self.lab.kind == MJCF:
-            return LabExport(None)
-        return export_lab(self.context, self.engines.native, self.trial, self.lab, trial.main)
-
-    def _draw_picture(self, key: str, main: MainRun) -> bytes:
-        """Draw the start of the main run."""
-        from coursebuild.features.lab.picture.static import draw_picture
-
-        picture_key = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
-        store = self.context.run_store.store
-        return store.get_or_make("pictures", picture_key, lambda: draw_picture(self.lab, main))
 
 
 def _add_camera(config: dict[str, Any], main: MainRun | None) -> dict[str, Any]:

@@ -1,19 +1,26 @@
 """The reply of a trial as diagnostics at the entries of the lab.
 
 Entry points: `failure_diagnostics` and `remark_diagnostics` of a lab and its trial;
-`code_diagnostic`.
+`code_diagnostic`; `references(lab)`, names in its code, of which `name_diagnostics` reports those
+that the engine has not found (`site/js/lab/trial/names.js`), such as `data.qps`, `math.sin` or
+`data.qpos[5]`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from msgspec import Struct
+from tree_sitter import Node
 
 from coursebuild.core.checks.compiled import line_span
 from coursebuild.core.run.mjcf import error_line, readable_error
-from coursebuild.core.run.script_environment import engine_version
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.features.lab.compile import LabCode
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
+from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.features.lab.compile import LabCode, pieces
+from coursebuild.features.lab.javascript import dotted_names, parse, text_of, walk
 from coursebuild.features.lab.model import MJCF, Entry, Lab
 from coursebuild.features.lab.reply import Parity, TrialFailure, TrialReply
 from coursebuild.features.lab.schema import Button
@@ -108,11 +115,14 @@ _HELP = {
 
 
 def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report what a lab cannot be published with: failures, other engines, untrue fields."""
-    yield from _check_failures(lab, trial)
-    if trial.version != engine_version():
-        message = f"the browser's engine is {trial.version}, native MuJoCo {engine_version()}"
-        yield diagnose("lab-engine", lab.span.first_line(), message)
+    """Report what a lab cannot be published with: failures, and untrue fields."""
+    # Report each failure of a trial at its entry. MuJoCo warns of the main run again in every
+    # attempt; to report it once is enough
+    failures = [f for f in trial.failures if f.kind != "deep" and not _is_claimed(lab, f)]
+    of_main_run = {f.kind for f in failures if f.entry == () and f.kind in ("warning", "diverged")}
+    for failure in failures:
+        if failure.entry == () or failure.kind not in of_main_run:
+            yield _make_diagnostic(lab, failure)
     yield from _check_depth_claim(lab, trial)
     if trial.main is not None and trial.main["parity"] is not None:
         yield from _check_parity(lab, trial.main["parity"])
@@ -120,21 +130,22 @@ def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
 def remark_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     """Report what is to be said of a lab that can be published."""
-    yield from _check_depth(lab, trial)
+    # Report bodies that lie deep in each other; only once if the main run has some
+    if not lab.verify.deep:
+        failures = [f for f in trial.failures if f.kind == "deep"]
+        of_main_run = [f for f in failures if f.entry == ()]
+        yield from (_make_diagnostic(lab, failure) for failure in of_main_run or failures)
     yield from _check_reset(lab, trial)
-    yield from _check_framing(lab, trial)
-
-
-def _check_failures(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report each failure of a trial at its entry.
-
-    MuJoCo warns of the main run again in every attempt; to report it once is enough.
-    """
-    failures = [f for f in trial.failures if f.kind != "deep" and not _is_claimed(lab, f)]
-    of_main_run = {f.kind for f in failures if f.entry == () and f.kind in ("warning", "diverged")}
-    for failure in failures:
-        if failure.entry == () or failure.kind not in of_main_run:
-            yield _make_diagnostic(lab, failure)
+    # Report a camera of the lab's own that shows what moves too small
+    main = trial.main
+    if main is None or (fill := main["fill"]) is None or (most := main["mostFill"]) is None:
+        return
+    if fill < _SMALL and fill < most / 2:
+        message = (
+            f"motion fills {100 * fill:.2g} % of the picture and could fill {100 * most:.2g} %"
+        )
+        help = "without `distance` and `target` the camera fits the motion"
+        yield diagnose("lab-far", lab.place(("camera",)), message, help=help)
 
 
 def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
@@ -153,32 +164,12 @@ def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
             return from_start
 
 
-def _check_depth(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report bodies that lie deep in each other; only once if the main run has some."""
-    if not lab.verify.deep:
-        failures = [f for f in trial.failures if f.kind == "deep"]
-        of_main_run = [f for f in failures if f.entry == ()]
-        yield from (_make_diagnostic(lab, failure) for failure in of_main_run or failures)
-
-
 def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
         message = "the lab says `deep`, but no bodies lay deep in each other"
         span = lab.place(("verify", "deep"))
-        yield diagnose("lab-shallow", span, message, help="take `deep` away")
-
-
-def _check_framing(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report a camera of the lab's own that shows what moves too small."""
-    main = trial.main
-    if main is None or (fill := main["fill"]) is None or (most := main["mostFill"]) is None:
-        return
-    if fill < _SMALL and fill < most / 2:
-        message = (
-            f"motion fills {100 * fill:.2g} % of the picture and could fill {100 * most:.2g} %"
-        )
-        help = "without `distance` and `target` the camera fits the motion"
-        yield diagnose("lab-far", lab.place(("camera",)), message, help=help)
+        fix = Fix("take `deep` away", "false", "true", safe=True)
+        yield diagnose("lab-shallow", span, message, help=fix)
 
 
 _SMALL = 0.1
@@ -187,10 +178,12 @@ _SMALL = 0.1
 def _make_diagnostic(lab: Lab, failure: TrialFailure) -> Diagnostic:
     kind: str = failure.kind
     message = (failure.message or "something that has no text").rstrip(".")
-    span, special_help = lab.place(failure.entry), None
+    special_help: str | None = None
+    span = lab.place(failure.entry)
     match kind:
         case "throws" if function := _OF_MATH.search(message):
-            special_help = f"did you mean `Math.{function[1].replace('pi', 'PI')}`?"
+            name = f"Math.{function[1].replace('pi', 'PI')}"
+            special_help = Fix(f"did you mean `{name}`?", name, function[1], safe=True)
         case "nan" if failure.entry[0] == "expect":
             special_help = ""
         case "expect" if (expr := lab.fields.expect[int(failure.entry[1])].expr) is not None:
@@ -277,3 +270,81 @@ def _spellings(lab: Lab) -> dict[str, str]:
 def _shorten(code: str) -> str:
     line = " ".join(code.split())
     return line if len(line) <= 60 else line[:59] + "…"
+
+
+_OPEN_OBJECTS = ("ctx", "value", "globalThis")
+"""Objects that may have any members."""
+_SIZES = {"qpos": "nq", "qvel": "nv", "qacc": "nv", "ctrl": "nu", "act": "na"}
+"""Arrays whose length is a size of the model."""
+
+
+class NameReference(Struct, frozen=True):
+    """A name with dots in the code of a lab, or an element of what it names."""
+
+    path: tuple[str, ...]
+    places: tuple[Span, ...]
+    """The place of each part of the path."""
+    index: int | None = None
+    """The number in brackets after it."""
+    element: Span | None = None
+    """The place of all of it, brackets included."""
+
+
+def references(lab: Lab) -> list[NameReference]:
+    """List the names that the pieces of a lab use and do not declare themselves."""
+    code = dict(lab.code)
+    texts = (code[piece.entry] for piece in pieces(lab) if piece.entry in code)
+    return [reference for text in texts for reference in _references(text)]
+
+
+def _references(code: Excerpt) -> Iterator[NameReference]:
+    data = code.text.encode("utf-8", "replace")
+    nodes = list(walk(parse(code.text)))
+    declared_names = {text_of(name) for node in nodes for name in _declarations(node)}
+
+    def place(node: Node) -> Span:
+        start, end = (len(data[:at].decode()) for at in (node.start_byte, node.end_byte))
+        return code.span(start, end)
+
+    for node in nodes:
+        parts = dotted_names(node) if node.type == "member_expression" else ()
+        path = tuple(map(text_of, parts))
+        outer = node.parent
+        is_longer_name = outer is not None and outer.type == "member_expression"
+        if len(path) < 2 or path[0] in (*declared_names, *_OPEN_OBJECTS) or is_longer_name:
+            continue
+        places = tuple(map(place, parts))
+        index = outer.child_by_field_name("index") if outer is not None else None
+        if outer is not None and index is not None and text_of(index).isdecimal():
+            yield NameReference(path, places, int(text_of(index)), place(outer))
+        else:
+            yield NameReference(path, places)
+
+
+def _declarations(node: Node) -> Iterator[Node]:
+    """Yield the names that a node declares."""
+    if node.type in ("formal_parameters", "array_pattern", "object_pattern"):
+        yield from node.named_children
+    for field in ("name", "parameter", "left"):
+        child = node.child_by_field_name(field)
+        if child is not None and child.type == "identifier":
+            yield child
+
+
+def name_diagnostics(
+    references: Sequence[NameReference], replies: Sequence[dict[str, Any]]
+) -> Iterator[Diagnostic]:
+    """Report the names that do not exist, as the engine's reply to each says."""
+    for reference, reply in zip(references, replies, strict=True):
+        path, length, at = reference.path, reply.get("length"), reply.get("at")
+        if at is not None:
+            owner = ".".join(path[:at])
+            message = f"`{owner}` has no `{path[at]}`" if owner else f"there is no `{path[0]}`"
+            help = did_you_mean(path[at], reply["names"])
+            yield diagnose("lab-name", reference.places[at], message, help=help)
+        elif length is not None and reference.index is not None and reference.index >= length:
+            assert reference.element is not None
+            size = _SIZES.get(path[-1]) if path[0] == "data" else None
+            extent = f"`{size}` is {length}" if size else f"the array has {length} numbers"
+            message = f"`{'.'.join(path)}[{reference.index}]` does not exist: {extent}"
+            yield diagnose("lab-name", reference.element, message, help="numbers count from 0")

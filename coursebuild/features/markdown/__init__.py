@@ -1,9 +1,8 @@
 """Every page as Markdown, and a list of them for language models.
 
-1. `blocks` writes a document as Markdown that needs no course; `writer` adds the course's own
-   blocks, and the addresses of links.
+1. `writer` writes a document as Markdown.
 2. `copies` writes a page as Markdown: from its document, or from its HTML where it has none
-   (`from_html`). `llms` lists these copies.
+   (`from_html`), and lists these copies.
 """
 
 from coursebuild.core.features import Feature, PageCopy

@@ -18,7 +18,6 @@ from collections.abc import Callable, Iterator
 from typing import TypeAlias
 from urllib.parse import urlsplit
 
-from coursebuild.core.model import Lesson
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext, SiteContext
@@ -77,6 +76,7 @@ def _document_copy(inputs: PageInputs, page: PageContext) -> str:
         *head(inputs, words, writer.locate),
         writer.blocks(document.blocks),
         writer.footnotes(document.footnotes),
+        writer.references(),
         *_footer(inputs, words, writer.locate),
     )
     return "\n\n".join(filter(None, parts))
@@ -103,7 +103,8 @@ def _facts(inputs: PageInputs, lesson: LessonLink, words: Strings, locate: Locat
     if isinstance(level, LevelView):
         name = f"{words('level.label', id=level.id)}: {level.title}"
         facts.append(link(escape_line(name), locate(level.href)))
-    facts.append(escape_line(words(f"status.{lesson.status}")))
+    if lesson.status != "complete":
+        facts.append(escape_line(words(f"status.{lesson.status}")))
     if lesson.minutes:
         facts.append(escape_line(words("lesson.minutes", n=lesson.minutes)))
     if lesson.further:
@@ -154,22 +155,28 @@ def write_llms(library: Library) -> bytes:
     parts.append(words("exports.llms"))
     for level in course.written_levels:
         label = f"{words('level.label', id=level.id)}: {level.title}"
-        rows = (_lesson_row(library, lesson) for lesson in level.lessons)
+        rows = (
+            _row(library, urls.lesson_path(lesson), f"{lesson.id} {lesson.title}", lesson.summary)
+            for lesson in level.lessons
+        )
         parts.append("\n".join((f"## {escape_line(label)}", "", *rows)))
+    for section in dict.fromkeys(page.section for page in course.pages if page.section):
+        pages = (page for page in course.pages if page.section == section)
+        rows = (_row(library, urls.page_path(page), page.title, "") for page in pages)
+        parts.append("\n".join((f"## {escape_line(section)}", "", *rows)))
     parts += _optional_part(library)
     return visible("\n\n".join(parts) + "\n").encode()
-
-
-def _lesson_row(library: Library, lesson: Lesson) -> str:
-    path = urls.lesson_path(lesson)
-    return _row(library, path, f"{lesson.id} {lesson.title}", lesson.summary)
 
 
 def _optional_part(library: Library) -> list[str]:
     """Return the list of pages that can be left out where there is little room."""
     course, words = library.course, library.words
     rows = [_row(library, urls.HOME, words("site.map"), "")]
-    rows += [_row(library, urls.page_path(page), page.title, "") for page in course.pages]
+    rows += [
+        _row(library, urls.page_path(page), page.title, "")
+        for page in course.pages
+        if not page.section and not page.is_home
+    ]
     rows += [
         _row(library, urls.model_page_path(m.name), words("model.title", name=m.name), "")
         for m in course.models

@@ -113,14 +113,14 @@ class _Converter:
         if not rows:
             return ""
         width = max(map(len, rows))
-        texts = [[self._cell(cell) for cell in cells] for cells in rows]
+        texts = [
+            [" ".join(" ".join(self.blocks(cell.children)).split()) for cell in cells]
+            for cells in rows
+        ]
         texts = [[*row, *[""] * (width - len(row))] for row in texts]
         has_head = not any(cell.name == "td" for cell in rows[0])
         head = texts.pop(0) if has_head else [""] * width
         return table(head, texts)
-
-    def _cell(self, node: HtmlElement) -> str:
-        return " ".join(" ".join(self.blocks(node.children)).split())
 
     # --- lines
 

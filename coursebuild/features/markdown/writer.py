@@ -1,32 +1,60 @@
-"""Writes the course's own blocks as plain Markdown: scripts, outputs, labs, quizzes, callouts.
+"""Writes documents as CommonMark with tables, footnotes and `$`, for readers elsewhere.
 
-Entry point: `DocumentWriter`, for one document on one page.
+Entry points: `DocumentWriter`, for one document on one page: a script is a fence below its name, a
+lab its recorded picture and values, a quiz a list with its answers.
 
-A script is a fence below its name, a lab its recorded picture and values, a quiz a list with its
-answers.
+1. A text that has no escapes or entities is copied from its source, where it was read as text
+   between the same neighbours. In any other text (also that from JSON) all marks are escaped.
+2. What can begin another block at the start of a line is escaped when a paragraph is complete.
+3. Containers indent their blocks.
 """
 
 from __future__ import annotations
 
+import re
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import assert_never
+from typing import Literal, TypeAlias, assert_never
 
 from markupsafe import Markup
 
 from coursebuild.core import model
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.marks import block_quote, code_span, escape_marks, fence, link
-from coursebuild.core.pages.markup import SpecialBlock
+from coursebuild.core.pages.marks import (
+    block_quote,
+    code_span,
+    escape_marks,
+    fence,
+    guard_lines,
+    hang,
+    link,
+    picture,
+    table,
+)
+from coursebuild.core.pages.markup import escape, is_tight, raw_html
 from coursebuild.core.pages.page_writer import output_receipt, script_receipt
 from coursebuild.core.registry import kind_of_block
-from coursebuild.features.markdown.blocks import BlockWriter
 from coursebuild.features.markdown.from_html import html_to_markdown
+
+_SPACED_BLOCKS = (
+    *(model.Callout, model.PlainCode, model.Script, model.Recording, model.Mjcf),
+    *(model.FeatureBlock, model.HtmlBlock, model.Table, model.MathBlock),
+)
+"""Blocks with empty lines around them, even in a tight list."""
+
+_Room: TypeAlias = Literal["block", "line", "cell"]
+"""What inlines may fill: lines of their own, a single line, or a cell of a table."""
+_LAST_MARKS = re.compile(r"(^|\s)(#+)$")
+_ALWAYS_ESCAPED = re.compile(r"[$`]")
+"""Marks that other readers of Markdown may understand where ours reads text."""
+_PIPE = re.compile(r"(?<!\\)\|")
+_COMMENT = re.compile(r"(?<!\\)%")
+_MINUS = re.compile(r"(?<!\w)-(?=\d)")
 
 
 @dataclass(frozen=True)
-class DocumentWriter(BlockWriter):
+class DocumentWriter:
     """Writes a document as plain Markdown."""
 
     page: PageContext
@@ -36,6 +64,215 @@ class DocumentWriter(BlockWriter):
     """The address of the page, where labs run."""
     notebook: bool = False
     """Whether scripts have cells of their own, answers are folded, and footnotes are a list."""
+
+    def inlines(self, inlines: Iterable[model.Inline]) -> str:
+        """Write inlines on one line, such as a title."""
+        return " ".join(self._inlines(inlines, "line").split("\n")).strip()
+
+    def footnotes(self, footnotes: Iterable[model.Footnote]) -> str:
+        """Write the definitions of footnotes, for references such as `[^1]`."""
+        return "\n\n".join(
+            hang(f"[^{note.number}]: ", self.blocks(note.blocks), 4) for note in footnotes
+        )
+
+    # --- blocks
+
+    def blocks(self, blocks: Iterable[model.Block], *, tight: bool = False) -> str:
+        """Write blocks, without the last line end."""
+        text, previous = "", None
+        for block in blocks:
+            block_text = self.block(block, previous)
+            if block_text and text:
+                is_apart = (
+                    not tight
+                    or isinstance(previous, _SPACED_BLOCKS)
+                    or isinstance(block, _SPACED_BLOCKS)
+                )
+                text += "\n\n" if is_apart else "\n"
+            if block_text:
+                text += block_text
+                previous = block
+        return text
+
+    def block(self, block: model.Block, previous: model.Block | None = None) -> str:
+        """Write a block, without its last line end; may be empty."""
+        match block:
+            case model.Heading():
+                text = _LAST_MARKS.sub(r"\1\\\2", self.inlines(block.children))
+                return f"{'#' * block.level} {text}".rstrip()
+            case model.Paragraph():
+                text = self._inlines(block.children)
+                if number := self.number(block.label):
+                    text = text.removeprefix("Figure:").lstrip()
+                    text = f"**{escape_marks(number)}:** {text}"
+                return text
+            case model.HtmlFlow():
+                return "".join(map(self._in_html, block.children))
+            case model.ListBlock():
+                return self._list(block, after_list=isinstance(previous, model.ListBlock))
+            case model.BlockQuote():
+                return block_quote(self.blocks(block.blocks))
+            case model.CodeBlock():
+                code = fence(re.sub(r"[\s`]", "", block.language), block.code.text)
+                return self._below_caption(block, code)
+            case model.HtmlBlock():
+                return raw_html(block, self.url).rstrip("\n")
+            case model.ThematicBreak():
+                return "___"
+            case model.MathBlock():
+                tex, tag = _remove_empty_lines(block.tex.text), self._tag(block.span.start)
+                return "\n".join(filter(None, ("$$", tex, tag, "$$")))
+            case model.Table():
+                rows = (map(self._cell, row) for row in block.rows)
+                header, align = map(self._cell, block.header), (mark or "" for mark in block.align)
+                text = table(header, rows, align)
+                return self._below_caption(block, text, self.inlines(block.caption))
+            case model.Callout():
+                label = f"**{escape_marks(self.page.inputs.callouts[block.kind].label)}**"
+                title = self.inlines(block.title)
+                head = f"{label} {title}" if title else label
+                inner = self.blocks(block.blocks)
+                return block_quote(f"{head}\n\n{inner}" if inner else head)
+            case model.PlainCode():
+                return self._below_caption(block, fence("python", block.code.text))
+            case model.Script():
+                href = self.locate(self.page.place.href(block.path))
+                name = link(code_span(block.path), href)
+                if number := self.number(block.label):
+                    name = f"**{escape_marks(number)}** {name}"
+                if self.notebook:
+                    return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
+                command = code_span(shlex.join(("python", block.path, *block.args)))
+                run = f"{self.words('code.run')}: {command}"
+                if block.requires:
+                    run += f" ({self.words('code.requires', modules=', '.join(block.requires))})"
+                parts = [f"{name}:", fence("python", block.code.text), run]
+                recordings = self.page.script_outputs.get(block.span.start, ())
+                parts += [self.recording(recording) for recording in recordings]
+                if not recordings:
+                    receipt = script_receipt(self.page, block)
+                    parts.append(f"*{escape_marks(receipt.text)}*")
+                return "\n\n".join(parts)
+            case model.Recording():
+                is_joined = any(block in outputs for outputs in self.page.script_outputs.values())
+                return "" if is_joined else self.recording(block)
+            case model.Mjcf():
+                engine = self.page.inputs.engine
+                label = (
+                    self.words("mjcf.fragment", element=block.fragment)
+                    if block.fragment
+                    else self.words("mjcf.label")
+                )
+                verdict = f"*{self.words('mjcf.compiles', engine=engine)}*"
+                if block.error is not None:
+                    verdict = (
+                        f"*{self.words('mjcf.fails', engine=engine)}* {code_span(block.error)}"
+                    )
+                text = f"{label}:\n\n{fence('xml', block.code.text)}\n\n{verdict}"
+                return self._below_caption(block, text)
+            case model.FeatureBlock():
+                return self._below_caption(block, kind_of_block(block).markdown(self, block))
+            case _:
+                assert_never(block)
+
+    def _below_caption(self, block: model.Labelled, text: str, caption: str = "") -> str:
+        """Write a block below its number and its caption, if it has one of the two."""
+        if number := self.number(block.label):
+            caption = f"**{escape_marks(number)}:** {caption}".rstrip()
+        return f"{caption}\n\n{text}" if caption else text
+
+    def _in_html(self, inline: model.Inline) -> str:
+        """Write an inline within HTML, where text is no Markdown."""
+        if isinstance(inline, model.Text):
+            return escape(inline.text)
+        return self._inline(inline, "block")
+
+    def _list(self, block: model.ListBlock, *, after_list: bool) -> str:
+        """Write a list; directly after another list it has different marks, to stay separate."""
+        number, mark = block.start, "*" if after_list else "-"
+        tight = all(
+            is_tight(inner) or not isinstance(inner, model.Paragraph)
+            for item in block.items
+            for inner in item.blocks
+        )
+        items: list[str] = []
+        for item in block.items:
+            if number is not None:
+                mark = f"{number}{')' if after_list else '.'}"
+                number += 1
+            items.append(self._item(f"{mark} ", item, tight=tight))
+        return ("\n" if tight else "\n\n").join(items)
+
+    def _item(self, mark: str, item: model.ListItem, *, tight: bool) -> str:
+        text = self.blocks(item.blocks, tight=tight)
+        if item.checked is not None:
+            text = f"[{'x' if item.checked else ' '}] {text or '&nbsp;'}"
+        elif item.blocks and isinstance(item.blocks[0], model.ListBlock):
+            text = f"\n{text}"  # three marks on one line would be a thematic break
+        return hang(mark, text, len(mark))
+
+    def _cell(self, cell: model.Cell) -> str:
+        return self._inlines(cell.children, "cell").replace("\n", " ")
+
+    # --- inlines
+
+    def _inlines(self, inlines: Iterable[model.Inline], room: _Room = "block") -> str:
+        text = self._join_inlines(inlines, room)
+        return guard_lines(text) if room == "block" else text
+
+    def _join_inlines(self, inlines: Iterable[model.Inline], room: _Room) -> str:
+        return "".join([self._inline(inline, room) for inline in inlines])
+
+    def _inline(self, inline: model.Inline, room: _Room) -> str:
+        match inline:
+            case model.Text():
+                return _text(inline, room)
+            case model.SoftBreak():
+                return "\n" if room == "block" else " "
+            case model.HardBreak():
+                if room != "block":
+                    return " "
+                return "\\\n" if inline.span.text.startswith("\\") else "  \n"
+            case model.CodeSpan():
+                source = inline.span.text
+                ticks = source[: len(source) - len(source.lstrip("`"))]
+                return _escape_pipes(code_span(inline.text, ticks), room)
+            case model.NumberBinding():
+                return escape_marks(_MINUS.sub("\u2212", inline.text))
+            case model.Math():
+                tag = self._tag(inline.span.start) if inline.display else ""
+                return _formula(inline, tag, room)
+            case model.Emphasis() | model.Strong() | model.Term() | model.Strikethrough():
+                mark = _delimiter(inline)
+                return f"{mark}{self._join_inlines(inline.children, room)}{mark}"
+            case model.Link():
+                text = self._join_inlines(inline.children, room)
+                return self._link(inline, text, room)
+            case model.Image():
+                url = self.url(inline.url)
+                return _escape_pipes(picture(inline.alt, url, inline.title), room)
+            case model.RawInline():
+                return _escape_pipes(raw_html(inline, self.url), room)
+            case model.FootnoteRef():
+                return self.reference(inline.number)
+            case model.Citation():
+                return _escape_pipes(self.citation(inline), room)
+            case _:
+                assert_never(inline)
+
+    def _tag(self, start: int) -> str:
+        number = self.formula_number(start)
+        return f"\\tag{{{number}}}" if number else ""
+
+    def _link(self, node: model.Link, text: str, room: _Room) -> str:
+        source = node.span.text
+        if source == f"<{model.plain_text(node.children)}>" and room != "cell":
+            return source
+        href = self.href(node.target)
+        text = text or escape_marks(self.link_text(node.target))
+        return link(text, href.replace("|", "%7C") if room == "cell" else href, node.title)
+
+    # --- what depends on the page
 
     def href(self, target: model.Target) -> str:
         """Return the address of a link."""
@@ -55,27 +292,22 @@ class DocumentWriter(BlockWriter):
 
     def formula_number(self, start: int) -> str:
         """Return the number of a formula that does not show one itself."""
-        equation = self.page.equations.get(start)
-        return equation.number if equation is not None and equation.has_margin_number else ""
+        item = self.page.numbered_items.get(start)
+        return item.number if item is not None and item.has_margin_number else ""
 
-    def own_block(self, block: SpecialBlock) -> str:
-        """Write one of the course's own blocks."""
-        match block:
-            case model.Callout():
-                return self._callout(block)
-            case model.PlainCode():
-                return fence("python", block.code.text)
-            case model.Script():
-                return self._script(block)
-            case model.Recording():
-                is_joined = any(block in outputs for outputs in self.page.script_outputs.values())
-                return "" if is_joined else self.recording(block)
-            case model.Mjcf():
-                return self._mjcf(block)
-            case model.FeatureBlock():
-                return kind_of_block(block).markdown(self, block)
-            case _:
-                assert_never(block)
+    def number(self, label: model.Label | None) -> str:
+        """Return the name that a label gives, such as "Figure 4.2.3"; empty without one."""
+        return "" if label is None else self.page.number(label)
+
+    def citation(self, citation: model.Citation) -> str:
+        """Return a citation, with links to the references below the text."""
+        return self.html(self.page.citation(citation))
+
+    def references(self) -> str:
+        """Return the list of the sources that the document cites; perhaps empty."""
+        entries = (self.html(entry.html) for entry in self.page.inputs.citations.entries)
+        items = "\n".join(hang("- ", entry) for entry in entries)
+        return f"**{self.words('references.title')}**\n\n{items}" if items else ""
 
     def html(self, html: Markup) -> str:
         """Convert HTML of a template to Markdown."""
@@ -85,45 +317,7 @@ class DocumentWriter(BlockWriter):
         """Return a text of the interface as Markdown."""
         return escape_marks(self.page.renderer.words(key, **values))
 
-    # --- callouts, io, MJCF
-
-    def _callout(self, block: model.Callout) -> str:
-        label = f"**{escape_marks(self.page.inputs.callouts[block.kind].label)}**"
-        title = self.inlines(block.title)
-        head = f"{label} {title}" if title else label
-        inner = self.blocks(block.blocks)
-        return block_quote(f"{head}\n\n{inner}" if inner else head)
-
-    def _mjcf(self, block: model.Mjcf) -> str:
-        engine = self.page.inputs.engine
-        label = (
-            self.words("mjcf.fragment", element=block.fragment)
-            if block.fragment
-            else self.words("mjcf.label")
-        )
-        receipt = f"*{self.words('mjcf.compiles', engine=engine)}*"
-        if block.error is not None:
-            receipt = f"*{self.words('mjcf.fails', engine=engine)}* {code_span(block.error)}"
-        return f"{label}:\n\n{fence('xml', block.code.text)}\n\n{receipt}"
-
     # --- scripts and outputs
-
-    def _script(self, block: model.Script) -> str:
-        href = self.locate(self.page.place.href(block.path))
-        name = link(code_span(block.path), href)
-        if self.notebook:
-            return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
-        command = code_span(shlex.join(("python", block.path, *block.args)))
-        run = f"{self.words('code.run')}: {command}"
-        if block.requires:
-            run += f" ({self.words('code.requires', modules=', '.join(block.requires))})"
-        parts = [f"{name}:", fence("python", block.code.text), run]
-        recordings = self.page.script_outputs.get(block.span.start, ())
-        parts += [self.recording(recording) for recording in recordings]
-        if not recordings:
-            receipt = script_receipt(self.page, block)
-            parts.append(f"*{escape_marks(receipt.text)}*")
-        return "\n\n".join(parts)
 
     def recording(self, block: model.Recording) -> str:
         """Write an output with its caption and its receipt."""
@@ -147,3 +341,47 @@ class DocumentWriter(BlockWriter):
             return f"<details>\n<summary>{label}</summary>\n\n{text}\n\n</details>"
         begins_block = text.startswith(("```", "- ", "1. ", "$$", "> ", "| ", "<"))
         return f"**{label}:**\n\n{text}" if begins_block else f"**{label}:** {text}"
+
+
+def _text(node: model.Text, room: _Room) -> str:
+    """Write a text, copied from its source if that is the same."""
+    source = node.span.text
+    if source != node.text:
+        text = escape_marks(node.text)
+        if text[:1].isspace() and not source[:1].isspace():
+            text = f"&#{ord(text[0])};{text[1:]}"
+        if text[-1:].isspace() and not source[-1:].isspace():
+            text = f"{text[:-1]}&#{ord(text[-1])};"
+        return text.replace("\n", "&#10;")
+    source = _ALWAYS_ESCAPED.sub(lambda match: f"\\{match[0]}", source)
+    return _escape_pipes(source, room)
+
+
+def _escape_pipes(text: str, room: _Room) -> str:
+    """Escape the pipes of a text in a cell of a table."""
+    return _PIPE.sub(r"\\|", text) if room == "cell" else text
+
+
+def _delimiter(node: model.Emphasis | model.Strong | model.Term | model.Strikethrough) -> str:
+    """Return the marks around a text; those of emphasis are as in its source."""
+    if isinstance(node, model.Strikethrough):
+        return "~~"
+    mark = "_" if node.span.text[:1] == "_" else "*"
+    return mark * 2 if isinstance(node, model.Strong) else mark
+
+
+def _formula(node: model.Math, tag: str, room: _Room) -> str:
+    """Write a formula between dollar signs, with its number if it has one."""
+    tex = f"{node.tex.text}\n{tag}" if tag else node.tex.text  # it can end with a comment
+    if room == "cell":  # a pipe would end the cell, and an escaped one is another sign
+        tex = tex.replace(r"\|", r"\Vert{}").replace("|", r"\vert{}")
+    if _COMMENT.search(tex):  # the line end ends the comment
+        tex = _remove_empty_lines(tex)
+    elif "\n" in tex:
+        tex = " ".join(part.strip() for part in tex.split("\n"))
+    return f"$${tex}$$" if node.display else f"${tex}$"
+
+
+def _remove_empty_lines(tex: str) -> str:
+    """Remove empty lines from TeX: a formula would end there."""
+    return "\n".join(line for line in tex.split("\n") if line.strip())

@@ -16,6 +16,7 @@ from __future__ import annotations
 import ast
 import functools
 import re
+from collections import Counter
 from collections.abc import Iterator
 from typing import Literal, TypeAlias
 
@@ -24,6 +25,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
+from coursebuild.core.pages.listings import python_nodes
 from coursebuild.core.text.source import Span
 
 Kind: TypeAlias = Literal[
@@ -58,7 +60,7 @@ _FILE = re.compile(r"(?:content|examples|models)/(?!.*[A-Z]{3})[\w./-]*\w\.[a-z]
 _NEAR_FILE = re.compile(r"(?!.*[A-Z]{3})[\w.-]+/[\w./-]*\w\.(?:md|py|toml|xml)")
 """What is a file of the course only if it is like the name of one."""
 _CODE_WORD = re.compile(
-    r"\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
+    r"\b\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
 )
 """A word of code that inline code could mean."""
 _CODE = (
@@ -70,6 +72,8 @@ _TOKEN = re.compile(r"(?<!\S)(?=\S*[A-Za-z_]{4})(?!\w+(?!\S))\S{6,}(?!\S)")
 """What stands between blanks, with a word of some length and more than that."""
 _TAIL = re.compile(r"[A-Za-z]+(?!\w)")
 """Letters directly after code."""
+_MOST_PLAIN = 3
+"""How many uses of a plain word are kept of a document: what is used again is no slip."""
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
 GUESSES = frozenset("plain token torn half".split())
 """Kinds of claims that are none where nothing is called like them."""
@@ -134,6 +138,12 @@ def course_names(course: model.Course) -> tuple[CodeNames, ...]:
     return tuple(note.names for note in map(names_of, course.documents) if note is not None)
 
 
+@functools.lru_cache(maxsize=256)
+def words_of(text: str) -> frozenset[str]:
+    """Return the words of code."""
+    return frozenset(re.findall(r"[A-Za-z]\w*", text))
+
+
 def document_names(document: model.Document) -> DocumentNames | None:
     """Return the names of a document; `None` if it has neither claims nor code."""
     claims: list[Claim] = []
@@ -142,6 +152,7 @@ def document_names(document: model.Document) -> DocumentNames | None:
     words: set[str] = set()
     names = CodeNames((), frozenset(), {}, {}, {}, {})
     inner: set[int] = set()
+    plain_counts = Counter[str]()
     for block in model.document_blocks(document):
         if isinstance(block, model.FeatureBlock):
             inner |= {id(part) for part in model.walk_blocks(block.child_blocks())}
@@ -160,6 +171,10 @@ def document_names(document: model.Document) -> DocumentNames | None:
                 link_parts |= {id(child) for child in model.walk_inlines(inline.children)}
             elif isinstance(inline, model.CodeSpan) and not inline.literal:
                 for claim, place in claims_of(inline):
+                    if claim.kind == "plain":
+                        plain_counts[claim.name] += 1
+                        if plain_counts[claim.name] > _MOST_PLAIN:
+                            continue
                     claims.append(
                         replace(
                             claim, linked=may_link and claim.linked and id(inline) not in link_parts
@@ -176,40 +191,46 @@ def document_names(document: model.Document) -> DocumentNames | None:
 
 def _read_script(script: model.Script, names: CodeNames) -> None:
     """Add what a script defines and imports."""
-    try:
-        tree = ast.parse(script.code.text)
-    except (SyntaxError, ValueError, RecursionError):
-        return
     members: dict[str, set[str]] = {}
-    for node in ast.walk(tree):
-        definition: str | None = None
-        match node:
-            case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
-                definition = node.name
-            case ast.Name(id=definition, ctx=ast.Store()):
-                pass
-            case ast.arg(arg=definition):
-                pass
-            case ast.Import():
+    for node in python_nodes(script.code.text.rstrip("\n")):
+        definition = ""
+        if isinstance(node, ast.Name):
+            definition = node.id if isinstance(node.ctx, ast.Store) else ""
+        elif isinstance(node, ast.Attribute):
+            if isinstance(node.value, ast.Name):
+                members.setdefault(node.value.id, set()).add(node.attr)
+        elif isinstance(node, ast.arg):
+            definition = node.arg
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            definition = node.name
+        elif isinstance(node, ast.Import):
+            for alias in node.names:
+                name = alias.asname or alias.name.partition(".")[0]
+                names.imports[name] = alias.name if alias.asname else name
+        elif isinstance(node, ast.ImportFrom):
+            if node.module and not node.level:
                 for alias in node.names:
-                    name = alias.asname or alias.name.partition(".")[0]
-                    names.imports[name] = alias.name if alias.asname else name
-            case ast.ImportFrom(module=str(module), level=0):
-                for alias in node.names:
-                    names.imports[alias.asname or alias.name] = f"{module}.{alias.name}"
-            case ast.Attribute(value=ast.Name(id=name), attr=attribute):
-                members.setdefault(name, set()).add(attribute)
-            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call(func=function)):
-                classes = _STRUCTURES.intersection(ast.unparse(function).split("."))
-                if classes:
-                    names.variables[name] = classes.pop()
-            case _:
-                pass
-        if definition is not None:
+                    names.imports[alias.asname or alias.name] = f"{node.module}.{alias.name}"
+        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.Call):
+            target, class_name = node.targets[0], _find_structure(node.value.func)
+            if class_name and isinstance(target, ast.Name) and len(node.targets) == 1:
+                names.variables[target.id] = class_name
+        if definition:
             line = getattr(node, "lineno", 1)
             names.definitions.setdefault(definition, (script.path, line))
     for name, attributes in members.items():
         names.members[name] = names.members.get(name, frozenset()) | attributes
+
+
+def _find_structure(function: ast.expr) -> str:
+    """Return the structure of MuJoCo in a function's name, as in `mujoco.MjData`; else nothing."""
+    node: ast.AST | None = function
+    while node is not None:
+        name: str = getattr(node, "attr", getattr(node, "id", ""))
+        if name in _STRUCTURES:
+            return name
+        node = getattr(node, "func", getattr(node, "value", None))
+    return ""
 
 
 def claims_of(code: model.CodeSpan) -> Iterator[tuple[Claim, Span]]:

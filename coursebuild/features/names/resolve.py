@@ -16,13 +16,13 @@ from typing import TypeAlias
 
 from msgspec import Struct
 
+from coursebuild import MANUAL
 from coursebuild.core.model import Course, document_scripts
 from coursebuild.core.model.addresses import line_anchor
 from coursebuild.core.syntax.course_schema import CourseFile
 from coursebuild.core.syntax.html import ELEMENTS
-from coursebuild.core.text.diagnostics import LETTERS, did_you_mean, misspelt, nearest, slips_of
-from coursebuild.core.text.rules import HELP
-from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, course_names
+from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest, propose, slips_of
+from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, course_names, words_of
 from coursebuild.features.names.engine import (
     ITEM_CLASSES,
     EngineName,
@@ -35,6 +35,8 @@ from coursebuild.features.names.engine import (
 )
 from coursebuild.features.names.own_names import known_keys, options_by_command, tables_of
 
+_MANUAL_ID = "coursebuild-manual"
+"""The id of the manual, in docs/content/course.toml."""
 _ROOTS = {"model": "MjModel", "data": "MjData", "opt": "MjOption", "spec": "MjSpec"}
 """The classes of variables by their usual names."""
 _HTML = ELEMENTS | frozenset(
@@ -67,9 +69,9 @@ def resolver_of(course: Course) -> Resolver:
 
 def _propose(name: str, names: Iterable[str]) -> str:
     """Propose the nearest name, if one is near; only those of about its length are compared."""
-    similar = (candidate for candidate in names if abs(len(candidate) - len(name)) <= 2)
+    similar = {candidate for candidate in names if abs(len(candidate) - len(name)) <= 2}
     likely = nearest(name, similar, cutoff=0.8)
-    return f"did you mean `{likely}`?" if likely else ""
+    return propose(name, likely, similar) if likely else ""
 
 
 class Resolver:
@@ -87,7 +89,7 @@ class Resolver:
         """The words of all code of the course."""
         words: set[str] = {model.name for model in self.course.models}
         for model in self.course.models:
-            words |= _words_of(model.source.text)
+            words |= words_of(model.source.text)
         for names in course_names(self.course):
             words |= names.words
             words |= names.definitions.keys()
@@ -182,16 +184,15 @@ class Resolver:
     @functools.cached_property
     def plain_words(self) -> dict[str, int]:
         """Words without the shape of a name, each with the least length that is telling."""
-        uses = self.uses
-        engine, files = self.engine, (path.rpartition("/")[2] for path in self.files)
+        uses, engine = self.uses, self.engine
+        files = (path.rpartition("/")[2] for path in self.files)
         common_words = {*known_keys(), *self.imports, *options_by_command(), *keyword.kwlist}
         common_words.update(vars(builtins), *(() if engine is None else engine.modules.values()))
         own_words = {*self.words, *files, *(word for word, count in uses.items() if count > 1)}
-        frequent_words = {word for word, count in uses.items() if count > 4}
+        frequent_words = {word for word, count in uses.items() if count > 4 and len(word) > 3}
         engine_words = engine.words if engine is not None and self.has_engine else ()
-        sets = ((common_words, 6), (own_words, 4), (engine_words, 4))
-        lengths = {word: length for words, length in sets for word in words}
-        return lengths | dict.fromkeys((w for w in frequent_words if len(w) > 3), 3)
+        sets = ((common_words, 6), (own_words, 4), (engine_words, 4), (frequent_words, 3))
+        return {word: length for words, length in sets for word in words}
 
     @functools.cached_property
     def long_words(self) -> frozenset[str]:
@@ -226,12 +227,16 @@ class Resolver:
         if len(name) > 5 or re.search("[0-9]", name):
             splits = [(name[:n], name[n:]) for n in range(1, len(name) - 1)]
             words = {head + tail[1:] for head, tail in splits}
-            words |= {head + letter + tail[1:] for head, tail in splits for letter in LETTERS}
+            words |= {
+                head + letter + tail[1:]
+                for head, tail in splits
+                for letter in "abcdefghijklmnopqrstuvwxyz_"
+            }
             near |= words & self.long_words
         if (likely := min(near, default=None)) is None:
             return None
         message = f"nothing that the course knows is called `{name}`"
-        return Unknown(message, f"did you mean `{likely}`?", name)
+        return Unknown(message, propose(name, likely, near), name)
 
     def _token(self, name: str) -> Answer:
         """A token that is another one of the course but for a slip in or beside a word."""
@@ -273,7 +278,7 @@ class Resolver:
             self._path(path.replace(root, likely, 1), names), KnownName
         ):
             message = f"nothing that the course knows is called `{root}`"
-            return Unknown(message, f"did you mean `{likely}`?", root)
+            return Unknown(message, propose(root, likely), root)
         if ENGINE_WORD.fullmatch(root):
             message = f"MuJoCo {engine.version} has no `{root}`"
             return Unknown(message, did_you_mean(root, engine.classes), root)
@@ -382,7 +387,7 @@ class Resolver:
         if name in self.words or likely is None or name in known_keys():
             return None
         message = f"no element of MuJoCo {engine.version} has an attribute `{name}`"
-        return Unknown(message, f"did you mean `{likely}`?", name)
+        return Unknown(message, propose(name, likely, engine.attributes), name)
 
     # --- coursebuild and the course
 
@@ -412,7 +417,7 @@ class Resolver:
             if likely is None:
                 return None
             return Unknown(
-                f"the course map has no table `{name}`", f"did you mean `{likely}`?", name
+                f"the course map has no table `{name}`", propose(name, likely, tables), name
             )
         if key and tables[name] and key not in tables[name]:
             help = did_you_mean(key, tables[name])
@@ -420,10 +425,11 @@ class Resolver:
         return KnownName(self._manual("course-map"))
 
     def _manual(self, page: str) -> str:
-        path = f"docs/reference/{page}.md"
-        if any(p.path == path for p in self.course.pages):
+        """A page of the manual: in the manual's own course its file, else its address if known."""
+        path = f"reference/{page}.md"
+        if self.course.id == _MANUAL_ID and any(p.path == path for p in self.course.pages):
             return path
-        return HELP.replace("rules.md#{}", f"{page}.md")
+        return MANUAL and f"{MANUAL}{page}.html"
 
     def _file(self, path: str) -> Answer:
         if path in self.files:
@@ -442,8 +448,3 @@ class Resolver:
         lessons = (lesson.path for lesson in course.lessons)
         sources = (source.path for source in course.sources)
         return frozenset((*course.files, *scripts, *sources, *lessons))
-
-
-@functools.lru_cache(maxsize=256)
-def _words_of(text: str) -> frozenset[str]:
-    return frozenset(re.findall(r"[A-Za-z]\w*", text))

@@ -11,7 +11,9 @@ site.
    they are when the course is checked, and scripts do not share state.
 3. A recorded output is the output of its cell.
 4. The id of a cell depends on the heading above it, or on its script.
-5. A cell at the start contains the files that scripts need (models, `mjcourse`, other scripts),
+5. Where the course map says in `[launch]` where notebooks can be run, the first cell with code
+   installs the packages, in the versions of the runs that were verified.
+6. A cell at the start contains the files that scripts need (models, `mjcourse`, other scripts),
    packed, and writes those that are missing.
 """
 
@@ -26,7 +28,7 @@ import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeAlias
-from urllib.parse import urljoin, urlsplit
+from urllib.parse import quote, urljoin, urlsplit
 
 import msgspec
 
@@ -34,6 +36,7 @@ from coursebuild.core.engine.tool import step_key
 from coursebuild.core.features import Feature, PageCopy
 from coursebuild.core.model import (
     Block,
+    Course,
     Heading,
     Lesson,
     Script,
@@ -142,6 +145,8 @@ def _footnote_cells(writer: DocumentWriter) -> Iterator[Cell]:
         notes = (hang(f"{n.number}. ", writer.blocks(n.blocks)) for n in footnotes)
         title = f"## {writer.words('markup.footnotes')}"
         yield _text_cell("footnotes", "\n\n".join((title, *notes)))
+    if references := writer.references():
+        yield _text_cell("references", references)
     for note in footnotes:
         for script in _find_scripts(note.blocks):
             yield from _script_cells(writer, "footnotes", script)
@@ -200,7 +205,8 @@ def notebook_files(site: SiteContext) -> Iterator[CachedFile]:
         lesson = site.library.lessons[page.id]
         archive = site.archives.get(urls.lesson_zip_path(lesson))
         language = site.library.words.language
-        key = step_key("notebook", language, page.digest, archive.key if archive else "")
+        installs = str(site.library.course.launch is not None)
+        key = step_key("notebook", language, installs, page.digest, archive.key if archive else "")
         path = urls.copy_path(page.path, ".ipynb")
         yield CachedFile(
             path, key, functools.partial(_write_notebook, site, lesson, page.path, archive)
@@ -252,8 +258,11 @@ def _setup_cells(site: SiteContext, lesson: Lesson, archive: zips.Archive) -> It
             _PLACEHOLDER, name
         )
     if packages:
-        yield markdown_cell("before", f"{title}\n\n{escape_marks(words('exports.install'))}")
-        yield code_cell("install", f"# %pip install {' '.join(packages)}")
+        is_elsewhere = site.library.course.launch is not None
+        install_text = words("exports.install_here" if is_elsewhere else "exports.install")
+        command = "%pip install -q" if is_elsewhere else "# %pip install"
+        yield markdown_cell("before", f"{title}\n\n{escape_marks(install_text)}")
+        yield code_cell("install", f"{command} {' '.join(packages)}")
         title = ""
     yield markdown_cell("before-setup", f"{title}\n\n{text}".strip())
     template = site.assets.template("notebook/setup.py")
@@ -299,6 +308,42 @@ def _setup_code(template: str, files: Mapping[str, bytes], missing: list[str]) -
     return code.replace('FILES = ""', f'FILES = """\n{lines}\n"""' if packed else 'FILES = ""')
 
 
+def launch_services(course: Course, path: str) -> tuple[tuple[str, str], ...]:
+    """The services that can run the notebook at a site path, each with the address for it.
+
+    A name of a branch or folder may hold anything that Git and file systems allow.
+    """
+    launch = course.launch
+    if launch is None or launch.repository is None:
+        return ()
+    repository = launch.repository.rstrip("/").removesuffix(".git")
+    host, _, project = repository.partition("://")[2].partition("/")
+    file = f"{launch.folder}/{path}" if launch.folder else path
+    branch, url = quote(launch.branch), quote(repository, safe="")
+    services: list[tuple[str, str]] = []
+    if launch.colab:  # what follows the branch is the file, so the branch may have no `/`
+        ref = quote(launch.branch, safe="")
+        address = f"https://colab.research.google.com/github/{project}/blob/{ref}/{quote(file)}"
+        services.append(("Colab", address))
+    if launch.binder:
+        provider = f"git/{url}"
+        if host.lower() == "github.com":
+            provider = f"gh/{project}"
+        elif host.lower() == "gitlab.com":
+            provider = f"gl/{quote(project, safe='')}"
+        place = f"{launch.binder.rstrip('/')}/v2/{provider}/{branch}"
+        services.append(("Binder", f"{place}?labpath={quote(file, safe='')}"))
+    if launch.jupyterhub:
+        folder = project.rpartition("/")[2]
+        inner = quote(f"lab/tree/{folder}/{quote(file)}", safe="")
+        place = f"{launch.jupyterhub.rstrip('/')}/hub/user-redirect/git-pull"
+        ref = quote(launch.branch, safe="")
+        services.append(("JupyterHub", f"{place}?repo={url}&branch={ref}&urlpath={inner}"))
+    if launch.codespaces:
+        services.append(("Codespaces", f"https://codespaces.new/{project}/tree/{branch}"))
+    return tuple(services)
+
+
 FEATURE = Feature(
     name="notebook",
     needs=("markdown",),
@@ -309,6 +354,7 @@ FEATURE = Feature(
             text="exports.notebook",
             lessons=True,
             download=True,
+            services=launch_services,
         ),
     ),
     note=note_cells,

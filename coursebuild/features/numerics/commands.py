@@ -4,7 +4,8 @@ Entry points: `stability(options, names)`, `check_stability`; `stability_text`, 
 case says, and the errors of its plots.
 
 1. A name means a problem, or a family of them (`damped-spring` is all of its damping ratios), or a
-   model of the course whose exact motion it gives: what `bench` measures of it is a hard case too.
+   model of the course whose exact motion it gives, or of which it knows theory: what `bench`
+   measures of it is a hard case too.
 2. Measurements are cached by the machine, its versions and the code that measures. `--check`
    measures again.
 3. All problems are recorded in one file. Where some are named, recording them leaves the others as
@@ -24,10 +25,11 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.core.engine.tool import code_digest
+from coursebuild.core.files.errors import require
 from coursebuild.core.pages import urls
 from coursebuild.core.run.script_environment import engine_version, machine, one_processor
 from coursebuild.core.text.diagnostics import nearest
-from coursebuild.features.bench.commands.bench import bench
+from coursebuild.features.bench.commands import bench
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     MeasuringRun,
@@ -46,11 +48,17 @@ from coursebuild.numerics.reports.case_report import (
     course_cases,
     exact_file,
 )
-from coursebuild.numerics.reports.departures import RecordCheck, case_departures
-from coursebuild.numerics.reports.records import STABILITY, ReportFailure
+from coursebuild.numerics.reports.records import (
+    STABILITY,
+    RecordCheck,
+    ReportFailure,
+    case_departures,
+)
 from coursebuild.numerics.reports.report_plots import case_quantities
+from coursebuild.numerics.reports.scene_report import SceneReport
 from coursebuild.numerics.reports.shown_errors import seconds_text, status_text
 from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.scenes import find_scenes
 from coursebuild.pipeline.shown_reports import read_record
 from coursebuild.report.text import BOLD, Column, Style, table
 from coursebuild.report.values import json_text
@@ -71,7 +79,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "problems",
         nargs="*",
         metavar="PROBLEM",
-        help="a hard case, a family of them, or a model with `NAME.exact.py` (default: all)",
+        help="a hard case, a family of them, or a model of the course (default: all)",
     )
     add_format(parser, "text", "json")
     add_report_options(parser)
@@ -80,6 +88,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, or check by measuring again."""
+    require("scipy", "measure", "`coursebuild stability`")
     names = tuple(arguments.problems)
 
     def measure(options: Options) -> Measurement[Any]:
@@ -110,8 +119,7 @@ def stability(
     Raises:
         UsageError: no case is called so.
     """
-    own_models = tuple(name for name in names if (options.root / exact_file(name)).is_file())
-    built_in = tuple(name for name in names if name not in own_models)
+    own_models, built_in = _split(options, names)
     problems = _select_problems(built_in) if built_in or not own_models else []
     measurement: Measurement[CaseReport] = Measurement(())
     if problems:
@@ -120,13 +128,34 @@ def stability(
             measurement = _record(options, measurement, whole=not names)
     if not own_models:
         return measurement
-    of_course = bench(options, own_models, record=record)
-    reports = (case for scene in of_course.reports for case in course_cases(scene))
-    return replace(
-        measurement,
-        reports=(*measurement.reports, *reports),
+    return _join_reports(measurement, bench.bench(options, own_models, record=record))
+
+
+def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The names of models of the course, and those of hard cases.
+
+    Raises:
+        UsageError: a model is named of which the course knows nothing in theory.
+    """
+    models = tuple(name for name in names if (options.root / f"models/{name}.xml").is_file())
+    for scene in find_scenes(options.root, models).value if models else ():
+        has_theory = any(scenario.expected for scenario in scene.declarations.scenarios)
+        if not has_theory and not (options.root / exact_file(scene.name)).is_file():
+            help = f"give its motion in {exact_file(scene.name)}, or `expected` of a scenario"
+            raise UsageError(f"nothing is known of `{scene.name}` in theory", help=help)
+    return models, tuple(name for name in names if name not in models)
+
+
+def _join_reports(
+    measurement: Measurement[CaseReport], of_course: Measurement[SceneReport]
+) -> Measurement[CaseReport]:
+    """What was measured on hard cases, with those of the course's own models."""
+    course_reports = [case for scene in of_course.reports for case in course_cases(scene)]
+    return Measurement(
+        reports=(*measurement.reports, *course_reports),
         diagnostics=of_course.diagnostics,
         failures=(*measurement.failures, *of_course.failures),
+        checked=(*measurement.checked, *of_course.checked),
         remarks=(*measurement.remarks, *of_course.remarks),
     )
 
@@ -152,6 +181,16 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
     Raises:
         UsageError: no case is called so.
     """
+    own_models, built_in = _split(options, names)
+    measurement: Measurement[CaseReport] = Measurement(())
+    if built_in or not own_models:
+        measurement = _check_problems(options, built_in)
+    if not own_models:
+        return measurement
+    return _join_reports(measurement, bench.check(options, own_models))
+
+
+def _check_problems(options: Options, names: tuple[str, ...]) -> Measurement[CaseReport]:
     problems = _select_problems(names)
     recorded = read_record(options.root, STABILITY)
     if isinstance(recorded, ReportFailure):

@@ -63,7 +63,8 @@ def _application_files(course: Course, assets: Assets, names: Names) -> tuple[Ou
     icon_files: list[OutputFile] = []
     if not (theme.icon or theme.touch_icon):
         for name, side in (("192", 192), ("512", 512), ("maskable", 512)):
-            icon_files.append(_icon(assets, f"icon-{name}.png"))
+            data = assets.file(f"icons/icon-{name}.png")
+            icon_files.append(OutputFile(hashed_name(f"assets/icon-{name}.png", data), data))
             icons.append(_png(icon_files[-1].path, f"{side}x{side}"))
         icons[-1]["purpose"] = "maskable"
     manifest = {
@@ -108,11 +109,6 @@ def short_name(title: str) -> str:
     lines = textwrap.wrap(line, _MAX_NAME, break_long_words=False, break_on_hyphens=False)
     # Punctuation and dashes are removed at the cut.
     return "".join(lines[:1]).rstrip(" ,;:–—-") or title
-
-
-def _icon(assets: Assets, name: str) -> OutputFile:
-    data = assets.file(f"icons/{name}")
-    return OutputFile(hashed_name(f"assets/{name}", data), data)
 
 
 # ---------------------------------------------------------------------------------- the list

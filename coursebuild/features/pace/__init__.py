@@ -112,6 +112,11 @@ FEATURE = Feature(
     summary=lambda document, mathml: Parsed(count_efforts(document)),
     check=check,
     rules=(
-        Rule("lesson-minutes", "warning", "A lesson takes more or less time than its map says."),
+        Rule(
+            "lesson-minutes",
+            "warning",
+            "A lesson takes more or less time than its map says.",
+            "The estimate is rough, and the map may be right.",
+        ),
     ),
 )

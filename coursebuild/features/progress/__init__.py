@@ -71,7 +71,13 @@ _TROUBLE = "progress.trouble."
 FEATURE = Feature(
     name="progress",
     pages=(
-        PageKind(name="progress", values=progress_values, order=50, indexed=False),
+        PageKind(
+            name="progress",
+            values=progress_values,
+            exists=lambda library: not library.course.is_manual or bool(library.quiz_index),
+            order=50,
+            indexed=False,
+        ),
         PageKind(
             name="review",
             values=review_values,

@@ -105,12 +105,34 @@ class Flow:
         elif name == "hr":
             yield element("hr")
         elif name in ("ul", "ol"):
-            yield from self._list(node)
+            if node.attributes.get("start", "1") != "1" or "reversed" in node.attributes:
+                self.lose("a numbered list counts from 1")
+            items = [
+                self._container("li", child if _is_item(child) else HtmlElement("li", {}, [child]))
+                for child in node.children
+                if not isinstance(child, str) or child.strip()
+            ]
+            yield from [element(node.name, {}, *items)] if items else ()
         elif name == "dl":
             parts = [self._container(part.name, part) for part in node.nearest("dt", "dd")]
             yield from [element("dl", {}, *parts)] if parts else ()
         elif name == "table":
-            yield from self._table(node)
+            # Make a table with one head at most and a body, which QTI requires; captions go first
+            head: list[Element] = []
+            body: list[Element] = []
+            for child in sorted(node.elements, key=lambda child: child.name == "tfoot"):
+                if child.name == "caption":
+                    yield from self._blocks(child.children)
+                    continue
+                for row in child.nearest("tr"):
+                    cells = list(map(self._cell, row.nearest("td", "th")))
+                    rows = head if child.name == "thead" else body
+                    rows += [element("tr", {}, *cells)] if cells else []
+            if not body:
+                head, body = [], head
+            if body:
+                top = element("thead", {}, *head) if head else None
+                yield element("table", {}, top, element("tbody", {}, *body))
         else:
             if name == "details":
                 self.lose("`<details>` is open")
@@ -119,16 +141,6 @@ class Flow:
                 yield element("blockquote", {}, *inner)
             else:
                 yield from [element("div", {}, *inner)] if len(inner) > 1 and name != "p" else inner
-
-    def _list(self, node: HtmlElement) -> Iterator[Element]:
-        if node.attributes.get("start", "1") != "1" or "reversed" in node.attributes:
-            self.lose("a numbered list counts from 1")
-        items = [
-            self._container("li", child if _is_item(child) else HtmlElement("li", {}, [child]))
-            for child in node.children
-            if not isinstance(child, str) or child.strip()
-        ]
-        yield from [element(node.name, {}, *items)] if items else ()
 
     def _container(
         self, name: str, node: HtmlElement, attributes: dict[str, str] | None = None
@@ -140,24 +152,6 @@ class Flow:
         else:
             add(container, *self._line(node.children))
         return container
-
-    def _table(self, node: HtmlElement) -> Iterator[Element]:
-        """Make a table with one head at most and a body, which QTI requires; captions go first."""
-        head: list[Element] = []
-        body: list[Element] = []
-        for child in sorted(node.elements, key=lambda child: child.name == "tfoot"):
-            if child.name == "caption":
-                yield from self._blocks(child.children)
-                continue
-            for row in child.nearest("tr"):
-                cells = list(map(self._cell, row.nearest("td", "th")))
-                rows = head if child.name == "thead" else body
-                rows += [element("tr", {}, *cells)] if cells else []
-        if not body:
-            head, body = [], head
-        if body:
-            top = element("thead", {}, *head) if head else None
-            yield element("table", {}, top, element("tbody", {}, *body))
 
     def _cell(self, cell: HtmlElement) -> Element:
         attributes = _numbers(cell, ("colspan", "rowspan"))

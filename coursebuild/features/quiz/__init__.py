@@ -1,7 +1,7 @@
 """Quizzes: questions that a learner answers in the page, and whose answers the build checks.
 
 A `quiz` fence holds JSON (`schema`). `parse` makes a `Quiz` of it (`model`), `checks` compares it
-with the course and with what scripts printed, `page` and `markdown` show it.
+with the course and with what scripts printed, `page` shows it.
 """
 
 from coursebuild.core.features import Feature, FenceKind, PagePart

@@ -58,16 +58,12 @@ def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | Non
     return Parsed(None, tuple(chain.from_iterable(diagnostics)))
 
 
-def _following_blocks(quiz: Quiz, document: Document) -> tuple[Block, ...]:
-    """The blocks after a quiz, up to the next heading or rule; none if it is inside a block."""
+def _check_predictions(quiz: Quiz, document: Document) -> Iterator[Diagnostic]:
+    # The blocks after a quiz, up to the next heading or rule; none if it is inside a block
     at = next((at for at, block in enumerate(document.blocks) if block is quiz), None)
     rest = () if at is None else document.blocks[at + 1 :]
     ends = (i for i, block in enumerate(rest) if isinstance(block, Heading | ThematicBreak))
-    return rest[: next(ends, None)]
-
-
-def _check_predictions(quiz: Quiz, document: Document) -> Iterator[Diagnostic]:
-    blocks = _following_blocks(quiz, document)
+    blocks = rest[: next(ends, None)]
     labs = [block for block in blocks if isinstance(block, Lab)]
     for question in quiz.questions:
         if not isinstance(question, ChoiceQuestion):

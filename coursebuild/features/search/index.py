@@ -89,7 +89,14 @@ def search_files(site: SiteContext) -> Iterator[CachedFile]:
     slices = [_sorted_slices(site, plan, site.pages[start : start + _BATCH]) for start in starts]
     shards = list(zip(*slices, strict=True))
     names = [_digest(b"\0".join(parts))[:8] for parts in shards]
-    texts = _texts(site.pages)
+    # The pages of each file of texts; its name depends on paths, as texts can be alike
+    groups: list[tuple[NotedPage, ...]] = [
+        (page,) for page in site.pages if page.kind not in LEAD_ONLY
+    ]
+    leads = tuple(page for page in site.pages if page.kind in LEAD_ONLY)
+    groups += [leads[start : start + _BATCH] for start in range(0, len(leads), _BATCH)]
+    sums = (" ".join(f"{page.digest} {page.path}" for page in group) for group in groups)
+    texts = {_digest(s.encode())[:10]: g for s, g in zip(sums, groups, strict=True)}
     listing = script("index", "", as_json(_listing(site, plan, "".join(names), texts)))
     yield CachedFile(LIST, _digest(listing), lambda: listing)
     for number, (name, parts) in enumerate(zip(names, shards, strict=True)):
@@ -104,15 +111,6 @@ def search_files(site: SiteContext) -> Iterator[CachedFile]:
 def _text_script(site: SiteContext, pages: Iterable[NotedPage]) -> bytes:
     texts = (text_and_terms(site.note(page.path))[0].decode() for page in pages)
     return script("page", "", f"[{','.join(texts)}]")
-
-
-def _texts(pages: Sequence[NotedPage]) -> dict[str, tuple[NotedPage, ...]]:
-    """Return the pages of each file of texts; its name depends on paths, as texts can be alike."""
-    groups: list[tuple[NotedPage, ...]] = [(page,) for page in pages if page.kind not in LEAD_ONLY]
-    leads = tuple(page for page in pages if page.kind in LEAD_ONLY)
-    groups += [leads[start : start + _BATCH] for start in range(0, len(leads), _BATCH)]
-    sums = (" ".join(f"{page.digest} {page.path}" for page in group) for group in groups)
-    return {_digest(s.encode())[:10]: g for s, g in zip(sums, groups, strict=True)}
 
 
 def _digest(data: bytes) -> str:

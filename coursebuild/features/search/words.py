@@ -272,19 +272,16 @@ class _Reader:
         if piece[0] == "\\" and len(piece) > 1:
             return " " if piece[1].isspace() or piece[1] in ",;:!\\" else piece[1]
         if piece == "{":
-            return self._rest_of_group()
+            self._depth += 1
+            # Beyond the depth of any real formula groups are read flat, against stack overflows.
+            inner = self._group() if self._depth < 64 else ""
+            self._depth -= 1
+            if self._next() == "}":
+                self._at += 1
+            return inner
         if piece in ("^", "_"):
             return piece + _add_brackets(self._argument())
         return {"&": " ", "~": " ", "'": "′", "\\": ""}.get(piece, piece)
-
-    def _rest_of_group(self) -> str:
-        self._depth += 1
-        # Beyond the depth of any real formula groups are read flat, against stack overflows.
-        inner = self._group() if self._depth < 64 else ""
-        self._depth -= 1
-        if self._next() == "}":
-            self._at += 1
-        return inner
 
     def _argument(self) -> str:
         while self._next().isspace():

@@ -1,7 +1,7 @@
 """The symbols of a course: what documents declare of each, and a page that lists all.
 
-1. `mathml` finds the symbols of a formula.
-2. `uses` finds the symbols of a document, what it declares of them, and those of all lessons.
+`uses` finds the symbols of a formula, those of a document, what it declares of them, and those of
+all lessons.
 """
 
 from coursebuild.core.features import Feature, PageKind

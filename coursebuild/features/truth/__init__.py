@@ -27,7 +27,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.syntax.fence import Fence, TextParser
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt
 from coursebuild.features.truth.claims import (
@@ -66,7 +66,7 @@ def parse_truth(fence: Fence, texts: TextParser) -> Parsed[TruthTable]:
     """Parse the fence, which has neither keys nor a text."""
     diagnostics = list(fence.keys().diagnostics)
     if fence.body.text.strip():
-        help = "leave it empty: the table is made from the course"
+        help = Fix("leave it empty: the table is made from the course", "")
         place = fence.body.span()
         diagnostics.append(diagnose("truth-text", place, "this text is not used", help=help))
     return Parsed(TruthTable(fence.span), tuple(diagnostics))
@@ -191,9 +191,19 @@ FEATURE = Feature(
     unproven=unproven,
     texts={"en": _TEXTS},
     rules=(
-        Rule("number-unproven", "warning", "A number that nothing in the course proves."),
+        Rule(
+            "number-unproven",
+            "warning",
+            "A number that nothing in the course proves.",
+            "Only its author knows where the number is from.",
+        ),
         Rule("given-source", "error", "A number is not in the file that is named as its source."),
-        Rule("truth-share", "error", "Fewer numbers are proven than the course map asks for."),
+        Rule(
+            "truth-share",
+            "error",
+            "Fewer numbers are proven than the course map asks for.",
+            "Only their author knows where the numbers are from.",
+        ),
         Rule("truth-text", "error", "A `truth` fence holds a text, which nothing reads."),
     ),
 )

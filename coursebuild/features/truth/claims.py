@@ -31,7 +31,7 @@ from msgspec.structs import replace
 from coursebuild.core import model
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.scripts.numbers import Number, scan_prose
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import find_unit
 from coursebuild.features.arithmetic.evaluate import FormulaComparison, read_numeral
@@ -103,6 +103,10 @@ def check_sources(course: model.Course, numbers: Iterable[NamedNumber]) -> Itera
         if number.path not in texts:
             message = f"`{number.path}` is no script and no model of this course"
             help = did_you_mean(number.path, texts)
+            if isinstance(help, Fix):  # the path stands behind the number
+                source, end = number.span.source, number.span.end
+                line_end = source.line_start(number.span.end_line + 1)
+                help = help.at(source.span(end, line_end))
             yield diagnose("given-source", number.span, message, help=help)
             continue
         if number.path not in numbers_by_path:

@@ -4,6 +4,6 @@ Entry points: `survey.Surveyor`, for a `model_text.ModelText`; `comparison.pruni
 scenarios.
 
 `xml_edits`: MJCF as text with places, and changes of it. `candidates`: what could be left out, with
-`reachability`, where geoms can get. `readers`: by what code could tell. `comparison`, `trials`: how
-the model does without it.
+`bystanders`, and `reachability`, where geoms can get. `readers`: by what code could tell.
+`comparison`, `trials`: how the model does without it.
 """

@@ -1,8 +1,8 @@
 """Candidates: what could be left out of a model, and why all motions would stay the same.
 
 Entry points: `unread_elements(text, scenarios)`, of which no motion is computed;
-`unreachable_contacts(text)`, where nothing can touch; `idle_contacts`, `far_bodies`,
-`other_settings`, for which only runs speak.
+`unreachable_contacts(text)`, where nothing can touch; `idle_contacts`, `contact_of_rest`,
+`inner_geoms`, `primitive_meshes`, `other_settings`, for which only runs speak.
 
 1. The proof of a kind holds only if MuJoCo compiles the model without the thing, so that no other
    element refers to it. The survey checks that nothing else in the compiled model changes.
@@ -12,7 +12,7 @@ Entry points: `unread_elements(text, scenarios)`, of which no motion is computed
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from itertools import islice
 from pathlib import PurePosixPath
 from typing import Any
@@ -24,7 +24,14 @@ from msgspec import Struct
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.comparison import WatchedRun
 from coursebuild.numerics.pruning.model_text import ModelText, section_of, thing_kind
-from coursebuild.numerics.pruning.reachability import Pair, find_separate, iterate_pairs
+from coursebuild.numerics.pruning.reachability import (
+    Pair,
+    depths,
+    find_separate,
+    is_enclosed,
+    iterate_pairs,
+    mesh_vertices,
+)
 from coursebuild.numerics.pruning.xml_edits import (
     Element,
     ModelEdit,
@@ -109,13 +116,25 @@ KINDS = {
         "what the scene is about moves in the same way without the {}", "body", "Body"
     ),
     "contact-idle": FindingKind("contacts are searched for, and nothing touched"),
+    "contact-left": FindingKind("contacts are searched for, and without {} nothing touched"),
     "collision-idle": FindingKind(
         "contacts are searched for on the {}, and nothing touched there", "geom"
     ),
+    "resting-joint": FindingKind("nothing moved in the {}", "joint", "Joint"),
+    "coupling-idle": FindingKind("what the scene shows is the same without the {}", "coupling"),
+    "geom-inside": FindingKind("another geom of its body encloses the {}", "geom", "Geom"),
+    "mesh-primitive": FindingKind(
+        "a simple shape can stand for the mesh of the {}", "geom", "Geom"
+    ),
     "sleep": FindingKind("bodies at rest can sleep"),
     "island": FindingKind("all constraints can be solved at once, without islands"),
+    "multiccd": FindingKind("one contact of two meshes at a time does"),
     "solver": FindingKind("the solver {} does"),
     "cone": FindingKind("{} friction cones do"),
+    "jacobian": FindingKind("{} Jacobians do"),
+    "iterations": FindingKind("{} iterations of the solver do"),
+    "tolerance": FindingKind("a tolerance of {} of the solver does"),
+    "noslip_iterations": FindingKind("the solver does without its iterations against slip"),
 }
 """What uses other things comes before them, so that they can go with it."""
 
@@ -175,7 +194,7 @@ def _unread_kind(text: ModelText, element: Element, scenarios: Collection[Scenar
         return "sensor-unread"
     if section == "actuator" and ids and _is_forceless_actuator(text.model, ids, scenarios):
         return "actuator-idle"
-    if section == "tendon" and ids and _is_forceless_tendon(text.model, ids):
+    if section == "tendon" and ids and is_forceless_tendon(text.model, ids):
         return "tendon-idle"
     if section == "keyframe" and tag == "key":
         return "unused-keyframe"
@@ -222,15 +241,18 @@ def _is_forceless_actuator(
     return True
 
 
-_OF_TENDONS = (
+_FORCES_OF_TENDONS = (
     *("stiffness", "stiffnesspoly", "damping", "dampingpoly", "frictionloss", "armature"),
     "limited",
 )
 """Properties that make a tendon exert a force of its own."""
 
 
-def _is_forceless_tendon(model: Any, ids: Collection[int]) -> bool:
-    return not any(np.any(getattr(model, f"tendon_{name}")[i]) for name in _OF_TENDONS for i in ids)
+def is_forceless_tendon(model: Any, ids: Collection[int]) -> bool:
+    """Whether no force acts along these tendons, in any state."""
+    return not any(
+        np.any(getattr(model, f"tendon_{name}")[i]) for name in _FORCES_OF_TENDONS for i in ids
+    )
 
 
 def unreachable_contacts(text: ModelText) -> list[Item]:
@@ -249,6 +271,9 @@ def idle_contacts(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
     return _without_contact(text, pairs, touching, "contact-idle", "collision-idle")
 
 
+_UNTOUCHABLE = (("contype", "0"), ("conaffinity", "0"))
+
+
 def _without_contact(
     text: ModelText, pairs: Collection[Pair], touching: Collection[Pair], whole: str, part: str
 ) -> list[Item]:
@@ -264,98 +289,124 @@ def _without_contact(
     explicit = {int(g) for g in (*text.model.pair_geom1, *text.model.pair_geom2)}
     idle = {geom for pair in pairs for geom in pair} - explicit
     idle -= {geom for pair in touching for geom in pair}
-    none = (("contype", "0"), ("conaffinity", "0"))
     return [
-        Item(part, display_name(element), element, edits=set_attributes(element, none))
+        Item(part, display_name(element), element, edits=set_attributes(element, _UNTOUCHABLE))
         for element, ids in text.things("geom")
         if idle.issuperset(ids)
     ]
 
 
-def far_bodies(
-    text: ModelText, code_names: Collection[str], runs: Collection[WatchedRun]
-) -> list[Item]:
-    """Bodies that the scene is not about.
+def inner_geoms(text: ModelText) -> list[Item]:
+    """Geoms that lie wholly inside another one of their body, and collide as it does.
 
-    It is about trees of bodies that are driven or couple with others, are set in motion, or
-    contain a name that code uses; where there are none, about mechanisms rather than single free
-    bodies; where there are none, about those with names. Where all are alike none is far.
+    One that has mass only stops colliding.
     """
-    model, tree = text.model, text.model.body_treeid
-    used_names = {name for inner in text.elements for name in _references(inner, code_names)}
-    used_names |= set(code_names)
-    used_names |= {
-        name.rstrip("0123456789") for name in used_names
-    }  # what is repeated has a number
-    ranks: dict[int, int] = {}
-    for case in (run.scene.scenario for run in runs):
-        velocity = np.array(case.qvel)
-        if not case.qvel and case.keyframe >= 0:
-            velocity = model.key_qvel[case.keyframe]
-        ranks |= dict.fromkeys(model.dof_treeid[np.flatnonzero(velocity)].tolist(), 3)
-    roots: dict[Element, list[int]] = {}
-    for element, ids in text.things("body"):
-        names = {inner.get("name") for inner in element.walk()} - {None, ""}
-        for number in {int(tree[i]) for i in ids} - {-1}:
-            is_free_body = model.tree_bodynum[number] == 1 and model.tree_dofnum[number] == 6
-            rank = 3 if names & used_names else 0 if is_free_body else 2
-            ranks[number] = max(rank, ranks.get(number, 0), 1 if element.get("name") else 0)
-            if int(model.tree_bodyadr[number]) in ids:
-                roots.setdefault(element, []).append(number)
-    most = max(ranks.values(), default=0)
-    items = []
-    for element, numbers in roots.items():
-        is_viewpoint = any(inner.tag in ("camera", "light") for inner in element.walk())
-        if not is_viewpoint and all(ranks[number] < most for number in numbers):
-            removals = (element, *_pairs_and_sensors_of(text, element))
-            items.append(Item("far-body", display_name(element), element, removals))
+    model, items = text.model, []
+    for element, ids in text.things("geom"):
+        if not all(is_enclosed(model, i) for i in ids):
+            continue
+        body = element.parent
+        has_inertia = body is not None and any(child.tag == "inertial" for child in body.children)
+        if has_inertia or (element.get("mass") or element.get("density")) == "0":
+            removals = (element,)
+            items.append(Item("geom-inside", display_name(element), element, removals))
+        elif any(model.geom_contype[i] or model.geom_conaffinity[i] for i in ids):
+            edits = set_attributes(element, _UNTOUCHABLE)
+            items.append(Item("geom-inside", display_name(element), element, edits=edits))
     return items
 
 
-_NOT_REFERENCES = frozenset(("name", "class", "childclass", "material", "mesh", "file", "type"))
+def contact_of_rest(text: ModelText, items: Sequence[Item]) -> list[Item]:
+    """Contact as a whole, together with items without which nothing may touch any more."""
+    if not items:
+        return []
+    removals = tuple(element for item in items for element in item.removals)
+    drops = tuple(drop for item in items for drop in item.drops)
+    edits = [edit for item in items for edit in item.edits]
+    edits += set_option(text.main, "flag", "contact", "disable")
+    kinds = " and ".join(dict.fromkeys(f"`{item.kind}`" for item in items))
+    return [Item("contact-left", f"what {kinds} names", None, removals, drops, tuple(edits))]
 
 
-def _references(element: Element, code_names: Collection[str]) -> Iterator[str]:
-    """The names that an element refers to; excluded pairs and unread sensors do not count."""
-    is_optional = (
-        section_of(element) in ("contact", "sensor") and element.get("name") not in code_names
-    )
-    if not is_optional:
-        yield from (
-            attribute.value
-            for attribute in element.attributes
-            if attribute.name not in _NOT_REFERENCES
+_FIT = 0.05
+"""How far a shape may be off, relative to a mesh's size."""
+_SHAPES = ("sphere", "capsule", "cylinder", "box", "ellipsoid")
+
+
+def primitive_meshes(text: ModelText) -> list[Item]:
+    """Meshes that collide, each with the shape that MuJoCo fits to it best.
+
+    Its surface is off by as much as is said; whether that shows is tried by running.
+    """
+    model, items = text.model, []
+    for element, ids in text.things("geom"):
+        if element.get("type") != "mesh" or not all(
+            model.geom_contype[i] or model.geom_conaffinity[i] for i in ids
+        ):
+            continue
+        fits, body = [], element.parent
+        siblings = (
+            [child for child in body.children if child.tag in ("geom", "inertial")] if body else []
         )
+        mass = (("mass", f"{float(model.body_mass[model.geom_bodyid[ids[0]]]):.17g}"),)
+        for shape in _SHAPES:  # with the mass that the mesh has
+            edits = set_attributes(
+                element, (("type", shape), *(mass if len(siblings) == 1 else ()))
+            )
+            try:
+                variant = text.compile(edits)
+            except ValueError:
+                continue
+            turn, i = np.zeros(9), ids[0]
+            whole_turn, vertices = np.zeros(9), mesh_vertices(model, int(model.geom_dataid[i]))
+            mujoco.mju_quat2Mat(whole_turn, model.geom_quat[i])
+            mujoco.mju_quat2Mat(turn, variant.geom_quat[i])
+            places = model.geom_pos[i] + vertices @ whole_turn.reshape(3, 3).T
+            local = (places - variant.geom_pos[i]) @ turn.reshape(3, 3)
+            fits.append((float(np.abs(depths(variant, i, local)).max()), shape, edits))
+        if fits:
+            off, shape, edits = min(fits)
+            name = f"{display_name(element)} ({shape}, off by {off:.2g} m)"
+            if off < _FIT * min(model.geom_rbound[i] for i in ids):
+                items.append(Item("mesh-primitive", name, element, edits=edits))
+    return items
 
 
-def _pairs_and_sensors_of(text: ModelText, body: Element) -> list[Element]:
-    """The pairs and sensors that refer to something in a body, and go with it."""
-    names = {element.get("name") for element in body.walk()} - {None, ""}
-    return [
-        element
-        for element in text.elements
-        if section_of(element) in ("contact", "sensor")
-        and any(
-            attribute.value in names for attribute in element.attributes if attribute.name != "name"
-        )
-    ]
-
-
-_SETTINGS = (
+_OTHER_SETTINGS = (
     ("flag", "sleep", "enable"),
     ("flag", "island", "disable"),
+    ("flag", "multiccd", "disable"),
     ("option", "solver", "Newton"),
     ("option", "solver", "CG"),
     ("option", "cone", "pyramidal"),
     ("option", "cone", "elliptic"),
+    ("option", "jacobian", "dense"),
+    ("option", "jacobian", "sparse"),
+    ("option", "iterations", "10"),
+    ("option", "tolerance", "1e-6"),
+    ("option", "noslip_iterations", "0"),
 )
+
+SETTINGS = frozenset(name for _, name, _ in _OTHER_SETTINGS)
+"""Kinds of findings that are about settings rather than things."""
 
 
 def other_settings(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
-    """Other solver settings, for a model in which a constraint was ever active."""
+    """Other solver settings, for a model in which a constraint was ever active.
+
+    None asks for more work than the model's own.
+    """
     if not any(run.constrained for run in runs):
         return []
+    option = text.model.opt
+    is_spared = {
+        "iterations": option.iterations <= 10,
+        "tolerance": option.tolerance >= 1e-6,
+        "noslip_iterations": option.noslip_iterations == 0,
+        "multiccd": bool(option.disableflags & int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)),
+    }
     return [
         Item(name, value, None, edits=set_option(text.main, tag, name, value))
-        for tag, name, value in _SETTINGS
+        for tag, name, value in _OTHER_SETTINGS
+        if not is_spared.get(name, False)
     ]

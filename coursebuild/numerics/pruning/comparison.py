@@ -1,14 +1,17 @@
 """Two models in the same scenario: whether they do the same, bit for bit or nearly.
 
-Entry points: `compare(base, variant, index, scenes)`, `watch(model, scene)`; `pruning_scenes(model,
-declarations, quick=…)`, the scenarios by which a smaller model is judged.
+Entry points: `pruning_scenes(model, declarations, quick=…)`, the scenarios by which a smaller model
+is judged; `watch(model, scene)`, the whole model in one; `nearby_scenes(model, run, count)`, from
+random starts nearby; `compare(base, variant, index, runs)`.
 
-1. Both begin in the same state and are stepped side by side. Positions, velocities, activations and
-   the sensors that are left must be the same bits after every step; so must contacts with their
-   forces, at every tenth step.
-2. Where a bit differs, chaos may amplify it. So the base run is followed, and every 0.1 s the
-   variant starts from its state: what counts is how far both are apart within 50 ms.
-3. A run that the detector calls lost proves nothing.
+1. Both begin in the same state and are stepped side by side to the end: neither is ever set to the
+   state of the other, which would hide what a part does that is gone. Positions, velocities,
+   activations and the sensors that are left must be the same bits after every step; so must
+   contacts with their forces, at every tenth step.
+2. Where a bit differs, what counts is what the scene shows of it: how far the bodies that are left
+   are displaced and turned at any step, and what its sensors read.
+3. In chaos this is compared as long as a twin of the base, off by 1e-10, stays near it.
+4. A run that the detector calls lost proves nothing.
 """
 
 from __future__ import annotations
@@ -25,7 +28,8 @@ from numpy.typing import NDArray
 
 from coursebuild.core.model.scenarios import Declarations, DeclaredScenario
 from coursebuild.numerics.detector import Peaks, RunJudgement, judge, update_peaks
-from coursebuild.numerics.problem import Scenario
+from coursebuild.numerics.pilot import NUDGE, nudges
+from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.scene import Scene, scenes, thickness
 from coursebuild.numerics.simulation import STATE, advance, full_state, initial_data
 
@@ -46,6 +50,7 @@ _STATE = {
     "xfrc_applied": "nbody",
     "mocap_pos": "nmocap",
     "mocap_quat": "nmocap",
+    "eq_active": "neq",
 }
 """Parts of a state, with the field of their length."""
 KEY_SIZES = {"qpos": "nq", "qvel": "nv", "act": "na", "ctrl": "nu"}
@@ -55,7 +60,8 @@ KEY_SIZES = {"qpos": "nq", "qvel": "nv", "act": "na", "ctrl": "nu"}
 def index_map(model: Any, losses: Mapping[str, Collection[int]]) -> IndexMap:
     """The places in a model that are left without things of some kinds, given by number.
 
-    Those are `body`, whose descendants go too, `geom`, `sensor` and `actuator`.
+    Those are `body`, whose descendants go too, `joint`, `geom`, `sensor`, `actuator` and
+    `equality`.
     """
     bodies = set(losses.get("body", ()))
     for number in range(1, model.nbody):  # parents come first
@@ -64,17 +70,19 @@ def index_map(model: Any, losses: Mapping[str, Collection[int]]) -> IndexMap:
     body = np.setdiff1d(np.arange(model.nbody), [*bodies])
     mocap = model.body_mocapid[body]
     joints = np.flatnonzero(np.isin(model.jnt_bodyid, body))
+    joints = np.setdiff1d(joints, [*losses.get("joint", ())])
     ctrl = np.setdiff1d(np.arange(model.nu), [*losses.get("actuator", ())])
     sensors = np.setdiff1d(np.arange(model.nsensor), [*losses.get("sensor", ())])
     geoms = np.setdiff1d(np.arange(model.ngeom), [*losses.get("geom", ())])
     widths = [_WIDTHS.get(int(kind), 1) for kind in model.jnt_type[joints]]
     return {
         "nq": _ranges(model.jnt_qposadr[joints], widths),
-        "nv": np.flatnonzero(np.isin(model.dof_bodyid, body)),
+        "nv": np.flatnonzero(np.isin(model.dof_jntid, joints)),
         "na": _ranges(model.actuator_actadr[ctrl], model.actuator_actnum[ctrl]),
         "nu": ctrl,
         "nbody": body,
         "nmocap": mocap[mocap >= 0].astype(np.int64),
+        "neq": np.setdiff1d(np.arange(model.neq), [*losses.get("equality", ())]),
         "ngeom": geoms[np.isin(model.geom_bodyid[geoms], body)],
         "nsensordata": _ranges(model.sensor_adr[sensors], model.sensor_dim[sensors]),
     }
@@ -106,28 +114,28 @@ def transfer(model: Any, data: Any, index: IndexMap, variant: Any, variant_data:
     Raises:
         ValueError: a part of the state (of a plugin, of a delay) cannot be assigned.
     """
-    is_same_size = all(getattr(model, size) == getattr(variant, size) for size in (*index, "neq"))
+    is_same_size = all(getattr(model, size) == getattr(variant, size) for size in index)
     if is_same_size and mujoco.mj_stateSize(model, STATE) == mujoco.mj_stateSize(variant, STATE):
         mujoco.mj_setState(variant, variant_data, full_state(model, data), STATE)
         return
     delays = mujoco.mj_stateSize(variant, int(mujoco.mjtState.mjSTATE_HISTORY))
     if variant.npluginstate or delays:
         raise ValueError("its plugins or delays have states that cannot be told apart")
-    if variant.neq != model.neq:
-        raise ValueError("it has other equalities")
     variant_data.time = data.time
     for name, size in _STATE.items():
         getattr(variant_data, name)[:] = getattr(data, name)[index[size]]
-    variant_data.eq_active[:] = data.eq_active
     variant_data.userdata[:] = data.userdata
 
 
 QUICK = 0.5
 """About how many seconds a scenario takes with `--quick`."""
-TOLERANCE = 1e-8
-"""The difference that counts as none: relative to a number's size, absolute if that is under 1."""
-SHOTS, SHOT = 0.1, 0.05
-"""Seconds from one start to the next, and that each lasts."""
+ALIKE = 0.01
+"""The difference that counts as none: this part of what is just visible in a picture."""
+NEARBY = 0.01
+"""How far starts nearby are off in each degree of freedom: this part of how far, and how fast, it
+moves from the declared start. What rests stays where it is."""
+_ROUNDING = 1e-8
+"""A reading that differs by less, relative to 1 or to the largest of its sensor, is the same."""
 _CONTACTS = 10
 """Steps from one look at the contacts to the next."""
 
@@ -145,120 +153,19 @@ def pruning_scenes(
         step, place = float(model.opt.timestep), declarations.source.span(0, 0)
         scenario, start = Scenario(10 * step, step), DeclaredScenario("start", span=place)
         return (Scene("start", "", scenario, (step,), step, declarations.bench, start),)
-    return tuple(_shorten(scene) for scene in declared_scenes) if quick else declared_scenes
-
-
-def _shorten(scene: Scene) -> Scene:
-    sample, duration = scene.scenario.sample, scene.scenario.duration
-    short = sample * max(1, round(min(duration, QUICK) / sample))
-    return replace(scene, scenario=replace(scene.scenario, duration=short))
-
-
-class MotionComparison(Struct, frozen=True):
-    """How a variant compares with the base in all scenarios."""
-
-    identical: bool
-    difference: float
-    """The largest; 0 where all bits are the same, infinite where it was lost."""
-
-
-def compare(base: Any, variant: Any, index: IndexMap, scenes: Sequence[Scene]) -> MotionComparison:
-    """Run base and variant in all scenarios.
-
-    Raises:
-        ValueError: a state of the base cannot be transferred.
-    """
-    for model in (base, variant):
-        without_reset(model)
-    sleeps = int(mujoco.mjtEnableBit.mjENBL_SLEEP) & ~base.opt.enableflags & variant.opt.enableflags
-    difference, identical = 0.0, True
-    for scene in scenes:
-        if not _same_bits(base, variant, index, scene):
-            identical = False
-            # What sleeps would be awake after each shot.
-            departure = _largest_departure(base, variant, index, scene, whole=bool(sleeps))
-            difference = max(difference, departure)
-        if difference > TOLERANCE and not sleeps:
-            break
-    return MotionComparison(identical, difference)
+    if not quick:
+        return declared_scenes
+    short_scenes = []
+    for scene in declared_scenes:
+        sample, duration = scene.scenario.sample, scene.scenario.duration
+        short = sample * max(1, round(min(duration, QUICK) / sample))
+        short_scenes.append(replace(scene, scenario=replace(scene.scenario, duration=short)))
+    return tuple(short_scenes)
 
 
 def without_reset(model: Any) -> None:
     """Switch off MuJoCo's automatic reset, so that a state that blew up stays visible."""
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-
-
-def _begin_steps(
-    base: Any, variant: Any, index: IndexMap, scene: Scene
-) -> Iterator[tuple[int, Any, Any]]:
-    """The number of each step with the data of both models, which wait for it with its command."""
-    data, variant_data = initial_data(scene.scenario, base), mujoco.MjData(variant)
-    transfer(base, data, index, variant, variant_data)
-    for step, command in enumerate(scene.scenario.commands(scene.timestep)):
-        if command:
-            data.ctrl[:] = command
-            variant_data.ctrl[:] = data.ctrl[index["nu"]]
-        yield step, data, variant_data
-
-
-def _same_bits(base: Any, variant: Any, index: IndexMap, scene: Scene) -> bool:
-    left = {int(whole): i for i, whole in enumerate(index["ngeom"])}
-    identity = {i: i for i in range(variant.ngeom)}
-    for step, data, variant_data in _begin_steps(base, variant, index, scene):
-        advance(base, data)
-        advance(variant, variant_data)
-        if any(a.tobytes() != b.tobytes() for a, b in _states(data, variant_data, index)):
-            return False
-        if step % _CONTACTS == 0:  # the geoms that are left touch alike, with the same forces
-            contacts = _contacts(base, data, left)
-            if contacts != _contacts(variant, variant_data, identity):
-                return False
-    return judge(variant, variant_data, scene.scenario.duration).ok
-
-
-def _states(data: Any, variant_data: Any, index: IndexMap) -> tuple[tuple[Any, Any], ...]:
-    """The state and sensors of the variant, each beside the same entries of the base."""
-    return (
-        (data.qpos[index["nq"]], variant_data.qpos),
-        (data.qvel[index["nv"]], variant_data.qvel),
-        (data.act[index["na"]], variant_data.act),
-        (data.sensordata[index["nsensordata"]], variant_data.sensordata),
-    )
-
-
-def _contacts(model: Any, data: Any, left: dict[int, int]) -> list[tuple[object, ...]]:
-    """The contacts between geoms that are left: their numbers, distance and force, as bytes."""
-    contacts, force = [], np.zeros(6)
-    for i, pair in enumerate(data.contact.geom[: data.ncon].tolist()):
-        if all(geom < 0 or geom in left for geom in pair):
-            mujoco.mj_contactForce(model, data, i, force)
-            numbers = tuple(left.get(geom, -1) for geom in pair)
-            contacts.append((numbers, data.contact.dist[i].tobytes(), force.tobytes()))
-    return sorted(contacts)
-
-
-def _largest_departure(
-    base: Any, variant: Any, index: IndexMap, scene: Scene, *, whole: bool
-) -> float:
-    """How far the variant departs from the base within 50 ms, from states of the base run.
-
-    `whole`: over the whole scenario instead, from its beginning.
-    """
-    interval, length = (max(1, round(span / scene.timestep)) for span in (SHOTS, SHOT))
-    worst = 0.0
-    for step, data, variant_data in _begin_steps(base, variant, index, scene):
-        at = 0 if whole else step % interval
-        if at == 0 and not whole:
-            transfer(base, data, index, variant, variant_data)
-        advance(base, data)
-        if at < length:
-            advance(variant, variant_data)
-            for a, b in _states(data, variant_data, index):
-                relative = np.abs(a - b) / np.maximum(1.0, np.abs(a))
-                worst = max(worst, float(np.nan_to_num(relative, nan=np.inf).max(initial=0.0)))
-            if math.isinf(worst):
-                return math.inf
-    return worst if judge(variant, variant_data, float(variant_data.time)).ok else math.inf
 
 
 class WatchedRun(Struct, frozen=True, eq=False):
@@ -270,18 +177,30 @@ class WatchedRun(Struct, frozen=True, eq=False):
     """Pairs of geoms between which there was a contact that counts."""
     constrained: bool
     """Whether a constraint was ever active."""
+    displacements: Array
+    """(nv,): how far each degree of freedom was from its beginning, at most."""
+    speeds: Array
+    """(nv,): the largest."""
+    horizon: float
+    """s: how long a twin whose beginning is off by 1e-10 moves alike; infinite for to the end."""
 
 
 def watch(model: Any, scene: Scene) -> WatchedRun:
-    """Run the whole model in a scenario."""
+    """Run the whole model in a scenario, and beside it a twin."""
     without_reset(model)
-    data = initial_data(scene.scenario, model)
-    steps_made = 0
+    data, twin = initial_data(scene.scenario, model), initial_data(scene.scenario, model)
+    position, velocity = nudges(model, 2, NUDGE)[0] if model.nv else (twin.qvel, twin.qvel)
+    mujoco.mj_integratePos(model, twin.qpos, position, 1.0)
+    twin.qvel[:] += velocity
+    start, change = data.qpos.copy(), np.zeros(model.nv)
+    displacements, speeds = np.zeros(model.nv), np.zeros(model.nv)
+    steps_made, horizon = 0, math.inf
     touching: set[tuple[int, int]] = set()
     peaks, constrained, half_thickness = Peaks(), False, thickness(model)
+    gauge = _Gauge(model, model, index_map(model, {}), scene)
     for command in scene.scenario.commands(scene.timestep):
         if command:
-            data.ctrl[:] = command
+            data.ctrl[:] = twin.ctrl[:] = command
         advance(model, data)
         steps_made += 1
         constrained = constrained or data.nefc > 0
@@ -291,5 +210,152 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
         peaks = update_peaks(data, peaks, half_thickness)
         if not peaks.finite:
             break
+        mujoco.mj_differentiatePos(model, change, 1.0, start, data.qpos)
+        np.maximum(displacements, np.abs(change), out=displacements)
+        np.maximum(speeds, np.abs(data.qvel), out=speeds)
+        if math.isinf(horizon):
+            advance(model, twin)
+            gauge.look(data, twin)
+            horizon = float(data.time) if gauge.seen > ALIKE else horizon
     judgement = judge(model, data, steps_made * scene.timestep, peaks)
-    return WatchedRun(scene, judgement, frozenset(touching), constrained)
+    observations = frozenset(touching), constrained, displacements, speeds, horizon
+    return WatchedRun(scene, judgement, *observations)
+
+
+def nearby_scenes(model: Any, run: WatchedRun, count: int) -> Iterator[Scene]:
+    """The scenario of a run from random starts nearby, always the same ones."""
+    scenario, random = run.scene.scenario, np.random.default_rng(2)
+    for number in range(count if np.any(run.displacements) or np.any(run.speeds) else 0):
+        data = initial_data(scenario, model)
+        far, fast = random.normal(size=(2, model.nv)) * NEARBY * (run.displacements, run.speeds)
+        mujoco.mj_integratePos(model, data.qpos, far, 1.0)
+        nearby = replace(scenario, qpos=tuple(data.qpos), qvel=tuple(data.qvel + fast))
+        yield replace(run.scene, name=f"{run.scene.name}, nearby {number + 1}", scenario=nearby)
+
+
+class MotionComparison(Struct, frozen=True):
+    """How a variant compares with the base in all runs."""
+
+    identical: bool
+    difference: float
+    """The largest of what can be seen, where 1 is just visible; infinite where it was lost."""
+    shown: str = ""
+    """The same in the scene's own quantities; empty where nothing differs."""
+
+
+def compare(
+    base: Any, variant: Any, index: IndexMap, runs: Sequence[WatchedRun]
+) -> MotionComparison:
+    """Run base and variant side by side as the base ran before, each from where it begins.
+
+    A run ends where a difference can be seen, which is then the largest that is known.
+
+    Raises:
+        ValueError: a state of the base cannot be transferred.
+    """
+    for model in (base, variant):
+        without_reset(model)
+    worst = MotionComparison(True, 0.0)
+    for run in runs:
+        comparison = _follow(base, variant, index, run)
+        identical = worst.identical and comparison.identical
+        worst = max(worst, comparison, key=lambda c: (c.difference, bool(c.shown)))
+        worst = replace(worst, identical=identical)
+        if worst.difference >= 1.0:
+            break
+    return worst
+
+
+def _follow(base: Any, variant: Any, index: IndexMap, run: WatchedRun) -> MotionComparison:
+    scene, identical = run.scene, True
+    gauge = _Gauge(base, variant, index, scene)
+    geoms = {int(whole): i for i, whole in enumerate(index["ngeom"])}
+    own_geoms = {i: i for i in range(variant.ngeom)}
+    data, variant_data = initial_data(scene.scenario, base), mujoco.MjData(variant)
+    transfer(base, data, index, variant, variant_data)
+    for step, command in enumerate(scene.scenario.commands(scene.timestep)):
+        if command:
+            data.ctrl[:] = command
+            variant_data.ctrl[:] = data.ctrl[index["nu"]]
+        advance(base, data)
+        advance(variant, variant_data)
+        if identical:
+            identical = all(
+                getattr(data, name)[index[size]].tobytes() == getattr(variant_data, name).tobytes()
+                for name, size in _MOTION.items()
+            )
+        if identical and step % _CONTACTS == 0:  # the same geoms touch, with the same forces
+            contacts = _contacts(base, data, geoms)
+            identical = contacts == _contacts(variant, variant_data, own_geoms)
+        if not identical and data.time <= run.horizon:
+            gauge.look(data, variant_data)
+            if gauge.seen >= 1.0:
+                return MotionComparison(False, gauge.seen, gauge.shown)
+    for model, state in ((base, data), (variant, variant_data)):
+        mujoco.mj_kinematics(model, state)  # a step leaves places as they were at its beginning
+    if not identical and data.time <= run.horizon:
+        gauge.look(data, variant_data)
+    judgement = judge(variant, variant_data, scene.scenario.duration)
+    if not judgement.ok:
+        return MotionComparison(False, math.inf, f"the run is lost: {'; '.join(judgement.reasons)}")
+    difference, words = gauge.with_sensors()
+    if words and math.isfinite(run.horizon):
+        words += f", until {run.horizon:.3g} s, beyond which nobody can predict the motion"
+    return MotionComparison(identical, difference, words)
+
+
+_MOTION = {"qpos": "nq", "qvel": "nv", "act": "na", "sensordata": "nsensordata"}
+
+
+class _Gauge:
+    """How far a variant is from the base, in what the scene shows."""
+
+    def __init__(self, base: Any, variant: Any, index: IndexMap, scene: Scene) -> None:
+        self._base, self._bodies, self._readings = base, index["nbody"], index["nsensordata"]
+        extent = max(min(float(base.stat.extent), float(variant.stat.extent)), 1e-15)
+        self._length, self._share = scene.bench.visible * extent, scene.bench.visible
+        self._angle = math.radians(scene.bench.visible_angle)
+        self._gaps, self._largest = np.zeros((2, len(self._readings)))
+        self.seen, self.shown = 0.0, ""
+        """The largest so far of bodies, where 1 is just visible, and the same in words."""
+
+    def look(self, data: Any, variant_data: Any) -> None:
+        """Compare places, attitudes and sensors now."""
+        places = np.linalg.norm(data.xpos[self._bodies] - variant_data.xpos, axis=1)
+        first, second = data.xquat[self._bodies], variant_data.xquat
+        chords = [np.linalg.norm(first - sign * second, axis=1) for sign in (1, -1)]
+        turns = 4 * np.arcsin(np.minimum(np.minimum(*chords) / 2, 1.0))
+        for gaps, size, unit in ((places, self._length, "m"), (turns, self._angle, "rad")):
+            values = np.nan_to_num(gaps, nan=np.inf)
+            worst = int(values.argmax())
+            if (share := float(values[worst]) / size) > self.seen:
+                number = int(self._bodies[worst])
+                name = self._base.body(number).name or f"number {number}"
+                off = f"off by {values[worst]:.2g} {unit} at {float(data.time):.3g} s"
+                self.seen, self.shown = share, f"the body {name} is {off}"
+        readings = data.sensordata[self._readings]
+        gaps = np.nan_to_num(np.abs(readings - variant_data.sensordata), nan=np.inf)
+        np.maximum(self._gaps, gaps, out=self._gaps)
+        np.maximum(self._largest, np.abs(readings), out=self._largest)
+
+    def with_sensors(self) -> tuple[float, str]:
+        """The largest of bodies and sensors, whose readings count relative to their largest."""
+        gaps = np.where(self._gaps > _ROUNDING * np.maximum(self._largest, 1.0), self._gaps, 0.0)
+        shares = gaps / (self._share * np.maximum(self._largest, _ROUNDING))
+        if shares.max(initial=0.0) <= self.seen:
+            return self.seen, self.shown
+        worst = int(shares.argmax())
+        sensor = int(np.searchsorted(self._base.sensor_adr, self._readings[worst], "right")) - 1
+        name = self._base.sensor(sensor).name or str(sensor)
+        return float(shares[worst]), f"the sensor {name} is off by {gaps[worst]:.2g}"
+
+
+def _contacts(model: Any, data: Any, left: dict[int, int]) -> list[tuple[object, ...]]:
+    """The contacts between geoms that are left: their numbers, distance and force, as bytes."""
+    contacts, force = [], np.zeros(6)
+    for i, pair in enumerate(data.contact.geom[: data.ncon].tolist()):
+        if all(geom < 0 or geom in left for geom in pair):
+            mujoco.mj_contactForce(model, data, i, force)
+            numbers = tuple(left.get(geom, -1) for geom in pair)
+            contacts.append((numbers, data.contact.dist[i].tobytes(), force.tobytes()))
+    return sorted(contacts)

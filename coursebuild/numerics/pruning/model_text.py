@@ -50,12 +50,13 @@ KINDS: Mapping[str, tuple[mujoco.mjtObj, str]] = {
     "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, "nsensor"),
     "actuator": (mujoco.mjtObj.mjOBJ_ACTUATOR, "nu"),
     "tendon": (mujoco.mjtObj.mjOBJ_TENDON, "ntendon"),
+    "equality": (mujoco.mjtObj.mjOBJ_EQUALITY, "neq"),
 }
 """Kinds of things that elements become: MuJoCo's type, and the field with their number."""
 _IN_BODIES = {"body": "body", "joint": "joint", "freejoint": "joint", "geom": "geom"}
 _IN_BODIES |= {"site": "site"}
 _HOLDERS = frozenset(("worldbody", "body", "frame", "replicate"))
-_SECTIONS = frozenset(("sensor", "actuator", "tendon"))
+_SECTIONS = frozenset(("sensor", "actuator", "tendon", "equality"))
 
 
 class ModelText:

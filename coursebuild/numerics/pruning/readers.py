@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import functools
 import re
+import tokenize
 from collections.abc import Collection, Iterator
 from typing import Any
 
@@ -113,25 +114,30 @@ _SIMULATION = frozenset(
 )
 """Functions of MuJoCo that reveal nothing of the model as a whole. A keyframe is the only thing
 that they take by its number."""
+_STATE_WORDS = frozenset(
+    "act ctrl eq_active history mocap_pos mocap_quat na neq nhistory nmocap npluginstate nq nu"
+    " nuserdata nv plugin_state qacc_warmstart qfrc_applied qpos qvel userdata xfrc_applied".split(
+        " "
+    )
+)
+"""Fields that `mj_stateSize`, `mj_getState` and `mj_setState` read, write or count."""
 _OPAQUE = frozenset(
     # reflection
     "__import__ breakpoint compile delattr dir eval exec format format_map getattr globals hasattr"
     " locals setattr vars Function Object Reflect"
     # the file of the model, or names of things
-    " fromfile genfromtxt glob iterdir listdir load loadtxt modules open read_bytes read_text rglob"
-    " scandir walk MjSpec MjvScene Renderer rollout".split(" ")
+    " fromfile genfromtxt glob iterdir listdir load loadtxt memmap modules open read_bytes"
+    " read_text rglob scandir st_size walk MjSpec MjvScene Renderer rollout".split(" ")
 )
 _THING = re.compile(r"""\w+\s*\.\s*(\w+)\(\s*(?:"[^"\\]*"|'[^'\\]*')\s*\)(?:\s*\.\s*(\w+))?""")
 """An access to one thing by its complete name, and the attribute that is read from it."""
 _RESET = re.compile(r"""mj_resetDataKeyframe\(\w+, \w+, \w+\.key\(("[^"\\]*"|'[^'\\]*')\)\.id\)""")
 """A reset to a keyframe that is given by its complete name."""
 _TEXT = re.compile(r""""((?:[^"\\\n]|\\.)*)"|'((?:[^'\\\n]|\\.)*)'|`([^`]*)`""")
-_LITERAL = r"(?<![fF])(?:\"\"\"[\s\S]*?\"\"\"|\"(?:[^\"\\\n]|\\.)*\"|'(?:[^'\\\n]|\\.)*')"
-_PROSE = {
-    True: re.compile(rf"{_LITERAL}|#[^\n]*"),
-    False: re.compile(rf"{_LITERAL}|//[^\n]*|/\*[\s\S]*?\*/"),
-}
-"""Texts and comments, in which no code stands: of Python, and of JavaScript."""
+_PROSE = re.compile(
+    r"\"(?:[^\"\\\n]|\\.)*\"|'(?:[^'\\\n]|\\.)*'|//[^\n]*|/\*[\s\S]*?\*/|(`(?:[^`\\]|\\.)*`)"
+)
+"""Texts and comments of JavaScript, in which no code stands; in templates (group 1) some does."""
 _FORMAT_CALL = re.compile(r"([\"'])\s*\.format\(")
 """A text that may read attributes of its arguments."""
 _FUNCTION = re.compile(r"mj[dsprv]?_")
@@ -202,14 +208,17 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Mod
     rest, filled = _FORMAT_CALL.subn(r"\1(", _RESET.sub("", text))
     parts = {(VIEWS[view], part) for view, part in _THING.findall(rest) if view in VIEWS}
     rest = _THING.sub(lambda match: "named" if match[1] in VIEWS else match[0], rest)
-    code = _PROSE[path.endswith(".py")].sub('""', rest)
+    is_python = path.endswith(".py")
+    code = _python_code(rest) if is_python else _PROSE.sub(lambda m: m[1] or '""', rest)
     words = frozenset(_WORD.findall(rest if filled else code))
+    if not words.isdisjoint(("mj_stateSize", "mj_getState", "mj_setState")):
+        words |= _STATE_WORDS
     members = frozenset(_MEMBER.findall(code))
     opaque = sorted(filter(_may_do_anything, _WORD.findall(code)))
     reasons = [f"it uses `{opaque[0]}`"] if opaque else []
     if _INCLUDE.search(text):
         reasons.append("it puts models together from files")
-    if path.endswith(".py"):
+    if is_python:
         modules = (name for match in _IMPORT.findall(text) for name in _modules(*match))
         harmless = _LEAVE_MODELS_ALONE.union(course_modules)
         reasons += [f"it imports {name}" for name in modules if name not in harmless]
@@ -220,6 +229,26 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Mod
     kinds |= {"Keyframe"} if "mj_resetDataKeyframe" in words else set()
     reason = next(iter(reasons), "")
     return ModelReader(path, names, words, members, frozenset(parts), frozenset(kinds), reason)
+
+
+def _python_code(text: str) -> str:
+    """Python without comments and texts; where fields are filled in, a text holds code."""
+    lines = text.splitlines(keepends=True)
+    try:
+        tokens = list(tokenize.generate_tokens(iter(lines).__next__))
+    except (tokenize.TokenError, SyntaxError):
+        return text  # all of it may be code
+    for token in reversed(tokens):
+        is_prose = token.type == tokenize.COMMENT or (
+            token.type == tokenize.STRING
+            and "f" not in (prefix := token.string.lower().partition(token.string[-1])[0])
+            and "t" not in prefix
+        )
+        if is_prose:
+            (first, start), (last, end) = token.start, token.end
+            lines[first - 1] = f'{lines[first - 1][:start]}""{lines[last - 1][end:]}'
+            lines[first:last] = [""] * (last - first)
+    return "".join(lines)
 
 
 def _may_do_anything(word: str) -> bool:

@@ -2,7 +2,8 @@
 
 Entry point: `Surveyor`, whose `survey` gives a `Survey`.
 
-1. The model runs once in each scenario. From one that is lost nothing is claimed.
+1. The model runs in each scenario, and from random starts nearby. From one that is lost nothing is
+   claimed.
 2. *Proved*: what no motion is computed of is taken out at once, as much as the compiler can do
    without, as changes nothing else in the compiled model, and as no code can notice; every scenario
    must give the same bits.
@@ -26,17 +27,27 @@ from msgspec.structs import replace
 from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import Keep
 from coursebuild.numerics.costs import Clock
+from coursebuild.numerics.pruning.bystanders import couplings, far_bodies, resting_joints
 from coursebuild.numerics.pruning.candidates import (
     KINDS,
+    SETTINGS,
     Item,
-    far_bodies,
+    contact_of_rest,
     idle_contacts,
+    inner_geoms,
     message_of,
     other_settings,
+    primitive_meshes,
     unreachable_contacts,
     unread_elements,
 )
-from coursebuild.numerics.pruning.comparison import TOLERANCE, MotionComparison, WatchedRun, watch
+from coursebuild.numerics.pruning.comparison import (
+    ALIKE,
+    MotionComparison,
+    WatchedRun,
+    nearby_scenes,
+    watch,
+)
 from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.pruning.reachability import PREMISES
 from coursebuild.numerics.pruning.readers import ModelReader, difference, unrelated_fields
@@ -58,6 +69,8 @@ from coursebuild.numerics.scene import Scene
 
 MIN_SPEEDUP = 1.05
 """The speedup from which on a finding that is not proved is worth a word."""
+_STARTS, _QUICK_STARTS = 2, 1
+"""Random starts of each scenario, beside its own."""
 Rerun = Callable[[Mapping[str, bytes]], str]
 """New bytes of files → which script or lab then prints something else; empty where none does."""
 
@@ -104,13 +117,19 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     rerun: Rerun | None = None
     """`None`: scripts and labs do not run."""
     good_runs: tuple[WatchedRun, ...] = ()
-    """Of the whole model, those that were not lost."""
+    """Of the whole model in its scenarios, those that were not lost."""
+    nearby_runs: tuple[WatchedRun, ...] = ()
+    """The same from starts nearby."""
     rejected: list[RejectedTrial] = field(default_factory=list)
 
     def survey(self) -> Survey:
         """Run the model in its scenarios, then without what it may not need."""
         runs = [watch(self.text.model, scene) for scene in self.scenes]
         self.good_runs = tuple(run for run in runs if run.judgement.ok)
+        starts = _QUICK_STARTS if self.quick else _STARTS
+        nearby = (s for run in self.good_runs for s in nearby_scenes(self.text.model, run, starts))
+        nearby_runs = [watch(self.text.model, scene) for scene in nearby]
+        self.nearby_runs = tuple(run for run in nearby_runs if run.judgement.ok)
         report = DietReport(
             model=self.model,
             digest=self.digest,
@@ -139,16 +158,30 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     def trials(self) -> PruningTrials:
         """Tries the model without some things, in the scenarios in which it was not lost."""
         scenes = tuple(run.scene for run in self.good_runs)
-        return PruningTrials(self.text, scenes, self.clock, self.quick)
+        runs = (*self.good_runs, *self.nearby_runs)
+        return PruningTrials(self.text, runs, scenes, self.clock, self.quick)
 
     def _try_all(self, report: DietReport) -> Survey:
         """Try every candidate, then all findings together."""
-        text, runs = self.text, self.good_runs
+        text, runs = self.text, self.trials.runs
         groups = self._prove()
-        candidates = [far_bodies(text, self._code_names(), runs)]
+        proved = {item.element for group in groups for item in group.items}
+        self.tell("what never moves")
+        names = {name for reader in self.readers for name in reader.names}
+        scenarios = [run.scene.scenario for run in self.good_runs]
+        candidates = [
+            far_bodies(text, names, scenarios, runs),
+            resting_joints(text, self.good_runs),
+            [item for item in couplings(text) if item.element not in proved],
+        ]
         if not any(group.finding.kind == "contact-off" for group in groups):
-            candidates.append(idle_contacts(text, runs))
-        groups = self._confirm([*groups, *self._try_by_running(candidates)])
+            candidates += [idle_contacts(text, runs), inner_geoms(text), primitive_meshes(text)]
+        groups += self._try_by_running(candidates)
+        removed_kinds = ("far-body", "resting-joint", "coupling-idle")
+        removed_items = [i for group in groups for i in group.items if i.kind in removed_kinds]
+        if not any(group.finding.kind in ("contact-off", "contact-idle") for group in groups):
+            groups += self._try_by_running([contact_of_rest(text, removed_items)])
+        groups = self._confirm(groups)
         groups += self._try_by_running([item] for item in other_settings(text, runs))
         self.tell("all together")
         fixable = [item for group in groups if group.finding.fixable for item in group.items]
@@ -169,9 +202,6 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             stale=tuple(StaleKeep(k, at.path, at.line, at.column) for k, at in stale.items()),
         )
         return Survey(report, self.text, () if fixed is None else fixed.edits)
-
-    def _code_names(self) -> set[str]:
-        return {name for reader in self.readers for name in reader.names}
 
     def _confirm(self, groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
         """The groups without which scripts and labs of the course print the same."""
@@ -207,7 +237,11 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             if not item.element or elements.isdisjoint(item.element.ancestors())
         ]
         groups = self._group_items([*outer, *kept_items])
-        return [self._make_group(similar, reason, PROVED_LABEL, 0.0) for reason, similar in groups]
+        no_difference = MotionComparison(True, 0.0)
+        return [
+            self._make_group(similar, reason, PROVED_LABEL, no_difference)
+            for reason, similar in groups
+        ]
 
     def _is_unread(self, item: Item) -> bool:
         names = {item.name} | {node.get("class") or "" for e in item.removals for node in e.walk()}
@@ -230,17 +264,15 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         own_fields = {field for item in items for field in KINDS[item.kind].fields.split()}
         if unrelated_fields(change, kinds) - own_fields:
             return False
-        if "tree_sleep_policy" in change and self._may_sleep():
+        sleeps = int(self.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
+        may_sleep = sleeps or any(reader.touches({"enableflags"}) for reader in self.readers)
+        if may_sleep and "tree_sleep_policy" in change:
             return False
         change |= self.trials.state_difference(trial)
         if self._find_noticing_reader((), kinds, change) is not None:
             return False
         result = self.trials.compare(trial)
         return result is not None and result.identical
-
-    def _may_sleep(self) -> bool:
-        sleep_flag = int(self.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
-        return bool(sleep_flag or any(reader.touches({"enableflags"}) for reader in self.readers))
 
     def _try_by_running(self, candidates: Iterable[Sequence[Item]]) -> list[_PrunedGroup]:
         """Take out of each list of items as many of a kind as change no motion."""
@@ -253,27 +285,31 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         return groups
 
     def _try_items(self, items: Sequence[Item], reason: str) -> _PrunedGroup | None:
-        """Take out as many of these items as change no motion, if that saves time."""
+        """Take out as many of these items as change no motion, if that saves time.
+
+        A shape that stands for a mesh is another scene: it may differ by less than can be seen.
+        """
         results: list[MotionComparison] = []
+        tolerance = 1.0 if items[0].kind == "mesh-primitive" else ALIKE
 
         def moves_alike(items: Sequence[Item]) -> bool:
             trial = self.trials.prune(items)
             result = None if trial is None else self.trials.compare(trial)
             if result is not None:
                 results.append(result)
-            return result is not None and result.difference <= tolerance
+            return result is not None and result.difference < tolerance
 
-        # Bodies fall asleep below a speed, which is then the difference.
-        sleeps = items[0].kind == "sleep"
-        tolerance = float(self.text.model.opt.sleep_tolerance) if sleeps else TOLERANCE
         removable = largest_subset(items, moves_alike)
         if not removable:
-            worst = max((result.difference for result in results), default=math.inf)
-            self._reject(items, worst, "it changes the motion")
+            smallest = min(results, key=lambda result: result.difference, default=None)
+            reason_text = (
+                "it cannot go alone" if smallest is None else f"without it {smallest.shown}"
+            )
+            self._reject(items, None if smallest is None else smallest.difference, reason_text)
             return None
         if not moves_alike(removable):
             return None
-        group = self._make_group(removable, reason, MEASURED_LABEL, results[-1].difference)
+        group = self._make_group(removable, reason, MEASURED_LABEL, results[-1])
         saving = group.finding.saving
         is_slow = saving.time is None or not (saving.certain and saving.time >= MIN_SPEEDUP)
         if self.clock is not None and is_slow and not reason:
@@ -295,7 +331,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         return [(reason, similar) for (_, reason), similar in groups.items()]
 
     def _make_group(
-        self, items: Sequence[Item], reason: str, label: str, gap: float
+        self, items: Sequence[Item], reason: str, label: str, comparison: MotionComparison
     ) -> _PrunedGroup:
         kind, trial, edits = items[0].kind, self.trials.prune(items), self.trials.edits(items)
         change: frozenset[str] = frozenset()
@@ -310,7 +346,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             message=message_of(items),
             places=tuple(_place(item) for item in items if item.element is not None),
             label=label,
-            difference=gap,
+            difference=comparison.difference,
             scenarios=tuple(run.scene.name for run in self.good_runs),
             proof=KINDS[kind].proof,
             saving=self.trials.measure_saving(edits, trial, timed=timed),
@@ -319,6 +355,8 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             unfixed=unfixed,
             kept=reason,
             doubt=f"{reader.path} may notice" if reader is not None else "",
+            shown=comparison.shown,
+            starts=len(self.trials.runs),
         )
         return _PrunedGroup(tuple(items), finding)
 
@@ -368,19 +406,29 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         def moves_alike(groups: Sequence[_PrunedGroup]) -> bool:
             trial = self._prune(groups)
             result = None if trial is None else self.trials.compare(trial)
-            tolerance = max([TOLERANCE, *(group.finding.difference for group in groups)])
-            return result is not None and result.difference <= tolerance
+            return result is not None and result.difference < ALIKE
 
+        groups = [group for group in groups if group.finding.difference < ALIKE]
         by_time = sorted(groups, key=lambda group: -(group.finding.saving.time or 0.0))
-        trial = self._prune(largest_subset(by_time, moves_alike)) if groups else None
+        is_setting = [group.finding.kind in SETTINGS for group in by_time]
+        things = [group for group, setting in zip(by_time, is_setting, strict=True) if not setting]
+        best = largest_subset(things, moves_alike)
+        saving = self._measure_groups(best)
+        # What is quicker in the whole model need not be so in what is left of it.
+        for group, setting in zip(by_time, is_setting, strict=True):
+            if setting and moves_alike([*best, group]):
+                other_saving = self._measure_groups([*best, group])
+                if other_saving and (other_saving.time or 0.0) > 1.03 * (
+                    (saving and saving.time) or 1.0
+                ):
+                    best, saving = [*best, group], other_saving
+        trial = self._prune(best) if best else None
         result = None if trial is None else self.trials.compare(trial)
-        if trial is None or result is None:
-            return None, None
-        slim = self.trials.measure_saving(trial.edits, trial)
-        best = by_time[0].finding
-        if (best.saving.time or 0.0) > (slim.time or 0.0):
-            return best.saving, best.difference
-        return slim, result.difference
+        return (None, None) if result is None else (saving, result.difference)
+
+    def _measure_groups(self, groups: Sequence[_PrunedGroup]) -> Saving | None:
+        trial = self._prune(groups) if groups else None
+        return None if trial is None else self.trials.measure_saving(trial.edits, trial)
 
 
 def _views(items: Iterable[Item]) -> frozenset[str]:

@@ -19,6 +19,7 @@ from coursebuild.numerics.pruning.comparison import (
     KEY_SIZES,
     IndexMap,
     MotionComparison,
+    WatchedRun,
     compare,
     fits,
     index_map,
@@ -81,7 +82,10 @@ class PruningTrials(Struct, eq=False, dict=True):
     """Tries a model without some things."""
 
     text: ModelText
+    runs: tuple[WatchedRun, ...]
+    """In the scenarios in which the whole model was not lost, and from starts nearby."""
     scenes: tuple[Scene, ...]
+    """These scenarios."""
     clock: Clock | None
     quick: bool
 
@@ -106,9 +110,9 @@ class PruningTrials(Struct, eq=False, dict=True):
         return sum(before[path] - len(data) for path, data in files.items())
 
     def compare(self, trial: PrunedModel) -> MotionComparison | None:
-        """Compare it with the whole model in all scenarios; `None` where that is not possible."""
+        """Compare it with the whole model in all runs; `None` where that is not possible."""
         try:
-            return compare(self.text.model, trial.model, trial.index, self.scenes)
+            return compare(self.text.model, trial.model, trial.index, self.runs)
         except (ValueError, mujoco.FatalError):
             return None
 
@@ -181,7 +185,7 @@ def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, .
     """All edits of items together, and what they leave of the compiled model."""
     elements = list(dict.fromkeys(element for item in items for element in item.removals))
     nodes = [node for element in elements for node in element.walk()]
-    kinds = ("body", "geom", "sensor", "actuator")
+    kinds = ("body", "joint", "geom", "sensor", "actuator", "equality")
     index = index_map(text.model, {kind: text.ids_of(nodes, kind) for kind in kinds})
     drops = [drop for item in items for drop in item.drops]
     edits = [edit for item in items for edit in item.edits]

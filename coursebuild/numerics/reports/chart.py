@@ -310,7 +310,7 @@ def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
 
 
 def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
-    """The band that is not resolved, and the line at 1."""
+    """The band that is not resolved, or where it would be, and the line at 1."""
     if chart.least > 0 and log(chart.least) > y.low:
         top = y(chart.least)
         d = f"M{x.start:.1f} {top:.1f}H{x.end:.1f}V{y.start:.1f}H{x.start:.1f}Z"
@@ -318,6 +318,9 @@ def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
         text = f"under {number_text(chart.least)}: not resolved by the reference"
         at = (top + y.start) / 2 + 4 if y.start - top >= 16 else top - 5
         yield label(x.end - 6, at, text, f'text-anchor="end" {FINE} {HALO}')
+    elif chart.least > 0:
+        text = f"not resolved: under {number_text(chart.least)}, below this scale"
+        yield label(x.end - 6, y.start - 5, text, f'text-anchor="end" {FINE} {HALO}')
     if chart.unit_label and y.low < 0 < y.high:
         look = 'stroke="currentColor" stroke-dasharray="1 3" stroke-width="1.2"'
         yield path(f"M{x.start:.1f} {y(1.0):.1f}H{x.end:.1f}", look)

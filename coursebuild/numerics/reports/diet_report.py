@@ -80,8 +80,8 @@ class Finding(Record, frozen=True):
     label: str
     """`PROVED_LABEL` or `MEASURED_LABEL`."""
     difference: float
-    """The largest within 50 ms, relative to a number's size where that is over 1; 0 where all bits
-    are the same."""
+    """The largest of what is seen without it, where 1 is just visible; 0 where all bits are the
+    same."""
     scenarios: tuple[str, ...]
     """The scenarios in which it was tried."""
     proof: str
@@ -96,6 +96,11 @@ class Finding(Record, frozen=True):
     """The author's reason to keep it; empty without one."""
     doubt: str
     """The code that may notice, where only runs speak for it; empty where none can."""
+    shown: str = ""
+    """The difference in the scene's own quantities; empty where there is none."""
+    starts: int = 0
+    """How many runs were compared: of each scenario, and from random starts nearby; 0 where that
+    was not recorded."""
 
     @property
     def is_fault(self) -> bool:

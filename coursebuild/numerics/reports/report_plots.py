@@ -8,8 +8,8 @@ Entry points: `plot_svg(report, …)`, of a scenario, from `work_precision(repor
    scene's own solver, iterations and cone; the rows with others are small marks beside it.
 2. A mark is filled where the setting is on the Pareto front, and hollow where another one is
    better. A ring is around the scene's own setting. Bars are the intervals of the costs.
-3. The cost of a row that was not timed is estimated from its number of steps. Where nothing at all
-   was timed, the number of steps stands in for the cost.
+3. The cost of a row that was not timed is estimated from the evaluations of the forward dynamics.
+   Where nothing at all was timed, these stand in for the cost.
 4. A sweep has a row for each value, and for each figure a scale beside it. A dot is a figure, a bar
    its interval; a line joins the values of one parameter, and a ring marks the model's own value. A
    scale is logarithmic where its figures differ by much.
@@ -64,6 +64,7 @@ from coursebuild.numerics.reports.shown_errors import (
     INTEGRATORS,
     Quantity,
     interval_text,
+    is_idle,
     main_quantity,
     seconds_text,
     setting_text,
@@ -89,6 +90,11 @@ def work_precision(report: ScenarioReport) -> Chart | None:
     if quantity is None:
         return None
     timed = [row for row in report.rows if row.cost is not None and row.cost.value > 0]
+    is_counted = any(row.evaluations for row in report.rows)
+    work = "evaluations of the forward dynamics" if is_counted else "steps"
+    base = "the scene’s own setting"
+    if report.cost_of is not None:
+        base = setting_text(report.cost_of, report.own_setting)
     integrators = {row.setting.integrator for row in report.rows}
     lines = tuple(
         _line(report, quantity, timed, name) for name in INTEGRATORS if name in integrators
@@ -96,13 +102,10 @@ def work_precision(report: ScenarioReport) -> Chart | None:
     return Chart(
         title=(
             f"{report.title or report.name}: error of {quantity.label} "
-            f"against {'cost' if timed else 'steps'}"
+            f"against {'cost' if timed else work}"
         ),
         text=" ".join(_describe(report, quantity, lines)),
-        axes=(
-            "cost, relative to the scene’s own setting" if timed else "steps",
-            f"error: {quantity.label}",
-        ),
+        axes=(f"cost, relative to {base}" if timed else work, f"error: {quantity.label}"),
         lines=lines,
         least=quantity.least,
         unit_label="just visible" if quantity.name == "seen" else "",
@@ -118,7 +121,7 @@ def _line(
 ) -> Line:
     baseline = report.own_setting
     points = []
-    rows = [row for row in report.rows if row.setting.integrator == name]
+    rows = [r for r in report.rows if r.setting.integrator == name and not is_idle(r)]
     for row in sorted(rows, key=lambda row: -row.setting.timestep):
         error = quantity.value_of(row) if row.status == "ok" else None
         points.append(
@@ -136,13 +139,17 @@ def _line(
 
 
 def _cost(row: WorkPrecisionRow, timed: Sequence[WorkPrecisionRow]) -> Interval:
-    """The cost of a row; estimated from its number of steps where it was not timed."""
+    """The cost of a row; estimated from its evaluations, or steps, where it was not timed."""
     if row in timed and row.cost is not None:
         return row.cost
     peers = [peer for peer in timed if peer.setting.integrator == row.setting.integrator] or timed
-    rates = [peer.cost.value / max(peer.steps, 1) for peer in peers if peer.cost is not None]
-    value = max(row.steps, 1) * (statistics.median(rates) if rates else 1.0)
+    rates = [peer.cost.value / _work(peer) for peer in peers if peer.cost is not None]
+    value = _work(row) * (statistics.median(rates) if rates else 1.0)
     return Interval(value, value, value)
+
+
+def _work(row: WorkPrecisionRow) -> int:
+    return max(row.evaluations or row.steps, 1)
 
 
 def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
@@ -199,6 +206,12 @@ def _point_title(
     elif timed:
         yield "not timed"
     yield f"{row.steps} steps"
+    if row.evaluations > row.steps:
+        yield f"{row.evaluations} evaluations"
+    if row.iterations is not None:
+        yield f"{row.iterations:.6g} iterations of the solver"
+    if row.lucky:
+        yield f"luck: {row.lucky}"
     if row.own:
         yield "the scene’s own setting"
     if row.front:

@@ -110,11 +110,13 @@ class MeasuredSetting(Record, frozen=True):
     """At most; 0 where no solver runs."""
     cone: str
     """As MJCF names it; empty where nothing can touch."""
+    options: tuple[tuple[str, str], ...] = ()
+    """Options and flags that are not the scene's own, as MJCF names them, with their values."""
 
     @property
-    def solver_settings(self) -> tuple[str, int, str]:
+    def solver_settings(self) -> tuple[str, int, str, tuple[tuple[str, str], ...]]:
         """All but integrator and timestep."""
-        return self.solver, self.iterations, self.cone
+        return self.solver, self.iterations, self.cone, self.options
 
 
 class Errors(Record, frozen=True):
@@ -182,6 +184,15 @@ class WorkPrecisionRow(MeasuredRun, frozen=True):
     mean_energy: float | None = None
     """Mean kinetic energy from the horizon to the end, relative to that of a run in small steps,
     less 1; `None` where nothing is beyond the horizon."""
+    evaluations: int = 0
+    """How often the forward dynamics are computed in the scenario, on any machine; 0 where that was
+    not recorded."""
+    iterations: float | None = None
+    """Iterations of the solver in the scenario; `None` where none runs."""
+    lucky: str = ""
+    """Why its error says nothing of what the setting does; empty where it does."""
+    same: bool = False
+    """Whether the motion is that of the scene's own setting, to the bit."""
 
     @property
     def realtime(self) -> float | None:
@@ -332,6 +343,12 @@ class ScenarioReport(Record, frozen=True):
     horizons: tuple[float, float] | None = None
     """s: the shortest and the longest of runs whose beginnings were nudged in different ways;
     `None` where the scenario is not chaotic."""
+    least_seen: float = 0.0
+    """Below this nothing is known of what is seen."""
+    least_figure: float = 0.0
+    """The same of the declared quantity, in its unit."""
+    cost_of: MeasuredSetting | None = None
+    """The setting that costs are relative to, where the scene's own was lost."""
 
     @property
     def own_setting(self) -> MeasuredSetting | None:

@@ -18,6 +18,7 @@ from coursebuild.numerics.reports.scene_report import (
     MeasuredSetting,
     ScenarioReport,
     StableRow,
+    WorkPrecisionRow,
 )
 
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
@@ -51,8 +52,8 @@ class Quantity(Struct, frozen=True):
 def quantities(report: ScenarioReport) -> tuple[Quantity, ...]:
     """The errors that some row has, what the scenario declares to be measured first."""
     candidates = (
-        Quantity("figure", report.figure or "figure"),
-        Quantity("seen", "what is seen (1: just visible)"),
+        Quantity("figure", report.figure or "figure", report.least_figure),
+        Quantity("seen", "what is seen (1: just visible)", report.least_seen),
         Quantity("position", "position (m or rad)", FLOORS * report.floor),
         Quantity("attitude", "attitude (rad)", FLOORS * report.floor),
         Quantity("velocity", "velocity (m/s or rad/s)", FLOORS * report.velocity_floor),
@@ -62,6 +63,15 @@ def quantities(report: ScenarioReport) -> tuple[Quantity, ...]:
         for quantity in candidates
         if any(quantity.value_of(row) is not None for row in report.rows)
     )
+
+
+def is_idle(row: WorkPrecisionRow) -> bool:
+    """Whether a setting changes no bit of the motion and saves no time: it is not shown."""
+    return row.same and (row.cost is None or row.cost.high > 1 - _SAVING)
+
+
+_SAVING = 0.03
+"""Times differ by less of themselves from one measurement to the next."""
 
 
 def main_quantity(report: ScenarioReport) -> Quantity | None:
@@ -133,7 +143,7 @@ def interval_text(value: Interval) -> str:
 def setting_text(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> str:
     """A setting in words; solver, iterations and cone only where they differ from those of `like`.
 
-    Without `like` all of them are given.
+    Without `like` all of them are given; options always.
     """
     parts = [f"{setting.integrator} at {seconds_text(setting.timestep)}"]
     return ", ".join([*parts, *solving_parts(setting, like)])
@@ -149,7 +159,7 @@ def solving_parts(setting: MeasuredSetting, like: MeasuredSetting | None = None)
         parts.append(f"{setting.iterations} {many}")
     if setting.cone and (like is None or setting.cone != like.cone):
         parts.append(f"{setting.cone} cone")
-    return parts
+    return parts + [f"{name} {value}" for name, value in setting.options]
 
 
 def status_text(status: str) -> str:

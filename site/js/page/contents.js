@@ -27,6 +27,8 @@ export function listMove(list, entry) {
 
 /** Follow the reader's scrolling; returns a function that ends it. */
 export function followContents(document) {
+  const page = document.querySelector('.level-nav [aria-current="page"]')
+  if (page) keepInSight(page, page)
   const links = [...document.querySelectorAll('.toc a[href^="#"]')]
   const pairs = links
     .map((link) => ({ link, heading: document.getElementById(decodeURIComponent(link.hash.slice(1))) }))
@@ -62,7 +64,7 @@ export function followContents(document) {
 
 /** Scroll a long list to its entry, unless somebody is going through it by keyboard. */
 function keepInSight(link, anyLink) {
-  const list = anyLink.closest('.toc')
+  const list = anyLink.closest('.toc, .level-nav')
   if (list.scrollHeight <= list.clientHeight || list.querySelector(':focus-visible')) return
   if (link) list.scrollTop += listMove(list.getBoundingClientRect(), link.getBoundingClientRect())
   else list.scrollTop = 0

@@ -7,6 +7,7 @@
  */
 
 import { h } from './elements.js'
+import { timesOf } from './times.js'
 
 const SIGNS = { ' ': '\u2007', '-': '−', '+': '+' }
 const KINDS = { ' ': 'both', '-': 'gone', '+': 'come' }
@@ -19,7 +20,8 @@ export class Marks {
     this.marksByElement = new Map() // element → { text, parts }
   }
 
-  show({ outputs, figures, numbers }) {
+  show({ outputs, figures, numbers, running }) {
+    this.running = running
     const itemsByElement = new Map()
     for (const output of outputs) {
       const element = outputOf(output)
@@ -55,10 +57,19 @@ export class Marks {
     return 'state' in item ? this.markState(element, item) : this.markNumber(element, item)
   }
 
-  markState(element, { state }) {
+  markState(element, { state, script }) {
     const mark = h('p', { class: `preview-mark preview-${state === 'running' ? 'running' : 'failed'}`, role: 'status' }, this.say(`state.${state}`))
+    const time = h('span', { class: 'preview-time', 'aria-hidden': 'true' }) // it changes each second
+    if (state === 'running') mark.append(' ', time)
+    const tell = () => {
+      if (!mark.isConnected) return clearInterval(timer)
+      const times = this.running.filter(({ path }) => path === script).map(timesOf)[0]
+      time.textContent = times ? this.say(times.left ? 'time.left' : 'time.over', times) : ''
+    }
     element.classList.add('preview-known')
     element.append(mark)
+    const timer = state === 'running' ? setInterval(tell, 1000) : null
+    tell()
     return [mark]
   }
 

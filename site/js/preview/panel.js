@@ -6,12 +6,13 @@
  */
 
 import { h } from './elements.js'
+import { timesOf } from './times.js'
 
 const PATIENCE = 600 // ms
 const OF_THE_TOOL = { lang: 'en', dir: 'ltr' } // its messages, which have no translation
 
 /** The text of the button. */
-export function summary(say, { problems, busy, trouble }, lost, isGone) {
+export function summary(say, { problems, busy, trouble, running }, lost, isGone) {
   const errors = problems.filter(({ severity }) => severity === 'error').length
   const warnings = problems.length - errors
   const parts = []
@@ -20,28 +21,34 @@ export function summary(say, { problems, busy, trouble }, lost, isGone) {
   if (trouble) parts.push(say('trouble'))
   if (errors) parts.push(say('errors', { n: errors }))
   if (warnings) parts.push(say('warnings', { n: warnings }))
-  if (busy && !lost) parts.push(`${busy} …`)
+  const longest = running.map((script) => ({ path: script.path, ...timesOf(script) })).sort((a, b) => (b.left ?? 0) - (a.left ?? 0))[0]
+  if (busy && !lost) parts.push(longest?.left ? say('left', longest) : `${busy} …`)
   return parts.join(', ')
 }
 
 export class Panel {
-  /** `openPlace(place)` opens a place in the editor; it promises why it could not, or nothing. */
-  constructor(say, openPlace) {
+  /** `openPlace(place)` opens a place in the editor, `accept(ids)` accepts what is offered; each promises why it could not, or nothing. */
+  constructor(say, openPlace, accept) {
     this.say = say
     this.openPlace = openPlace
-    this.news = { problems: [], more: 0, busy: '', trouble: '' }
+    this.accept = accept
+    this.folder = '' // of the course, where places are links for an editor
+    this.news = { problems: [], more: 0, busy: '', trouble: '', running: [], outputs: [], figures: [], numbers: [] }
     this.lost = false
     this.gone = false
     this.open = false
     this.seenErrors = new Set() // mistakes that a reader has seen
     this.button = h('button', { type: 'button', class: 'preview-button', 'aria-expanded': 'false', click: () => this.toggle() })
+    this.all = h('button', { type: 'button', class: 'preview-accept preview-all', hidden: true, click: () => this.acceptAll() })
+    this.why = h('p', { class: 'preview-why preview-answer', role: 'status', hidden: true })
     this.status = h('span', { class: 'unseen', role: 'status' })
     this.list = h('section', { class: 'preview-panel', 'aria-label': say('problems'), tabindex: '-1' })
-    this.root = h('div', { class: 'preview-own' }, this.list, this.button, this.status)
+    this.root = h('div', { class: 'preview-own' }, this.list, this.why, this.all, this.button, this.status)
     this.root.addEventListener('keydown', (event) => {
       if (event.key === 'Escape' && this.open) this.toggle()
     })
     document.documentElement.append(this.root)
+    setInterval(() => this.news.running.length && this.draw(), 1000)
     this.draw()
   }
 
@@ -50,7 +57,7 @@ export class Panel {
     clearTimeout(this.timer)
     if (news.busy && !this.news.busy) {
       this.timer = setTimeout(() => this.take(news), PATIENCE)
-      news = { ...news, busy: '' }
+      return this.take({ ...news, busy: '' })
     }
     this.take(news)
   }
@@ -65,8 +72,8 @@ export class Panel {
     this.draw()
   }
 
-  setState({ lost = this.lost, gone = this.gone }) {
-    Object.assign(this, { lost, gone })
+  setState({ lost = this.lost, gone = this.gone, folder = this.folder }) {
+    Object.assign(this, { lost, gone, folder })
     this.draw()
   }
 
@@ -80,9 +87,13 @@ export class Panel {
   draw() {
     const text = summary(this.say, this.news, this.lost, this.gone)
     const hasProblems = this.news.problems.length > 0 || this.news.trouble !== ''
-    const key = JSON.stringify([text, this.open, this.news, this.gone])
+    const key = JSON.stringify([text, this.open, this.news, this.gone, this.folder])
     if (key === this.drawnKey) return
     this.drawnKey = key
+    const offers = this.offers()
+    this.all.hidden = offers.length < 2
+    this.all.textContent = this.say('accept_all', { n: offers.length })
+    if (offers.length < 2) this.why.hidden = true
     this.button.hidden = text === ''
     this.button.textContent = text
     this.button.disabled = !hasProblems && !this.gone
@@ -91,6 +102,20 @@ export class Panel {
     this.status.textContent = hasProblems || this.gone || this.lost ? text : ''
     this.list.hidden = !this.open
     this.list.replaceChildren(...(this.open ? this.makeContent() : []))
+  }
+
+  /** The ids of all that the page offers. */
+  offers() {
+    const { outputs, figures, numbers } = this.news
+    return [...outputs, ...figures, ...numbers].flatMap(({ offer }) => offer ?? [])
+  }
+
+  async acceptAll() {
+    this.all.disabled = true
+    const refusal = await this.accept(this.offers().join(' '))
+    this.all.disabled = false
+    this.why.hidden = !refusal
+    this.why.textContent = refusal ? this.say('not_written', { reason: refusal }) : ''
   }
 
   makeContent() {
@@ -103,7 +128,7 @@ export class Panel {
     return parts
   }
 
-  makeProblem({ severity, rule, place, message, label, help, notes, line, start, end, blocks }) {
+  makeProblem({ severity, rule, place, message, label, help, notes, line, start, end, blocks, offer, fixed }) {
     const item = h('li', { class: `preview-problem preview-${severity}` })
     const kind = this.say(blocks ? 'blocks' : severity)
     item.append(
@@ -117,10 +142,30 @@ export class Panel {
     if (label) item.append(h('p', { class: 'preview-label', ...OF_THE_TOOL }, ...formatCode(label)))
     for (const note of notes) item.append(h('pre', { class: 'preview-note', ...OF_THE_TOOL }, note))
     if (help) item.append(h('p', { class: 'preview-help', ...OF_THE_TOOL }, ...formatCode(help)))
+    if (offer) item.append(...this.makeFix(offer, fixed))
     return item
   }
 
+  /** The line as a fix writes it, and the button that does. */
+  makeFix(offer, line) {
+    const answer = h('span', { class: 'preview-why', role: 'status' })
+    const button = h('button', { type: 'button', class: 'preview-accept' }, this.say('fix'))
+    button.addEventListener('click', async () => {
+      button.disabled = true
+      const refusal = await this.accept(offer)
+      if (!refusal) return
+      answer.textContent = this.say('not_written', { reason: refusal })
+      button.disabled = false
+    })
+    const written = h('pre', { class: 'preview-source', tabindex: '0', dir: 'ltr' }, h('ins', {}, line))
+    return line.trim() ? [written, h('p', {}, button, ' ', answer)] : [h('p', {}, button, ' ', answer)]
+  }
+
   makePlace(text, rule) {
+    if (this.folder) {
+      const link = h('a', { href: editorLink(this.folder, text), title: this.say('open') }, h('code', {}, text))
+      return h('p', { class: 'preview-place', dir: 'ltr' }, link, ` ${rule}`)
+    }
     const answer = h('span', { class: 'preview-why', role: 'status' })
     const button = h('button', { type: 'button', title: this.say('open') }, h('code', {}, text))
     button.addEventListener('click', async () => {
@@ -130,6 +175,9 @@ export class Panel {
     return h('p', { class: 'preview-place', dir: 'ltr' }, button, ` ${rule} `, answer)
   }
 }
+
+/** A link by which a browser asks Visual Studio Code to open a place, such as `content/a.md:3:5`. */
+export const editorLink = (folder, place) => `vscode://file${`${folder}/${place}`.split('/').map(encodeURIComponent).join('/').replaceAll('%3A', ':')}`
 
 /** Show text between backticks as code. */
 const formatCode = (text) => text.split(/`([^`]*)`/).map((part, index) => (index % 2 ? h('code', {}, part) : part))

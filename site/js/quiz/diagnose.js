@@ -22,7 +22,7 @@ export function isWithin(value, answer, tolerance) {
 /**
  * @param {{value: number, step: number | null}} entry `step`: a unit of its last digit, in the answer's unit; null for a calculation
  * @param {{answer: number, tolerance: number, angle: boolean}} expected `angle`: whether it is in radians or degrees
- * @returns {'' | 'rounded' | 'close' | 'sign' | 'degrees' | 'radians' | 'ten' | 'two' | 'turn' | 'reciprocal'}
+ * @returns {'' | 'rounded' | 'close' | 'sign' | 'degrees' | 'radians' | 'ten' | 'signed_ten' | 'two' | 'turn' | 'reciprocal'}
  */
 export function nearMiss({ value, step }, { answer, tolerance, angle }) {
   const hits = (candidate) => isWithin(candidate, answer, tolerance)
@@ -33,9 +33,10 @@ export function nearMiss({ value, step }, { answer, tolerance, angle }) {
   if (hits(-value)) return 'sign'
   if (angle && hits((value * Math.PI) / 180)) return 'degrees'
   if (angle && hits((value * 180) / Math.PI)) return 'radians'
-  for (let exponent = 1; exponent <= TENS; exponent++) {
-    if (hits(value * 10 ** exponent) || hits(value / 10 ** exponent)) return 'ten'
-  }
+  const isShifted = (number) =>
+    Array.from({ length: TENS }, (_, index) => 10 ** (index + 1)).some((power) => hits(number * power) || hits(number / power))
+  if (isShifted(value)) return 'ten'
+  if (isShifted(-value)) return 'signed_ten'
   if (hits(value * 2) || hits(value / 2)) return 'two'
   if (hits(value * 2 * Math.PI) || hits(value / (2 * Math.PI))) return 'turn'
   if (hits(1 / value)) return 'reciprocal'

@@ -6,7 +6,7 @@
 
 import { pageFile, readShard, shardFile } from './index.js'
 import { memoize } from './data.js'
-import { findPages } from './pages.js'
+import { byRank, findPages } from './pages.js'
 import { excerpt, findSections, markWords, openPage, phraseFactor, trail } from './sections.js'
 import { lexicon } from './spelling.js'
 
@@ -52,7 +52,7 @@ export async function openSearch(load) {
       await new Promise((resolve) => setTimeout(resolve))
       sliceStart = performance.now()
     }
-    results.sort((a, b) => b.score - a.score)
+    results.sort(byRank)
     const instead = words.filter(({ instead }) => instead !== null).map(({ instead }) => instead)
     return { query, pages: results.slice(0, limit), count: pages.length, instead, complete }
   }

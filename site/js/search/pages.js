@@ -21,7 +21,10 @@ const FIELDS = [0.7, 1, 2.4, 5] // code, text, heading, title
 const TITLE = 3 << 2
 const OFTEN = 0.22 // for each step of the frequency
 const NAMED = 2.5 // a page whose name is in the query
-const KINDS = { lesson: 1, level: 0.8, stub: 0.5 } // lessons come before documents of the tool
+const KINDS = { lesson: 1, level: 0.8 } // lessons come before other pages
+
+/** The order of results: what can be read comes before lessons that are planned only, then by score. */
+export const byRank = (a, b) => Number(a.kind === 'stub') - Number(b.kind === 'stub') || b.score - a.score
 const OTHER = 0.7
 const FEW = 1 // pages with all words; if there are fewer, other spellings are tried as well
 const MOST_BEGUN = 64 // terms that begin with a word
@@ -29,7 +32,7 @@ const MOST_BEGUN = 64 // terms that begin with a word
 /**
  * @param {string} query
  * @param {{ listing: Record<string, any>, shard: (n: number) => Promise<Map<string, string>>, spelling: (n: number) => Promise<Record<string, any>> }} source
- * @returns {Promise<{ pages: { page: number, score: number, words: number }[], words: Record<string, any>[] }>} pages, the best first;
+ * @returns {Promise<{ pages: { page: number, kind: string, score: number, words: number }[], words: Record<string, any>[] }>} pages, the best first;
  *   of each word its terms by how well they fit, and the spelling that it was taken for (`instead`)
  */
 export async function findPages(query, source) {
@@ -139,7 +142,7 @@ function raise(pages, page, fit, weight) {
   if (value > (pages.get(page) ?? 0)) pages.set(page, value)
 }
 
-/** The pages by score, those of equal score in the order of the course. */
+/** The pages by score, those of equal score in the order of the course; planned lessons come last. */
 function rankPages(words, listing) {
   const pageCount = listing.pages.length
   const rarity = words.map(({ pages }) => Math.log(1 + (pageCount - pages.size + 0.5) / (pages.size + 0.5)))
@@ -147,7 +150,7 @@ function rankPages(words, listing) {
   const sums = new Map()
   words.forEach(({ pages }, index) => {
     for (const [page, value] of pages) {
-      const sum = sums.get(page) ?? { page, score: 0, share: 0, words: 0 }
+      const sum = sums.get(page) ?? { page, kind: listing.kinds[listing.pages[page][1]], score: 0, share: 0, words: 0 }
       sum.score += value * rarity[index]
       sum.share += rarity[index] / whole
       sum.words += 1
@@ -156,9 +159,9 @@ function rankPages(words, listing) {
   })
   const names = new Set(words.map(({ whole }) => whole))
   for (const sum of sums.values()) {
-    const [, kind, , name] = listing.pages[sum.page]
-    sum.score *= sum.share ** 2 * (KINDS[listing.kinds[kind]] ?? OTHER)
+    const name = listing.pages[sum.page][3]
+    sum.score *= sum.share ** 2 * (KINDS[sum.kind] ?? OTHER)
     if (name && names.has(name.toLowerCase())) sum.score *= NAMED
   }
-  return [...sums.values()].sort((a, b) => b.score - a.score || a.page - b.page)
+  return [...sums.values()].sort((a, b) => byRank(a, b) || a.page - b.page)
 }

@@ -205,7 +205,7 @@ def test_no_such_kind_of_place_and_no_fsspec(
     with pytest.raises(EffectError) as caught:
         shared_place("nowhere://there")
     assert caught.value.message.startswith("there is no place like nowhere://there: protocol not")
-    monkeypatch.setitem(sys.modules, "fsspec.core", None)
+    monkeypatch.setitem(sys.modules, "fsspec", None)
     with pytest.raises(EffectError) as caught:
         shared_place("s3://bucket/cache")
     assert caught.value.message == "the cache s3://bucket/cache needs the package fsspec"

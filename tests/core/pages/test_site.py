@@ -368,3 +368,54 @@ def test_the_address_of_any_file_name_leads_to_it(name: str) -> None:
     href = Place("lessons/1-a.html").href(path)
     if name not in (".", ".."):
         assert unquote(urlsplit(urljoin("https://h/lessons/1-a.html", href)).path) == f"/{path}"
+
+
+PLANNED_BETWEEN = MAP.replace(
+    '[[level.lesson]]\nid = "1.1"',
+    '[[level.lesson]]\nid = "1.0"\nslug = "between"\ntitle = "Between"\nstatus = "planned"\n\n'
+    '[[level.lesson]]\nid = "1.1"',
+)
+
+
+def steps_of(page: str) -> dict[str, str]:
+    """The links that lead to the pages before and after a page, by their relation."""
+    pager = page[page.index('<nav class="pager"') :]
+    return {
+        relation: unquote(href)
+        for relation, href in re.findall(r'rel="(prev|next)" href="([^"]+)"', pager)
+    }
+
+
+def test_previous_and_next_pass_over_planned_lessons(make: Make) -> None:
+    site = pages(make("Text.", course=PLANNED_BETWEEN).site())
+    assert steps_of(site["lessons/0.1-falling.html"]) == {"next": "1.1-spinning.html"}
+    assert steps_of(site["lessons/1.1-spinning.html"]) == {"prev": "0.1-falling.html"}
+    assert steps_of(site["lessons/1.0-between.html"]) == {
+        "prev": "0.1-falling.html",
+        "next": "1.1-spinning.html",
+    }
+
+
+def manual_map() -> str:
+    """A map of pages alone, in two sections."""
+    head = MAP[: MAP.index("[[page]]")]
+    return head + "".join(
+        f'[[page]]\nid = "{id}"\ntitle = "{id.title()}"\nfile = "{id}.md"\nsection = "{section}"\n'
+        for id, section in (("about", "Begin"), ("second", "Begin"), ("third", "Reference"))
+    )
+
+
+def test_pages_in_sections_make_a_manual(make: Make) -> None:
+    files = make("", course=manual_map(), second="Two.", third="Three.").site()
+    site = pages(files)
+    assert steps_of(site["second.html"]) == {"prev": "about.html", "next": "third.html"}
+    (page_list,) = re.findall(r'<nav class="level-nav".*?</nav>', site["second.html"], re.DOTALL)
+    assert re.findall(r'<p class="label">(.*?)</p>', page_list) == ["Begin", "Reference"]
+    assert re.findall(r'<a href="(\w+).html"(?: aria-current="page")?>', page_list) == [
+        "about",
+        "second",
+        "third",
+    ]
+    assert "Course map" not in site["second.html"] + site["index.html"]
+    assert "progress/index.html" not in site
+    assert b"## Reference" in files["llms.txt"]

@@ -12,6 +12,7 @@ import pytest
 
 from coursebuild.core.model.results import Divergence, Outcome, Sign
 from coursebuild.core.run.script_environment import clean_environment
+from support.fixture_cases import fixture_text
 from support.runners import Run, both_ways
 
 pytestmark = pytest.mark.site
@@ -164,25 +165,7 @@ pointer.value = ctypes.cast(ignore, ctypes.c_void_p).value
 
 # --- bodies deep in each other
 
-FALL = """\
-import mujoco
-XML = '''
-<mujoco model="press">
-  <worldbody>
-    <geom name="floor" type="plane" size="1 1 1"/>
-    <body pos="0 0 0.1">
-      <joint type="slide" axis="0 0 1"/>
-      <geom size="0.1" mass="1"/>
-    </body>
-  </worldbody>
-</mujoco>
-'''
-model = mujoco.MjModel.from_xml_string(XML)
-data = mujoco.MjData(model)
-for _ in range(300):
-    data.qfrc_applied[0] = -{force}
-    mujoco.mj_step(model, data)
-"""
+FALL = fixture_text("scripts/press.txt")
 PLATE = FALL.replace('size="0.1" mass', 'type="box" size="0.1 0.1 1e-4" mass').replace(
     'pos="0 0 0.1"', 'pos="0 0 1e-4"'
 )

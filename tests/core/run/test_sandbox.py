@@ -21,6 +21,7 @@ from coursebuild.core.run import sandbox
 from coursebuild.core.run.sandbox import examine_sandbox, find_sandbox
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.script_server import ScriptServer
+from support.fixture_cases import fixture_text
 from support.runners import wait_until_ended
 from support.sandbox_probes import (
     CALLS,
@@ -275,34 +276,7 @@ print(model.ngeom, helper.VALUE, old, os.getcwd(), os.path.expanduser("~"))
             assert getattr(inside, name) == getattr(outside, name)
 
     def test_processes_threads_and_memory_that_they_share(self, confine: Confine) -> None:
-        (run,) = confine(
-            "import asyncio, multiprocessing, threading, time\n"
-            "from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor\n"
-            "from multiprocessing import shared_memory\n"
-            "import matplotlib.pyplot, numpy\n"
-            "async def say():\n"
-            "    server = await asyncio.start_server(lambda _, w: w.close(), '127.0.0.1', 0)\n"
-            "    port = server.sockets[0].getsockname()[1]\n"
-            "    reader, _ = await asyncio.open_connection('127.0.0.1', port)\n"
-            "    process = await asyncio.create_subprocess_exec('true')\n"
-            "    return await reader.read(), await process.wait()\n"
-            "if __name__ == '__main__':\n"
-            "    for method in 'fork', 'spawn':\n"
-            "        with multiprocessing.get_context(method).Pool(2) as pool:\n"
-            "            print(pool.map(abs, [-1, 2]))\n"
-            "    for executor in ProcessPoolExecutor, ThreadPoolExecutor:\n"
-            "        with executor(2) as pool: print(list(pool.map(abs, [-3])))\n"
-            "    number = multiprocessing.Value('i', 1)\n"
-            "    def add(): number.value += 1\n"
-            "    child = multiprocessing.get_context('fork').Process(target=add)\n"
-            "    child.start(), child.join()\n"
-            "    memory = shared_memory.SharedMemory(create=True, size=9)\n"
-            "    memory.close(), memory.unlink()\n"
-            "    figure, axes = matplotlib.pyplot.subplots()\n"
-            "    axes.plot(numpy.linalg.eigvals(numpy.eye(200)).real)\n"
-            "    figure.savefig(os.environ['TMPDIR'] + '/a.svg')\n"
-            "    print(number.value, asyncio.run(say()))\n"
-        )
+        (run,) = confine(fixture_text("scripts/shared_memory.txt"))
         assert run.stdout == "[1, 2]\n" * 2 + "[3]\n" * 2 + "2 (b'', 0)\n", run.stderr
 
     def test_what_is_written_is_seen_and_goes(self, confine: Confine, root: Path) -> None:

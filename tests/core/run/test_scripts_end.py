@@ -11,6 +11,7 @@ import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.run.script_server import RunStoppedError, ScriptServer
+from support.fixture_cases import fixture_text
 from support.runners import (
     SOURCE_TREE,
     TOOL,
@@ -31,30 +32,7 @@ RECORD_PID = (
     "import os, time\nopen('examples/tmp', 'w').write(os.environ['TMPDIR'])\n"
     "open('examples/me', 'w').write(str(os.getpid()))\n"
 )
-DAEMON = """
-import os, signal, sys, time
-for i in range(3):
-    if os.path.exists(f"examples/pid{i}"):
-        os.unlink(f"examples/pid{i}")
-def daemon(number):
-    if os.fork():
-        return
-    os.setsid()
-    if os.fork():
-        os._exit(0)
-    for n in (1, 2, 15):
-        signal.signal(n, signal.SIG_IGN)
-    with open(f"examples/pid{number}.part", "w") as file:
-        file.write(str(os.getpid()))
-    os.rename(f"examples/pid{number}.part", f"examples/pid{number}")
-    time.sleep(1000)
-    os._exit(0)
-for i in range(3):
-    daemon(i)
-while not all(os.path.exists(f"examples/pid{i}") for i in range(3)):
-    time.sleep(0.005)
-print("started", flush=True)
-"""
+DAEMON = fixture_text("scripts/daemon.txt")
 
 
 def daemons(root: Path) -> list[int]:

@@ -16,6 +16,7 @@ from coursebuild.core.model.results import Trace
 from coursebuild.core.run import tracing
 from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.run.tracing import Tracer
+from support.fixture_cases import fixture_text
 from support.runners import Run, both_ways, job, run_hanging
 
 pytestmark = pytest.mark.site
@@ -113,19 +114,7 @@ def test_folders_that_are_listed(traced: RunTraced) -> None:
 
 
 def test_files_that_forked_processes_read(traced: RunTraced) -> None:
-    code = """
-import os
-def tried(path):
-    try: open(path)
-    except OSError: pass
-for i in range(4):
-    if os.fork() == 0:
-        tried(f'data/{i}')
-        if os.fork(): os.wait()
-        else: tried(f'data/{i}-inner')
-        os._exit(0)
-for i in range(4): os.wait()
-"""
+    code = fixture_text("scripts/tried.txt")
     expected = {f"data/{i}{end}" for i in range(4) for end in ("", "-inner")}
     assert set(traced(code).files) == expected
 

@@ -24,6 +24,7 @@ from coursebuild.core.run.v8 import (
     ScriptError,
     StoppedError,
 )
+from support.fixture_cases import fixture_text
 from support.run_code import run_code
 from support.runners import processor_time
 from support.waiting import wait_until
@@ -37,64 +38,12 @@ ALLOWED_ATTRIBUTES = {
     name: set(attributes)
     for name, *attributes in map(
         str.split,
-        """\
-        math display
-        semantics
-        annotation encoding
-        mrow
-        mi mathvariant
-        mn mathvariant
-        mo accent fence form largeop lspace mathsize maxsize minsize \
-           movablelimits rspace separator \
-           stretchy symmetric
-        mtext mathvariant
-        mspace depth height linebreak width
-        mfrac linethickness
-        msqrt
-        mroot
-        msub
-        msup
-        msubsup
-        munder accentunder
-        mover accent
-        munderover accent
-        mmultiscripts
-        mprescripts
-        none
-        mstyle displaystyle mathsize scriptlevel
-        mpadded depth height lspace voffset width
-        mphantom
-        menclose notation
-        mtable displaystyle columnalign rowspacing
-        mtr
-        mtd
-        span""".splitlines(),
+        fixture_text("documents/mathml_attributes.txt").splitlines(),
     )
 }
 """What the HTML checker takes and browsers draw; a `span` in `mtext` is the number of an equation.
 """
-FORMULAS = r"""
-\frac{1}{2} \dfrac12 \tfrac12 \cfrac{1}{1+\cfrac{1}{2}} \binom{n}{k} {n \choose k}
-x^2_3 x' x'' x'''_i {}^{14}C \prescript{a}{b}{c} \sideset{_a^b}{_c^d}\sum
-\begin{pmatrix}a&b\\c&d\end{pmatrix} \begin{vmatrix}a\end{vmatrix}
-\begin{bmatrix*}[r]a\end{bmatrix*}
-\begin{aligned}a&=b\\c&=d\end{aligned} \begin{cases}a&x>0\\b&\text{otherwise}\end{cases}
-\begin{array}{c|c}a&b\\\hline c&d\end{array} \begin{smallmatrix}a&b\\c&d\end{smallmatrix}
-\cancel{x}+\bcancel{y}+\xcancel{z}+\sout{q}+\boxed{E=mc^2}+\fbox{x}
-\color{red}x \textcolor{blue}{x} \colorbox{yellow}{x} \fcolorbox{red}{yellow}{x} \color{#ff0000}{x}
-\underbrace{a+b}_{c} \overbrace{a+b}^{c} \underline{x} \overline{x} \overrightarrow{AB} \utilde{x}
-\hat x \vec{x} \dot x \ddot x \dddot{x} \bar x \tilde x \widehat{abc} \widetilde{abc} \mathring x
-\left(\frac{a}{b}\right) \left.\frac{a}{b}\right|_{x=0} \left( a \middle| b \right) \bigl( \Bigr)
-\sqrt{x} \sqrt[3]{x} \sum_{i=1}^n \prod \int_0^1 \oint \iint \lim_{x\to0} \operatorname*{argmin}_x
-\mathbb{R} \mathcal{L} \mathfrak{g} \mathsf{x} \mathtt{x} \mathbf{x} \boldsymbol\omega \bm{\omega}
-\text{text with $x$ math} \textbf{bold} \textit{it} \texttt{tt} \textsc{ab} \verb|<x>|
-a \xrightarrow{f} b \xleftarrow[g]{f} c \rightarrow \mapsto \stackrel{a}{b} \overset{a}{b}
-\phantom{x} \hphantom{x} \vphantom{x} \smash{x} \mathllap{x} \mathrlap{x} \hspace{1em} \quad \, \!
-\rule{1em}{2em} \raisebox{1em}{x} \vcenter{x} \Large x \small y \displaystyle \sum \textstyle \sum
-\not= \neq \not\in \notin \lVert x\rVert \langle x\rangle \lfloor x \rfloor \bra{x} \ket{y}
-3.14\times10^{-3}\,\mathrm{kg\,m^2} 90^\circ 1{,}000 é ü α 日本 \LaTeX
-\mathbf{I}_c = \sum_i m_i\left(\lVert \mathbf r_i\rVert^2\mathbf 1-\mathbf r_i\mathbf r_i^T\right)
-""".strip().splitlines()
+FORMULAS = fixture_text("documents/formulas.tex").strip().splitlines()
 DISPLAY_ONLY = r"""
 \begin{align}a&=b\\c&=d\end{align}
 \begin{align*}a&=b\\c&=d\end{align*}

@@ -9,6 +9,7 @@ from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.scripts.failures import failure_diagnostic
 from coursebuild.core.scripts.findings import script_findings
+from support.fixture_cases import fixture_text
 from support.sample_lessons import course, describe, document, make_run
 
 
@@ -65,24 +66,7 @@ def test_paths_that_clash() -> None:
     assert extract(course_of("".join(map(block, neighbours)))).diagnostics == ()
 
 
-LESSON = """\
-```python file=examples/a.py
-import b
-```
-
-Output:
-
-```text
-E 1.5
-```
-
-See `1.5`{out} and `7.0`{out=examples/b.py}.
-
-```python file=examples/b.py
-print(7)
-1/0
-```
-"""
+LESSON = fixture_text("documents/findings.md")
 
 
 def test_tracebacks_lead_into_scripts_that_did_not_run() -> None:
@@ -118,33 +102,7 @@ def test_a_text_that_resembles_an_output_is_mended_by_its_edit() -> None:
 
 
 def test_every_recording_gets_a_verdict() -> None:
-    text = """\
-```python file=examples/a.py
-1
-```
-
-Output:
-
-```text
-one
-```
-
-Output:
-
-```text volatile
-two
-```
-
-```python file=examples/b.py
-2
-```
-
-Output:
-
-```text digits
-1.5
-```
-"""
+    text = fixture_text("documents/verdicts.md")
     lessons = course(document(text))
     runs = (make_run("one\n"), make_run("1.52\n", path="examples/b.py"))
     assert [v.status for v in verify(lessons, runs)] == ["verified", "volatile", "verified"]

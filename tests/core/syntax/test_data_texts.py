@@ -21,10 +21,8 @@ from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNod
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Excerpt, Source
-from support.json_fences import parse_lab, parse_quiz
-from support.json_fences import parse_text as parse
-from support.positioned_nodes import plain
-from support.text_cases import FOLDER, Reader, check_texts
+from support.text_cases import FOLDER, Reader, check_texts, parse_lab, parse_quiz, plain
+from support.text_cases import parse_text as parse
 
 
 def walk(node: Node) -> list[Node]:

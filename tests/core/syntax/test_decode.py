@@ -21,8 +21,7 @@ from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.text.source import Excerpt, Source
 from coursebuild.features.lab.schema import SimLab
 from coursebuild.features.quiz.schema import QuizFile
-from support.positioned_nodes import format_diagnostics
-from support.text_cases import check_texts
+from support.text_cases import check_texts, format_diagnostics
 
 
 class Disc(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="disc"):

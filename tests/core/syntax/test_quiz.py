@@ -31,9 +31,9 @@ from coursebuild.features.quiz.model import (
     OutputQuestion,
     Quiz,
 )
-from support.json_fences import MCQ
-from support.json_fences import parse_quiz as parse
 from support.plain_html import plain_blocks
+from support.text_cases import MCQ
+from support.text_cases import parse_quiz as parse
 
 
 def html(blocks: tuple[Block, ...]) -> str:

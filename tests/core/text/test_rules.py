@@ -2,17 +2,20 @@
 
 A case holds a smallest course that breaks the rule (see `support.rule_cases`) and all diagnostics
 that the tool then prints. `[update]`, `[build]` or `[check --no-cache]` in a title says which
-command finds the mistake, where it is not `check`. `[engine of 3.13.0]` and `[after 1 s]` change
-the engine that tries the labs, for mistakes that no course can make happen, or not soon enough.
+command finds the mistake, where it is not `check`. `[after 1 s]` gives labs less time, for mistakes
+that no course can make happen soon enough. `[then RULE]` names what comes to light once a mistake
+is mended. What `--fix` writes stands below.
 `pytest tests/core/text --rewrite-fixtures` writes the expected parts and
 `docs/reference/rules.md` anew.
 """
 
 from __future__ import annotations
 
+import difflib
 import re
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +24,17 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.registry import installed_features
-from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.scripts.edit import apply_edits
+from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.rules import RULES, Rule
+from coursebuild.core.text.source import Source
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.pipeline.check import check
+from coursebuild.pipeline.fix import choose_fixes
 from coursebuild.pipeline.outputs import update
 from coursebuild.pipeline.publication import build, export
 from coursebuild.report import Style, diagnostic_text
+from coursebuild.report.text import visible
 from support.fixture_cases import Case, read_cases, rewrite
 from support.rule_cases import Layout, Workshop, parts
 
@@ -79,6 +86,10 @@ reason = "the levels are those of the book"
 path = "content/lessons/4.*"   # optional
 ```
 
+Where it is known what to write, a diagnostic has an edit. `coursebuild check --fix` makes those
+that can only have been meant, `--fix --unsafe` also the likely ones, and `coursebuild undo` takes
+them back. The rule of a mistake that nothing mends by itself says why.
+
 {_contents("error")}
 
 {_contents("warning")}
@@ -94,13 +105,22 @@ def _contents(severity: str) -> str:
 
 def _entry(rule: Rule, example: Example | None) -> str:
     parts = [f"\n## {rule.name}\n\n{rule.severity.capitalize()}. {rule.summary}\n"]
+    if rule.no_fix:
+        parts.append(f"\nNothing mends it by itself. {rule.no_fix}\n")
     if example is None:
         return parts[0]
     for file in example.files:
         parts.append(f"\n`{file.path}`{file.remark}\n")
         if file.text:
             parts.append(f"\n{_fence(_LANGUAGES.get(file.path.rpartition('.')[2], ''), file.text)}")
-    parts.append(f"\n`coursebuild {example.command}` says:\n\n{_fence('', example.output)}")
+    output, *writings = re.split(r"\n\n(?=--fix)", example.output)
+    parts.append(f"\n`coursebuild {example.command}` says:\n\n{_fence('', output)}")
+    for writing in writings:
+        head, diff = writing.split("\n", 1)
+        option, _, path = head.partition(" writes ")
+        parts.append(
+            f"\n`coursebuild check {option}` writes in `{path}`:\n\n{_fence('diff', diff)}"
+        )
     return "".join(parts)
 
 
@@ -128,20 +148,18 @@ RUN = re.compile(r"file=examples/|models/|```mjcf|```lab")
 """Marks of a course with something to run or compile."""
 
 
-class ChangedEngine:
-    """The browser's engine, of another version or with less time for a trial, as a title asks."""
+class HurriedEngine:
+    """The browser's engine, with less time for a trial where a title asks for it."""
 
     def __init__(self, engine: LabEngine, title: str) -> None:
         self._engine = engine
-        self._version = re.search(r"\[engine of ([\d.]+)\]", title)
         self._time = re.search(r"\[after ([\d.]+) s\]", title)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._engine, name)
 
     def trial(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
-        reply = self._engine.trial(request, mjb, float(self._time[1]) if self._time else seconds)
-        return {**reply, "version": self._version[1]} if self._version else reply
+        return self._engine.trial(request, mjb, float(self._time[1]) if self._time else seconds)
 
 
 def command_of(case: Case) -> str:
@@ -156,24 +174,63 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
 
 
 def print_diagnostics(case: Case, root: Path, workshop: Workshop) -> str:
-    """All that the tool prints of a case, without colours."""
+    """All that the tool prints of a case, without colours, and what its fixes write.
+
+    With them the mistakes are gone, and there is none of another rule.
+    """
     diagnostics = run_case(case, root, workshop)
+    fixes = choose_fixes(diagnostics, unsafe=True)
+    if fixes:
+        fixed_texts = {s.path: apply_edits(s.text, edits) for s, edits in by_source(fixes).items()}
+        after = run_case(case, root.with_name(f"{root.name}-fixed"), workshop, fixed_texts)
+        rules = {d.rule for d in diagnostics}
+        rules |= set(re.findall(r"\[then ([\w-]+)\]", case.title))
+        new = [diagnostic_text(d, Style()) for d in after if d.is_error and d.rule not in rules]
+        assert new == [], f"{case.title}:\n" + "\n\n".join(new)
+        left = Counter((d.rule, d.message) for d in after)
+        left.subtract((d.rule, d.message) for d in diagnostics)
+        assert all(left[fix.rule, fix.message] < 0 for fix in fixes), "a fix mends nothing"
     text = "\n\n".join(diagnostic_text(d, Style()) for d in diagnostics)
     assert str(root) not in text, "a message names a folder of this machine"
     # Which part of a line a traceback underlines is different in each version of Python.
     text = re.sub(r"^ +[~^][ ~^]*\n", "", text, flags=re.MULTILINE)
-    return without_page_lines(text) + "\n"
+    return without_page_lines(text) + "\n" + "".join(print_fixes(fixes))
 
 
-def run_case(case: Case, root: Path, workshop: Workshop) -> tuple[Diagnostic, ...]:
+def print_fixes(fixes: Sequence[Diagnostic]) -> Iterator[str]:
+    """The lines that `--fix` changes, and those that it changes only with `--unsafe`."""
+    for option, is_safe in (("--fix", True), ("--fix --unsafe", False)):
+        for source, edits in by_source(f for f in fixes if f.safe is is_safe).items():
+            lines, new_lines = (
+                source.text.splitlines(),
+                apply_edits(source.text, edits).splitlines(),
+            )
+            diff = list(difflib.unified_diff(lines, new_lines, n=0, lineterm=""))[2:]
+            changed = "".join(f"{visible(line)}\n" for line in diff if not line.startswith("@@"))
+            yield f"\n{option} writes {source.path}\n{changed}"
+
+
+def by_source(fixes: Iterable[Diagnostic]) -> dict[Source, list[Edit]]:
+    edits: dict[Source, list[Edit]] = {}
+    for edit in (edit for fix in fixes for edit in fix.edits):
+        edits.setdefault(edit.span.source, []).append(edit)
+    return edits
+
+
+def run_case(
+    case: Case, root: Path, workshop: Workshop, fixed_texts: Mapping[str, str] = {}
+) -> tuple[Diagnostic, ...]:
+    """The diagnostics of a case; with texts that fixes have made, of what comes of it."""
     layout = Layout.of(case.input)
     layout.write(root)
+    for path, text in fixed_texts.items():
+        (root / path).write_bytes(text.encode())
     options = workshop.options(root)
     if layout.later:
         check(options)
         layout.write_later(root)
     if "```lab" in case.input and command_of(case) == "check":
-        return workshop.try_labs(root, lambda engine: ChangedEngine(engine, case.title))
+        return workshop.try_labs(root, lambda engine: HurriedEngine(engine, case.title))
     match command_of(case):
         case "check":
             return check(options).diagnostics
@@ -230,6 +287,15 @@ def test_what_the_author_sees(
 
 def test_every_rule_has_its_fixture_and_every_fixture_its_rule() -> None:
     assert set(FILES) == set(RULES)
+
+
+def test_a_rule_without_edits_says_why() -> None:
+    with_edits = {
+        name for name, cases in CASES.items() if any("\n--fix" in case.expected for case in cases)
+    }
+    without_edits = {name for name, rule in RULES.items() if rule.no_fix}
+    assert sorted(RULES.keys() - with_edits - without_edits) == [], "neither edit nor reason"
+    assert sorted(with_edits & without_edits) == [], "edit and reason"
 
 
 def test_each_case_of_a_fixture_shows_its_rule() -> None:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from support.formatting import check_formatting, format_text
+from support.plain_html import check_formatting, format_text
 from support.random_lessons import markdown
 from support.scratch_course import CommandResult, Make
 

@@ -319,7 +319,7 @@ def test_action_installs_a_version_and_runs_a_command(course: Folder, runner: Ru
     inputs = {"version": "0.9.0", "path": course.root.name, "command": "build --out ../site"}
     assert statuses(runner.action(parent, steps, **inputs)) == [0, 0]
     assert (parent / "site/index.html").is_file()
-    locked = "pip install --require-hashes -r requirements.txt -r requirements-build.txt"
+    locked = "pip install --require-hashes -r requirements-course.txt -r requirements-build.txt"
     alone = "pip install --no-deps --no-build-isolation"
     assert runner.notes == [
         *(locked, f"{alone} .", "pip check"),

@@ -19,7 +19,7 @@ from coursebuild.features.bench.commands.measurement import (
     measurement_json,
 )
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.departures import Departure, RecordCheck
+from coursebuild.numerics.reports.records import Departure, RecordCheck
 from coursebuild.numerics.reports.scene_report import RowVerdict
 from coursebuild.report import Style
 from coursebuild.report.text import Column, cells, table

@@ -79,6 +79,57 @@ def test_equations_of_motion_are_integrated(course: Path) -> None:
     assert 1e-6 < loose.floor < 1e-4, "and no error is given that is not known"
 
 
+def test_two_motions_of_the_course_are_told_apart(course: Path) -> None:
+    """A formula and equations: the one that errs is named, and the engine decides."""
+    exact = EXACT.format(velocity=", qvel - 9.81 * time") + "\n\n" + EQUATIONS
+    assert report(course, exact.format("")).floor < 1e-11
+    with pytest.raises(CannotMeasureError) as caught:
+        report(course, exact.format(" * (1 + 1e-5)"))
+    diagnostic = caught.value.diagnostic
+    assert diagnostic.message == (
+        "`models/ball.exact.py`, `acceleration`, is not this scene's motion"
+    )
+
+
+PENDULUM = """\
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody><body><joint name="j" axis="0 1 0"/>
+    <geom size=".01" pos="0 0 -1" mass="1"/><inertial pos="0 0 -1" mass="1" diaginertia="0 0 0"/>
+  </body></worldbody>
+  <sensor><jointpos name="angle" joint="j"/></sensor>
+</mujoco>
+"""
+QUARTER = """\
+from scipy.special import ellipk
+
+
+def expected(qpos, qvel):
+    return {"crossing": ellipk(0.5) / 9.81**0.5, "largest": qpos[0]}
+"""
+
+
+def test_quantities_of_theory_are_measured_by_their_formula(course: Path) -> None:
+    """A pendulum let go at 90°: it is down after a quarter of its period, K(1/2)/√g."""
+    write(course / "models" / "ball.xml", PENDULUM.replace('"0 0 0"/>', '"1e-9 1e-9 1e-9"/>'))
+    start = "qpos = [1.5707963267948966]\nduration = 1\nsample = 0.02\nmeasure = 'sensor:angle'\n"
+    toml = f"[[scenario]]\nname = 'swing'\n{start}"
+    scenario = report(course, QUARTER, toml + "energy_bound = 9.9\n")
+    figures = {(line.integrator, line.name): line for line in scenario.figures}
+    crossing = figures["RK4", "crossing"]
+    assert (crossing.unit, crossing.source) == ("s", "models/ball.exact.py")
+    assert crossing.exact == pytest.approx(0.59196, abs=1e-6)
+    assert crossing.measured == pytest.approx(crossing.exact, abs=1e-6)
+    euler = figures["Euler", "crossing"].measured
+    assert euler is not None and 1e-5 < abs(euler - crossing.exact) < 1e-2
+    assert figures["RK4", "largest"].measured == pytest.approx(1.5707, abs=1e-3)
+    assert {row.energy for row in scenario.stable} == {9.9}
+    with pytest.raises(CannotMeasureError) as caught:
+        report(course, QUARTER.replace("largest", "loudest"), toml)
+    message = "`models/ball.exact.py` expects `loudest`, which is not measured"
+    assert caught.value.diagnostic.message == message
+
+
 BOUNCE = """\
 <mujoco>
   <option timestep="0.002" cone="elliptic"/>

@@ -1,19 +1,26 @@
-"""The whole course as an e-book and on one page: valid, whatever its lessons hold."""
+"""E-books and the course on one page; what is taken from the pages of a site."""
 
 from __future__ import annotations
 
 import re
 import shutil
 import zipfile
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
+from hypothesis import given
 
+from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html, to_html, to_xml
+from coursebuild.core.pages.urls import Place
+from coursebuild.features.book.chapters import RewriteRules, rewrite
+from coursebuild.features.book.epub import xml_id
 from support.archives import epub_messages
 from support.built_sites import BuiltCourses
+from support.fixture_cases import fixture_text
+from support.hostile_html import PAGES
 from support.scratch_course import Folder, Make
-
-pytestmark = pytest.mark.site
 
 
 def export(folder: Folder, kind: str) -> Path:
@@ -25,21 +32,7 @@ def export(folder: Folder, kind: str) -> Path:
 
 HOSTILE = "<b>\\\"&amp;' \\u0007 ]](x) $x$ ‮ `"
 """A title, as TOML has it."""
-WILD = """## One {#a:b}
-
-<p class=x onclick="alert(1)">Its end is left out, <b>bold</b><br>a line
-<img src="dot.png">
-<svg viewBox="0 0 1 1"><path d="M0 0h1"/></svg>
-<table><tr><td>1<td>2<tr><td colspan=2>3</table> &nbsp;&eacute;&#1;
-<custom-thing @x="1">own</custom-thing>
-<button>press</button><input type=text value=x>
-
-[a file](data.csv), [a section](#a:b), [itself](lesson:1.9), [another](lesson:1.1), Level 1.[^x]
-
-![a dot](dot.png "A dot") $x < y \\,\\&\\, z$
-
-[^x]: A note with `code`.
-"""
+WILD = fixture_text("documents/wild.md")
 
 
 DOT = bytes.fromhex(
@@ -49,6 +42,11 @@ DOT = bytes.fromhex(
 )
 
 
+SOURCES = r"""
+@article{key:1/a, author = {<b> & "Co"}, title = {]]> <i>x</i> \'e}, doi = {10.1000/<"'&>},
+  year = 1}
+@misc{other, title = {{Only} a title}, url = {https://example.org/?a="b"&c=<d>}}
+"""
 MAP = "content/course.toml"
 SITE = 'base_url = "https://example.org/a%20b/"\n'
 ENTRY = '[[level.lesson]]\nid = "1.9"\nslug = "wild"\ntitle = "Wild"\nstatus = "complete"\n\n'
@@ -69,6 +67,7 @@ def full_course(tmp_path_factory: pytest.TempPathFactory, built_courses: BuiltCo
     folder.write("content/lessons/1.9-wild.md", WILD)
     folder.write("content/lessons/dot.png", DOT)
     folder.write("content/lessons/data.csv", b"1,2\n")
+    folder.write("content/references.bib", SOURCES)
     folder.replace(MAP, '[[level]]\nid = "A"', ENTRY + '[[level]]\nid = "A"')
     text = re.sub(r"(?m)^(base_url|language) = .*\n", "", folder.text(MAP))
     text = re.sub(r'(?m)^(title|summary) = ".*"$', lambda m: f'{m[1]} = "{HOSTILE}"', text)
@@ -77,6 +76,7 @@ def full_course(tmp_path_factory: pytest.TempPathFactory, built_courses: BuiltCo
     return folder
 
 
+@pytest.mark.site
 def test_ebook_of_every_construct_and_of_wild_html_is_valid(full_course: Folder) -> None:
     book = export(full_course, "epub")
     assert book.read_bytes()[30:58] == b"mimetypeapplication/epub+zip"
@@ -94,6 +94,7 @@ def test_ebook_of_every_construct_and_of_wild_html_is_valid(full_course: Folder)
     full_course.replace(MAP, "[course]\n", f"[course]\n{SITE}")
 
 
+@pytest.mark.site
 def test_page_of_every_construct_and_of_wild_html_is_self_contained(full_course: Folder) -> None:
     page = export(full_course, "page").read_text("utf-8")
     ids = re.findall(r' id="([^"]*)"', page)
@@ -106,6 +107,7 @@ def test_page_of_every_construct_and_of_wild_html_is_self_contained(full_course:
     assert page.index('id="_1.1--_top"') < page.index('id="_1.9--_top"')
 
 
+@pytest.mark.site
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["unicode", "real"])
 def test_ebook_of_course_is_valid(built_courses: BuiltCourses, name: str, tmp_path: Path) -> None:
@@ -115,6 +117,7 @@ def test_ebook_of_course_is_valid(built_courses: BuiltCourses, name: str, tmp_pa
     assert epub_messages(book) == []
 
 
+@pytest.mark.site
 def test_export_follows_edits_and_can_be_offered_by_a_link(make_course: Make) -> None:
     folder = make_course("## One\n\n![a dot](dot.png)\n\nText.\n")
     folder.write("content/lessons/dot.png", DOT)
@@ -127,3 +130,90 @@ def test_export_follows_edits_and_can_be_offered_by_a_link(make_course: Make) ->
     folder.write(folder.lesson(1), "[The book](../files/course.epub).\n")
     assert folder.main("build", "--quiet").status == 0
     assert folder.read("public/files/files/course.epub") == first["epub"]
+
+
+PAGE = Place("lessons/1.1-one.html")
+
+
+def picture(path: str) -> str:
+    return f"in-book/{path}" if path.endswith(".png") else ""
+
+
+def link(path: str, anchor: str) -> str:
+    return f"to:{path}#{anchor}" if path.startswith("lessons/") else ""
+
+
+BOOK = RewriteRules(PAGE, link, picture, xml_id)
+WHOLE = RewriteRules(
+    PAGE,
+    link,
+    picture,
+    "1.1--{}".format,
+    heading_shift=2,
+    closed_classes=frozenset({"answer"}),
+    section="1.1",
+)
+
+
+def xml(html: str) -> str:
+    return to_xml(rewrite(parse_html(html), BOOK))
+
+
+def html_for_page(html: str) -> str:
+    return to_html(rewrite(parse_html(html), WHOLE))
+
+
+@given(PAGES)
+def test_any_html_becomes_well_formed_and_runs_nothing(html: str) -> None:
+    ElementTree.fromstring(f"<body>{xml(html)}</body>".encode())
+    for element in walk(parse_html(html_for_page(html))):
+        assert element.name not in ("script", "button")
+        assert not any(name.startswith("on") for name in element.attributes)
+
+
+def walk(content: Iterable[HtmlContent]) -> Iterator[HtmlElement]:
+    for child in content:
+        if isinstance(child, HtmlElement):
+            yield child
+            yield from walk(child.children)
+
+
+def test_rewriting_html() -> None:
+    cases = [
+        ("<h2 id=a>A</h2>", '<h4 id="1.1--a">A</h4>'),
+        ("<h6>A</h6>", "<h6>A</h6>"),
+        ("<xmp><b></xmp><plaintext><b>", "<pre>\n&lt;b&gt;</pre><pre>\n&lt;b&gt;</pre>"),
+        ('<a href="#a">b</a>', '<a href="#1.1--a">b</a>'),
+        ('<a href="1.2-two.html#c">b</a>', '<a href="to:lessons/1.2-two.html#c">b</a>'),
+        ('<a href="../files/x.csv">b</a>', "<a>b</a>"),
+        ('<a href="https://e.org/#a">b</a>', '<a href="https://e.org/#a">b</a>'),
+        ("<a href='//['>b</a>", '<a href="//[">b</a>'),
+        ('<a href="b%20c.html#%C3%A9">b</a>', '<a href="to:lessons/b c.html#é">b</a>'),
+        ('<a href="../lessons/">b</a>', '<a href="to:lessons/index.html#">b</a>'),
+        ('<a href="../../out.html">b</a>', '<a href="../../out.html">b</a>'),
+        ('<a href="mailto:a@b">b</a>', '<a href="mailto:a@b">b</a>'),
+        ('<a href="?q">b</a>', '<a href="?q">b</a>'),
+        ('<p aria-labelledby="a b">', '<p aria-labelledby="1.1--a 1.1--b"></p>'),
+        ('<section aria-label="S">', '<section aria-label="S, 1.1"></section>'),
+        ("<details><p>s</p></details>", '<details open=""><p>s</p></details>'),
+        ('<details class="answer">', '<details class="answer"></details>'),
+        ('<img src="a.png" alt="x" loading="lazy">', '<img src="in-book/lessons/a.png" alt="x">'),
+        ('<img src="a.avif" alt="&lt;x">', "&lt;x"),
+        ('<img src="https://e.org/a.png" alt="far">', "far"),
+        ('<svg><use href="#a"/><g fill="url(#b)"/></svg>',
+         '<svg><use href="#1.1--a"></use><g fill="url(#1.1--b)"></g></svg>'),
+        ('<b data-x="1" onclick="e()" tabindex="0" style="a">b</b>', "<b>b</b>"),
+        ('<a class="anchor" href="#a">#</a><button>b</button>c', "c"),
+    ]  # fmt: skip
+    assert [html_for_page(html) for html, _ in cases] == [expected for _, expected in cases]
+
+
+def test_rewriting_html_as_xml() -> None:
+    cases = [
+        ('<p id="1 é">a<br>&nbsp;&amp;\x07', '<p id="_1_20__e9_">a<br/>\xa0&amp;\ufffd</p>'),
+        ("<b @x=1 y:z=2 ok=3>b</b>", '<b ok="3">b</b>'),
+        ("<math><mi>x</mi></math>",
+         '<math xmlns="http://www.w3.org/1998/Math/MathML"><mi>x</mi></math>'),
+        ("<b<i>text</b<i>", "text"),
+    ]  # fmt: skip
+    assert [xml(html) for html, _ in cases] == [expected for _, expected in cases]

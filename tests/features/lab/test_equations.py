@@ -28,7 +28,7 @@ from coursebuild.features.lab.equations.reference import (
     compare_values,
     evaluate,
 )
-from support.json_fences import parse_lab
+from support.text_cases import parse_lab
 
 PATIENCE = math.inf
 NAMES = {"x": 0, "y": 1}

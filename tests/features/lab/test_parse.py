@@ -18,42 +18,12 @@ from coursebuild.features.lab.schema import (
     Slider,
     Verify,
 )
-from support.json_fences import parse_lab as parse
+from support.fixture_cases import fixture_text
 from support.lab_values import lab_of
-from support.positioned_nodes import format_diagnostics
+from support.text_cases import format_diagnostics
+from support.text_cases import parse_lab as parse
 
-COMPLETE = r"""{
-  "title": "The flip", "note": "Press *Play*.", "height": 240, "dock": true,
-  "model": "tumbling_box", "key": "intermediate",
-  "camera": {"azimuth": -70, "elevation": 20, "distance": 0.8, "target": [0, 0, 0.5]},
-  "toggles": ["frames", "com"], "overlays": {"frames": true, "com": false},
-  "forceScale": 0.01, "autoplay": true, "stopAt": 20,
-  "setup": "data.qvel[4] = 6", "controller": "ctx.n += 1",
-  "controls": [
-    {"label": "mass", "unit": "kg", "min": 0.5, "max": 2, "step": 0.1, "value": 1, "digits": 1,
-     "set": "model.body_mass[1]", "init": true},
-    {"type": "slider", "label": "gain", "min": -1, "max": 1, "value": 0, "param": "gain"},
-    {"type": "select", "label": "integrator", "options": [["RK4", 1], ["Euler", 0]], "value": 0,
-     "apply": "model.opt.integrator = value", "reset": true},
-    {"type": "select", "label": "mode", "options": [["slow", "s"], ["fast", "f"]], "param": "mode"},
-    {"type": "button", "label": "Spin", "run": "data.qvel[4] = 6"}],
-  "readouts": [{"label": "E (J)", "expr": "lib.energy().kinetic", "digits": 5},
-               {"label": "n", "expr": "ctx.n"}],
-  "plots": [{"ylabel": "ω", "window": 10, "ymin": -7, "ymax": 7, "height": 200,
-    "refLines": [{"y": 6, "label": "start"}, {"y": 0}],
-    "traces": [{"label": "x", "expr": "data.qvel[3]", "dash": [4, 2]},
-               {"label": "y", "expr": "data.qvel[4]", "dash": true},
-               {"label": "z", "expr": "data.qvel[5]"}]}],
-  "trail": "tip",
-  "expect": [{"after": "Spin", "t": 5, "expr": "lib.energy().kinetic", "min": 0.1, "max": 1},
-             {"after": {"mass": 2, "mode": "f"}, "t": 0, "expr": "1", "min": 1},
-             {"t": 1, "expr": "2", "max": 2},
-             {"after": [{"mass": 2}, "Spin", {"mode": "f", "gain": 1}], "t": 0, "expr": "1",
-              "min": 1}],
-  "goal": {"text": "Let it *fly*.", "expr": "up", "hold": 2,
-           "log": [{"t": 0, "do": {"gain": 1, "mass": 2}}, {"t": 0.5, "do": "Spin"}]},
-  "seed": 4294967295, "verify": {"seconds": 3, "rtol": 0}
-}"""
+COMPLETE = fixture_text("documents/complete_lab.json")
 
 
 def test_a_complete_lab() -> None:

@@ -1,7 +1,4 @@
-"""Pictures without a graphics processor: what hides what, what cannot be drawn, and the file.
-
-`tests/browser/test_drawing.py` tests that they look like MuJoCo's own.
-"""
+"""Pictures of labs: what is drawn, and surfaces of geoms that degenerate."""
 
 from __future__ import annotations
 
@@ -17,11 +14,18 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from coursebuild.features.lab.picture.draw import FreeCamera, Solid, draw
-from coursebuild.features.lab.picture.raster import Floor
-from coursebuild.features.lab.picture.shapes import Kind, flat_surface, grid_faces, surface
+from coursebuild.features.lab.picture.raster import Floor, TextureMapping, texture_of
+from coursebuild.features.lab.picture.shapes import (
+    Kind,
+    flat_surface,
+    grid_faces,
+    ropes,
+    sharpen,
+    smooth_surface,
+    surface,
+)
 from coursebuild.features.lab.picture.static import png
-from coursebuild.features.lab.picture.textures import TextureMapping, texture_of
-from support.png_files import read_png
+from support.model_files import read_png
 
 FRONT = FreeCamera(azimuth=90, elevation=0, distance=4, target=(0, 0, 0))
 """Looks along +y: x is to the right, z is up."""
@@ -192,3 +196,39 @@ def test_a_file_is_read_back_as_it_was() -> None:
         assert np.array_equal(read_png(png(pixels)), pixels)
         pixels[..., 3] = 255
         assert np.array_equal(read_png(png(pixels)), pixels)
+
+
+def test_normals_of_an_ellipsoid_are_those_of_its_equation() -> None:
+    axes = np.array((0.5, 0.2, 1.0))
+    shape = surface("ellipsoid", (0.5, 0.2, 1.0))
+    assert shape is not None
+    gradient = shape.vertices / axes**2
+    gradient /= np.linalg.norm(gradient, axis=1, keepdims=True)
+    assert np.allclose(shape.normals, gradient, atol=1e-9)
+
+
+def test_a_triangle_without_area_has_no_normal_and_no_error() -> None:
+    shape = flat_surface(np.zeros((3, 3)), np.array([(0, 1, 2)]))
+    assert np.array_equal(shape.normals, np.zeros((3, 3)))
+
+
+def test_a_rope_whose_ends_meet_is_a_ball() -> None:
+    rope = ropes(np.zeros((2, 3)), np.array([(0, 1)]), 0.2)
+    assert np.isfinite(rope.vertices).all()
+    assert np.linalg.norm(rope.vertices, axis=1).max() == pytest.approx(0.2)
+
+
+def test_a_smooth_surface_has_the_mean_normal_of_its_faces() -> None:
+    ridge = np.array([(0.0, -1, 0), (0, 1, 0), (-1, 0, -1), (1, 0, -1)])
+    shape = smooth_surface(ridge, np.array([(0, 1, 2), (1, 0, 3)]))
+    assert shape.normals[0] == pytest.approx((0, 0, 1))
+    assert shape.normals[3] == pytest.approx((math.sqrt(0.5), 0, math.sqrt(0.5)))
+
+
+def test_an_edge_is_sharp_where_the_face_is_turned_far() -> None:
+    up = np.tile((0.0, 0.0, 1.0), (1, 3, 1))
+    for angle, sharp in ((0.3, False), (0.6, False), (0.7, True), (1.5, True)):
+        corners = np.array([[(0.0, 0, 0), (1, 0, 0), (0, math.cos(angle), math.sin(angle))]])
+        expected = (0, -math.sin(angle), math.cos(angle)) if sharp else (0, 0, 1)
+        assert sharpen(corners, up)[0, 1] == pytest.approx(expected), angle
+    assert np.array_equal(sharpen(np.zeros((1, 3, 3)), up), up), "no face, no normal of it"

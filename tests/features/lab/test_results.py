@@ -19,6 +19,7 @@ from coursebuild.features.lab.reply import (
     reply_bytes,
 )
 from coursebuild.features.lab.verdict import failure_diagnostics
+from support.fixture_cases import fixture_text
 from support.lab_lessons import RIGHT, course, fence, run_check
 from support.lab_values import BALL, lab_of, make_lab
 from support.scratch_course import Folder
@@ -115,42 +116,7 @@ def test_models_are_live_on_their_pages_and_seen_in_the_gallery(site: BuiltSite)
     assert "<p>A box that nothing moves.</p>" in gallery
 
 
-LINES = """{
-  "xml": "BALL",
-  "stopAt": 2,
-  "setup": "ctx.a = 1",
-  "controller":
-    "ctx.b = 1",
-  "controls": [
-    {"label": "mass", "min": 0, "max": 1, "value": 0,
-     "set": "model.body_mass[1]"},
-    {
-      "label": "size",
-      "min": 0, "max": 1, "value": 0,
-      "apply": "ctx.size = value"
-    },
-    {"type": "button",
-     "label": "Kick", "run":
-       "data.qvel[0] = 1"},
-    {"min": 0, "max": 1, "value": 0, "label": "gain",
-     "param": "gain"}
-  ],
-  "readouts": [
-    {"label": "x",
-     "expr": "data.qpos[0]"}, {"label": "y", "expr": "data.qpos[1]"}
-  ],
-  "plots": [
-    {"ylabel": "z", "traces": [{"label": "one", "expr": "1"},
-      {"label": "two",
-       "expr": "2"}]}
-  ],
-  "expect": [
-    {"t": 1,
-     "expr": "data.time", "min": 1}
-  ],
-  "verify": {"seconds": 1,
-    "rtol": 1e-6}
-}""".replace("BALL", BALL)
+LINES = fixture_text("documents/lab_lines.json").replace("BALL", BALL)
 
 PLACES = [
     ((), "```lab simlab"),

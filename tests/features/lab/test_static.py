@@ -14,38 +14,13 @@ from coursebuild.features.lab.picture.draw import Solid
 from coursebuild.features.lab.picture.scenery import scene_solids
 from coursebuild.features.lab.picture.static import draw_picture, lab_record
 from coursebuild.features.lab.reply import unpack_arrays
+from support.fixture_cases import fixture_text
 from support.lab_values import Bench, make_lab
-from support.png_files import read_png
+from support.model_files import read_png
 
 pytestmark = pytest.mark.engine
 
-FULL_MODEL = """
-<mujoco>
-  <asset>
-    <texture name="grid" type="2d" builtin="checker" width="8" height="8" rgb1="1 0 0" rgb2="0 1 0"/>
-    <material name="floor" texture="grid" texrepeat="4 4" texuniform="true"/>
-    <mesh name="first" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/>
-    <mesh name="second" vertex="0 0 0  2 0 0  0 2 0  0 0 2"/>
-    <hfield name="hills" nrow="3" ncol="4" size="2 1 0.5 0.1" elevation="0 0 0 0  0 1 1 0  0 0 0 0"/>
-  </asset>
-  <worldbody>
-    <light pos="0 0 5"/>
-    <geom type="plane" size="5 5 1" material="floor"/>
-    <geom type="hfield" hfield="hills" pos="0 6 0"/>
-    <body pos="0 0 1"><freejoint/><geom type="sphere" size="0.1" rgba="1 0 0 1"/></body>
-    <body pos="1 0 1"><freejoint/><geom type="capsule" size="0.1 0.3"/></body>
-    <body pos="2 0 1"><freejoint/><geom type="ellipsoid" size="0.1 0.2 0.3" rgba="0 0 1 0.5"/></body>
-    <body pos="3 0 1"><freejoint/><geom type="cylinder" size="0.1 0.3"/></body>
-    <body pos="4 0 1"><freejoint/><geom type="box" size="0.1 0.2 0.3"/></body>
-    <body pos="5 0 1"><freejoint/><geom type="mesh" mesh="first"/></body>
-    <body pos="7 0 1"><freejoint/><geom type="mesh" mesh="second"/></body>
-    <body name="hidden" pos="9 0 1"><geom type="box" size="1 1 1" group="4"/></body>
-    <body name="a" pos="0 3 2"><joint type="hinge" axis="0 1 0"/><geom size="0.05"/><site name="s" pos="0 0 0.2"/></body>
-    <body name="b" pos="1 3 2"><joint type="hinge" axis="0 1 0"/><geom size="0.05"/><site name="t" type="box" size="0.02 0.02 0.02"/></body>
-  </worldbody>
-  <tendon><spatial width="0.01" rgba="0 1 0 1"><site site="s"/><site site="t"/></spatial></tendon>
-</mujoco>
-"""  # noqa: E501
+FULL_MODEL = fixture_text("documents/full_model.xml")
 
 
 def main_of(bench: Bench, **fields: Any) -> tuple[Any, dict[str, Any]]:

@@ -26,8 +26,8 @@ from coursebuild.core.run.run_store import RunStore
 from coursebuild.features.lab.compile import LabCode
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
-from coursebuild.features.lab.files import LabOutput
 from coursebuild.features.lab.inputs import lab_trials
+from coursebuild.features.lab.reply import LabOutput
 from coursebuild.features.lab.trial import Engines, LabTrials
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import Options

@@ -11,6 +11,7 @@ import pytest
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException
 
+from coursebuild import MANUAL
 from support.editor import Editor
 from support.scratch_course import Folder, block, wait_until_alone
 
@@ -112,9 +113,8 @@ def test_mistakes_are_reported_while_typing_and_nothing_is_saved(editor: Editor)
     assert mistake.range == types.Range(place, types.Position(5, 16))
     assert mistake.severity == types.DiagnosticSeverity.Error
     assert mistake.message.startswith("lesson 9.9 is not in the course map")
-    assert mistake.code_description and mistake.code_description.href.endswith(
-        "rules.md#link-lesson"
-    )
+    address = mistake.code_description and mistake.code_description.href
+    assert address == (f"{MANUAL}rules.html#link-lesson" if MANUAL else None)
     editor.write(SECOND_LESSON, LINKS)
     editor.until(SECOND_LESSON)
     assert editor.folder.text(SECOND_LESSON) == LINKS
@@ -349,9 +349,24 @@ def test_a_proposal_of_a_diagnostic_is_a_quick_fix(editor: Editor) -> None:
     text = FALL.replace("at `1.000`{out} m", "at `1.200 m`{out}")
     editor.write(FIRST_LESSON, text)
     editor.until(FIRST_LESSON, "binding-mismatch")
-    (fix,) = editor.actions(FIRST_LESSON, "`1.2|00 m`").values()
+    fix, fix_all = editor.actions(FIRST_LESSON, "`1.2|00 m`").values()
     assert (fix.title, fix.kind) == ("Write `1.000 m`", types.CodeActionKind.QuickFix)
+    assert fix.is_preferred
     assert editor.apply_edits(fix.edit.changes)[FIRST_LESSON] == text.replace("1.200", "1.000")
+    assert fix_all.title == "Fix all in this file (1)"
+
+
+def test_all_mistakes_of_a_file_are_fixed_together(editor: Editor) -> None:
+    """On request, from anywhere in the file, and only what can be meant."""
+    text = FALL.replace("## ", "[a](lesson:fall) [b](term:zzzz)\n\n> [!nte] A\n>\n> B.\n\n## ", 1)
+    editor.write(FIRST_LESSON, text)
+    editor.until(FIRST_LESSON, "link-lesson", "link-term", "callout-unknown")
+    kind = types.CodeActionKind.SourceFixAll
+    (fix_all,) = editor.actions(FIRST_LESSON, "> |B.", only=[kind]).values()
+    assert (fix_all.title, fix_all.kind) == ("Fix all in this file (1)", kind)
+    new = editor.apply_edits(fix_all.edit.changes)[FIRST_LESSON]
+    assert new == text.replace("!nte", "!note")
+    assert not editor.actions(FIRST_LESSON, "> |B.", only=[types.CodeActionKind.Refactor])
 
 
 def test_renaming_a_lesson(editor: Editor) -> None:
@@ -380,8 +395,11 @@ def rename(editor: Editor, path: str, needle: str, name: str) -> dict[str, str]:
 
 def test_renaming_a_term_and_a_label(editor: Editor) -> None:
     text = LINKS + "\n[again][r] and [the term](lesson:1.1#term:moment-of-inertia).\n\n"
-    text += "[r]: lesson:1.1#eq:energy\n"
+    text += "[r]: lesson:1.1#eq:energy\n\n```bash {#lst:run}\nls\n```\n\nSee [](#lst:run).\n"
     editor.write(SECOND_LESSON, text)
+    assert rename(editor, SECOND_LESSON, "(#lst:ru|n)", "lst:go") == {
+        SECOND_LESSON: text.replace("lst:run", "lst:go")
+    }
     for path, needle in (
         (FIRST_LESSON, "{#eq:en|ergy}"),
         (SECOND_LESSON, "lesson:1.1#eq:en|ergy)"),
@@ -411,6 +429,7 @@ def test_renaming_a_term_and_a_label(editor: Editor) -> None:
         ("lesson:1.1#eq:en|ergy)", "energy", "a label is `eq:`"),
         ("lesson:1.1#eq:en|ergy)", "eq:", "a label is `eq:`"),
         ("{#a|ll", "a b", "a label is letters"),
+        ("{#lst:ru|n", "fig:run", "a label is `lst:`"),
     ):
         with pytest.raises(JsonRpcException, match=reason):
             rename(editor, SECOND_LESSON, needle, name)
@@ -457,5 +476,6 @@ def test_without_pygls_the_command_says_what_to_install(tmp_path: Path, stores: 
         "from coursebuild.cli import main; sys.exit(main())"
     )
     process = folder.start("lsp", code=code, stderr=subprocess.PIPE)
-    message = b"coursebuild: the language server needs pygls: `pip install 'coursebuild[lsp]'`\n"
-    assert (process.communicate()[1], process.returncode) == (message, 2)
+    message = b"coursebuild: the language server needs the package pygls\n"
+    message += b"  help: run `pip install 'coursebuild[lsp]'`\n"
+    assert (process.communicate()[1], process.returncode) == (message, 1)

@@ -70,6 +70,27 @@ def test_stability_of_a_family_and_of_an_unknown_case(
     assert heads == ["millimetre-cube", "flat-plate"]
 
 
+def test_model_of_the_course_is_a_case_if_something_is_known_of_it(
+    course: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (course / "models").mkdir()
+    joint, geom = '<joint type="slide"/>', '<geom size=".1" contype="0" conaffinity="0"/>'
+    (course / "models" / "drop.xml").write_text(
+        f"<mujoco><worldbody><body>{joint}{geom}</body></worldbody></mujoco>"
+    )
+    assert run(course, "drop") == 2
+    assert capsys.readouterr().err == (
+        "coursebuild: nothing is known of `drop` in theory; "
+        "give its motion in models/drop.exact.py, or `expected` of a scenario\n"
+    )
+    (course / "models" / "drop.toml").write_text(
+        '[[scenario]]\nname = "fall"\nduration = 0.2\nsample = 0.02\n'
+        "timesteps = [0.002]\nexpected = { penetration = 0 }\n"
+    )
+    assert run(course, "drop", "--check") == 1
+    assert "drop.bench.json" in capsys.readouterr().out, "there is none yet to compare with"
+
+
 def test_recorded_then_checked(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(course, "projectile", "--record") == 0
     out = capsys.readouterr().out

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model.results import FileFacts
 from coursebuild.features.offline import PAPER, listing, short_name
+from support.fixture_cases import fixture_text
 from support.rendered_course import Make
 
 ROOT = Path(__file__).parents[3]
@@ -166,22 +167,4 @@ def test_hostile_titles_stay_text(make: Make) -> None:
     assert json.loads(site["manifest.webmanifest"])["name"] == title
 
 
-MAP = """
-[course]
-title = 'TITLE'
-
-[[page]]
-id = "about"
-title = "About"
-file = "content/pages/about.md"
-
-[[level]]
-id = "0"
-title = "Start"
-
-[[level.lesson]]
-id = "0.1"
-slug = "falling"
-title = "Falling"
-status = "complete"
-"""
+MAP = fixture_text("documents/offline.toml")

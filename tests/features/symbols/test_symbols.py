@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model.results import Formula
 from coursebuild.core.run.v8 import MathEngine
-from coursebuild.features.symbols.mathml import only_symbol, sort_key, symbols
+from coursebuild.features.symbols.uses import only_symbol, sort_key, symbols
 
 Typeset = Callable[[str], str]
 

@@ -7,16 +7,20 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pytest
 
 from coursebuild.core.model.scenarios import BenchTable, DeclaredScenario
 from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.pruning.comparison import (
+    ALIKE,
     IndexMap,
     compare,
     fits,
     index_map,
+    nearby_scenes,
     pruning_scenes,
     transfer,
+    watch,
 )
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.simulation import initial_data
@@ -45,23 +49,51 @@ def identity_map(model: Any) -> IndexMap:
 
 
 def test_chaos_is_no_difference() -> None:
-    """After 15 s the trajectories are far apart for that; within 50 ms they are one."""
+    """After 15 s the trajectories are far apart; as long as a twin stays near they are one."""
     base, variant = double(), double(1.0 + 1e-13)
-    comparison = compare(base, variant, identity_map(base), [CHAOS])
-    assert not comparison.identical and 0 < comparison.difference < 1e-11
+    run = watch(base, CHAOS)
+    assert 5 < run.horizon < 14
+    comparison = compare(base, variant, identity_map(base), [run])
+    assert not comparison.identical and 0 < comparison.difference < ALIKE
+    assert f"until {run.horizon:.3g} s, beyond which nobody" in comparison.shown
     ends = []
     for model in (base, variant):
         data = initial_data(CHAOS.scenario, model)
         mujoco.mj_step(model, data, 7500)
         ends.append(data.qpos.copy())
-    assert np.max(np.abs(ends[0] - ends[1])) > 1e5 * comparison.difference
+    assert np.max(np.abs(ends[0] - ends[1])) > 10 * math.radians(1) * comparison.difference
+
+
+def test_difference_is_that_of_the_whole_run_in_the_scenes_own_quantities() -> None:
+    """A slide that leans by a millionth of the gravity is off by g t²/2 at the end."""
+    text = """<mujoco><option gravity="{!r} 0 0"/><worldbody><body name="sled"><joint type="slide"
+      axis="1 0 0"/><geom size=".1"/></body></worldbody></mujoco>"""
+    base, variant = (mujoco.MjModel.from_xml_string(text.format(g)) for g in (0.0, 1e-5))
+    run = watch(base, scene_of(4.0))
+    comparison = compare(base, variant, identity_map(base), [run])
+    assert comparison.shown == "the body sled is off by 8e-05 m at 4 s"
+    length = 0.01 * float(base.stat.extent)
+    assert comparison.difference == pytest.approx(8e-5 / length, rel=1e-3)
+
+
+def test_starts_nearby_move_only_what_moves() -> None:
+    text = """<mujoco><option gravity="0 0 0"/><worldbody>
+      <body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/></body>
+      <body pos="3 0 0"><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/></body>
+      </worldbody><keyframe><key qvel="2 0"/></keyframe></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    run = watch(model, scene_of(1.0, 0))
+    nearby = [scene.scenario for scene in nearby_scenes(model, run, 3)]
+    assert len({scenario.qpos[0] for scenario in nearby}) == 3
+    assert all(0 < abs(scenario.qvel[0] - 2) < 0.1 for scenario in nearby)
+    assert all(scenario.qpos[1] == scenario.qvel[1] == 0 for scenario in nearby)
 
 
 def test_a_changed_model_that_diverges_is_not_equal() -> None:
     base, variant = double(), double()
     variant.dof_damping[:] = -1e6
-    comparison = compare(base, variant, identity_map(base), [CHAOS])
-    assert not comparison.identical and math.isinf(comparison.difference)
+    comparison = compare(base, variant, identity_map(base), [watch(base, CHAOS)])
+    assert not comparison.identical and comparison.difference > 1
 
 
 def test_contacts_count_though_nothing_moves() -> None:
@@ -72,9 +104,9 @@ def test_contacts_count_though_nothing_moves() -> None:
     base = mujoco.MjModel.from_xml_string(text.format("a", "b"))
     variant = mujoco.MjModel.from_xml_string(text.format("a", "b"))
     variant.geom_contype[0] = variant.geom_conaffinity[0] = 0
-    scene = scene_of(0.002)
-    assert compare(base, base, identity_map(base), [scene]).identical
-    comparison = compare(base, variant, identity_map(base), [scene])
+    run = watch(base, scene_of(0.002))
+    assert compare(base, base, identity_map(base), [run]).identical
+    comparison = compare(base, variant, identity_map(base), [run])
     assert not comparison.identical
 
 

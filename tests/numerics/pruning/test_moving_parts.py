@@ -49,7 +49,8 @@ def test_tendons_along_which_nothing_acts() -> None:
     left = fixed_text(survey)
     assert left.count("<fixed") == 4 and "lazy" not in left
     survey = run_survey(scene(rest=rest), lesson="data.ctrl[0]; data.ten_length[4]")
-    assert survey.report.findings == ()
+    assert "tendon-idle" not in findings_by_kind(survey)
+    assert names(findings_by_kind(survey)["coupling-idle"]) == ["bound"]  # it never was at its end
 
 
 def test_contact_is_off_where_nothing_can_touch() -> None:

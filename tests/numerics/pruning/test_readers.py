@@ -35,6 +35,12 @@ HOSTILE = {
     # What of the model it uses, by the kind of a finding, and the script.
     "concatenation": ("sensor", 'print([data.sensor("hip_" + s).data for s in "lr"])'),
     "f-string": ("sensor", 's = "r"\nprint(data.sensor(f"hip_{s}").data)'),
+    "raw f-string": ("sensor", 's = "r"\nprint(fr"{data.sensordata}")'),
+    "f-string before a text": ("sensor", 'print(f"{model}", data.sensordata, "x")'),
+    "triple f-string": ("sensor", "print(f'''it's {data.sensordata}''', \"x\")"),
+    "size of a state": ("actuator", "print(mujoco.mj_stateSize(model, 8191))"),
+    "whole state": ("actuator", "mujoco.mj_getState(model, data, np.empty(9), 31)"),
+    "file mapped": ("sensor", "print(np.memmap(model_path('leg')))"),
     "number": ("sensor", "print(data.sensor(0).data)"),
     "getattr": ("sensor", 'print(getattr(data, "sensor" + "data"))'),
     "format field": ("sensor", 'print("{0.sensordata}".format(data))'),

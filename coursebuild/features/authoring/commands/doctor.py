@@ -24,9 +24,11 @@ from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import try_lock
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.files.trust import FOLDER, find_store, store_key
+from coursebuild.core.run.packages import environment_prefix
 from coursebuild.core.run.sandbox import examine_sandbox
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.features.lab.engines.browser import LabEngine
+from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.report.text import GREEN, RED, YELLOW, Style, visible
 
 EXAMPLES = """\
@@ -100,13 +102,29 @@ def _mujoco(_: Path) -> Iterator[Probe]:
         yield Probe(error.message, False, error.help)
 
 
-def _lab_engine(_: Path) -> Iterator[Probe]:
+def _lab_engine(folder: Path) -> Iterator[Probe]:
+    """Probe the engine of labs, and native MuJoCo of the same version, which compiles for it."""
     try:
         with LabEngine() as engine:
             engine.check_code(())
             yield Probe(f"MuJoCo {engine.version} of the browser, in V8, for labs", True)
     except EffectError as error:
         yield Probe(error.message, False, error.help or "install coursebuild again")
+        return
+    if engine_version() == LAB_ENGINE:
+        return
+    try:
+        prefix, text = (
+            environment_prefix(folder, LAB_ENGINE),
+            f"native MuJoCo {LAB_ENGINE} for labs",
+        )
+    except EffectError as error:
+        yield Probe(error.message, False, error.help)
+        return
+    text += (
+        f" in {prefix}" if prefix.is_dir() else ": pip will install it when a lab is first tried"
+    )
+    yield Probe(text, True)
 
 
 def _fonts(_: Path) -> Iterator[Probe]:

@@ -17,7 +17,7 @@ from coursebuild.core.files.write import FileChange
 from coursebuild.core.model import Course, Lesson
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.text.diagnostics import Edit, did_you_mean
-from coursebuild.core.text.source import Source, Span
+from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import (
     doubtful_places,
@@ -57,7 +57,12 @@ def run(arguments: argparse.Namespace) -> int:
     changes = _list_changes(root, course, lesson, new, edits)
     doubtful = doubtful_places(course, lesson, new, edits, _read_code(root))
     if doubtful and not arguments.leave:
-        return _refuse(doubtful, lesson)
+        lines = [f"{plural(len(doubtful), 'place')} may mean lesson {lesson.id}:"]
+        for span in doubtful:
+            text = visible(span.source.line_text(span.line).strip())
+            lines.append(f"  {location(span)}: {text}")
+        help = "edit them first, or leave them as they are with --leave; nothing was changed"
+        return fail(FAILURE, "\n".join(lines), help)
     return apply_changes(root, changes)
 
 
@@ -90,12 +95,3 @@ def _read_code(root: Path) -> tuple[Source, ...]:
     files = (path for top in (*FOLDERS, "src") for path in (root / top).rglob("*.*"))
     code = [path for path in files if path.suffix in (".py", ".js") and path.is_file()]
     return read_sources(root, sorted(path.relative_to(root).as_posix() for path in code)).value
-
-
-def _refuse(doubtful: Sequence[Span], lesson: Lesson) -> int:
-    lines = [f"{plural(len(doubtful), 'place')} may mean lesson {lesson.id}:"]
-    for span in doubtful:
-        text = visible(span.source.line_text(span.line).strip())
-        lines.append(f"  {location(span)}: {text}")
-    help = "edit them first, or leave them as they are with --leave; nothing was changed"
-    return fail(FAILURE, "\n".join(lines), help)

@@ -21,6 +21,7 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, add_format, add_quiet
 from coursebuild.core.engine.tool import code_digest
+from coursebuild.core.files.errors import require
 from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands import measuring
@@ -38,14 +39,14 @@ from coursebuild.features.bench.commands.measurement import (
 )
 from coursebuild.features.bench.grids import Grid, machine_text, power
 from coursebuild.features.bench.scenario_view import scenario_view
-from coursebuild.numerics.reports.departures import RecordCheck, scene_departures
-from coursebuild.numerics.reports.records import BENCH, ReportFailure
+from coursebuild.numerics.reports.records import BENCH, RecordCheck, ReportFailure, scene_departures
 from coursebuild.numerics.reports.scene_report import (
     ScenarioReport,
     SceneReport,
     SweepReport,
     WorkPrecisionRow,
 )
+from coursebuild.numerics.reports.shown_errors import is_idle
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.pipeline.shown_reports import read_record
@@ -82,6 +83,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure models, or check their recorded reports."""
+    require("scipy", "measure", "`coursebuild bench`")
     names, quick = tuple(arguments.scenes), arguments.quick
 
     def measure(options: Options) -> Measurement[Any]:
@@ -290,7 +292,8 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
     for text in (*texts, *report.notes):
         lines += style.wrap(text, 2 * _INDENT)
     legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
-    lines += _table(view.settings, map(_mark, report.rows), legend, style)
+    shown_rows = (row for row in report.rows if not is_idle(row))
+    lines += _table(view.settings, map(_mark, shown_rows), legend, style)
     colour = GREEN if report.verdict.on_front and not report.verdict.noticeable else YELLOW
     if report.verdict.text:
         lines += ["", *style.wrap(report.verdict.text, 2 * _INDENT, colour)]

@@ -41,6 +41,7 @@ from coursebuild.features.bench.commands.measurement import (
 )
 from coursebuild.numerics.pruning.survey import Survey
 from coursebuild.numerics.reports.diet_report import (
+    PROVED_LABEL,
     DietReport,
     Finding,
     Saving,
@@ -309,8 +310,9 @@ def _finding(finding: Finding, style: Style) -> list[str]:
     lines = style.wrap(f"{finding.kind}: {finding.message}", "  ")
     lines[0] = lines[0].replace(finding.kind, style.paint(finding.kind, colour), 1)
     label = finding.label
-    if finding.difference:
-        label += f" ({finding.difference:.1e})"
+    if finding.starts and finding.label != PROVED_LABEL:
+        label += f" (in {plural(finding.starts, 'run')}"
+        label += f"; at most {finding.shown})" if finding.shown else ", to the bit)"
     lines += style.wrap(f"{label}; {_saving(finding.saving)}", "    ")
     if finding.proof:
         lines += style.wrap(f"because {finding.proof}", "    ")

@@ -32,8 +32,7 @@ from coursebuild.core.pages.strings import Strings
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.core.values import fingerprint
 from coursebuild.features.bench.grids import Grid
-from coursebuild.numerics.reports.departures import RecordCheck
-from coursebuild.numerics.reports.records import ReportFailure
+from coursebuild.numerics.reports.records import RecordCheck, ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.report.text import (
     BOLD,

@@ -14,7 +14,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -41,10 +41,16 @@ from coursebuild.numerics.reports.scene_report import (
     SceneReport,
     SweepReport,
 )
-from coursebuild.numerics.scene import EXACT_SCRIPT, ExactMotion, SceneError, scenes
+from coursebuild.numerics.scene import (
+    EXACT_SCRIPT,
+    ExactMotion,
+    ExactStates,
+    SceneError,
+    scenes,
+)
 from coursebuild.numerics.scene import Scene as PhysicsScene
 from coursebuild.numerics.simulation import silent
-from coursebuild.numerics.sweep import measure_sweep
+from coursebuild.numerics.sweep import THREADS, measure_sweep
 from coursebuild.numerics.work_precision import measure_scenario
 from coursebuild.pipeline.scenes import CourseScene
 
@@ -112,9 +118,18 @@ def run_sweep(
     """
     tell(sweep.name)
     clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
-    scenarios = (s for s in compiled_scene.scenarios if sweep.scenario in (None, s.name))
+    scenario = next(s for s in compiled_scene.scenarios if sweep.scenario in (None, s.name))
+    threads = tuple(part for part in sweep.variations if part.parameter == THREADS)
+    single_thread = tuple(part for part in sweep.variations if part.parameter != THREADS)
+    reports = []
     with report_errors(compiled_scene.scene):
-        return measure_sweep(compiled_scene.spec, next(scenarios), sweep, clocks, quick=quick)
+        for variations in filter(None, (single_thread, threads)):
+            part = replace(sweep, variations=variations)
+            # One processor, unless what is measured is how it goes on several.
+            with one_processor() if variations is single_thread else nullcontext():
+                report = measure_sweep(compiled_scene.spec, scenario, part, clocks, quick=quick)
+            reports.append(report)
+    return replace(reports[0], rows=tuple(row for report in reports for row in report.rows))
 
 
 @contextmanager
@@ -154,23 +169,35 @@ def _exact_motion(root: Path, scene: CourseScene) -> ExactMotion | None:
         return None
     span = Source(path, "").span(0, 0)
 
-    def states(times: Array, qpos: Array, qvel: Array) -> tuple[Array, Array | None]:
+    def states(times: Array, qpos: Array, qvel: Array) -> ExactStates:
         request = {"times": times.tolist(), "qpos": qpos.tolist(), "qvel": qvel.tolist()}
         script = os.path.relpath(EXACT_SCRIPT, root)
         job = ScriptJob(script, (path, json.dumps(request)), _SECONDS, ())
         with ScriptServer() as server:
             (run,) = server.run(root, (job,), parallel=1)
         try:
-            rows = msgspec.json.decode(run.stdout, type=list[list[list[float]]])
-            parts = [np.array(part) for part in zip(*rows, strict=True)]
+            answer = msgspec.json.decode(run.stdout, type=_Answer)
+            motions = {}
+            for name in ("motion", "acceleration"):
+                if (rows := getattr(answer, name)) is not None:
+                    qpos, *rest = (np.array(part) for part in zip(*rows, strict=True))
+                    motions[name] = (qpos, rest[0] if rest else None)
         except (msgspec.DecodeError, ValueError):
             last = run.stderr.strip().splitlines()[-1:] or [run.outcome.value]
             message = f"`{path}` says no motion: {last[0]}"
             help = "it defines `motion(time, qpos, qvel)`, which gives the positions at a time in s"
             raise SceneError(message, span, help) from None
-        return parts[0], parts[1] if len(parts) > 1 else None
+        return ExactStates(motions, answer.expected)
 
     return ExactMotion(span, states)
+
+
+class _Answer(Struct, frozen=True):
+    """What the script that evaluates an exact motion says; each part where its file has it."""
+
+    motion: list[list[list[float]]] | None = None
+    acceleration: list[list[list[float]]] | None = None
+    expected: dict[str, float] = {}
 
 
 def add_card(

@@ -1,7 +1,11 @@
 """Native MuJoCo for labs: saves models as MJB files, and repeats runs of the browser's engine.
 
-Entry points: `NativeEngine`, a context manager around a child process; `wasm_path`, `script_path`,
-`engine_digest`, `lab_digest`: files that a trial runs, whose digests can be had without V8.
+Entry points: `NativeEngine`, a context manager around a child process; `LAB_ENGINE`, the version of
+MuJoCo in the browser; `wasm_path`, `script_path`, `engine_digest`, `lab_digest`: files that a trial
+runs, whose digests can be had without V8.
+
+Only the version that wrote an MJB file can read it. Where another MuJoCo is installed than that of
+the browser, the child runs in an environment with that one, in the user's state folder.
 """
 
 from __future__ import annotations
@@ -9,12 +13,17 @@ from __future__ import annotations
 import base64
 import functools
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.run.child import LIMITS, JsonChild
+from coursebuild.core.run.script_environment import engine_version
+
+LAB_ENGINE = "3.14.0"
+"""The version of MuJoCo in the browser, as `site/package.json` names it."""
 
 
 def wasm_path() -> Path:
@@ -67,6 +76,7 @@ class NativeEngine(JsonChild):
         seconds: processor time that one request may take.
         memory: MiB that the child may take.
         compiling: processor time that a model may take to compile.
+        say: tells of an environment that has to be made.
     """
 
     def __init__(
@@ -75,8 +85,10 @@ class NativeEngine(JsonChild):
         seconds: float = 120.0,
         memory: int = LIMITS.memory,
         compiling: float = LIMITS.models,
+        say: Callable[[str], None] = lambda _: None,
     ) -> None:
         super().__init__(str(_WORKER), seconds, memory=memory)
+        self._say = say
         self._root = root.resolve()
         self._compiling = compiling
 
@@ -120,6 +132,10 @@ class NativeEngine(JsonChild):
         return self._request({"task": "script", "library": library, **request})
 
     def _request(self, request: dict[str, Any], seconds: float | None = None) -> dict[str, Any]:
+        if self._process is None and engine_version() != LAB_ENGINE:
+            from coursebuild.core.run.packages import prepare_environment
+
+            self._python = prepare_environment(self._root, LAB_ENGINE, self._say).python
         limit = self._seconds if seconds is None else min(seconds, self._seconds)
         reply: dict[str, Any] | None = self.ask({**request, "limit": limit}, limit)
         if reply is None:

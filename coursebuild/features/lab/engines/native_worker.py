@@ -151,7 +151,15 @@ def _script(request: Any) -> dict[str, Any]:
             *((request["text"], name) for name in request["buttons"]),
             *((text, None) for text in request["variants"]),
         ]:
-            _take_steps(_load(path, text), button)
+            # Take a few steps, after a button if one is given
+            module = _load(path, text)
+            state = module.load()
+            module.start(*state)
+            if button is not None:
+                getattr(module, button)(*state)
+            for _ in range(10):
+                module.step(*state)
+            module.report(*state)
     except (Exception, SystemExit) as error:  # any exception is the script's
         return {"failure": f"{type(error).__name__}: {error}"}
     return {"failure": "", **observations}
@@ -189,17 +197,6 @@ def _observe(module: Any, recorded_step: int) -> dict[str, Any]:
 def _readouts(module: Any, *state: Any) -> list[list[Any]]:
     readouts = module.readouts(*state)
     return [[label, v if isinstance(v, str) else float(v)] for label, v, _ in readouts]
-
-
-def _take_steps(module: Any, button: str | None) -> None:
-    """Take a few steps, after a button if one is given."""
-    state = module.load()
-    module.start(*state)
-    if button is not None:
-        getattr(module, button)(*state)
-    for _ in range(10):
-        module.step(*state)
-    module.report(*state)
 
 
 if __name__ == "__main__":

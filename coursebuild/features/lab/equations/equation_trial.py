@@ -23,6 +23,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
+from coursebuild.core.files.errors import require
 from coursebuild.core.model import Course, Recording, find_blocks
 from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedError
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
@@ -209,6 +210,8 @@ def add_points(config: dict[str, Any], course: Course) -> Iterator[CurveFinding]
 
 def run_trial(engine: EquationEngine, config: dict[str, Any], seconds: float) -> EquationReply:
     """Try a lab, whose result depends on nothing but its data and the tool."""
+    if config["states"]:
+        require("scipy", "measure", "a trial of a lab's equations")
     attempts, patience = _attempts(config), time.thread_time() + seconds
     marks = [
         (i, plot["traces"][0]["value"], *pair)

@@ -17,7 +17,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt
 
 Program: TypeAlias = list[float | str | list[int]]
@@ -37,7 +37,7 @@ _OPERATORS: dict[type[ast.AST], str] = {
 }  # fmt: skip
 _DIRECTIONS = {"<": -1, "<=": -1, ">": 1, ">=": 1, "==": 0}
 _HELP: dict[type[ast.AST], str] = {
-    ast.BitXor: "a power is `a**b`",
+    ast.BitXor: Fix("a power is `a**b`", "**", "^", safe=True),
     ast.FloorDiv: "write `floor(a/b)`",
     ast.Attribute: "write the function by its own name: `sin(x)`",
 }

@@ -102,7 +102,10 @@ class Expressions:
         """Translate an expression that is used for its value."""
         match node.type:
             case "number":
-                return _number(text_of(node))
+                text = text_of(node)
+                if text.endswith("n"):
+                    raise UntranslatableError(f"the number `{text}`")
+                return text
             case "string":
                 return repr(string_value(node))
             case "template_string":
@@ -279,12 +282,6 @@ def _mujoco() -> Any:
     import mujoco  # late: only a lab that has changed is translated
 
     return mujoco
-
-
-def _number(text: str) -> str:
-    if text.endswith("n"):
-        raise UntranslatableError(f"the number `{text}`")
-    return text
 
 
 def python_name(name: str) -> str:

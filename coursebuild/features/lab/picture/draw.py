@@ -5,7 +5,7 @@ Entry point: `draw(solids, camera, size, light)` → pixels.
 1. Every solid's triangles are brought into the camera's frame (MuJoCo's free camera) and projected
    (`raster.py`). Each sample keeps the nearest surface, with its place, normal and texture
    coordinates there. A pixel has 2 × 2 samples.
-2. The samples are coloured by texture and light (`light.py`), and the first shiny plane or box
+2. The samples are coloured by texture and light, and the first shiny plane or box
    shows what the camera's mirror image sees.
 3. Transparent solids are mixed in, the farthest first, and the sky is put behind all.
 
@@ -28,11 +28,13 @@ from coursebuild.features.lab.picture.raster import (
     Eye,
     Floor,
     GBuffer,
+    Texture,
+    TextureMapping,
     draw_edges,
     rotate,
+    sky,
 )
 from coursebuild.features.lab.picture.shapes import Array, Light, Material, Surface, shade, studio
-from coursebuild.features.lab.picture.textures import Texture, TextureMapping, sharpness, sky
 
 _SAMPLES = 2
 _NEAR_SHARE = 0.01
@@ -49,6 +51,8 @@ _PLAIN = Material()
 
 Samples = tuple[NDArray[np.int64], NDArray[np.int64]]
 """Rows and columns."""
+_SHARPER = 4.0
+"""How much longer than wide a sample may be on a surface before the texture is blurred."""
 
 
 class Solid(Struct, frozen=True):
@@ -273,7 +277,7 @@ class _Canvas:
             normals[facing < 0] *= -1
         texel = np.ones((1, 3))
         if solid.texture is not None:
-            steps = buffer.depth[samples] / self.eye.focal * sharpness(facing)
+            steps = buffer.depth[samples] / self.eye.focal * _sharpness(facing)
             texel = solid.texture.texels(places, local_normals, attributes[:, UV], steps)
         base = np.array(solid.rgba[:3])
         colour = shade(self.light, solid.material, base, texel, (points, normals, toward_eye))
@@ -293,3 +297,9 @@ def _batches(samples: NDArray[np.int64], width: int) -> Iterator[Samples]:
     """Yield samples, counted row by row, not too many at once."""
     for start in range(0, len(samples), _AT_ONCE):
         yield np.divmod(samples[start : start + _AT_ONCE], width)
+
+
+def _sharpness(cosines: Array) -> Array:
+    """Return by how much to blur a surface that is seen at an angle, given the cosines."""
+    longer = 1 / np.maximum(np.abs(cosines), 1e-3)
+    return np.maximum(longer / _SHARPER, 1.0)

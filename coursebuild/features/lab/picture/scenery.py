@@ -12,6 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from coursebuild.features.lab.picture.draw import Solid
+from coursebuild.features.lab.picture.raster import SKY, TextureMapping, texture_of
 from coursebuild.features.lab.picture.shapes import (
     Array,
     Kind,
@@ -28,7 +29,6 @@ from coursebuild.features.lab.picture.shapes import (
     surface,
     unit,
 )
-from coursebuild.features.lab.picture.textures import SKY, TextureMapping, texture_of
 
 RGBA = tuple[float, float, float, float]
 

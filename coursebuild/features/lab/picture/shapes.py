@@ -61,7 +61,16 @@ def surface(kind: Kind, size: tuple[float, ...], mesh: Surface | None = None) ->
             corners = np.array([(-x, -y, 0.0), (-x, y, 0.0), (x, -y, 0.0), (x, y, 0.0)])
             return Surface(corners, np.tile((0.0, 0.0, 1.0), (4, 1)), grid_faces(2, 2))
         case "box":
-            return _box(size)
+            square = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+            sides = [(axis, sign) for axis in range(3) for sign in (1.0, -1.0)]
+            vertices = [
+                np.roll((sign, a * sign, b), axis) for axis, sign in sides for a, b in square
+            ]
+            outward = [np.roll((sign, 0.0, 0.0), axis) for axis, sign in sides]
+            faces = 4 * np.arange(6)[:, None, None] + ((0, 1, 2), (0, 2, 3))
+            return Surface(
+                np.array(vertices) * size[:3], np.repeat(outward, 4, axis=0), faces.reshape(-1, 3)
+            )
         case "cylinder":
             radius, half = size[:2]
             rim, hub = [(radius, half), (radius, -half)], [(0, half), (0, -half)]
@@ -157,17 +166,6 @@ def unit(vectors: Array) -> Array:
     """Scale vectors to length 1; those of length 0 stay."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(lengths > 0, lengths, 1.0)
-
-
-def _box(size: tuple[float, ...]) -> Surface:
-    square = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    sides = [(axis, sign) for axis in range(3) for sign in (1.0, -1.0)]
-    corners = [np.roll((sign, a * sign, b), axis) for axis, sign in sides for a, b in square]
-    normals = [np.roll((sign, 0.0, 0.0), axis) for axis, sign in sides]
-    faces = 4 * np.arange(6)[:, None, None] + ((0, 1, 2), (0, 2, 3))
-    return Surface(
-        np.array(corners) * size[:3], np.repeat(normals, 4, axis=0), faces.reshape(-1, 3)
-    )
 
 
 def _capsule(radius: float, half: float, segments: int) -> Surface:

@@ -24,14 +24,12 @@ from numpy.typing import NDArray
 from coursebuild.core.drawing.scales import Scale, separate_labels, typeset_number
 from coursebuild.core.drawing.scales import markup_text as _text
 from coursebuild.features.lab.equations.reference import CurveRun
-from coursebuild.features.lab.files import LabRecord
 from coursebuild.features.lab.model import ODE, Lab
 from coursebuild.features.lab.picture.draw import FreeCamera, draw
-from coursebuild.features.lab.picture.raster import Floor, round_length
+from coursebuild.features.lab.picture.raster import SKY, Floor, round_length, texture_of
 from coursebuild.features.lab.picture.scenery import scene_solids
 from coursebuild.features.lab.picture.shapes import light_of
-from coursebuild.features.lab.picture.textures import SKY, texture_of
-from coursebuild.features.lab.reply import MainRun, unpack_arrays
+from coursebuild.features.lab.reply import LabRecord, MainRun, unpack_arrays
 from coursebuild.features.lab.schema import Plot, TraceFields
 
 _WIDTH = 640

@@ -1,8 +1,8 @@
 """The diagnostics of a course while its texts are edited, and the edits that are offered.
 
 Entry points: `current_diagnostics`; `to_lsp`, which converts one for the client; `actions`: the
-edits that diagnostics propose; "accept this output", as in the preview; "bind this number", for a
-number that the script above it printed.
+edits that diagnostics propose, one by one or all that are safe; "accept this output", as in the
+preview; "bind this number", for a number that the script above it printed.
 
 1. Reading and checking is repeated at each change.
 2. Recorded outputs and bound numbers of a changed text are compared with what the scripts printed
@@ -13,7 +13,7 @@ number that the script above it printed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from difflib import SequenceMatcher
 from functools import lru_cache
 
@@ -26,9 +26,10 @@ from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.findings import output_findings
 from coursebuild.core.scripts.numbers import scan_prose
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
-from coursebuild.core.text.rules import HELP
+from coursebuild.core.text.rules import rule_address
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.language_server.commands.texts import OpenTexts, Places
+from coursebuild.pipeline.fix import choose_fixes
 from coursebuild.pipeline.judge import judge
 from coursebuild.preview.messages import new_output
 from coursebuild.preview.session import Session
@@ -124,12 +125,13 @@ def to_lsp(diagnostic: Diagnostic, places: Places) -> types.Diagnostic:
     is_error = diagnostic.is_error
     lines = [diagnostic.message, diagnostic.label, diagnostic.help and f"help: {diagnostic.help}"]
     lines += [f"note: {note.message}" for note in diagnostic.notes if note.span is None]
+    address = rule_address(diagnostic.rule)
     return types.Diagnostic(
         places.range(diagnostic.span),
         "\n".join(filter(None, lines)),
         severity=types.DiagnosticSeverity.Error if is_error else types.DiagnosticSeverity.Warning,
         code=diagnostic.rule,
-        code_description=types.CodeDescription(HELP.format(diagnostic.rule)),
+        code_description=types.CodeDescription(address) if address else None,
         source="coursebuild",
         related_information=[
             types.DiagnosticRelatedInformation(places.location(note.span), note.message)
@@ -147,16 +149,30 @@ def actions(
         *(texts.places.offset(source, at) for at in (params.range.start, params.range.end))
     )
     diagnostics = [d for d in current_diagnostics(texts.session) if d.span.source == place.source]
-    fixes = [
+    actions = [
         _make_action(texts.places, d.help or f"write `{d.edits[0].text}`", d.edits, [d])
         for d in diagnostics
         if d.edits and _overlap(d.span, place)
     ]
-    return [*fixes, *_accept_outputs(texts, place, diagnostics), *_bind_numbers(texts, place)]
+    fixable = (d for d in diagnostics if all(edit.span.source == place.source for edit in d.edits))
+    if safe_fixes := choose_fixes(fixable):
+        edits = [edit for diagnostic in safe_fixes for edit in diagnostic.edits]
+        title = f"fix all in this file ({len(safe_fixes)})"
+        fix_all = _make_action(texts.places, title, edits, safe_fixes)
+        fix_all.kind = types.CodeActionKind.SourceFixAll
+        actions.append(fix_all)
+    actions += [*_accept_outputs(texts, place, diagnostics), *_bind_numbers(texts, place)]
+    asked_kinds = tuple(str(getattr(kind, "value", kind)) for kind in params.context.only or ("",))
+    kinds = [str(getattr(action.kind, "value", action.kind)) for action in actions]
+    return [
+        action
+        for action, kind in zip(actions, kinds, strict=True)
+        if any(not name or f"{kind}.".startswith(f"{name}.") for name in asked_kinds)
+    ]
 
 
 def _make_action(
-    places: Places, title: str, edits: Iterable[Edit], solved: Iterable[Diagnostic] = ()
+    places: Places, title: str, edits: Iterable[Edit], solved: Sequence[Diagnostic] = ()
 ) -> types.CodeAction:
     """Return an action of these edits; `solved` are the diagnostics that they remove."""
     diagnostics = [to_lsp(diagnostic, places) for diagnostic in solved]
@@ -165,6 +181,7 @@ def _make_action(
         title[:1].upper() + title[1:],
         kinds.QuickFix if diagnostics else kinds.RefactorRewrite,
         diagnostics,
+        is_preferred=solved[0].safe if len(solved) == 1 else None,
         edit=types.WorkspaceEdit(places.changes(edits)),
     )
 

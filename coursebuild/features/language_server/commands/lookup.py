@@ -36,7 +36,7 @@ from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.engine import EngineName, KnownName, engine_names
 from coursebuild.features.names.resolve import resolver_of
-from coursebuild.features.symbols.mathml import declared_symbol, symbols
+from coursebuild.features.symbols.uses import declared_symbol, symbols
 from coursebuild.pipeline.reader import kept_formulas
 
 _ASSIGNMENT = re.compile(r"(\w+)\s*=\s*mujoco\.(Mj(?:Data|Model))\b")

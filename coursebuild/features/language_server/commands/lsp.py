@@ -14,14 +14,13 @@ import signal
 import threading
 import traceback
 from collections.abc import Callable
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
 from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, options_of
 from coursebuild.cli.output import CLEAN
-from coursebuild.core.files.errors import UsageError
+from coursebuild.core.files.errors import require
 from coursebuild.pipeline.progress import Progress
 from coursebuild.preview.live_course import LiveCourse
 from coursebuild.report import Style
@@ -45,8 +44,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve until the client disconnects."""
-    if find_spec("pygls") is None:
-        raise UsageError("the language server needs pygls: `pip install 'coursebuild[lsp]'`")
+    require("pygls", "lsp", "the language server")
     from coursebuild.features.language_server.commands.server import Server
 
     options = replace(options_of(arguments), progress=Progress(quiet=True))

@@ -4,7 +4,7 @@ Entry points: `name_at`, the name at a place; `rename`, the edits that change it
 
 1. A lesson gets a new id, and its file a new path, as with `coursebuild rename`.
 2. A term gets a new name in the glossary, and links to it the id that follows from the name.
-3. A label is that of a formula, or the explicit id of a heading.
+3. A label is that of what has a number, or the explicit id of a heading.
 """
 
 from __future__ import annotations
@@ -152,9 +152,10 @@ def _label_name(texts: OpenTexts, path: str, label: str, span: Span) -> _Name | 
         return None  # an anchor that follows from the text of a heading
 
     def rename_label(name: str) -> types.WorkspaceEdit:
-        is_formula = label.startswith("eq:")
-        if not re.fullmatch(r"eq:[\w-]+" if is_formula else r"[\w:.-]*[\w:-]", name):
-            form = "`eq:` and then " if is_formula else ""
+        prefix, colon, _ = label.partition(":")
+        is_numbered = colon and prefix in model.LABEL_KINDS
+        if not re.fullmatch(rf"{prefix}:[\w-]+" if is_numbered else r"[\w:.-]*[\w:-]", name):
+            form = f"`{prefix}:` and then " if is_numbered else ""
             raise JsonRpcInvalidParams(f"a label is {form}letters, digits, `-` and `_`")
         if name != label and name in anchors(document):
             raise JsonRpcInvalidParams(f"there is an anchor `{name}` already")
@@ -168,7 +169,7 @@ def _labels(document: model.Document) -> dict[str, Span]:
     """Return the explicit labels of a document, and their places."""
     labels = {}
     for node in (*model.document_blocks(document), *model.document_inlines(document)):
-        if isinstance(node, model.Math | model.MathBlock) and node.label is not None:
+        if isinstance(node, model.Math | model.Labelled) and node.label is not None:
             labels[node.label.id] = node.label.span
         elif isinstance(node, model.Heading) and node.explicit:
             start = node.span.start + node.span.text.rindex(f"#{node.anchor}") + 1

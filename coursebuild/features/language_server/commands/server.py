@@ -119,6 +119,13 @@ _ANSWERS: dict[str, Callable[[OpenTexts, Source, Any], Any]] = {
     types.TEXT_DOCUMENT_FOLDING_RANGE: folds,
 }
 _OPTIONS: dict[str, object] = {
+    types.TEXT_DOCUMENT_CODE_ACTION: types.CodeActionOptions(
+        [
+            types.CodeActionKind.QuickFix,
+            types.CodeActionKind.RefactorRewrite,
+            types.CodeActionKind.SourceFixAll,
+        ]
+    ),
     types.TEXT_DOCUMENT_COMPLETION: types.CompletionOptions(trigger_characters=[*':.#!"/(`=']),
     types.TEXT_DOCUMENT_RENAME: types.RenameOptions(prepare_provider=True),
 }

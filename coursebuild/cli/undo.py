@@ -1,0 +1,26 @@
+"""`coursebuild undo`: take back what `check --fix` has changed."""
+
+from __future__ import annotations
+
+import argparse
+
+from coursebuild.cli.output import CLEAN, FAILURE, fail, write
+from coursebuild.core.files.write import take_back
+from coursebuild.pipeline.options import find_course
+from coursebuild.pipeline.progress import Progress
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Declare no arguments."""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Give the files their texts of before; those that were edited since stay."""
+    outcome = take_back(find_course(arguments.root), Progress().say)
+    if outcome is None:
+        return fail(FAILURE, "there is nothing to undo", "`check --fix` is what can be undone")
+    restored_paths, edited_paths = outcome
+    status = write("".join(f"restored {path}\n" for path in restored_paths), CLEAN)
+    for path in edited_paths:
+        status = fail(FAILURE, f"{path} was edited since, so it stays as it is")
+    return status

@@ -1,0 +1,108 @@
+r"""Numbers of formulas, figures, tables, listings and labs.
+
+Entry points: `number_items`; `items_of`, for other pages; `item_name` and `name_elsewhere`, the
+texts of references.
+
+1. What has a label has a number, in the order of the text, and nothing else: a number is there to
+   be referred to. Each kind is counted for itself.
+2. A figure of Lesson 4.2 is "Figure 4.2.3" wherever it is named, and on a page that is no lesson
+   "Figure 3". A formula is "(3)" where it stands, and "(3) of Lesson 4.2" elsewhere.
+3. LaTeX's numbered environments count too: the style sheet writes their numbers, continuing ours. A
+   formula with such numbers of its own, or with a `\tag`, gets no other.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from html import unescape
+
+from coursebuild.core.model import (
+    LABEL_KINDS,
+    Document,
+    LessonTarget,
+    NumberedItem,
+    PageTarget,
+    Target,
+    display_formulas,
+    labelled_blocks,
+    resolve,
+)
+from coursebuild.core.model.results import Mathml
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.strings import Strings
+
+_COUNTER_CLASS = 'class="tml-eqn"'
+_TAG_CLASS = 'class="tml-tag"'
+_NUMBER = re.compile(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
+
+
+def number_items(document: Document, mathml: Mathml) -> dict[int, NumberedItem]:
+    """What has a number in a document, and formulas that have an id only, by offset."""
+    items: dict[int, NumberedItem] = {}
+    count = 0
+    for formula in display_formulas(document):
+        html = mathml(formula.tex, True)
+        styled_count = html.count(_COUNTER_CLASS)
+        tag = _NUMBER.search(html) if _TAG_CLASS in html else None
+        number, has_margin_number = "", False
+        if formula.label is not None and formula.id:
+            has_margin_number = not styled_count and tag is None
+            number = unescape(tag[1]) if tag is not None and not styled_count else str(count + 1)
+        count += styled_count + has_margin_number
+        if formula.id:
+            items[formula.start] = NumberedItem(formula.id, number, has_margin_number)
+    counts = Counter[str]()
+    for block, label in labelled_blocks(document):
+        item = NumberedItem(label.id)
+        counts[item.kind] += 1
+        items[block.span.start] = NumberedItem(label.id, str(counts[item.kind]))
+    return items
+
+
+def items_of(document: Document, mathml: Mathml) -> tuple[NumberedItem, ...]:
+    """The numbered items of a document, or of its summary."""
+    if document.summaries is not None:
+        return document.numbered_items
+    return tuple(number_items(document, mathml).values())
+
+
+def item_name(item: NumberedItem, prefix: str, words: Strings) -> str:
+    """The name of an item, such as "(3)" or "Figure 4.2.3"; empty without a number.
+
+    `prefix` is what stands before the numbers of its lesson: `4.2.`.
+    """
+    if not item.number or item.kind == "eq":
+        return item.number and f"({item.number})"
+    return words(f"number.{item.kind}", number=prefix + item.number)
+
+
+def number_prefix(id: str) -> str:
+    """What stands before numbers in a lesson."""
+    return f"{id}."
+
+
+def name_elsewhere(library: Library, path: str, target: Target) -> str:
+    """The name of a numbered item of another page, for the document at a path.
+
+    Empty for a target of another kind.
+    """
+    target = resolve(target, library.course, path)
+    if not isinstance(target, LessonTarget | PageTarget) or not target.anchor:
+        return ""
+    if target.anchor.partition(":")[0] not in LABEL_KINDS:
+        return ""
+    lesson = isinstance(target, LessonTarget)
+    owner = library.lessons[target.id] if lesson else library.pages[target.id]
+    if owner.document is None:
+        return ""
+    items = items_of(owner.document, library.mathml)
+    item = next((item for item in items if item.id == target.anchor), None)
+    name = item and item_name(item, number_prefix(owner.id) if lesson else "", library.words)
+    if not item or not name:
+        return ""
+    if owner.document.source.path == path or (lesson and item.kind != "eq"):
+        return name
+    if lesson:
+        return library.words("number.of_lesson", name=name, id=owner.id)
+    return library.words("number.of_page", name=name, title=owner.title)

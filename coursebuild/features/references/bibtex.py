@@ -1,0 +1,186 @@
+"""Reads a list of sources in BibTeX, each with its place.
+
+Entry point: `read_works`. `bibtexparser` reads the text; LaTeX in it becomes plain text. Nothing in
+it is HTML: whatever is shown of a source is escaped where it is drawn.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import logging
+import re
+from collections.abc import Iterable, Iterator
+
+from msgspec import Struct
+
+from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.core.text.source import Source, Span
+
+NAMES = ("author", "editor", "translator")
+"""Fields that hold names of people."""
+_KEY = re.compile(r"@\s*\w+\s*[{(]\s*([^,\s{}()]*)")
+_ENTRY = re.compile(r"^[ \t]*@", re.MULTILINE)
+_DOI = re.compile(r"(?:https?://(?:dx\.)?doi\.org/|doi:\s*)?(10\.\d{4,9}/\S+)", re.IGNORECASE)
+_IDENTIFIERS = frozenset(("doi", "isbn", "url"))
+"""Fields in which a backslash only stands before a character of LaTeX."""
+_WEB = frozenset(("dataset", "electronic", "misc", "online", "software", "webpage"))
+"""Types of sources that an address identifies."""
+
+
+class PersonName(Struct, frozen=True):
+    """The name of a person, or of a body, which has a family name only."""
+
+    family: str
+    given: str = ""
+    particle: str = ""
+    suffix: str = ""
+
+
+class Work(Struct, frozen=True):
+    """An entry of the list: a work that texts cite."""
+
+    key: str
+    kind: str
+    """The type of the entry, such as `article`."""
+    fields: tuple[tuple[str, str], ...]
+    """Plain texts by the name of their field, but for names."""
+    people: tuple[tuple[str, tuple[PersonName, ...]], ...]
+    """The names in the fields `NAMES`."""
+    span: Span
+    """The first line of the entry."""
+
+    def field(self, *names: str) -> str:
+        """The first of some fields that is not empty; empty if all are."""
+        fields = dict(self.fields)
+        return next((fields[name] for name in names if fields.get(name)), "")
+
+    @property
+    def doi(self) -> str:
+        """Without the address of a resolver; empty if there is none."""
+        match = _DOI.fullmatch(self.field("doi"))
+        return match[1] if match is not None else ""
+
+    @property
+    def isbn(self) -> str:
+        """Empty if there is none."""
+        return self.field("isbn")
+
+
+@functools.lru_cache(maxsize=8)
+def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
+    """The works of a list, and what is wrong in it.
+
+    Raises:
+        ImportError: the packages that read it are not installed.
+    """
+    from bibtexparser import middlewares
+    from bibtexparser.entrypoint import parse_string
+    from bibtexparser.model import DuplicateBlockKeyBlock, ImplicitComment, MiddlewareErrorBlock
+
+    logging.getLogger("bibtexparser").disabled = True
+    for name in ("bibtexparser.entrypoint", "bibtexparser.splitter", "pylatexenc.latexwalker"):
+        logging.getLogger(name).disabled = True
+    library = parse_string(
+        source.text.replace("\r\n", "\n").replace("\r", "\n"),
+        append_middleware=[
+            middlewares.NormalizeFieldKeys(),
+            middlewares.SeparateCoAuthors(),
+            middlewares.SplitNameParts(),
+        ],
+    )
+    diagnostics: list[Diagnostic] = []
+
+    def report(line: int, message: str, help: str, notes: tuple[Note, ...] = ()) -> None:
+        place = _line(source, line)
+        diagnostics.append(diagnose("source-malformed", place, message, help=help, notes=notes))
+
+    for block in library.failed_blocks:
+        match = _KEY.match(block.raw or "")
+        name = f"`{match[1]}`" if match is not None and match[1] else "this entry"
+        if isinstance(block, DuplicateBlockKeyBlock):
+            first = _line(source, block.previous_block.start_line or 0)
+            notes = (Note("the first one is here", first),)
+            message, help = f"{name} is listed twice", "give one of the two another key"
+            report(block.start_line or 0, message, help, notes)
+        elif isinstance(block, MiddlewareErrorBlock):
+            reason = " ".join(str(block.error).split())
+            message, help = f"{name} cannot be read: {reason[:200]}", "mend the field"
+            report(block.start_line or 0, message, help)
+        else:
+            help = "close each value and each entry with the brace or quote that it opened"
+            report(block.start_line or 0, f"{name} is not whole", help)
+    for comment in library.blocks:
+        if not isinstance(comment, ImplicitComment):
+            continue
+        for match in _ENTRY.finditer(comment.comment or ""):
+            line = (comment.start_line or 0) + comment.comment[: match.start()].count("\n")
+            report(line, "no entry begins here", "an entry is `@article{key, title = {…}, …}`")
+    works = tuple(_read_works(library.entries, source))
+    return Parsed(works, tuple(diagnostics))
+
+
+def _line(source: Source, index: int) -> Span:
+    """A line of the list, from 0, without the white space at its ends."""
+    line = min(index + 1, len(source.line_starts))
+    text = source.line_text(line)
+    start = source.line_start(line) + len(text) - len(text.lstrip())
+    return source.span(start, start + len(text.strip()))
+
+
+def _read_works(entries: Iterable[object], source: Source) -> Iterator[Work]:
+    from bibtexparser.model import Entry
+
+    for entry in entries:
+        assert isinstance(entry, Entry)
+        fields: list[tuple[str, str]] = []
+        people: list[tuple[str, tuple[PersonName, ...]]] = []
+        for field in entry.fields:
+            if field.key in NAMES and isinstance(field.value, list):
+                people.append((field.key, tuple(map(_read_name, field.value))))
+            else:
+                fields.append((field.key, _plain(str(field.value), field.key)))
+        span = _line(source, entry.start_line or 0)
+        yield Work(entry.key, entry.entry_type.lower(), tuple(fields), tuple(people), span)
+
+
+def _read_name(name: object) -> PersonName:
+    """A name from its parts; one in braces stays whole."""
+    first, von, last, junior = (
+        _plain(" ".join(getattr(name, part))) for part in ("first", "von", "last", "jr")
+    )
+    return PersonName(last, first, von, junior)
+
+
+def _plain(text: str, field: str = "") -> str:
+    """A field on one line as plain text: without LaTeX, and braces that only protect capitals."""
+    from pylatexenc.latex2text import LatexNodes2Text
+
+    if field in _IDENTIFIERS:
+        text = text.replace("\\", "")
+    elif "\\" in text or "$" in text or "~" in text:
+        with contextlib.suppress(ValueError, RecursionError):  # it stays as it is written
+            text = LatexNodes2Text(math_mode="text").latex_to_text(text)
+    return " ".join(re.sub(r"[{}\ue000-\uf8ff]", "", text).replace("--", "–").split())
+
+
+def check_identifier(work: Work) -> str:
+    """Why a source cannot be found by its DOI or ISBN; empty if it can."""
+    doi, isbn = work.field("doi"), re.sub(r"[\s-]", "", work.isbn).upper()
+    if doi and not work.doi:
+        return f"`{doi}` is not a DOI"
+    if isbn and not _is_isbn(isbn):
+        return f"`{work.isbn}` is not an ISBN: its last digit does not fit"
+    if doi or isbn or (work.kind in _WEB and work.field("url")):
+        return ""
+    return f"`{work.key}` has no DOI or ISBN"
+
+
+def _is_isbn(text: str) -> bool:
+    """Whether the check digit of an ISBN of 10 or 13 digits is right."""
+    if re.fullmatch(r"\d{9}[\dX]", text):
+        digits = [10 if char == "X" else int(char) for char in text]
+        return sum((10 - i) * digit for i, digit in enumerate(digits)) % 11 == 0
+    if re.fullmatch(r"\d{13}", text):
+        return sum((3 if i % 2 else 1) * int(char) for i, char in enumerate(text)) % 10 == 0
+    return False
