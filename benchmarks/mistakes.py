@@ -27,7 +27,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from datetime import date
 from difflib import SequenceMatcher
@@ -51,6 +51,7 @@ from coursebuild.core.pages.page_list import page_list  # noqa: E402
 from coursebuild.core.registry import unproven  # noqa: E402
 from coursebuild.core.run.script_server import ScriptServer  # noqa: E402
 from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
+from coursebuild.features.names.resolve import resolver_of  # noqa: E402
 from coursebuild.pipeline.judge import judge  # noqa: E402
 from coursebuild.pipeline.options import Options, open_store  # noqa: E402
 from coursebuild.pipeline.verify import verify  # noqa: E402
@@ -133,7 +134,8 @@ class Checker:
             self.session.take_results(self._course, self.verification)
         if verdict != "other":
             return Outcome(change, verdict)
-        reason = find_reason(change, old, claims)
+        known_names = resolver_of(self._course).plain_words
+        reason = find_reason(change, old, claims, known_names)
         return Outcome(change, "reason" if reason else "silent", reason)
 
     def _diagnose(self, path: str, new: str) -> list[Diagnostic]:
@@ -255,8 +257,13 @@ _QUOTED = frozenset("bash console html ini json markdown md sh text toml xml yam
 """Kinds of blocks that show what nothing runs."""
 
 
-def find_reason(change: Change, old: str, claims: Iterable[Diagnostic]) -> str:
-    """Why a change is no mistake that can be known; empty where it should be."""
+def find_reason(
+    change: Change, old: str, claims: Iterable[Diagnostic], known_names: Collection[str]
+) -> str:
+    """Why a change is no mistake that can be known; empty where it should be.
+
+    `known_names`: the names that the course can tell.
+    """
     new, start = change.apply(old), change.start
     end = max(start + len(change.text), start + 1)
     steps = SequenceMatcher(None, old[start : change.end], change.text, False).get_opcodes()
@@ -274,11 +281,9 @@ def find_reason(change: Change, old: str, claims: Iterable[Diagnostic]) -> str:
         return "another lesson of the map"
     line_start = new.rfind("\n", 0, start) + 1
     line = new[line_start : new.find("\n", end) % (len(new) + 1)]
-    words = re.finditer(r"(?<![\w.])[A-Za-z]+(?![\w.(])", line)
-    if re.fullmatch("[A-Za-z]+", letters) and change.place in ("code", "list"):
-        at = start - line_start
-        if any(word.start() <= at <= word.end() and _is_in_code(line, at) for word in words):
-            return "a plain word in code: one in twenty of any prose is a letter from some name"
+    is_word = change.place in ("code", "list", "words") and re.fullmatch("[A-Za-z_]+", letters)
+    if is_word and (reason := _judge_code(old, new, known_names)):
+        return reason
     if change.place == "other block":
         kind = re.findall(r"^[ >]*`{3,} *([^\s`]*)", old[:start], re.MULTILINE)[-1]
         if kind in _QUOTED:
@@ -297,8 +302,24 @@ def find_reason(change: Change, old: str, claims: Iterable[Diagnostic]) -> str:
     return ""
 
 
-def _is_in_code(line: str, at: int) -> bool:
-    return line.count("`", 0, at) % 2 == 1
+def _judge_code(old: str, new: str, known_names: Collection[str]) -> str:
+    """Why a word of inline code that has changed is no mistake that can be known."""
+    at = next(n for n, pair in enumerate(zip(old, new, strict=False)) if pair[0] != pair[1])
+    words = []
+    for text in (old, new):
+        start = text.rfind("\n\n", 0, at) + 1
+        is_code = text.count("`", start, at) % 2
+        words += [m[0] for m in re.finditer(r"\w+", text) if m.start() <= at <= m.end() and is_code]
+    if len(words) != 2 or not words[1][0].isalpha():
+        return ""
+    if words[1] in known_names:
+        return "another name that there is"
+    if len(words[1]) < 4:
+        return "a name of three letters in code"
+    is_alone = (
+        len(re.findall(rf"\b{re.escape(words[0])}\b", old)) == 1 and words[0] not in known_names
+    )
+    return "a name that nothing else has" if is_alone else ""
 
 
 # --- the run

@@ -47,10 +47,12 @@ from coursebuild.core.syntax.attributes import (
 )
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
+from coursebuild.core.syntax.inline_code import check_inline_code
 from coursebuild.core.syntax.inline_parser import inline_tokens
 from coursebuild.core.syntax.labels import take_label
 from coursebuild.core.syntax.mentions import (
     TextPiece,
+    check_link_text,
     check_scheme,
     classify,
     link_mentions,
@@ -60,7 +62,6 @@ from coursebuild.core.syntax.mentions import (
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.syntax.unread_markup import (
-    check_inline_code,
     check_unread_markup,
     find_repetitions,
     find_stars,
@@ -243,8 +244,10 @@ class _TokenReader:
         if diagnostic is not None:
             self.report(diagnostic)
             return None
-        title = str(opening.attrs.get("title", ""))
-        return Link(span, classify(url), destination, title, children)
+        title, target = str(opening.attrs.get("title", "")), classify(url)
+        if (diagnostic := check_link_text(target, children, span)) is not None:
+            self.report(diagnostic)
+        return Link(span, target, destination, title, children)
 
     def _find_destination(self, start: int, label_end: int, end: int) -> Span:
         """The span of the destination of a link or image: in itself, or in its definition."""

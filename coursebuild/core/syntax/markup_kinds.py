@@ -225,7 +225,7 @@ BROKEN = {
         "a task is `- [ ] text` or `- [x] text`",
     ),
     "mention": MarkupKind(
-        r"(?<![\w\\])(?-i:Lesson) (?:0\d[\d.]*|\d+(?:(?:[,;/:]|\.\.)\d+(?![\w,])"
+        r"(?<![\w\\])(?-i:Lesson) (?:0\d[\d.]*|\d+(?:(?:[,;/:]|\.\.)\d+(?!\w|,\d)"
         r"|(?<=\d\d)(?![\w.,]|\.\d)|(?<=\d\d)\.(?= (?-i:[a-z]))))",
         "no lesson has such a number",
         "a lesson is mentioned as `Lesson 1.2`, with a point",
@@ -233,7 +233,8 @@ BROKEN = {
     "item": MarkupKind(
         r"^\d{1,2}(?:[.)][.,)]|[,;]) (?=(?-i:[A-Z\0]))|^\d{1,2}[.)](?=(?-i:[A-Z][a-z]))"
         r"|\A1 (?=(?:[^\n]*\n)+?2\. )|^-(?=(?-i:[A-Z][a-z]))"
-        r"|(?:^[=_]|(?<=\n)0) (?=(?-i:[A-Z][a-z]))|^[0=_] (?=(?-i:\0\0?[A-Z]))",
+        r"|(?:^[=_]|(?<=\n)0) (?=(?-i:[A-Z][a-z]))|^[.)] (?=(?-i:[A-Z][a-z]))"
+        r"|^[0=_] (?=(?-i:\0\0?[A-Z]))",
         "no item of a list begins here",
         "an item is `- text` or `1. text`, with one blank after the mark",
     ),

@@ -19,6 +19,7 @@ from typing import NamedTuple
 from urllib.parse import unquote
 
 from coursebuild.core.model import (
+    CodeSpan,
     ExampleTarget,
     Inline,
     LessonTarget,
@@ -34,7 +35,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.syntax.attributes import term_id
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, nearest, propose
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, nearest, propose
 from coursebuild.core.text.source import Excerpt, Span
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
@@ -94,6 +95,26 @@ def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
         help = f"write the link in Markdown: `[…]({url})`"
         return diagnose("link-scheme", span, message, help=help)
     return check_scheme(url, span, image=True)
+
+
+_NUMBERED = re.compile(r"(?:[^\W\d_]+ )?(\d+(?:\.\d+)+)")
+"""A text that is the number of a lesson, as "Lesson 4.2"."""
+
+
+def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> Diagnostic | None:
+    """The diagnostic of a text that is another lesson, or almost the name of a model or script."""
+    match target, children:
+        case LessonTarget(id=name), (Text(text=text),) if number := _NUMBERED.fullmatch(text):
+            label, kind = number[1], "lesson"
+        case ModelTarget(name=name), (CodeSpan(text=label),) if misspelt(label, (name,)):
+            kind = "model"
+        case ExampleTarget(path=name), (CodeSpan(text=label),) if misspelt(label, (name,)):
+            kind = "script"
+        case _:
+            return None
+    message = f"the text of this link says `{label}`, and it leads to the {kind} `{name}`"
+    help = "name the same in both"
+    return diagnose("link-text", span, message, help=help) if label != name else None
 
 
 _LESSON = r"[0-9]+(?:\.[0-9]+)+(?!\w)"

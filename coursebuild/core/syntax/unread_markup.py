@@ -1,8 +1,7 @@
 """Markup that readers would see as it is written: broken markup of ours, and that of other tools.
 
-Entry points: `check_unread_markup`, for a block's content; `check_inline_code`, for code in a line
-that another tool would compute; `check_kind`, for a fence of a kind that looks misspelt or needs a
-feature that is not installed.
+Entry points: `check_unread_markup`, for a block's content; `check_kind`, for a fence of a kind that
+looks misspelt or needs a feature that is not installed.
 
 Only texts of the parsed content are searched, neither code nor formulas nor escaped characters, so
 a backslash or backticks say that markup is meant to be seen. Everything else is NUL in the searched
@@ -55,7 +54,7 @@ _SIGN = re.compile(
     r"|(?<=[´‘’])[´‘’]{2}|(?<=\()(?:out|given)\))"
 )
 _FIRST_SIGN = re.compile(
-    r"\d{1,2}[.,;)][^\d\s]|\d{1,2}[,;] |-[A-Z]|[0=_] |h\d\. |[A-Z?!]> |1 |import |_\Z"
+    r"\d{1,2}[.,;)][^\d\s]|\d{1,2}[,;] |-[A-Z]|[0=_.)] |h\d\. |[A-Z?!]> |1 |import |_\Z"
 )
 """What all unread markup has at least once, in a text or where a line of it begins, so that most
 texts are passed over quickly; or it mentions a lesson, or is a letter directly after a formula."""
@@ -85,16 +84,12 @@ def _pattern(*, html: bool) -> re.Pattern[str]:
     return re.compile("|".join(parts), re.MULTILINE | re.IGNORECASE)
 
 
-_CELL = re.compile(r"\{[=.]?(?:bash|julia|js|ojs|python|py|r|sql)\}\s|r [A-Za-z_.][\w.]*[($\[]")
-"""How an expression begins that Quarto or R Markdown would compute."""
-
 _STAR = re.compile(
     r"^\*(?:[^\W\d_]{2,}|[aA] )|[^\W\d_]{2,}\*(?![\w*])|[^\W_][.!?]\*(?= [A-Z])"
     r"|(?<=[a-z] )[+\u2212-]?\d[\d.,]*\*\*(?= [a-z]|[.,;:]?$)",
     re.MULTILINE,
 )
 """A star at the start of a line before a word or after a word, or two after a number in a text."""
-_LETTER_BEFORE, _LETTER_AFTER = re.compile(r"(?:^|(?<=\s))\w\Z"), re.compile(r"\w")
 
 
 def check_unread_markup(
@@ -301,28 +296,6 @@ def find_repetitions(content: Excerpt) -> Iterator[Diagnostic]:
             span = content.span(line.start() + at, line.start() + at + len(half))
             message = f"`{shorten(half)}` stands here twice"
             yield diagnose("text-repeated", span, message, help=Fix("delete it once", ""))
-
-
-def check_inline_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[Diagnostic]:
-    """Report code in a line that another tool would compute, or whose backticks are misplaced."""
-    text, span = content.text, content.span(start, end)
-    fence = re.match(r"``(\w+)[^`\n]*\n", text[start:end])
-    if fence is not None and is_known_kind(fence[1]):
-        message = f"a block of kind `{fence[1]}` does not begin here: there are two backticks"
-        opening = content.span(start, start + len(fence[0].rstrip()))
-        yield diagnose("markup-unread", opening, message, help=BROKEN["fence"].help)
-    if _CELL.match(code):
-        message = f"`{shorten(code)}` is shown, and not computed"
-        help = "show the value, bound to what a script printed: `` `4.47`{out} ``"
-        yield diagnose("markup-foreign", span, message, help=help)
-    # A letter and a backtick change places easily, as in "i`mpratio`" and "`body_mass `while".
-    letter = _LETTER_BEFORE.search(text, max(start - 2, 0), start)
-    if letter is None and text[start:end].endswith(" `"):
-        letter = _LETTER_AFTER.match(text, end)
-    if letter is not None:
-        message = f"`{letter[0]}` stands directly beside a backtick that begins or ends code"
-        help = "move the backtick, or write a blank between them"
-        yield diagnose("markup-unread", content.span(*letter.span()), message, help=help)
 
 
 def _mask_all_but(texts: Sequence[tuple[int, str]], whole: str) -> str:

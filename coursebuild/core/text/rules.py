@@ -145,6 +145,7 @@ _SUMMARIES = {
     "link-lesson": "A link or mention names a lesson that the map does not have.",
     "link-level": "A mention names a level that the map does not have.",
     "link-page": "A link names a page that the map does not have.",
+    "link-text": "The text of a link names another lesson or model than the one it leads to.",
     "link-term": "A link names a term that no lesson defines.",
     "link-model": "A link names a model that is not in models/.",
     "link-example": "A link names a script that no lesson has.",

@@ -19,18 +19,14 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
-from coursebuild.features.names.claims import document_names
+from coursebuild.features.names.claims import GUESSES, course_names, document_names, names_of
 from coursebuild.features.names.engine import EngineTable, KnownName, engine_names, list_names
 from coursebuild.features.names.resolve import (
     Resolver,
     Unknown,
-    course_names,
-    names_of,
     resolver_of,
 )
 
-_TAIL = re.compile(r"[^\W\d_]+(?!\w)")
-"""Letters directly after code."""
 _HELP = "say `{code}` after it if it is no name, or list it under `names` in `[verify]`"
 
 
@@ -45,7 +41,7 @@ def reference(course: Course, store: Store, interpreter: Interpreter | None) -> 
             module = names.imports.get(root, "numpy" if root == "np" else "")
             paths |= {f"{module}.{rest}"} if dot and module else set()
     modules = {path[: dot.start()] for path in paths for dot in re.finditer(r"\.", path)}
-    is_asked = any(claim.kind != "plain" for names in documents for claim in names.claims)
+    is_asked = any(claim.kind not in GUESSES for names in documents for claim in names.claims)
     return engine_names(store, interpreter, modules) if is_asked else None
 
 
@@ -57,19 +53,24 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
         note = names_of(document)
         if note is None or id(document) in free:
             continue
+        known_codes, reported = set[int](), set[int]()
         for claim, code, span in note.claims:
+            if span.start in reported or (claim.kind == "token" and code.start in known_codes):
+                continue
             answer = resolver.resolve(claim, note.names)
-            if claim.kind == "plain" and (tail := _TAIL.match(code.source.text, code.end)):
-                answer = answer or resolver.find_torn(claim.name, tail[0], note.names)
+            if answer is not None and claim.kind not in ("word", "call"):
+                known_codes.add(code.start)
             if not isinstance(answer, Unknown):
                 continue
             text = code.text.strip("` ")
-            if claim.kind == "plain" and _is_used_again(course, claim.name):
+            if claim.kind in ("plain", "token") and _is_used_again(course, claim.name):
                 continue
             if any(
                 fnmatchcase(word, name) for word in (text, answer.part) for name in course.names
             ):
                 continue
+            known_codes.add(code.start)
+            reported.add(span.start)
             at = code.source.text.find(answer.part, span.start, code.end)
             place = code.source.span(at, at + len(answer.part)) if at >= 0 else span
             yield diagnose("name-unknown", place, answer.message, help=answer.help or _HELP)
@@ -77,7 +78,7 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
 
 def _is_used_again(course: Course, word: str) -> bool:
     """Whether the texts of a course have a word more than once, so that it is no slip."""
-    pattern = re.compile(rf"\b{re.escape(word)}\b")
+    pattern = re.compile(rf"(?<!\w){re.escape(word)}(?!\w)")
     texts = (source.text for source in course.sources if word in source.text)
     return sum(len(pattern.findall(text)) for text in texts) > 1
 

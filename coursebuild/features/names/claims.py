@@ -6,7 +6,9 @@ one piece of inline code; `Claim` and `CodeNames`.
 Inline code is a claim only where it has the shape of a name: a call, a dotted name, a word with an
 underscore or one that begins as MuJoCo's do, elements and attributes of MJCF, a command or an
 option of coursebuild, a table of the course map, a file of the course. Any other word may be one:
-it is "plain", and wrong only where it is a name with two letters swapped.
+it is "plain", and wrong only where it is a name but for a slip of the hand. So is a "token", which
+stands between blanks and is more than a word; "torn" is a word that goes on behind its backtick,
+and "half" what has one bracket of an element.
 """
 
 from __future__ import annotations
@@ -27,11 +29,23 @@ from coursebuild.core.pages.listings import python_nodes
 from coursebuild.core.text.source import Span
 
 Kind: TypeAlias = Literal[
-    "word", "call", "path", "element", "attribute", "command", "option", "table", "file", "plain"
+    "word",
+    "call",
+    "path",
+    "element",
+    "attribute",
+    "command",
+    "option",
+    "table",
+    "file",
+    "plain",
+    "token",
+    "torn",
+    "half",
 ]
 
 _SHAPE = re.compile(
-    r"[A-Za-z0-9]_[A-Za-z0-9]|\w\.[A-Za-z]|\w\(|\b[Mm]j[A-Z]|=[\"]|\A<[/A-Za-z]|--\w|/|\[\w"
+    r"[A-Za-z0-9]_[A-Za-z0-9]|\w\.[A-Za-z]|\w\(|\b[Mm]j[A-Z]|=[\"]|\A<[/A-Za-z]|>\Z|--\w|/|\[\w"
     r"|->\w|\Acoursebuild "
 )
 """What every claim has somewhere, so that most code is passed over quickly."""
@@ -39,6 +53,8 @@ ENGINE_WORD = re.compile(r"(?:mj[A-Z]|mj[a-z]{0,2}_|mjt[A-Z]|Mj[A-Z])\w+")
 """A name that only MuJoCo has."""
 _ATTRIBUTES = re.compile(r'\s*([A-Za-z_][\w:-]*)\s*=\s*"[^"]*"')
 _TAG = re.compile(rf"<(/?)([A-Za-z]\w*)((?:{_ATTRIBUTES.pattern[:-7]}\"[^\"]*\")*)\s*/?>")
+_HALF = re.compile(r"(?=.*[<>])(?!<.*>\Z)[^\w\s]?/?[A-Za-z]\w*/?[^\w\s]?|<\w+/\w+>|<<[a-z]+[ >/].*")
+"""Perhaps an element that lost a bracket."""
 _TABLE = re.compile(r"(\[\[?)([a-z][\w.]*)\]\]?(?: (\w+)(?: =.*)?)?")
 _FILE = re.compile(r"(?:content|examples|models)/(?!.*[A-Z]{3})[\w./-]*\w\.[a-z]+")
 _NEAR_FILE = re.compile(r"(?!.*[A-Z]{3})[\w.-]+/[\w./-]*\w\.(?:md|py|toml|xml)")
@@ -52,9 +68,15 @@ _CODE = (
 ) | model.Recording
 _PLAIN = re.compile(r"(?<![\w.\\/-])[A-Za-z]\w+[^\W_](?:\.(?:md|py|toml|xml)\b)?(?![\w./\\-])")
 """A word of inline code that is no part of a path."""
+_TOKEN = re.compile(r"(?<!\S)(?=\S*[A-Za-z_]{4})(?!\w+(?!\S))\S{6,}(?!\S)")
+"""What stands between blanks, with a word of some length and more than that."""
+_TAIL = re.compile(r"[A-Za-z]+(?!\w)")
+"""Letters directly after code."""
 _MOST_PLAIN = 3
 """How many uses of a plain word are kept of a document: what is used again is no slip."""
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
+GUESSES = frozenset("plain token torn half".split())
+"""Kinds of claims that are none where nothing is called like them."""
 
 
 class Claim(Struct, frozen=True, array_like=True):
@@ -63,7 +85,8 @@ class Claim(Struct, frozen=True, array_like=True):
     kind: Kind
     name: str
     """Parts of a path are joined by dots; `()` and `[]` after one say that it is called or
-    indexed. An attribute has the elements before it, as in `joint damping`."""
+    indexed. An attribute has the elements before it, as in `joint damping`; a torn name has a
+    blank before its letters behind the backtick."""
     linked: bool
     """Whether the whole code can link to what this name means."""
 
@@ -102,6 +125,23 @@ class DocumentNames(Struct, frozen=True, dict=True):
     def claims(self) -> Iterator[tuple[Claim, Span, Span]]:
         """Each claim with the place of its code and its own."""
         return zip(self.names.claims, self.codes, self.places, strict=True)
+
+
+def names_of(document: model.Document) -> DocumentNames | None:
+    """Return the names of a document that the course has read."""
+    names = (document.summaries or {}).get("names")
+    return names if isinstance(names, DocumentNames) else None
+
+
+def course_names(course: model.Course) -> tuple[CodeNames, ...]:
+    """Return the names of each document of a course."""
+    return tuple(note.names for note in map(names_of, course.documents) if note is not None)
+
+
+@functools.lru_cache(maxsize=256)
+def words_of(text: str) -> frozenset[str]:
+    """Return the words of code."""
+    return frozenset(re.findall(r"[A-Za-z]\w*", text))
 
 
 def document_names(document: model.Document) -> DocumentNames | None:
@@ -200,13 +240,17 @@ def claims_of(code: model.CodeSpan) -> Iterator[tuple[Claim, Span]]:
     if _SHAPE.search(text) or ENGINE_WORD.fullmatch(text):
         finds += _find(text)
     used_words = {word for _, name, part in finds for word in re.findall(r"\w+", f"{name} {part}")}
+    tail, last = _TAIL.match(code.span.source.text, code.span.end), re.search(r"\w+\Z", text)
+    if tail is not None and last is not None:
+        finds.append(("torn", f"{last[0]} {tail[0]}", last[0]))
     plain = (word for word in _PLAIN.findall(text) if word not in used_words)
     finds += (("plain", word, word) for word in dict.fromkeys(plain))
+    finds += (("token", token, token) for token in _TOKEN.findall(text))
     for number, (kind, name, part) in enumerate(finds):
         start = code.span.start + code.span.text.find(part)
         has_part = start >= code.span.start
         span = code.span.source.span(start, start + len(part)) if has_part else code.span
-        yield Claim(kind, name, not number and kind != "plain"), span
+        yield Claim(kind, name, not number and kind not in GUESSES), span
 
 
 def _find(text: str) -> Iterator[tuple[Kind, str, str]]:
@@ -223,6 +267,8 @@ def _find(text: str) -> Iterator[tuple[Kind, str, str]]:
                 yield "option", f"{command} {option[0]}", option[0]
     elif table := _TABLE.fullmatch(text):
         yield "table", f"{table[1]}{table[2]} {table[3] or ''}", table[3] or table[2]
+    elif _HALF.fullmatch(text):
+        yield "half", text, text
     elif text.startswith("<"):
         for tag in _TAG.finditer(text):
             yield "element", tag[2], tag[2]

@@ -25,6 +25,13 @@ from coursebuild.features.names import introspect
 _MANUAL = "https://mujoco.readthedocs.io/en/{}/{}"
 _KIND = "names"
 _SECONDS = 30.0
+ITEM_CLASSES = {
+    "MjContactList": "MjContact",
+    "MjSolverStatList": "MjSolverStat",
+    "MjTimerStatList": "MjTimerStat",
+    "MjWarningStatList": "MjWarningStat",
+}
+"""The classes of the items of lists."""
 
 
 class EngineName(Struct, frozen=True):

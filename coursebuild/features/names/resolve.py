@@ -17,13 +17,14 @@ from typing import TypeAlias
 from msgspec import Struct
 
 from coursebuild import MANUAL
-from coursebuild.core.model import Course, Document, document_scripts
+from coursebuild.core.model import Course, document_scripts
 from coursebuild.core.model.addresses import line_anchor
 from coursebuild.core.syntax.course_schema import CourseFile
 from coursebuild.core.syntax.html import ELEMENTS
-from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest, propose
-from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, DocumentNames
+from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest, propose, slips_of
+from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, course_names, words_of
 from coursebuild.features.names.engine import (
+    ITEM_CLASSES,
     EngineName,
     EngineNames,
     EngineTable,
@@ -88,7 +89,7 @@ class Resolver:
         """The words of all code of the course."""
         words: set[str] = {model.name for model in self.course.models}
         for model in self.course.models:
-            words |= _words_of(model.source.text)
+            words |= words_of(model.source.text)
         for names in course_names(self.course):
             words |= names.words
             words |= names.definitions.keys()
@@ -138,6 +139,12 @@ class Resolver:
                 return self._file(claim.name)
             case "plain":
                 return self._plain(claim.name, names)
+            case "token":
+                return self._token(claim.name)
+            case "half":
+                return self._half(claim.name)
+            case "torn":
+                return self._torn(claim.name, names)
 
     # --- Python
 
@@ -169,54 +176,81 @@ class Resolver:
         return Unknown(message, _propose(name, candidates), name)
 
     @functools.cached_property
+    def uses(self) -> Counter[str]:
+        """How often inline code has each word and each token that may be no name."""
+        claims = (claim for names in course_names(self.course) for claim in names.claims)
+        return Counter(claim.name for claim in claims if claim.kind in ("plain", "token"))
+
+    @functools.cached_property
     def plain_words(self) -> dict[str, int]:
         """Words without the shape of a name, each with the least length that is telling."""
-        claims = (claim for names in course_names(self.course) for claim in names.claims)
-        uses = Counter(claim.name for claim in claims if claim.kind == "plain")
-        engine, files = self.engine, (path.rpartition("/")[2] for path in self.files)
+        uses, engine = self.uses, self.engine
+        files = (path.rpartition("/")[2] for path in self.files)
         common_words = {*known_keys(), *self.imports, *options_by_command(), *keyword.kwlist}
         common_words.update(vars(builtins), *(() if engine is None else engine.modules.values()))
         own_words = {*self.words, *files, *(word for word, count in uses.items() if count > 1)}
+        frequent_words = {word for word, count in uses.items() if count > 4 and len(word) > 3}
         engine_words = engine.words if engine is not None and self.has_engine else ()
-        sets = ((common_words, 7), (own_words, 5), (engine_words, 3))
+        sets = ((common_words, 6), (own_words, 4), (engine_words, 4), (frequent_words, 3))
         return {word: length for words, length in sets for word in words}
 
     @functools.cached_property
     def long_words(self) -> frozenset[str]:
         """Names of MuJoCo, and words that the course often has as code; shorter with a digit."""
-        claims = (claim for names in course_names(self.course) for claim in names.claims)
-        uses = Counter(claim.name for claim in claims if claim.kind == "plain")
-        words = {word for word, count in uses.items() if count > 2}
+        words = {word for word, count in self.uses.items() if count > 2}
         if self.engine is not None and self.has_engine:
             words |= self.engine.words
         return frozenset(w for w in words if len(w) > 6 or (re.search("[0-9]", w) and len(w) > 3))
 
-    def find_torn(self, name: str, tail: str, names: CodeNames) -> Answer:
+    def _torn(self, torn: str, names: CodeNames) -> Answer:
         """A name of which a backtick stands before the last letters, as in "`Eule`r"."""
+        name, tail = torn.split(" ")
         whole, words = name + tail, self.plain_words.keys() | names.words
-        if whole not in words or name in words:
+        if whole not in words or (name in words and tail in ("s", "es", "d", "ed", "ing")):
             return None
         message = f"`{name}` and the letters after its backtick are the name `{whole}`"
         return Unknown(message, f"did you mean `{whole}`?", name)
 
     def _plain(self, name: str, names: CodeNames) -> Answer:
-        if name in (lengths := self.plain_words) or name in names.words or name.isupper():
+        lengths, is_constant = self.plain_words, name.isupper()
+        if name in lengths or name in names.words or (is_constant and len(name) < 7):
             return None
+        slips = {slip.upper() for slip in slips_of(name.lower())} if is_constant else slips_of(name)
+        near = {
+            word
+            for word in slips
+            if len(word) >= lengths.get(word, len(word) + 1)
+            and (word[0] == name[0] or self.uses[word] > 1)  # `fields` is no slip of `hfields`
+        }
         # Of 9,600 words of prose, 8 have another letter inside than a long name of MuJoCo, but some
         # 500 differ by a letter from any name: `weight` is no slip of `height`.
-        splits = [(name[:n], name[n:]) for n in range(len(name) - 1)]
-        swaps = {head + tail[1] + tail[0] + tail[2:] for head, tail in splits}
-        near = {word for word in swaps - {name} if len(word) >= lengths.get(word, len(word) + 1)}
         if len(name) > 5 or re.search("[0-9]", name):
-            slips = {head + tail[1:] for head, tail in splits[1:-1]}
-            for letter in "abcdefghijklmnopqrstuvwxyz_":
-                slips |= {head + letter + tail for head, tail in splits[1:]}
-                slips |= {head + letter + tail[1:] for head, tail in splits[1:-1]}
-            near |= slips & self.long_words
+            splits = [(name[:n], name[n:]) for n in range(1, len(name) - 1)]
+            words = {head + tail[1:] for head, tail in splits}
+            words |= {
+                head + letter + tail[1:]
+                for head, tail in splits
+                for letter in "abcdefghijklmnopqrstuvwxyz_"
+            }
+            near |= words & self.long_words
         if (likely := min(near, default=None)) is None:
             return None
         message = f"nothing that the course knows is called `{name}`"
         return Unknown(message, propose(name, likely, near), name)
+
+    def _token(self, name: str) -> Answer:
+        """A token that is another one of the course but for a slip in or beside a word."""
+        if self.uses[name] > 1:
+            return None
+        words = [word.span() for word in re.finditer("[A-Za-z_]{4,}", name)]
+        for candidate in slips_of(name):
+            if self.uses[candidate] > 1 or candidate in self.files:
+                pairs = enumerate(zip(name, candidate, strict=False))
+                at = next((n for n, (a, b) in pairs if a != b), len(name))
+                if any(start - 1 <= at <= end + 1 for start, end in words):
+                    message = f"nothing that the course knows is called `{name}`"
+                    return Unknown(message, f"did you mean `{candidate}`?", name)
+        return None
 
     def _path(self, path: str, names: CodeNames) -> Answer:
         parts = [re.sub(r"[()\[\]]+", "", part) for part in path.split(".")]
@@ -239,12 +273,21 @@ class Resolver:
             return Unknown(f"`{root}` has no member `{parts[1]}`", help, parts[1])
         if root in names.definitions or root in names.words:
             return None
-        likely = misspelt(root, ("model", "data", "mujoco")) if self.has_engine else None
+        likely = misspelt(root, (*_ROOTS, "mujoco")) if self.has_engine else None
         if likely is not None and isinstance(
             self._path(path.replace(root, likely, 1), names), KnownName
         ):
             message = f"nothing that the course knows is called `{root}`"
             return Unknown(message, propose(root, likely), root)
+        if ENGINE_WORD.fullmatch(root):
+            message = f"MuJoCo {engine.version} has no `{root}`"
+            return Unknown(message, did_you_mean(root, engine.classes), root)
+        head, _, tail = path.partition(".")
+        for candidate in (f"{head[:-1]}.{head[-1]}{tail}", f"{head}{tail[0]}.{tail[1:]}"):
+            is_likely = candidate.partition(".")[0] in _ROOTS
+            if is_likely and isinstance(self._path(candidate, names), KnownName):
+                message = f"nothing that the course knows is called `{root}`"
+                return Unknown(message, f"did you mean `{candidate}`?", root)
         return None
 
     def _class_of(self, root: str, names: CodeNames) -> str:
@@ -273,7 +316,7 @@ class Resolver:
                 return Unknown(message, did_you_mean(name, members), name)
             class_name = member.type
             if class_name.endswith("List"):
-                class_name = _ITEMS.get(class_name, "") if "[]" in part else ""
+                class_name = ITEM_CLASSES.get(class_name, "") if "[]" in part else ""
         if member is None:
             return None
         href = class_href(self.engine, first_class)
@@ -316,6 +359,15 @@ class Resolver:
             return None
         message = f"MJCF of MuJoCo {engine.version} has no element `<{name}>`"
         return Unknown(message, did_you_mean(name, engine.elements), name)
+
+    def _half(self, text: str) -> Answer:
+        """An element of which a bracket is lost, or is another key."""
+        name = re.sub(r"\W", "", text.split()[0])
+        letters = {name, name[1:] if text[0] == name[0] else name}
+        elements = set() if self.engine is None or not self.has_engine else self.engine.elements
+        if (element := next((word for word in letters if word in elements), None)) is None:
+            return None
+        return Unknown(f"`{text}` is not a whole tag", f"did you mean `<{element}>`?", text)
 
     def _attribute(self, element: str, name: str) -> Answer:
         engine = self.engine
@@ -396,27 +448,3 @@ class Resolver:
         lessons = (lesson.path for lesson in course.lessons)
         sources = (source.path for source in course.sources)
         return frozenset((*course.files, *scripts, *sources, *lessons))
-
-
-_ITEMS = {
-    "MjContactList": "MjContact",
-    "MjSolverStatList": "MjSolverStat",
-    "MjTimerStatList": "MjTimerStat",
-    "MjWarningStatList": "MjWarningStat",
-}
-
-
-def names_of(document: Document) -> DocumentNames | None:
-    """Return the names of a document that the course has read."""
-    names = (document.summaries or {}).get("names")
-    return names if isinstance(names, DocumentNames) else None
-
-
-def course_names(course: Course) -> tuple[CodeNames, ...]:
-    """Return the names of each document of a course."""
-    return tuple(note.names for note in map(names_of, course.documents) if note is not None)
-
-
-@functools.lru_cache(maxsize=256)
-def _words_of(text: str) -> frozenset[str]:
-    return frozenset(re.findall(r"[A-Za-z]\w*", text))
