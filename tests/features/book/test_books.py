@@ -7,6 +7,7 @@ import shutil
 import zipfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from urllib.parse import unquote
 from xml.etree import ElementTree
 
 import pytest
@@ -99,7 +100,7 @@ def test_page_of_every_construct_and_of_wild_html_is_self_contained(full_course:
     page = export(full_course, "page").read_text("utf-8")
     ids = re.findall(r' id="([^"]*)"', page)
     assert len(ids) == len(set(ids)) and page.count("<h1") == 1
-    assert set(re.findall(r'href="#([^"]*)"', page)) <= set(ids)
+    assert {unquote(anchor) for anchor in re.findall(r'href="#([^"]*)"', page)} <= set(ids)
     assert not re.findall(r'(?:src|srcset|poster)="(?!data:)', page)
     assert not re.findall(r"url\((?!.?(?:data:|#))", page) and "@font-face" in page
     assert "<script" not in page and "<button" not in page and "onclick" not in page
