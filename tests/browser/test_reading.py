@@ -26,6 +26,8 @@ from support.lab_page import (
 pytestmark = pytest.mark.browser
 
 LESSON = "lessons/1.1-one.html"
+DRAFT = "lessons/1.3-line-ends.html"
+"""A draft in the course of every construct: it shows its status."""
 OpenPage = Callable[..., Page]
 
 
@@ -335,14 +337,15 @@ def test_axe_finds_nothing(open_page: OpenPage, name: str) -> None:
     assert violations(page) == []
 
 
-def test_colours_of_the_reader_are_kept(open_page: OpenPage) -> None:
+def test_colours_of_the_reader_are_kept(sites: Mapping[str, Site], open_page: OpenPage) -> None:
     """High contrast: what is told by a colour of ours is told by one of the system's."""
     page = open_page(at="#sub/wide.L6", forced_colors="active")
     becomes(page, lambda: marked_ids(page), ["sub/wide.L6"])
     line, second_line = (page.locator(f"[id='sub/wide.L{n}']") for n in (6, 3))
     colour = "e => getComputedStyle(e).backgroundColor"
     assert line.evaluate(colour) != second_line.evaluate(colour)
-    shape = page.locator(".status").first.evaluate(
+    page.goto(sites["full"].url(DRAFT))
+    shape = page.locator(".status-draft").first.evaluate(
         "e => getComputedStyle(e, '::before').borderTopStyle"
     )
     assert shape == "solid"

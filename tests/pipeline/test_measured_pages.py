@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
+import shlex
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -99,6 +101,12 @@ class Course:
         return [re.sub(r"<svg.*?</svg>", "<svg>", part, flags=re.S) for part in figures]
 
 
+def words(page: str) -> str:
+    """The text of a page's main part."""
+    main = page[page.index("<main") : page.index("</main>")]
+    return " ".join(re.sub(r"<[^>]*>", " ", main).split())
+
+
 @pytest.fixture(scope="module")
 def built_course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     """The course with its site, before any change."""
@@ -125,7 +133,9 @@ def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built_course: Folde
     assert 'class="work-precision"' in page and "Nobody reads it." in page
     assert "It swings." in course.page(NUMERICS)
     assert (course.folder.root / "public/files/reports/box.bench.json").is_file()
-    assert "not measured" in course.page("models/cup.html").lower()
+    cup = course.page("models/cup.html")
+    assert "measured" not in words(cup), "of what nobody measured nothing is said"
+    assert 'id="measured"' in cup, "so that links to it hold"
     whole, tables, alone = course.figures()
     assert '<a href="../models/box.html#measured-swing">box</a>: A pendulum swings' in whole
     assert whole.count("<svg>") == 2 and '<details class="more-figures">' in whole
@@ -183,10 +193,13 @@ def test_a_report_that_does_not_fit_is_told_and_not_shown(course: Course) -> Non
     def stale_warnings() -> str:
         result = course.build()
         assert 'class="work-precision"' not in course.page()
-        assert "Not measured." in course.page()
-        assert 'id="measured-awkward"' in course.page(), "so that links to it hold"
+        assert "Speed against error" not in words(course.page())
+        assert "Speed natively" not in words(course.page())
+        for anchor in ("measured", "measured-swing", "measured-awkward", "diet"):
+            assert f'id="{anchor}"' in course.page(), "so that links to it hold"
         for figure in course.figures():
-            assert "Not measured. This measures it:" in figure and "<svg>" not in figure
+            assert "Not measured. To measure it:" in figure and "<svg>" not in figure
+            assert "coursebuild bench box --record" in figure
             assert '<a href="../models/box.html#measured">box</a></figcaption>' in figure
         return result
 
@@ -198,6 +211,7 @@ def test_a_report_that_does_not_fit_is_told_and_not_shown(course: Course) -> Non
     ):
         folder.replace(path, old, new)
         warnings = stale_warnings()
+        assert "What it could do without" not in words(course.page())
         assert warnings.count("warning[report-stale]") == 2 and "bench-" not in warnings, path
         assert "`box`, its files or its scenarios have changed since" in warnings
         assert "help: make it again with `coursebuild bench box --record`" in warnings
@@ -238,8 +252,10 @@ def test_the_preview_follows_reports(course: Course) -> None:
         course.folder.replace("content/lessons/1.2-two.md", "=awkward", "=swing")
         shows(SCENARIO_LESSON, "#measured-swing")
         course.folder.replace("models/box.xml", "<mujoco>", "<mujoco >")
-        gone = "It is far away."
-        wait_until(lambda: gone not in preview.get(PAGE)[2].decode(), f"no {gone!r} on {PAGE}")
+        message = "It is far away."
+        wait_until(
+            lambda: message not in preview.get(PAGE)[2].decode(), f"no {message!r} on {PAGE}"
+        )
 
 
 def test_a_model_with_an_unusual_name(course: Course) -> None:
@@ -248,10 +264,12 @@ def test_a_model_with_an_unusual_name(course: Course) -> None:
     course.write_bench(course.bench(name))
     assert course.build() == ""
     page = course.page(f"models/{name}.html")
-    assert "coursebuild bench &#39;odd &amp; old/it&#39;&#34;&#39;" in page
+    assert "Speed against error" in words(page) and name in html.unescape(words(page))
     assert "reports/odd%20&amp;%20old/" in page or "reports/odd%20%26%20old/" in page
     course.folder.write(f"models/{name}.xml", "<mujoco></mujoco>\n")
-    assert f"`{name}`, its files or its scenarios have changed since" in course.build()
+    warnings = course.build()
+    assert f"`{name}`, its files or its scenarios have changed since" in warnings
+    assert f"`coursebuild bench {shlex.quote(name)} --record`" in warnings
 
 
 SINGULAR = """\

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
+import socket
 import sys
 from collections.abc import Iterator
 from http.client import HTTPConnection
@@ -370,14 +371,20 @@ def test_preview_listens_on_the_loopback_only(preview: Preview) -> None:
     assert listening(preview) == ["0100007F"]
 
 
-def test_port_or_host_that_cannot_be_had_is_told(preview: Preview) -> None:
-    for host, reason in (
-        ("127.0.0.1", "Address already in use"),
-        ("no.invalid", "Name or service"),
-    ):
-        result = preview.folder.main("serve", "--host", host, "--port", str(preview.port))
-        assert (result.status, result.out) == (2, "")
-        assert f"port {preview.port} of {host} cannot be used: {reason}" in result.err
-        proposal = re.search(r"; `coursebuild serve --port (\d+)`", result.err)
-        assert (proposal is not None) == (host == "127.0.0.1")
-        assert proposal is None or int(proposal[1]) > preview.port
+def test_port_or_host_that_cannot_be_had_is_told(preview: Preview, make: Make) -> None:
+    """The port of another program, or of another course's preview; a host that is not there."""
+    folder = make(GOOD)
+    with socket.create_server(("127.0.0.1", 0)) as other_program:
+        used_port = other_program.getsockname()[1]
+        for course, host, port, reason in (
+            (preview.folder, "127.0.0.1", used_port, "Address already in use"),
+            (folder, "127.0.0.1", used_port, "Address already in use"),
+            (folder, "127.0.0.1", preview.port, "Address already in use"),
+            (preview.folder, "no.invalid", preview.port, "Name or service"),
+        ):
+            result = course.main("serve", "--host", host, "--port", str(port))
+            assert (result.status, result.out) == (2, "")
+            assert f"port {port} of {host} cannot be used: {reason}" in result.err
+            proposal = re.search(r"; `coursebuild serve --port (\d+)`", result.err)
+            assert (proposal is not None) == (host == "127.0.0.1")
+            assert proposal is None or int(proposal[1]) > port

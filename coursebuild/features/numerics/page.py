@@ -101,16 +101,29 @@ def numerics_values(library: Library) -> dict[str, object]:
         *sorted(library.reports.cases, key=attrgetter("case")),
         *course_reports,
     ]
+    groups = tuple(
+        _group(words, place, number, tuple(group))
+        for number, group in groupby(cases, key=attrgetter("case"))
+    )
     return {
-        "groups": tuple(
-            _group(words, place, number, tuple(group))
-            for number, group in groupby(cases, key=attrgetter("case"))
-        ),
+        "groups": groups,
+        "tables": tuple(_tables(groups)),
         "integrators": INTEGRATORS,
         "where": dict.fromkeys(machine_text(words, report.machine) for report in cases),
         "file": place.href(urls.file_path(STABILITY.path())),
         "command": STABILITY.command(),
     }
+
+
+def _tables(groups: Sequence[CaseGroup]) -> Iterator[tuple[str, int, list[list[CaseView]]]]:
+    """The tables of all cases: a name, the column of `matrix`, and by group the cases with cells.
+
+    A table without a case is none.
+    """
+    for column, name in enumerate(("order", "largest", "cost")):
+        bodies = [[case for case in group.cases if any(case.matrix[column])] for group in groups]
+        if any(bodies):
+            yield name, column, [cases for cases in bodies if cases]
 
 
 def _group(

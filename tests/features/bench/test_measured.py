@@ -92,7 +92,7 @@ def test_the_card_of_a_model(site: dict[str, str]) -> None:
     assert "Speed natively 100 × real time Speed in WebAssembly 151 × real time" in words
 
 
-def test_a_scenario_has_its_plot_tables_and_command(site: dict[str, str]) -> None:
+def test_a_scenario_has_its_plots_tables_and_figures_as_a_file(site: dict[str, str]) -> None:
     page = site["models/box.html"]
     words = text(page)
     assert "A pendulum swings RK4 at 20 ms costs 0.39 times as much" in words
@@ -109,7 +109,7 @@ def test_a_scenario_has_its_plot_tables_and_command(site: dict[str, str]) -> Non
     own_rows = re.findall(r'<tr class="own"><th scope="row">(.*?)</th>', page)
     assert own_rows[0] == "Euler at 2 ms"
     assert "Euler at 50 ms: diverged; the state is not finite." in words
-    assert "coursebuild bench box --record" in words
+    assert "coursebuild" not in words, "a page for readers names no command of authors"
     assert 'href="../files/reports/box.bench.json"' in page
     assert "MuJoCo 3.14.0, Python 3.11.7, NumPy 2.3.0; Linux x86_64, A Processor @ 2 GHz." in words
 
@@ -136,20 +136,22 @@ def test_an_error_that_the_reference_does_not_resolve_has_no_column(make: Make) 
 
 def test_the_diet_of_a_model(site: dict[str, str]) -> None:
     words = text(site["models/box.html"])
-    assert "One thing in it is not needed by any scenario." in words
+    assert "One part of this model changes nothing that happens in its scenarios." in words
     assert "sensor-unread Nobody reads &lt;this&gt; sensor." in words
     assert "proved; ×1.07 as fast, 120 B of memory, 40 B of text (swing)." in words
     assert "Because its value goes nowhere. models/box.xml:3" in words
     assert "Kept: it is the horizon." in words
     assert "It is no fault, as examples/a.py names &lt;it&gt;." in words
-    assert "coursebuild diet box --record" in words
+    assert 'href="../files/reports/box.diet.json"' in site["models/box.html"]
 
 
 def test_what_was_measured_in_part(make: Make) -> None:
+    """Facts that nobody measured have no row; the size of the file is known without measuring."""
     half = pages(make, Reports({"box": box(None)}, {"box": diet()}))["models/box.html"]
-    assert "Pairs of geoms that may touch not measured" in text(half)
-    assert "Speed natively 100 × real time Speed in WebAssembly not measured" in text(half)
-    assert "Everything in it is needed." in text(half)
+    facts = text(half).partition(" Facts ")[2].partition(" Speed against error ")[0]
+    assert facts.endswith("unnamed The MJCF file 46 B Speed natively 100 × real time")
+    assert "not measured" not in text(half).lower()
+    assert "Nothing in this model could be left out" in text(half)
 
 
 def test_the_page_of_the_hard_cases(site: dict[str, str]) -> None:
@@ -176,19 +178,42 @@ def test_the_page_of_the_hard_cases(site: dict[str, str]) -> None:
     assert 'href="numerics/index.html"' in site["index.html"]
 
 
-def test_the_page_begins_with_a_matrix_of_cases_and_integrators(site: dict[str, str]) -> None:
-    head, _, rest = site["numerics/index.html"].partition("<tbody>")
-    assert head.count('scope="colgroup"') == 3 and head.count('scope="col"') == 16
-    (row,) = (row for row in rest.split("<tr>") if 'href="#spring"' in row)
-    cells = re.findall(r"<td[^>]*>(.*?)</td>", row)
-    assert [cells[n] for n in (0, 5, 6, 8, 9)] == [
-        "1.00",
-        "200 ms",
-        "all",
-        "250 ms – 290 ms",
-        "all",
-    ]
-    assert cells[10:] == [""] * 5  # no run comes to an error of 1e-3
+def first_tables(page: str) -> dict[str, dict[str, list[str]]]:
+    """The tables of all cases by their headings: the cells of each row by its first one."""
+    start = page[page.index('id="matrix"') : page.index("</section>")]
+    tables = {}
+    for part in start.split("<h3 ")[1:]:
+        title = re.findall(r">(.*?)</h3>", part)[0]
+        rows = re.findall(r"<tr>(.*?)</tr>", part)
+        cells = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in rows]
+        tables[title] = {re.sub("<.*?>", "", row[0]): row[1:] for row in cells}
+    return tables
+
+
+def test_the_page_begins_with_tables_of_cases_and_integrators(make: Make) -> None:
+    lost = replace(case().boundaries[0], largest=0.0)
+    costs = (StepCost("RK4", Interval(1e-6, 9e-7, 2e-6)),)
+    cheap = case("cheap", 4, errors=(run(integrator="RK4", position=(1e-4, 1e-4)),), costs=costs)
+    cases = (case("spring", 5), replace(case("lost", 5), boundaries=(lost,), orders=()), cheap)
+    page = pages(make, Reports(cases=cases))["numerics/index.html"]
+    tables = first_tables(page)
+    assert list(tables) == ["Order", "Largest stable timestep", "Cost of an error of 1e-3"]
+    order, largest, cost = tables.values()
+    for table in tables.values():
+        assert table["Case"] == ["Euler", "implicit", "implicitfast", "RK4", "discrete"]
+    assert order["A &lt;spring&gt;"] == ["1.00", "–", "–", "–", "–"]
+    assert "A &lt;lost&gt;" not in order, "of which none was fitted"
+    assert largest["A &lt;spring&gt;"] == ["200 ms", "any", "–", "250 ms – 290 ms", "any"]
+    assert largest["A &lt;lost&gt;"] == ["none", "–", "–", "–", "–"]
+    assert list(cost) == ["Case", "A &lt;cheap&gt;"], "no other run comes to an error of 1e-3"
+    assert [cell != "–" for cell in cost["A &lt;cheap&gt;"]] == [False] * 3 + [True, False]
+    assert page.index('href="#spring"') < page.index('id="spring"')
+
+
+def test_a_table_of_cases_without_a_row_is_not_shown(site: dict[str, str]) -> None:
+    page = site["numerics/index.html"]
+    assert list(first_tables(page)) == ["Order", "Largest stable timestep"]
+    assert not re.search(r"<tbody>\s*</tbody>", page)
 
 
 def test_errors_and_energy_are_drawn_against_processor_time(make: Make) -> None:
