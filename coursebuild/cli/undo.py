@@ -9,6 +9,11 @@ from coursebuild.core.files.write import take_back
 from coursebuild.pipeline.options import find_course
 from coursebuild.pipeline.progress import Progress
 
+EXAMPLES = """\
+examples:
+  coursebuild undo                after `coursebuild check --fix`
+"""
+
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare no arguments."""

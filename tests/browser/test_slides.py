@@ -65,7 +65,7 @@ def test_play_moves_the_body_of_a_lab_in_a_page_from_disk(
     ]:  # a course's own kind of lab, and one with an editor
         other.scroll_into_view_if_needed()
         expect(other).to_have_class(re.compile("lab-on"))
-    assert page.locator(".lab-message:visible").count() == 0
+    expect(page.locator(".lab-message:visible")).to_have_count(0)
 
 
 def test_keys_and_addresses_lead_from_slide_to_slide(
@@ -82,7 +82,8 @@ def test_keys_and_addresses_lead_from_slide_to_slide(
             page.evaluate("scrollTo(0, 1e6)")
         page.keyboard.press(key)
         expect(counter).to_have_text(f"{number} / 3")
-        assert page.url == f"{address}#_slide-{number}" and visible_slides.count() == 1
+        assert page.url == f"{address}#_slide-{number}"
+        expect(visible_slides).to_have_count(1)
         expect(visible_slides).to_be_focused()
     ball = page.locator(".lab").nth(1)
     page.keyboard.press("End")
@@ -111,7 +112,7 @@ def test_on_paper_and_without_scripts_all_slides_are_there(
     with browsers["plain"].new_context(java_script_enabled=False) as context:
         page = context.new_page()
         page.goto(address)
-        assert page.locator(".slide:visible").count() == 3
+        expect(page.locator(".slide:visible")).to_have_count(3)
         expect(page.locator(".lab-static").first).to_be_visible()
         pdf = PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True)))
         sheets = [sheet.extract_text() for sheet in pdf.pages]

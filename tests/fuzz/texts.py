@@ -23,7 +23,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
 from coursebuild.report.text import Style, diagnostic_text
-from support.fixture_cases import read_cases
+from support.fixture_cases import Case, read_cases
 from support.plain_html import plain_html
 from support.random_lessons import KINDS
 from support.sample_lessons import (
@@ -74,13 +74,19 @@ def describe(*diagnostics: Diagnostic) -> None:
         assert diagnostic.message and diagnostic_text(diagnostic, Style(colour=False))
 
 
+def _fixture_cases() -> Iterator[Case]:
+    for path in sorted(FIXTURES.rglob("*.md")):
+        if path.parent.name != "documents":
+            yield from read_cases(path)
+
+
 def lessons() -> Iterator[bytes]:
     """Parts of real ones, and those of the fixtures."""
     for path in sorted((ROOT / "content/lessons").glob("*.md")):
         for part in re.split("^(?=## )", path.read_text("utf-8"), flags=re.MULTILINE):
             yield part[:3000].encode()
-    for path in sorted(FIXTURES.rglob("*.md")):
-        yield from (case.input.encode() for case in read_cases(path))
+    yield from (case.input.encode() for case in _fixture_cases())
+    yield from (path.read_bytes() for path in sorted(FIXTURES.glob("documents/*.md")))
 
 
 def info_string(text: str) -> None:
@@ -110,10 +116,9 @@ def course_map(text: str) -> None:
 
 def course_maps() -> Iterator[bytes]:
     yield (ROOT / "content/course.toml").read_bytes()[:4000]
-    for path in sorted(FIXTURES.rglob("*.md")):
-        for case in read_cases(path):
-            if "[course]" in case.input:
-                yield case.input[case.input.index("[course]") :].encode()
+    for case in _fixture_cases():
+        if "[course]" in case.input:
+            yield case.input[case.input.index("[course]") :].encode()
 
 
 def declarations(text: str) -> None:

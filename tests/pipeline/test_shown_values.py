@@ -263,6 +263,7 @@ FRAME = FrameInputs(
     engine="3.14.0",
     python="3.11.7",
     templates=(),
+    is_manual=False,
     names=Names(
         style="assets/site.1.css",
         theme_script="assets/theme.1.js",

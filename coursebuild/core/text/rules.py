@@ -260,9 +260,9 @@ _NO_FIX = {
     _MEANING: """
     binding-volatile bench-text draft-empty fence-unread field-missing field-repeated figure-unshown
     footnote-repeated footnote-unused heading-empty html-unbalanced image-alt io-order io-repeated
-    io-stray lesson-planned-file math-brackets math-unclosed math-unread merge-conflict nesting-deep
-    prerequisite-cycle quiz-answer quiz-gate recording-body recording-orphan symbol-formula
-    symbol-repeated table-cells term-place
+    io-stray lesson-planned-file link-text math-brackets math-unclosed math-unread merge-conflict
+    nesting-deep prerequisite-cycle quiz-answer quiz-gate recording-body recording-orphan
+    symbol-formula symbol-repeated table-cells term-place
     """,
     "Links may lead to either of the two, so its author chooses the new name.": """
     anchor-repeated id-repeated question-id-repeated quiz-id-repeated script-repeated term-repeated
