@@ -40,10 +40,10 @@ def page(browsers: Mapping[str, Browser]) -> Iterator[Page]:
         page.on("request", lambda request: requests.append(request.url))
         yield page
         assert console == []
-        loaded = {
+        addresses = {
             url.partition("#")[0] for url in requests if not url.startswith(("data:", "blob:"))
         }
-        assert len(loaded) == 1
+        assert len(addresses) == 1
 
 
 def test_play_moves_the_body_of_a_lab_in_a_page_from_disk(
@@ -60,11 +60,11 @@ def test_play_moves_the_body_of_a_lab_in_a_page_from_disk(
     play.click()
     expect(clock).not_to_have_text("0.00 s")
     expect(lab.locator(".lab-live dd").first).not_to_have_text(first)
-    for other in page.locator(".lab").all()[
+    for following in page.locator(".lab").all()[
         1:
     ]:  # a course's own kind of lab, and one with an editor
-        other.scroll_into_view_if_needed()
-        expect(other).to_have_class(re.compile("lab-on"))
+        following.scroll_into_view_if_needed()
+        expect(following).to_have_class(re.compile("lab-on"))
     expect(page.locator(".lab-message:visible")).to_have_count(0)
 
 
