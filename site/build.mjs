@@ -6,7 +6,8 @@
  * Sources are the js/, css/ and licences/ folders beside this file. In OUT, in this order:
  *
  *   js/NAME.js           one ES module for each js/NAME.js; of js/NAME-trial.js a classic script for V8 without a page
- *   css/NAME.css         css/site.css with its imports, and css/preview.css and css/scorm.css, which only the preview and packages have
+ *   css/NAME.css         css/site.css with its imports, and css/preview.css, css/scorm.css and css/slides.css, which only the preview,
+ *                        packages and slides have
  *   mujoco/mujoco.wasm   the physics engine of js/lab-worker.js and js/lab-trial.js
  *   temml/temml.min.js   a classic script that defines the global `temml`
  *   fonts/*.woff2        and fonts.json, which says what each file holds (see `readFaces`)
@@ -126,7 +127,7 @@ async function bundleStyles(out) {
     throw new BuildError('site/css/site.css is missing: nothing to bundle')
   }
   return bundle({
-    entryPoints: ['site.css', 'preview.css', 'scorm.css'].map((file) => join('css', file)).filter((file) => existsSync(join(HERE, file))),
+    entryPoints: ['site.css', 'preview.css', 'scorm.css', 'slides.css'].map((file) => join('css', file)).filter((file) => existsSync(join(HERE, file))),
     outdir: join(out, 'css'),
     external: ['*.woff2'], // the site writes its own @font-face rules, for the subsets that it makes
     loader: { '.svg': 'dataurl' },

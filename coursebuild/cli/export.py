@@ -1,4 +1,4 @@
-"""`coursebuild export`: write the course as one file."""
+"""`coursebuild export`: write the course, or a lesson of it, as one file."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ EXAMPLES = """\
 examples:
   coursebuild export epub
   coursebuild export scorm --out course.zip
+  coursebuild export slides 1.1
 """
 
 
@@ -21,9 +22,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
     add_running(parser)
     exporters = [exporter for feature in features() for exporter in feature.exporters]
     offers = ", ".join(f"{e.name} ({e.summary})" for e in exporters)
-    files = ", ".join(e.file for e in exporters)
+    files = ", ".join(f"LESSON-{e.file}" if e.of_lesson else e.file for e in exporters)
+    of_lesson = ", ".join(e.name for e in exporters if e.of_lesson)
     parser.add_argument(
         "name", metavar="EXPORT", help=f"{offers}, or what a feature of the course itself can write"
+    )
+    parser.add_argument(
+        "lesson", metavar="LESSON", nargs="?", default="", help=f"which lesson ({of_lesson})"
     )
     parser.add_argument(
         "--out", metavar="FILE", help=f"from the course's folder (default: {files})"
@@ -34,4 +39,4 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the course in a form that a feature knows."""
     options = options_of(arguments)
     out = Path(arguments.out) if arguments.out else None
-    return print_report(export(options, arguments.name, out), "text", options)
+    return print_report(export(options, arguments.name, arguments.lesson, out), "text", options)

@@ -245,6 +245,8 @@ class Exporter(Struct, frozen=True, kw_only=True):
     """The files of the archive, and warnings about what it cannot hold."""
     archive: bool = True
     """Whether it is a ZIP archive; otherwise `make` yields a single file."""
+    of_lesson: bool = False
+    """Whether it writes a lesson that is named (`context.lesson`), to `LESSON-` and its `file`."""
 
 
 class Command(Struct, frozen=True, kw_only=True):

@@ -146,7 +146,7 @@ def select(course: Course, names: tuple[str, ...], root: Path) -> frozenset[str]
     Raises:
         UsageError: a name means nothing, or a lesson that is not written yet.
     """
-    return frozenset(_find_owner(course, name, root).path for name in names) if names else None
+    return frozenset(find_owner(course, name, root).path for name in names) if names else None
 
 
 def documents_by_name(course: Course) -> dict[str, Owner]:
@@ -170,7 +170,12 @@ def path_from_root(name: str, root: Path) -> str:
     return name
 
 
-def _find_owner(course: Course, name: str, root: Path) -> Owner:
+def find_owner(course: Course, name: str, root: Path) -> Owner:
+    """The lesson or page of a name.
+
+    Raises:
+        UsageError: there is none, or nothing is written of it yet.
+    """
     by_name = documents_by_name(course)
     owner = by_name.get(name) or by_name.get(path_from_root(name, root))
     if owner is None:

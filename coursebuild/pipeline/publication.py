@@ -1,6 +1,6 @@
 """`coursebuild build` and `export`: verify the course, and write its site or a file of it.
 
-Entry points: `build(options, out)`; `export(options, name, out)`, where features have the
+Entry points: `build(options, out)`; `export(options, name, lesson, out)`, where features have the
 exporters. Nothing is written where something is wrong.
 
 An export is a file or an archive, written in one step, without holding the archive in memory. The
@@ -29,7 +29,7 @@ from coursebuild.core.files.errors import EffectError, PublishRefusedError, Usag
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
-from coursebuild.core.model import Document
+from coursebuild.core.model import Document, Lesson
 from coursebuild.core.model.results import SiteFile
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import ExportContext, PageContext
@@ -41,7 +41,7 @@ from coursebuild.core.registry import find_exporter
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.check import read_and_verify
 from coursebuild.pipeline.load import MAP
-from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.options import Options, find_owner
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.site import Site, page_request
 from coursebuild.report import Report
@@ -70,18 +70,27 @@ def build(options: Options, out: Path) -> Report:
     return replace(report, remarks=(f"published {count} files in {out}",))
 
 
-def export(options: Options, name: str, out: Path | None) -> Report:
+def export(options: Options, name: str, lesson: str, out: Path | None) -> Report:
     """Write the file to `out` (relative to the course's folder), or nothing.
 
     Raises:
-        UsageError: no feature has an exporter of this name.
+        UsageError: no feature has an exporter of this name, or there is no such `lesson`; it is
+            empty for exporters of the whole course.
     """
     exporter = _find_exporter(options.root, name)
-    out = out or Path(exporter.file)
+    if exporter.of_lesson and not lesson:
+        raise UsageError(
+            f"`export {name}` writes one lesson, and none is named",
+            help=f"name it, as in `coursebuild export {name} 1.1`",
+        )
+    if lesson and not exporter.of_lesson:
+        raise UsageError(f"`export {name}` writes the whole course, and takes no lesson")
+    stem = Path(lesson).name.removesuffix(".md")
+    out = out or Path(f"{stem}-{exporter.file}" if stem else exporter.file)
     place = options.root / out
     check_target(options.root, place, exporter.mark, archive=exporter.archive)
     with project_lock(options.root, options.progress.say), Reader(options) as reader:
-        make = functools.partial(_make_export, exporter, reader, options)
+        make = functools.partial(_make_export, exporter, reader, options, lesson)
         report, outputs = make_files(options, reader, make)
         if outputs is None:
             return replace(report, remarks=("nothing was written",))
@@ -142,7 +151,12 @@ def _find_exporter(root: Path, name: str) -> Exporter:
     return exporter
 
 
-def _make_export(exporter: Exporter, reader: Reader, options: Options, library: Library) -> _Export:
+def _make_export(
+    exporter: Exporter, reader: Reader, options: Options, lesson: str, library: Library
+) -> _Export:
+    owner = find_owner(library.course, lesson, options.root) if lesson else None
+    if owner is not None and not isinstance(owner, Lesson):
+        raise UsageError(f"`{lesson}` is a page, and `export {exporter.name}` writes a lesson")
     pages = {
         document.source.path: page
         for page in page_list(library)
@@ -160,7 +174,7 @@ def _make_export(exporter: Exporter, reader: Reader, options: Options, library: 
         return reader.page_context(page_request(pages[document.source.path], library))
 
     context = ExportContext(
-        library, library.assets, site, page, functools.partial(read_bytes, options.root)
+        library, library.assets, site, page, functools.partial(read_bytes, options.root), owner
     )
     files: list[SiteFile] = []
     for file in exporter.make(context):

@@ -75,7 +75,7 @@ def test_export_is_refused_where_it_would_be_in_the_way(course: Folder) -> None:
 
 def test_unknown_and_broken_exporters_are_reported(course: Folder) -> None:
     result = course.main("export", "docx")
-    offers = "epub, lessons, page, pdf, qti, scorm"
+    offers = "epub, lessons, page, pdf, qti, scorm, slides"
     assert result.status == 2
     assert result.err == f"coursebuild: there is no export `docx`: choose from {offers}\n"
     course.replace("features/lessons.py", 'Feature(name="lessons"', 'Feature(name="scorm"')

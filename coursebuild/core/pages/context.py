@@ -26,6 +26,7 @@ from coursebuild.core.model import (
     Course,
     Document,
     Label,
+    Lesson,
     NumberedItem,
     Recording,
     Script,
@@ -219,6 +220,8 @@ class ExportContext(Struct, frozen=True):
     """A document with its whole text on its page, ready to be drawn."""
     read: Callable[[str], bytes]
     """A file of the course, by its path."""
+    lesson: Lesson | None = None
+    """The lesson that an `Exporter` of a lesson writes."""
 
     @property
     def course(self) -> Course:

@@ -1,9 +1,10 @@
-"""All lessons in one file: as an e-book (EPUB 3), as one page, and as a PDF of it."""
+"""All lessons in one file: as an e-book (EPUB 3), as one page, as a PDF of it; one as slides."""
 
 from coursebuild.core.features import Exporter, Feature
 from coursebuild.features.book.chapters import page_file
 from coursebuild.features.book.epub import epub_files
 from coursebuild.features.book.pdf import MARK, pdf_file
+from coursebuild.features.book.slides import slides_file
 
 EPUB = Exporter(
     name="epub",
@@ -28,4 +29,13 @@ PDF = Exporter(
     archive=False,
     make=lambda context: (pdf_file(context),),
 )
-FEATURE = Feature(name="book", exporters=(EPUB, PAGE, PDF))
+SLIDES = Exporter(
+    name="slides",
+    summary="a lesson as slides, with its labs",
+    file="slides.html",
+    mark='<meta name="generator" content="coursebuild: slides">',
+    archive=False,
+    of_lesson=True,
+    make=lambda context: (slides_file(context),),
+)
+FEATURE = Feature(name="book", exporters=(EPUB, PAGE, PDF, SLIDES))

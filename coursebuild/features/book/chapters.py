@@ -34,9 +34,9 @@ _WITHOUT_MARKUP = frozenset(("plaintext", "xmp"))
 _NOT_PRINTED = frozenset(("anchor", "bar-tools", "plot-wide", "figure-dark", "qr"))
 """Classes of elements that are left out: links of headings to themselves, downloads, QR codes, and
 the drawings of a plot for large screens or dark pages."""
-_FOR_SCRIPTS = frozenset(
-    "style download loading srcset sizes tabindex xmlns usemap autofocus".split()
-)
+_KEPT_FOR_SCRIPTS = frozenset(("plot-wide", "figure-dark", "qr"))
+"""Those that stay where scripts run, on screens of all kinds and on paper."""
+_LEFT_OUT = frozenset("style download loading srcset sizes xmlns usemap autofocus".split())
 _ID_ATTRIBUTES = frozenset(
     "aria-activedescendant aria-controls aria-describedby aria-details aria-errormessage"
     " aria-flowto aria-labelledby aria-owns for headers list".split()
@@ -63,14 +63,17 @@ class RewriteRules(Struct, frozen=True):
     """Classes of the folds that stay closed."""
     section: str = ""
     """A suffix for the labels of sections, to tell them from those of other lessons."""
+    live: bool = False
+    """Whether scripts run there: what they need is kept, and folds stay as they are."""
 
 
 def rewrite(content: Iterable[HtmlContent], rules: RewriteRules) -> Iterator[HtmlContent]:
     """Yield the content of a lesson's page, rewritten."""
+    dropped_classes = _NOT_PRINTED - _KEPT_FOR_SCRIPTS if rules.live else _NOT_PRINTED
     for child in content:
         if isinstance(child, str):
             yield child
-        elif child.name not in _DROPPED_ELEMENTS and not child.classes & _NOT_PRINTED:
+        elif child.name not in _DROPPED_ELEMENTS and not child.classes & dropped_classes:
             yield _rewrite_element(child, rules)
 
 
@@ -87,7 +90,7 @@ def _rewrite_element(element: HtmlElement, rules: RewriteRules) -> HtmlContent:
         for key, value in old_attributes.items()
         if (new_value := _rewrite_attribute(element, key, value, rules)) is not None
     }
-    if name == "details" and not element.classes & rules.closed_classes:
+    if name == "details" and not rules.live and not element.classes & rules.closed_classes:
         attributes["open"] = ""
     if name in _WITHOUT_MARKUP:
         name = "pre"
@@ -100,8 +103,10 @@ def _rewrite_attribute(
     element: HtmlElement, name: str, value: str, rules: RewriteRules
 ) -> str | None:
     """Return the new value of an attribute; `None` if it is left out."""
-    if name in _FOR_SCRIPTS or name.startswith(("on", "data-")):
+    if name in _LEFT_OUT or name.startswith("on"):
         return None
+    if name == "tabindex" or name.startswith("data-"):
+        return value if rules.live else None
     if name == "id" or (name == "name" and element.name == "a"):
         return rules.id(value)
     if name in _ID_ATTRIBUTES:
@@ -154,16 +159,20 @@ def render_lesson(
     top: str,
 ) -> Markup:
     """Render a lesson for use elsewhere; `write` writes its tree, `top` is its own id there."""
-    page = context.site()[rules.place.path].make().decode()
-    text = page.partition(_TEXT_START)[2].rpartition(_TEXT_END)[0]
     return context.library.render(
         "book/lesson.html",
         lesson=lesson,
         draft=lesson.status == "draft",
-        article=Markup(write(list(rewrite(parse_html(text), rules)))),
+        article=Markup(write(list(rewrite(lesson_text(context, rules.place.path), rules)))),
         top=top,
         heading=1 + rules.heading_shift,
     )
+
+
+def lesson_text(context: ExportContext, path: str) -> list[HtmlContent]:
+    """Return the text of a lesson, from its page."""
+    page = context.site()[path].make().decode()
+    return parse_html(page.partition(_TEXT_START)[2].rpartition(_TEXT_END)[0])
 
 
 def site_address(context: ExportContext, path: str, anchor: str) -> str:
@@ -195,7 +204,7 @@ def page_file(context: ExportContext, *, page_numbers: bool = False) -> OutputFi
     """Return the page."""
     course = context.course
     ids = {urls.lesson_path(lesson): lesson.id for lesson in course.written_lessons}
-    picture = functools.cache(functools.partial(_data_address, context))
+    picture = functools.cache(functools.partial(data_address, context))
 
     def address(path: str, anchor: str) -> str:
         if path in ids:
@@ -222,7 +231,7 @@ def page_file(context: ExportContext, *, page_numbers: bool = False) -> OutputFi
         "book/page.html",
         language=language,
         direction=direction(language),
-        style=Markup(_embed_fonts(context)),
+        style=Markup(embed_fonts(context)),
         head_title=context.library.words("exports.book_title", title=course.title),
         title=course.title,
         summary=course.summary,
@@ -246,19 +255,19 @@ def _anchor(lesson: str, id: str = "_top") -> str:
     return f"_{lesson}--{id or '_top'}"
 
 
-def _embed_fonts(context: ExportContext) -> str:
+def embed_fonts(context: ExportContext) -> str:
     """Return the style sheet with its fonts, and without `</`, which could end the element."""
     path = style_path(context)
     folder = posixpath.dirname(path)
 
     def embed(match: re.Match[str]) -> str:
-        return f'url("{_data_address(context, posixpath.join(folder, match[1]))}")'
+        return f'url("{data_address(context, posixpath.join(folder, match[1]))}")'
 
     text = context.site()[path].make().decode()
     return re.sub(r'url\("([^"():]+)"\)', embed, text).replace("</", "<\\/")
 
 
-def _data_address(context: ExportContext, path: str) -> str:
+def data_address(context: ExportContext, path: str) -> str:
     """Return a file as a `data:` address; empty if it cannot be shown."""
     kind, file = _TYPES.get(extension(path)), context.site().get(path)
     if kind is None or file is None:

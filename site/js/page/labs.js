@@ -19,8 +19,9 @@ const instruments = new WeakMap() // lab → a promise of its instrument
 export function loadLabs(part, words, progress) {
   const labs = selectAll(part, '[data-lab][data-config]')
   if (labs.length === 0) return
-  // A page opened from disk may load neither modules nor data: the recorded form stays.
-  if (location.protocol === 'file:') return labs.forEach((lab) => addMessage(lab, words('lab.live.from_disk')))
+  // A page opened from disk may load neither modules nor data, unless it has them in itself: the recorded form stays.
+  const isLoaded = labs.every((lab) => lab.dataset.script?.startsWith('data:'))
+  if (location.protocol === 'file:' && !isLoaded) return labs.forEach((lab) => addMessage(lab, words('lab.live.from_disk')))
   const start = (lab) => {
     observer.unobserve(lab)
     // Relative to the page: in a classic script, import() would resolve against the script's address.

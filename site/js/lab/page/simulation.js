@@ -34,7 +34,7 @@ export class Simulation {
     this.on = on
     /** @type {HTMLElement | null} of a custom lab: see custom.js */
     this.element = null
-    this.address = (path) => new URL(path, base).href
+    this.address = (path) => (path ? new URL(path, base).href : '')
     this.visible = false
     this.settings = new Map() // messages to repeat after a restart: speed and overlays
     this.tick = (now) => this.refresh(now)
