@@ -247,7 +247,7 @@ def run_case(
         case "build":
             return build(options, Path("public")).diagnostics
         case "export qti":
-            return export(options, "qti", None).diagnostics
+            return export(options, "qti", "", None).diagnostics
         case name:
             raise ValueError(f"no command {name!r}")
 
