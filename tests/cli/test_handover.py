@@ -57,8 +57,9 @@ def preview_of(folder: Folder, runtime: str, *arguments: str) -> Iterator[Previe
 
 def normalize(result: CommandResult, folder: Folder) -> tuple[int, str, str]:
     def plain(text: str) -> str:
-        """Without times, and without steps that are left out where the preview has done them."""
-        text = re.sub(r"(?m)^(reading lessons and pages|drawing pages)\n", "", text)
+        """Without times, waits for the preview's writes, and steps that the preview has done."""
+        steps = "reading lessons and pages|drawing pages|another coursebuild .*; waiting for it"
+        text = re.sub(rf"(?m)^({steps})\n", "", text)
         # A preview runs a drifted script once more when it is idle.
         text = re.sub(r"(; 1 script recorded)?, not yet repeated", "", text)
         text = re.sub(r'("seconds": |after )[\d.]+', r"\1#", without_seconds(text))

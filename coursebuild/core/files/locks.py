@@ -39,6 +39,8 @@ from coursebuild.core.files.trust import find_store, make_store
 _BUSY = frozenset({errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES})
 _LONG_AGO = 3600.0
 """Seconds after which a temporary file is abandoned where there are no locks."""
+_MOMENT = 0.5
+"""Seconds of waiting that nobody is told of: a preview holds the lock for each of its writes."""
 
 
 def try_lock(fd: int) -> bool | None:
@@ -66,7 +68,7 @@ def project_lock(
 
     Args:
         root: the course folder; the lock is a file of its store.
-        on_wait: is called once, with a message, if another run has the lock.
+        on_wait: is called once, with a message, if another run has the lock for more than a moment.
         name: the name of the lock's file.
     """
     root = root.resolve()
@@ -155,7 +157,10 @@ def _lock_file(root: Path, path: Path, on_wait: Callable[[str], None] | None) ->
         make_store(str(path.parent), str(root))
         fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
         try:
-            if try_lock(fd) is False:
+            until = time.monotonic() + _MOMENT
+            while (locked := try_lock(fd)) is False and time.monotonic() < until:
+                time.sleep(0.01)
+            if locked is False:
                 if on_wait is not None:
                     on_wait(_waiting_message(os.pread(fd, 32, 0).decode("ascii", "replace")))
                     on_wait = None
