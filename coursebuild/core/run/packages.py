@@ -219,7 +219,7 @@ def latest_version() -> str:
     versions = re.findall(rf"\b{_ENGINE}[-=]+([0-9]\S*)", output.rpartition("Would install")[2])
     if status or not versions:
         raise _install_error("at all", output)
-    return str(versions[0])
+    return str(versions[-1])  # uv first names the one that it would remove
 
 
 def _without_zeros(version: str) -> str:
