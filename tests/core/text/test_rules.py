@@ -76,6 +76,7 @@ def _entry(rule: Rule) -> str:
         cure += f" Reported by `coursebuild {command_of(case)}`."
     blocks = case.expected.rstrip("\n").split("\n\n")
     message = next(block for block in blocks if block.startswith(f"{rule.severity}[{rule.name}]"))
+    message = re.sub(r"\n  --> .*(\n +\|$)?", "", message, count=1, flags=re.MULTILINE)
     marks = "`" * max(3, 1 + max(map(len, re.findall("`+", message)), default=2))
     return (
         f"\n### {rule.name}\n\n{rule.severity.capitalize()}. {rule.summary} {cure}\n\n"
