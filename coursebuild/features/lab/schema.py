@@ -237,9 +237,7 @@ class Verify(Struct, frozen=True, forbid_unknown_fields=True):
     rtol: Annotated[
         NotNegative | None, Meta(description="relative difference allowed to the native engine")
     ] = None
-    deep: Annotated[
-        bool, Meta(description="whether bodies are meant to lie deep in each other")
-    ] = False
+    deep: Annotated[bool, Meta(description="whether bodies are meant to overlap deeply")] = False
 
 
 class CommonLab(Struct, frozen=True):

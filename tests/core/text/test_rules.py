@@ -52,7 +52,7 @@ def catalogue_page() -> str:
 # Rules
 
 Each diagnostic names its rule, as in `error[output-drift]`; `coursebuild explain output-drift`
-prints what stands here. There are {errors} errors and {len(RULES) - errors} warnings. An error
+prints its entry. There are {errors} errors and {len(RULES) - errors} warnings. An error
 keeps the site from being published. A warning can be [silenced](course-map.md#silence), an error
 cannot. `--fix` and `--unsafe` are options of [`coursebuild check`](commands.md#fix).
 
