@@ -66,10 +66,9 @@ def _fields(
     structure = definitions[name]
     other_fields = {}
     if other_name:
-        others = (
-            definitions if other_name in definitions else json.loads(json_schema("lab"))["$defs"]
-        )
-        other_fields = others[other_name]["properties"]
+        is_here = other_name in definitions
+        base = definitions if is_here else json.loads(json_schema("lab"))["$defs"]
+        other_fields = base[other_name]["properties"]
     rows: list[tuple[str, str, str]] = []
     long_lists: dict[str, str] = {}
     for field, field_schema in structure["properties"].items():
