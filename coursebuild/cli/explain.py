@@ -1,4 +1,4 @@
-"""`coursebuild explain`: say what a rule means, or why something would run again.
+"""`coursebuild explain`: explain a rule, or why something would run again.
 
 Of a path it says whether it would run again, why, and what depends on it. The lessons are read and
 parsed; nothing is run, compiled or written, and neither NumPy nor MuJoCo is imported.

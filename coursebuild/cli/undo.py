@@ -1,4 +1,4 @@
-"""`coursebuild undo`: take back what `check --fix` has changed."""
+"""`coursebuild undo`: undo what `check --fix` changed."""
 
 from __future__ import annotations
 

@@ -54,15 +54,15 @@ CORE_FENCES = ("mjcf", "output", "python", "text")
 """The kinds of fences that the core reads."""
 CORE_COMMANDS = {
     "build": "verify everything and publish the site",
-    "check": "verify, publish nothing",
+    "check": "verify everything without publishing",
     "update": "bring recorded outputs up to date",
-    "undo": "take back what `check --fix` has changed",
+    "undo": "undo what `check --fix` changed",
     "extract": "write the scripts to examples/",
-    "serve": "preview: build, serve, rebuild and reload on change",
-    "export": "verify everything and write the course as one file",
-    "explain": "say what a rule means, or why something would run again",
-    "schema": "print a JSON Schema for an editor",
-    "completion": "print the completion script of a shell",
+    "serve": "preview the course and follow every change",
+    "export": "verify everything and export the course as one file",
+    "explain": "explain a rule, or why something would run again",
+    "schema": "print a JSON Schema for editors",
+    "completion": "print a shell completion script",
 }
 """The core's own commands with a summary, each in the module `coursebuild.cli.NAME`."""
 

@@ -47,7 +47,7 @@ class Options(Struct, frozen=True):
     long: bool = False
     """Whether scripts run that have a recorded run in the course."""
     verbose: bool = False
-    """Whether to say of each script why it runs."""
+    """Whether to say why each script runs."""
     run_all: RunAll | None = None
     """Runs scripts, where a `ScriptServer` stays warm from run to run."""
     on_start: Callable[[str, float | None], object] | None = None

@@ -170,7 +170,10 @@ def test_help_version_and_schemas_are_printed_anywhere(tmp_path: Path) -> None:
     for arguments in (["--help"], ["-h"], ["help"]):
         result = folder.main(*arguments)
         assert (result.status, result.err) == (0, "")
-        for line in ("  check        verify, publish nothing\n", "  bench        measure speed"):
+        for line in (
+            "  check        verify everything without publishing\n",
+            "  bench        measure speed",
+        ):
             assert line in result.out
     in_build = ["-C", "build", "bench", "--help"]  # a folder with the name of a command
     assert folder.main(*in_build) == folder.main("help", "bench")

@@ -328,7 +328,7 @@ examples:
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("base", metavar="BASE", help="a revision of git, or a folder with a course")
+    parser.add_argument("base", metavar="BASE", help="a Git revision, or a folder with a course")
     for name, subject in (("--base-site", "BASE"), ("--site", "this course")):
         help = f"where `build` published {subject}, for the weight of pages"
         parser.add_argument(name, metavar="FOLDER", help=help)

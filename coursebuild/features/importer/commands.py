@@ -59,9 +59,9 @@ examples:
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = (
-        "Write a course of another tool as one of coursebuild: a course.json with Markdown,\n"
-        "Jupyter notebooks, MyST, Quarto or MkDocs. Its folder is only read, its code is run:\n"
-        "what the cells and scripts of strangers may do is limited by --sandbox."
+        "Convert a course of another tool: a course.json with Markdown, Jupyter notebooks,\n"
+        "MyST, Quarto or MkDocs. The folder is only read, but its code is run: use --sandbox\n"
+        "to limit what the cells and scripts of strangers can do."
     )
     add_running(parser)
     add_sandbox(parser)

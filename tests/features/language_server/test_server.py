@@ -233,7 +233,7 @@ HOVERS = [
     (FIRST_LESSON, "mujoco.mj_st|ep(", "Advance simulation"),
     (FIRST_LESSON, '"expr": "data.qp|os', "position"),
     (FIRST_LESSON, "`1.0|00`{out}", "after 0.002 s at 1.000 m"),
-    (FIRST_LESSON, "[!warn|ing]", "Something here goes wrong easily, or costs dearly."),
+    (FIRST_LESSON, "[!warn|ing]", "Something that easily goes wrong, or costs dearly."),
     (FIRST_LESSON, '"tit|le"', "`title`: "),
     (FIRST_LESSON, 'model_path("ba|ll")', "A ball in the air."),
     (SECOND_LESSON, "model:ba|ll", "A ball in the air.\n\n1 bodies, 1 geoms; nq = 7, nv = 6"),

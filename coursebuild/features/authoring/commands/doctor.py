@@ -1,4 +1,4 @@
-"""`coursebuild doctor`: say what works on this machine, and how to mend what does not.
+"""`coursebuild doctor`: check this machine, and say how to fix what does not work.
 
 What can kill a process, as a driver of a graphics card can, is tried in a process of its own.
 """

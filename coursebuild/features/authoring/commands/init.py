@@ -1,4 +1,4 @@
-"""`coursebuild init`: make a small complete course to begin with."""
+"""`coursebuild init`: create a small, complete course."""
 
 from __future__ import annotations
 
@@ -42,7 +42,13 @@ _KEPT = ("README.md", "requirements.txt")
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("folder", nargs="?", default=".", metavar="DIR", help="default: this one")
+    parser.add_argument(
+        "folder",
+        nargs="?",
+        default=".",
+        metavar="DIR",
+        help="folder of the course (default: this one)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

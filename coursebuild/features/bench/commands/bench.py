@@ -63,7 +63,7 @@ _INDENT = "  "
 EXAMPLES = """\
 examples:
   coursebuild bench --quick              a first look at all models
-  coursebuild bench pendulum --record    what pages show of it
+  coursebuild bench pendulum --record    what its page shows
 """
 
 

@@ -63,7 +63,7 @@ _CODE = (
 )
 EXAMPLES = """\
 examples:
-  coursebuild diet pendulum              what it could be without
+  coursebuild diet pendulum              what it could do without
   coursebuild diet --fix                 take out what changes nothing
 """
 
@@ -76,10 +76,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     writes = parser.add_mutually_exclusive_group()
     writes.add_argument(
-        "--fix", action="store_true", help="change what leaves every bit of the motion as it is"
+        "--fix", action="store_true", help="remove what does not change a single bit of the motion"
     )
     writes.add_argument(
-        "--record", action="store_true", help="write what was found to content/reports/"
+        "--record", action="store_true", help="write the findings to content/reports/"
     )
     parser.add_argument("--quick", action="store_true", help="short runs, rough times")
     add_format(parser, "text", "json")

@@ -127,7 +127,7 @@ def add_report_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for reports in the course's folder."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument(
-        "--record", action="store_true", help="write what was measured to content/reports/"
+        "--record", action="store_true", help="write the measurements to content/reports/"
     )
     group.add_argument(
         "--check",
