@@ -93,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.against is not None:
         return _compare_with_version(arguments)
     if arguments.unsafe and not arguments.fix:
-        raise UsageError("--unsafe says how much --fix may change, which is not given")
+        raise UsageError("--unsafe needs --fix")
     if arguments.fix:
         return _fix(arguments)
 
@@ -107,7 +107,7 @@ def run(arguments: argparse.Namespace) -> int:
             truth=arguments.truth,
         )
         safe = sum(diagnostic.safe for diagnostic in report.diagnostics)
-        hint = f"`coursebuild check --fix` mends {safe} of {len(report.diagnostics)}"
+        hint = f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}"
         return replace(report, remarks=(*report.remarks, *([hint] if safe else [])))
 
     # Other formats say how long it took, which the report of before would not.

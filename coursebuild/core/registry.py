@@ -132,11 +132,11 @@ def find_clash(candidate: Feature, installed: Iterable[Feature]) -> str:
         return f"a page cannot be called `{odd[0]}`: use small letters, digits and `-`"
     core_rules = RULES.keys() - _names(_of_course, "rules")
     for field, core_names, message in (
-        ("rules", core_rules, "there is a rule `{}` already"),
-        ("fences", CORE_FENCES, "the fence `{}` is read already"),
-        ("pages", (*CORE_PAGES, *_FOLDERS), "there is a page `{}` already"),
-        ("exporters", (), "there is an export `{}` already"),
-        ("commands", CORE_COMMANDS, "there is a command `{}` already"),
+        ("rules", core_rules, "there is already a rule `{}`"),
+        ("fences", CORE_FENCES, "there is already a fence `{}`"),
+        ("pages", (*CORE_PAGES, *_FOLDERS), "there is already a page `{}`"),
+        ("exporters", (), "there is already an export `{}`"),
+        ("commands", CORE_COMMANDS, "there is already a command `{}`"),
     ):
         if twice := _names((candidate,), field) & _names(installed, field).union(core_names):
             return message.format(min(twice))

@@ -79,7 +79,7 @@ def find_course(directory: str | None) -> Path:
     try:
         start = Path.cwd()
     except OSError:
-        raise UsageError("the working directory is not there any more") from None
+        raise UsageError("the working directory no longer exists") from None
     root = find_root(None if directory is None else Path(directory), start)
     check_path(root)
     undo_changes(root, Progress().say)
@@ -121,7 +121,7 @@ def open_store(root: Path, location: str | None, size: str | None, *, fresh: boo
     if location is None:
         location = os.environ.get("COURSEBUILD_CACHE") or None
     elif not location:
-        raise UsageError("--cache names no place")
+        raise UsageError("--cache needs a place")
     shared = None
     if location is not None:
         from coursebuild.core.engine.shared_place import shared_place

@@ -125,7 +125,7 @@ WRONG_USAGE = [
     ),
     ("check --cache-size -1", "--cache-size"),
     ("check --cache gopher://x/y", "gopher"),
-    ("check --cache=", "coursebuild: --cache names no place\n"),
+    ("check --cache=", "coursebuild: --cache needs a place\n"),
     ("build --out .", " is the project itself"),
     ("build --out ..", " holds the project"),
     ("build --out content/site", "content/site lies in content/ of the project"),

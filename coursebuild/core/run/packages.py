@@ -192,7 +192,7 @@ _INSTALL = ("install", "--no-deps", "--no-input", "--progress-bar", "off", "--on
 _LINES = 4
 """The most lines of pip's that an error quotes."""
 _OFFLINE = (
-    "without a network let pip find the wheels in a folder, by the environment variables "
+    "without a network, point pip to a folder of wheels with the environment variables "
     "PIP_FIND_LINKS and PIP_NO_INDEX"
 )
 
@@ -254,7 +254,7 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
             for path in rest[_MAX_ENVIRONMENTS - 1 :]:
                 shutil.rmtree(path, ignore_errors=True)
     except OSError as error:
-        raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
+        raise EffectError(f"{prefix.name} cannot be created: {reason(error)}") from None
     return Interpreter(
         prefix.name,
         f"{prefix}/bin/python",
@@ -278,7 +278,7 @@ def environment_prefix(root: Path, engine: str) -> Path:
     if state is None:
         raise EffectError(
             f"there is no place for an environment with MuJoCo {engine}",
-            help="HOME or XDG_STATE_HOME gives one, outside of the course",
+            help="set HOME or XDG_STATE_HOME to a folder outside the course",
         )
     return Path(state, _FOLDER, name)
 
@@ -310,7 +310,9 @@ def _create_environment(prefix: Path, engine: str) -> None:
         (_packages(new) / "packages_of_here.pth").write_text("".join(lines))
         status, output = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
         if status:
-            message = f"MuJoCo {engine} cannot be imported beside the other packages of here"
+            message = (
+                f"MuJoCo {engine} cannot be imported together with the other installed packages"
+            )
             output_lines = [line.strip() for line in output.splitlines() if line.strip()]
             last_line = output_lines[-1] if output_lines else "no reason"
             raise EffectError(f"{message}: {last_line}")

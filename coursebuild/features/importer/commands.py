@@ -78,7 +78,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the course as one of coursebuild in a new folder, try its scripts, and check it."""
     if arguments.root is not None:
-        raise UsageError("import takes no -C: the new course's folder is named by --out")
+        raise UsageError("import does not take -C: name the new course's folder with --out")
     files = SourceFiles(Path(arguments.source))
     out = Path(os.path.realpath(arguments.out or files.name))
     check_path(out)

@@ -128,7 +128,7 @@ def write_course(course: ConvertedCourse, target: Path, files: SourceFiles, stor
     try:
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise EffectError(f"{target} cannot be made: {reason(error)}") from None
+        raise EffectError(f"{target} cannot be created: {reason(error)}") from None
     change_files(target, changes)
 
 

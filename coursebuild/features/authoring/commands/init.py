@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         root.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise EffectError(f"{folder} cannot be made: {reason(error)}") from None
+        raise EffectError(f"{folder} cannot be created: {reason(error)}") from None
     change_files(root, [FileChange(path, None, data) for path, data in files.items()])
     repository = ", in a new Git repository" if _make_repository(root) else ""
     option = "" if root == Path.cwd() else f" -C {shlex.quote(folder)}"

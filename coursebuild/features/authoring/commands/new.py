@@ -112,7 +112,7 @@ def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     course = load_course(root, code="none")
     id, title = arguments.id, arguments.title
     if title is None and re.fullmatch(r"[\w-]+(\.[\w-]+)+", id):
-        raise UsageError(f"lesson {id} needs a title", help="it comes behind the id")
+        raise UsageError(f"lesson {id} needs a title", help="it follows the id")
     if title is None:
         ids = next_lesson_ids(course) or ["1.1"]
         help = f"the id comes first: `coursebuild new lesson {ids[-1]} {shlex.quote(id)}`"
@@ -132,7 +132,7 @@ def _new_level(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     course = load_course(root, code="none")
     id, title = arguments.id, arguments.title
     if title is None:
-        help = "it comes behind the id"
+        help = "it follows the id"
         if not re.fullmatch(r"[\w-]+", id) or id in (level.id for level in course.levels):
             proposal = f"coursebuild new level {next_level_id(course)} {shlex.quote(id)}"
             help = f"the id comes first: `{proposal}`"
