@@ -381,7 +381,7 @@ def test_renaming_a_lesson(editor: Editor) -> None:
     assert new[SECOND_LESSON] == LINKS.replace("1.1", "1.5")
     assert 'id = "1.5"' in new[MAP]
     assert 'id = "1.1"' not in new[MAP]
-    with pytest.raises(JsonRpcException, match=r"there is a lesson 1\.2 already"):
+    with pytest.raises(JsonRpcException, match=r"there is already a lesson 1\.2"):
         editor.request("rename", types.RenameParams(*place, new_name="1.2"))
     heading = editor.identifier(SECOND_LESSON), editor.place(SECOND_LESSON, "## L|inks")
     assert editor.request("prepare_rename", types.PrepareRenameParams(*heading)) is None

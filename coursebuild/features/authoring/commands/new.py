@@ -178,7 +178,7 @@ def _new_feature(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     if not re.fullmatch("[a-z][a-z0-9]*", name) or keyword.iskeyword(name):
         raise UsageError(f"`{name}` is not a name for a feature: use lower-case letters")
     if name in {*CORE_FENCES, *fence_names(), *(feature.name for feature in features())}:
-        raise UsageError(f"there is a feature or a fence `{name}` already")
+        raise UsageError(f"there is already a feature or a fence `{name}`")
     path = f"features/{name}.py"
     templates = {path: "feature.txt", f"tests/test_{name}.py": "test.txt"}
     new_map = with_feature(course, path)
