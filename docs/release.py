@@ -101,17 +101,17 @@ def complete_maps(sources: Path) -> None:
 def arrange_manuals(site: Path, archives: Path, release: Path) -> None:
     """Put the manuals of all releases below `site/docs/`, that of this one packed into a folder."""
     docs, manuals = site / "docs", site / ".manuals"
-    (listed,) = json.loads((docs / "versions.json").read_text(encoding="utf-8"))
+    (entry,) = json.loads((docs / "versions.json").read_text(encoding="utf-8"))
     docs.rename(manuals)
     docs.mkdir()
     release.mkdir(parents=True, exist_ok=True)
-    pack(manuals, release / f"manual-{listed['version']}.tar.gz")
-    shutil.move(manuals, docs / listed["version"])
+    pack(manuals, release / f"manual-{entry['version']}.tar.gz")
+    shutil.move(manuals, docs / entry["version"])
     for archive in sorted(archives.glob("manual-*.tar.gz")):
         name = NAME.fullmatch(archive.name)
         if name is None:
             raise SystemExit(f"{archive.name} is not named as the manual of a release")
-        if name[1] != listed["version"]:
+        if name[1] != entry["version"]:
             with tarfile.open(archive) as tar:
                 tar.extractall(docs / name[1], filter="data")
     versions = sorted((path.name for path in docs.iterdir()), key=Version, reverse=True)
