@@ -42,7 +42,14 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Names, compressed_files
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
 from coursebuild.core.pages.context import NotedPage, SiteContext
-from coursebuild.core.pages.frame import FrameInputs, PageFrame, parts_by_mark, robots, sitemap, versions
+from coursebuild.core.pages.frame import (
+    FrameInputs,
+    PageFrame,
+    parts_by_mark,
+    robots,
+    sitemap,
+    versions,
+)
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import PageRecord

@@ -2,7 +2,8 @@
 
 Entry points: `FrameInputs`, what frames show of a course; `PageFrame`, whose `render` puts the
 frame around the body of a page; `course_data` and `lesson_data`, structured data; `sitemap`,
-`versions`, `robots`. Whatever needs the site's full address is left out if the course does not give that.
+`versions`, `robots`. Whatever needs the site's full address is left out if the course does not give
+that.
 
 Pages are drawn in two steps because a page's head refers to the style sheet by a hash of its
 content, and the style sheet names the fonts, which depend on the characters of all pages.
