@@ -56,7 +56,7 @@ CORE_COMMANDS = {
     "build": "verify everything and publish the site",
     "check": "verify, publish nothing",
     "update": "bring recorded outputs up to date",
-    "undo": "take back what `check --fix` has changed",
+    "undo": "take back the last change of `check --fix` or the preview",
     "extract": "write the scripts to examples/",
     "serve": "preview: build, serve, rebuild and reload on change",
     "export": "verify everything and write the course as one file",

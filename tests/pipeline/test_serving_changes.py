@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.core.files.locks import project_lock
 from support.preview_process import PATIENT, Events, serve_preview
 from support.scratch_course import (
     GOOD,
@@ -358,6 +359,9 @@ def test_output_is_accepted(make: Make) -> None:
         assert folder.read(folder.lesson()) == before.replace(b"hello 3\r", b"hello 3.14159\r")
         events.wait_until_settled()
         assert events.news["outputs"][0]["state"] == "verified"
+    undone = folder.main("undo")
+    assert (undone.status, undone.out) == (0, f"restored {folder.lesson()}\n")
+    assert folder.read(folder.lesson()) == before
 
 
 def test_several_offers_are_accepted_at_once_or_not_at_all(make: Make) -> None:
@@ -375,6 +379,25 @@ def test_several_offers_are_accepted_at_once_or_not_at_all(make: Make) -> None:
         )
         assert folder.text(folder.lesson()) == changed
         events.wait_until_settled()
+    assert folder.main("undo").status == 0
+    assert folder.text(folder.lesson()) == lesson
+
+
+def test_each_click_is_undone_alone_and_needs_no_other_command_to_end(make: Make) -> None:
+    lesson = "> [!nte] One\n>\n> Text.\n\n> [!tpi] Two\n>\n> Text.\n"
+    folder = make(lesson)
+    with serve_preview(folder) as preview, preview.events() as events:
+        events.until(lambda page: sum(bool(p.get("offer")) for p in page.news["problems"]) == 2)
+        with project_lock(folder.root):  # as `check` holds it while scripts run
+            assert preview.accept_offer(events.news["problems"][0]["offer"])[0] == 200
+        half = lesson.replace("nte", "note")
+        assert folder.text(folder.lesson()) == half
+        events.until(lambda page: [p["line"] for p in page.news["problems"]] == ["> [!tpi] Two"])
+        assert preview.accept_offer(events.news["problems"][0]["offer"])[0] == 200
+    for text in (half, lesson):
+        assert folder.main("undo").status == 0
+        assert folder.text(folder.lesson()) == text
+    assert folder.main("undo").status == 1
 
 
 def test_what_runs_is_told_with_the_time_that_it_took(make: Make) -> None:
