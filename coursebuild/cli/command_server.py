@@ -155,7 +155,8 @@ def _serve(
     for stream in range(3):
         os.dup2(null, stream)
     _close_all_but(listener.fileno(), events.fileno())
-    state, wait, modules = process_state(), _WARM_UP, list(_NEEDED)
+    wait: float | None = _WARM_UP
+    state, modules = process_state(), list(_NEEDED)
     while True:
         ready, _, _ = select.select([listener, events], [], [], wait)
         if events in ready:  # nothing comes here but the end

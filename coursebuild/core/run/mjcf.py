@@ -360,13 +360,14 @@ def _suspects(
                     yield from pairs if tag.name in schema else reversed(pairs)
                     return
         case "element":
-            for tag in (tag for tag in tags if tag.name == word):
-                yield (tag.place, *([tag.end_place] if tag.end_place else [])), schema
-                return
+            named_tags = [tag for tag in tags if tag.name == word]
+            ends = [tag.end_place for tag in named_tags if tag.end_place]
+            if named_tags:
+                yield (*(tag.place for tag in named_tags), *ends), schema
         case "attribute" | "missing":
             known_names = {word} if subject == "missing" else set()
-            for attributes in () if known_names else schema.get(element, {}).values():
-                known_names.update(attributes)
+            for names in () if known_names else schema.get(element, {}).values():
+                known_names.update(names)
             attributes = [a for tag in tags if tag.name == element for a in tag.attributes]
             for name, place, _, _ in attributes:
                 if name == word:

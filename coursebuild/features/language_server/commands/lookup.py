@@ -11,6 +11,7 @@ Entry points: `hover`, `definition`, `look_up`; `members`, the names that can fo
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterable, Mapping
 from urllib.parse import unquote
@@ -25,7 +26,12 @@ from coursebuild.core.model.results import Formula, ModelFacts
 from coursebuild.core.model.walk import display_formulas
 from coursebuild.core.pages.library import Library, models_named
 from coursebuild.core.pages.marks import code_span, escape_text, fence
-from coursebuild.core.pages.numbering import item_name, number_items, number_prefix
+from coursebuild.core.pages.numbering import (
+    item_name,
+    name_outside,
+    number_items,
+    number_prefix,
+)
 from coursebuild.core.scripts.bindings import PrintedOutputs
 from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.syntax.decode import field_description
@@ -248,7 +254,9 @@ class _Lookup:
             inlines = block.children if isinstance(block, model.Paragraph) else ()
             for term in model.walk_inlines(inlines):
                 if isinstance(term, model.Term) and term.id == id:
-                    text = model.plain_text(model.without_links(definition_of(inlines, term)))
+                    reference = functools.partial(name_outside, self.library, owner)
+                    sentences = model.without_links(definition_of(inlines, term), reference)
+                    text = model.plain_text(sentences)
                     name = f"**{escape_text(term.name)}**"
                     return _paragraphs(name, escape_text(text)), term.span
         return None
