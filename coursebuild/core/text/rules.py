@@ -278,7 +278,7 @@ _NO_FIX = {
     "your code or model has to change": """
     figure-missing figure-window lab-diverged lab-endless lab-engine lab-expect lab-far lab-goal
     lab-parity lab-penetration lab-reset lab-shared lab-timeout lab-value lab-warning
-    mjcf-compiles mjcf-error mjcf-message model-timeout output-noise script-connects
+    mjcf-compiles mjcf-message model-timeout output-noise script-connects
     script-diverged script-encoding script-killed script-output-limit script-penetration
     script-silent script-timeout script-unrepeatable script-writes
     """,

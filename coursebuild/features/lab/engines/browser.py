@@ -103,7 +103,7 @@ class LabEngine:
         except LimitError as error:
             return self._end(isolate, "timeout", str(error))
         except ScriptError as error:  # lab code has broken something that all labs share
-            return self._end(isolate, "engine", f"the trial broke: {str(error).splitlines()[0]}")
+            return self._end(isolate, "engine", f"the trial failed: {str(error).splitlines()[0]}")
         reply: dict[str, Any] = json.loads(text)
         if any(failure["kind"] in ("engine", "shared") for failure in reply["failures"]):
             self.close()  # an engine that failed or was changed may not run the other labs
