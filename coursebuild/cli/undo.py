@@ -1,4 +1,4 @@
-"""`coursebuild undo`: undo what `check --fix` changed."""
+"""`coursebuild undo`: undo the last change of `check --fix` or of a click in the preview."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ from coursebuild.pipeline.progress import Progress
 
 EXAMPLES = """\
 examples:
-  coursebuild undo                after `coursebuild check --fix`
+  coursebuild undo                after `check --fix`, or *Fix it* in the preview
 """
+
+
+_HELP = "what `check --fix` changed can be undone, and what was fixed or accepted in the preview"
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -23,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Give the files their texts of before; those that were edited since stay."""
     outcome = take_back(find_course(arguments.root), Progress().say)
     if outcome is None:
-        return fail(FAILURE, "there is nothing to undo", "only `check --fix` can be undone")
+        return fail(FAILURE, "there is nothing to undo", _HELP)
     restored_paths, edited_paths = outcome
     status = write("".join(f"restored {path}\n" for path in restored_paths), CLEAN)
     for path in edited_paths:

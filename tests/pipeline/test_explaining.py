@@ -204,7 +204,8 @@ def test_explain_tells_what_a_rule_means_anywhere(tmp_path: Path) -> None:
     result = folder.main("explain", "footnote-unused")
     assert (result.status, result.err) == (0, "")
     assert result.out.startswith(
-        "footnote-unused\n\nWarning. A footnote is defined but never referred to.\n\n"
+        "footnote-unused\n\nWarning. A footnote is defined but not used. No fix: "
+        "only you know what was meant.\n\n"
     )
     assert "\nwarning[footnote-unused]: " in result.out
     page = (ROOT / "docs/reference/rules.md").read_text()

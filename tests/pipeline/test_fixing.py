@@ -124,3 +124,21 @@ def test_options_that_do_not_go_with_fix(make: Make) -> None:
     folder = make(GOOD)
     for words in (["--unsafe"], ["--fix", "--truth"], ["--fix", "--against", "latest"]):
         assert folder.main("check", *words).status == 2
+
+
+def test_fix_mends_one_misspelt_name_of_a_model_after_the_other(make: Make) -> None:
+    """MuJoCo tells the first one only."""
+    model = (
+        "<mujoco>\n  <worldbody>\n    <bdoy>\n      <joint dampping='1' type='hindge'/>\n"
+        "      <gom size='1'/>\n    </bdoy>\n  </worldbody>\n</mujoco>\n"
+    )
+    mended = model
+    for slip, name in (("bdoy", "body"), ("dampping", "damping"), ("hindge", "hinge")):
+        mended = mended.replace(slip, name)
+    mended = mended.replace("gom", "geom")
+    folder = make(f"{GOOD}```mjcf\n{model}```\n")
+    folder.write("models/ball.xml", model)
+    result = folder.main("check", "--fix")
+    assert folder.text(folder.lesson()) == f"{GOOD}```mjcf\n{mended}```\n"
+    assert folder.text("models/ball.xml") == mended
+    assert "\nfixed 8 mistakes in 2 files (mjcf-error 4, model-error 4);" in result.out

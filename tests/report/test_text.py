@@ -242,4 +242,4 @@ def test_sarif_names_the_page_of_a_rule() -> None:
     assert rule["id"] == "math-syntax"
     known_address = f"{MANUAL}rules.html#math-syntax"
     assert rule.get("helpUri") == (known_address if MANUAL else None)
-    assert "\n## math-syntax\n" in (ROOT / "docs/reference/rules.md").read_text()
+    assert "\n### math-syntax\n" in (ROOT / "docs/reference/rules.md").read_text()

@@ -7,7 +7,7 @@ from coursebuild.core.features import Command, Feature
 
 FEATURE = Feature(
     name="language_server",
-    needs=("authoring", "glossary", "names", "symbols"),
+    needs=("authoring", "glossary", "names", "references", "symbols"),
     commands=(
         Command(
             name="lsp",

@@ -1,6 +1,6 @@
 """The browser's MuJoCo in this process: V8 runs the same WebAssembly file and the same lab code.
 
-Entry points: `LabEngine.trial`, `LabEngine.check_code`. docs/explanation/how-labs-run.md describes
+Entry points: `LabEngine.trial`, `LabEngine.check_code`. `site/js/lab/trial/trial.js` describes
 requests and replies.
 
 The engine starts when it is first needed, and again after a trial that ran too long or took too
