@@ -127,7 +127,7 @@ def test_a_page_weighs_what_it_loads(course: Folder) -> None:
     report = course.main("diff", "HEAD", *sites).out
     assert report.endswith("\nNot compared: there is no site in `public`.\n")
     result = course.main("diff", "HEAD", "--site", "preview")
-    assert (result.status, "belong together" in result.err) == (2, True)
+    assert (result.status, "need each other" in result.err) == (2, True)
 
 
 def test_a_base_that_cannot_be_had(course: Folder, tmp_path: Path) -> None:

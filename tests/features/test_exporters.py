@@ -83,7 +83,7 @@ def test_unknown_and_broken_exporters_are_reported(course: Folder) -> None:
     assert "features/lessons.py: two features are called `scorm`" in result.err
     course.replace("features/lessons.py", 'Feature(name="scorm"', 'Feature(name="own"')
     course.replace("features/lessons.py", 'name="lessons",\n', 'name="scorm",\n')
-    assert "there is an export `scorm` already" in course.main("check").out
+    assert "there is already an export `scorm`" in course.main("check").out
     usage = course.main("export", "--help").out
     assert "scorm (the course as SCORM 1.2)" in " ".join(usage.split())
 

@@ -253,7 +253,7 @@ def test_scripts_that_cannot_be_compared_say_why(make: Make, wheels: Path, insta
     assert sorted(lines) == [
         f"changed    examples/printed.py  by MuJoCo {NEW_VERSION}",
         "drifted    examples/drifted.py  (what is recorded is not what it prints here)",
-        "unclear    examples/lottery.py  (two runs of it there did not do the same)",
+        "unclear    examples/lottery.py  (two runs of it there differed)",
         "uncompared examples/broken.py  (it does not run to its end here)",
         "uncompared examples/needs.py  (it needs nowhere)",
         "uncompared examples/never.py  (its lesson says `norun`)",

@@ -94,7 +94,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     assert folder.tree() == before
     folder.write("file", "text")
     result = folder.main("init", "file")
-    assert (result.status, result.err) == (1, "coursebuild: file cannot be made: file exists\n")
+    assert (result.status, result.err) == (1, "coursebuild: file cannot be created: file exists\n")
     folder.write("half/models", "a file")
     result = folder.main("init", "half")
     assert (result.status, "models/pendulum.xml cannot be written: " in result.err) == (1, True)

@@ -103,7 +103,7 @@ REFUSED_COMMANDS = [
     ("lesson 1.7 there", "there is already a file content/lessons/1.7-there.md"),
     ("model ../x", "`../x` is not a name for a model: use letters, digits, `_` and `-`"),
     ("model there", "there is already a file models/there.xml"),
-    ("feature quiz", "there is a feature or a fence `quiz` already"),
+    ("feature quiz", "there is already a feature or a fence `quiz`"),
     ("feature Big-1", "`Big-1` is not a name for a feature: use lower-case letters"),
     ("template lessn.html", "there is no template `lessn.html`; did you mean `lesson.html`?"),
     ("template ../base.html", "there is no template `../base.html`; did you mean `base.html`?"),

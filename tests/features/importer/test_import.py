@@ -113,7 +113,7 @@ def test_nothing_is_written_over(
     (tmp_path / "there" / "content").mkdir(parents=True)
     (tmp_path / "there" / "content" / "course.toml").write_text("mine")
     message = import_refused(capsys, "old", "--out", "there")
-    reason = "has content/course.toml already; name an empty folder with --out"
+    reason = "already has content/course.toml; name an empty folder with --out"
     assert message == f"coursebuild: {tmp_path / 'there'} {reason}\n"
     assert texts(tmp_path / "there") == {"content/course.toml": b"mine"}
 
