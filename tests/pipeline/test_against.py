@@ -297,11 +297,11 @@ def test_version_that_cannot_be_installed_leaves_nothing(make: Make, wheels: Pat
     result = check_against(course, "-q", version="9.0.9")
     assert result.status == 1
     assert result.err.startswith("coursebuild: pip finds no MuJoCo 9.0.9 for Python ")
-    assert "\n  help: without a network let pip find the wheels in a folder" in result.err
+    assert "\n  help: without a network, point pip to a folder of wheels" in result.err
     wheel(wheels, "9.2.0", "raise ImportError('built for another numpy')")
     result = check_against(course, "-q", version="9.2.0")
     assert result.err == (
-        "coursebuild: MuJoCo 9.2.0 cannot be imported beside the other packages of here: "
+        "coursebuild: MuJoCo 9.2.0 cannot be imported together with the other installed packages: "
         "ImportError: built for another numpy\n"
     )
     assert environments(course) == []

@@ -250,7 +250,7 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
             for path in rest[_MAX_ENVIRONMENTS - 1 :]:
                 shutil.rmtree(path, ignore_errors=True)
     except OSError as error:
-        raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
+        raise EffectError(f"{prefix.name} cannot be created: {reason(error)}") from None
     return Interpreter(
         prefix.name,
         f"{prefix}/bin/python",
@@ -274,7 +274,7 @@ def environment_prefix(root: Path, engine: str) -> Path:
     if state is None:
         raise EffectError(
             f"there is no place for an environment with MuJoCo {engine}",
-            help="HOME or XDG_STATE_HOME gives one, outside of the course",
+            help="set HOME or XDG_STATE_HOME to a folder outside the course",
         )
     return Path(state, _FOLDER, name)
 
@@ -315,7 +315,9 @@ def _create_environment(prefix: Path, engine: str) -> None:
         (_packages(new) / "packages_of_here.pth").write_text("".join(lines))
         status, output = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
         if status:
-            message = f"MuJoCo {engine} cannot be imported beside the other packages of here"
+            message = (
+                f"MuJoCo {engine} cannot be imported together with the other installed packages"
+            )
             output_lines = [line.strip() for line in output.splitlines() if line.strip()]
             last_line = output_lines[-1] if output_lines else "no reason"
             raise EffectError(f"{message}: {last_line}")
@@ -352,8 +354,8 @@ def _install_error(engine: str, output: str) -> EffectError:
     if re.search(rf"No matching distribution found for {_ENGINE}|{_NO_VERSION}", output):
         host = f"Python {'.'.join(platform.python_version_tuple()[:2])} on {platform.machine()}"
         help = (
-            f"without a network let {tool} find the wheels in a folder, by the environment "
-            f"variables {tool.upper()}_FIND_LINKS and {offline}"
+            f"without a network, point {tool} to a folder of wheels with the environment variables "
+            f"{tool.upper()}_FIND_LINKS and {offline}"
         )
         return EffectError(f"{tool} finds no MuJoCo {engine} for {host}", help=help)
     lines = [line.strip() for line in output.splitlines() if line.strip()]

@@ -141,7 +141,7 @@ def test_the_diet_of_a_model(site: dict[str, str]) -> None:
     assert "proved; ×1.07 as fast, 120 B of memory, 40 B of text (swing)." in words
     assert "Because its value goes nowhere. models/box.xml:3" in words
     assert "Kept: it is the horizon." in words
-    assert "It is no fault, as examples/a.py names &lt;it&gt;." in words
+    assert "It is not a fault, because examples/a.py names &lt;it&gt;." in words
     assert 'href="../files/reports/box.diet.json"' in site["models/box.html"]
 
 
