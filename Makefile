@@ -32,7 +32,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(VENV)/.made),$(CURDIR))
 .PHONY: $(VENV)/.made
 endif
 
-.PHONY: help site pages release-files version serve quick test test-slow test-oldest fuzz lint format types dist vscode lock npm system clean distclean
+.PHONY: help site pages release-files tag-check version serve quick test test-slow test-oldest fuzz lint format types dist vscode lock npm system clean distclean
 
 help:
 	@echo 'make site       make the environment, install, build the course into public/, the manual into docs/public/'
@@ -73,13 +73,15 @@ pages: $(VENV)/.site
 	$(BIN)/python docs/release.py manuals $(PAGES) $(MANUALS) $(RELEASE)
 
 # All that a pushed tag publishes, from what is committed; a tag that is not the version is refused.
-release-files: $(VENV)/.site
-	$(BIN)/python docs/release.py check
+release-files: tag-check $(VENV)/.site
 	rm -rf $(RELEASE)
 	$(MAKE) pages dist vscode
 	cp dist/* $(RELEASE)
 	cp editors/vscode/dist/coursebuild.vsix $(RELEASE)/$$(basename dist/*.tar.gz .tar.gz).vsix
 	$(BIN)/python docs/release.py notes $(RELEASE)
+
+tag-check:
+	$(PYTHON) docs/release.py check
 
 version: $(VENV)/.site
 	$(BIN)/python docs/release.py version $(VERSION)

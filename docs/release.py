@@ -25,8 +25,6 @@ import sys
 import tarfile
 from pathlib import Path
 
-from packaging.version import Version
-
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
@@ -100,6 +98,8 @@ def complete_maps(sources: Path) -> None:
 
 def arrange_manuals(site: Path, archives: Path, release: Path) -> None:
     """Put the manuals of all releases below `site/docs/`, that of this one packed into a folder."""
+    from packaging.version import Version  # not there before packages are installed
+
     docs, manuals = site / "docs", site / ".manuals"
     (entry,) = json.loads((docs / "versions.json").read_text(encoding="utf-8"))
     docs.rename(manuals)
@@ -169,7 +169,7 @@ def main(word: str, *arguments: str) -> None:
     """Do what the first word says."""
     match word:
         case "version":
-            set_version(str(Version(*arguments)))
+            set_version(*arguments)
         case "check":
             check(*arguments)
         case "maps":

@@ -248,13 +248,13 @@ def test_tables_have_fields_that_there_are() -> None:
         Draft202012Validator(without_required(json.loads(json_schema(name))))
         for name in ("course", "model")
     ]
-    wrong = []
+    mistakes = []
     for fence in (fence for fence in FENCES if fence.kind == "toml"):
         table = tomllib.loads(fence.text)
         is_other = {"project", "language-server", "language"} & table.keys()
         if not is_other and not any(schema.is_valid(table) for schema in schemas):
-            wrong.append(str(fence))
-    assert wrong == []
+            mistakes.append(str(fence))
+    assert mistakes == []
 
 
 class Chart:
