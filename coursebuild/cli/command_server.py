@@ -196,9 +196,9 @@ def _attend(
             send(connection, preview)
         case {"ask": "command", "words": [command, *_]} if command in COMMANDS:
             if request["root"] != root or len(files) != 4:
-                send(connection, {"refusal": "is of another course"})
+                send(connection, {"refusal": "belongs to another course"})
             elif state is None or request["state"] != state:
-                reason = "is of another version or another Python environment"
+                reason = "runs another version or Python environment"
                 send(connection, {"refusal": reason})
             else:
                 _supervise(connection, events, request, files)

@@ -200,7 +200,7 @@ def _run_there(
     if answer is None or "refusal" in answer:
         reason = "does not answer" if answer is None else answer["refusal"]
         if not {"-q", "--quiet"} & {*words}:
-            say(0, f"the preview of this course {reason}; this command does without it")
+            say(0, f"the preview of this course {reason}; this command runs without it")
         return None
     return _wait(connection, int(answer["process"]))
 
@@ -232,7 +232,7 @@ def _wait(connection: socket.socket, process: int) -> int:
             signal.signal(number, signal.SIG_DFL)
     if answer is None:
         message = f"coursebuild: the preview's process {process}, which did this, has ended"
-        return say(FAILURE, f"{message}\n  help: files are whole; run the command again")
+        return say(FAILURE, f"{message}\n  help: no file was damaged; run the command again")
     return int(answer["status"])
 
 

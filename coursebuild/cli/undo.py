@@ -1,4 +1,4 @@
-"""`coursebuild undo`: take back the last change of `check --fix` or of a click in the preview."""
+"""`coursebuild undo`: undo the last `check --fix`, or click in the preview."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ examples:
 """
 
 
-_HELP = "what `check --fix` changed can be undone, and what was fixed or accepted in the preview"
+_HELP = "you can undo `check --fix`, and what you fixed or accepted in the preview"
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -30,5 +30,5 @@ def run(arguments: argparse.Namespace) -> int:
     restored_paths, edited_paths = outcome
     status = write("".join(f"restored {path}\n" for path in restored_paths), CLEAN)
     for path in edited_paths:
-        status = fail(FAILURE, f"{path} was edited since, so it stays as it is")
+        status = fail(FAILURE, f"{path} has been edited since, and was left as it is")
     return status

@@ -283,8 +283,8 @@ def test_another_python_environment_does_without_the_preview(make: Make, runtime
         env = {"XDG_RUNTIME_DIR": runtime, "PYTHONHASHSEED": "1"}
         result = folder.run("check", "1.1", env=env)
         message = (
-            "the preview of this course is of another version or another Python environment; "
-            "this command does without it\n"
+            "the preview of this course runs another version or Python environment; "
+            "this command runs without it\n"
         )
         assert (result.status, result.err.count(message)) == (0, 1)
         assert folder.run("check", "-q", env=env).err == ""
@@ -327,7 +327,7 @@ def test_the_server_refuses_what_is_no_command_for_it(make: Make, runtime: str) 
             ({"ask": "command", "words": ["lsp"]}, "does not know this command"),
             ({"ask": "command", "words": []}, "does not know this command"),
             ({"ask": "else"}, "does not know this command"),
-            ({"ask": "command", "words": ["check"], "root": "/"}, "is of another course"),
+            ({"ask": "command", "words": ["check"], "root": "/"}, "belongs to another course"),
         ):
             with socket.socket(socket.AF_UNIX) as connection:
                 connection.connect(place)
@@ -420,5 +420,5 @@ def test_a_listener_that_does_not_answer_is_left(
             os._exit(0)
         assert hand_over(None, ["check"]) is None
         os.waitpid(process, 0)
-    message = "the preview of this course does not answer; this command does without it\n"
+    message = "the preview of this course does not answer; this command runs without it\n"
     assert capfd.readouterr().err == message

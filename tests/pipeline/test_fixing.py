@@ -52,7 +52,10 @@ def test_undo_leaves_what_was_edited_since(make: Make) -> None:
     result = folder.main("undo")
     assert result.status == 1
     assert result.out == f"restored {folder.lesson(2)}\n"
-    assert result.err == f"coursebuild: {folder.lesson()} was edited since, so it stays as it is\n"
+    assert (
+        result.err
+        == f"coursebuild: {folder.lesson()} has been edited since, and was left as it is\n"
+    )
     assert folder.text(folder.lesson()) == new_text
     assert folder.text(folder.lesson(2)).startswith("[a](lesson:one)")
 

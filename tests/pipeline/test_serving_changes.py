@@ -245,13 +245,13 @@ def test_course_that_is_wrong_from_the_beginning(make: Make) -> None:
         events.until(lambda page: "map-syntax" in page.rules())
         status, _, body = preview.get("/")
         assert status == 404
-        assert b"Nothing is built yet." in body and b"/.coursebuild/preview.js" in body
+        assert b"Nothing has been built yet." in body and b"/.coursebuild/preview.js" in body
         folder.write("content/course.toml", good)
         events.wait_until_settled("link-lesson")
         assert events.state == ""
         status, _, body = preview.get(page)
         assert status == 200
-        assert b"This page cannot be shown before its mistakes are mended." in body
+        assert b"This page cannot be shown until its mistakes are fixed." in body
         assert b"/.coursebuild/preview.js" in body
         assert b"Scratch" in preview.get("/")[2]
         folder.write(folder.lesson(), GOOD)

@@ -176,7 +176,9 @@ def _move(temporary: str, target: Path, path: str, *, new: bool) -> None:
             os.link(temporary, target)
             return
         except FileExistsError:
-            raise FileChangedError(f"{path} was made by somebody else in the meantime") from None
+            raise FileChangedError(
+                f"{path} was created by another program in the meantime"
+            ) from None
         except OSError:
             pass  # a file system without links
     Path(temporary).replace(target)
@@ -202,7 +204,7 @@ def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
     if current is None:
         raise FileChangedError(f"{path} was removed in the meantime")
     if expected is None:
-        raise FileChangedError(f"{path} was made by somebody else in the meantime")
+        raise FileChangedError(f"{path} was created by another program in the meantime")
     raise FileChangedError(
         f"{path} was changed in the meantime", help="nothing was written; run the command again"
     )
@@ -350,8 +352,8 @@ def _undo(root: Path, tell: Callable[[str], None] | None) -> None:
     except (*DAMAGE, OutsideProjectError):
         journal.replace(journal.with_suffix(".damaged"))
         message = (
-            "a command that was interrupted has left a damaged journal, so nothing was undone: "
-            "look at what it was changing"
+            "an interrupted command left a damaged journal, so nothing was undone: "
+            "check the files that it was changing"
         )
     else:
         message = _restore(root, changes)

@@ -11,7 +11,7 @@ FEATURE = Feature(
     commands=(
         Command(
             name="lsp",
-            summary="serve an editor: diagnostics, completion and more while one types",
+            summary="run the language server for an editor",
             module=f"{__name__}.commands.lsp",
         ),
     ),

@@ -250,7 +250,7 @@ HOVERS = [
     (FIRST_LESSON, "mujoco.mj_st|ep(", "Advance simulation"),
     (FIRST_LESSON, '"expr": "data.qp|os', "position"),
     (FIRST_LESSON, "`1.0|00`{out}", "after 0.002 s at 1.000 m"),
-    (FIRST_LESSON, "[!warn|ing]", "Something here goes wrong easily, or costs dearly."),
+    (FIRST_LESSON, "[!warn|ing]", "Something that easily goes wrong, or costs dearly."),
     (FIRST_LESSON, '"tit|le"', "`title`: "),
     (FIRST_LESSON, 'model_path("ba|ll")', "A ball in the air."),
     (SECOND_LESSON, "model:ba|ll", "A ball in the air.\n\n1 bodies, 1 geoms; nq = 7, nv = 6"),
@@ -414,7 +414,7 @@ def test_renaming_a_lesson(editor: Editor) -> None:
     assert new[SECOND_LESSON] == LINKS.replace("1.1", "1.5")
     assert 'id = "1.5"' in new[MAP]
     assert 'id = "1.1"' not in new[MAP]
-    with pytest.raises(JsonRpcException, match=r"there is a lesson 1\.2 already"):
+    with pytest.raises(JsonRpcException, match=r"there is already a lesson 1\.2"):
         editor.request("rename", types.RenameParams(*place, new_name="1.2"))
     heading = editor.identifier(SECOND_LESSON), editor.place(SECOND_LESSON, "## L|inks")
     assert editor.request("prepare_rename", types.PrepareRenameParams(*heading)) is None
