@@ -182,10 +182,10 @@ def _propose_name(
     parts = [code.slice(a - offset, b - offset) for a, b in misspelling.places if a >= offset]
     if len(parts) < len(misspelling.places) or any(part.text != word for part in parts):
         return None
-    place, *others = (part.span() for part in parts)
+    place, *further_places = (part.span() for part in parts)
     fix = propose(word, likely, misspelling.candidates)
     if fix.new is not None:
-        edits = tuple(Edit(span, likely) for span in others)
+        edits = tuple(Edit(span, likely) for span in further_places)
         fix = Fix(fix, fix.new, fix.old, edits=edits, safe=fix.safe)
     return place, fix
 
