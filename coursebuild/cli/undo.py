@@ -1,4 +1,4 @@
-"""`coursebuild undo`: undo the last `check --fix`, or click in the preview."""
+"""`coursebuild undo`: undo the last change of `check --fix` or of a click in the preview."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ examples:
 """
 
 
-_HELP = "you can undo `check --fix`, and what you fixed or accepted in the preview"
+_HELP = "what `check --fix` changed can be undone, and what was fixed or accepted in the preview"
 
 
 def declare(parser: argparse.ArgumentParser) -> None:

@@ -56,7 +56,7 @@ CORE_COMMANDS = {
     "build": "verify everything and publish the site",
     "check": "verify everything without publishing",
     "update": "bring recorded outputs up to date",
-    "undo": "undo the last `check --fix`, or click in the preview",
+    "undo": "undo the last change of `check --fix` or the preview",
     "extract": "write the scripts to examples/",
     "serve": "preview the course and follow every change",
     "export": "verify everything and export the course as one file",
