@@ -230,6 +230,7 @@ class Reason(Struct, frozen=True):
 
 REASONS = (
     Reason("another level that a heading may have", "heading", "#+", "#{2,6} .*"),
+    Reason("without a heading, the one before it", "heading", "(?s).*", "(?s).*", "line lost"),
     Reason(
         "another formula that is whole: what it says is proven where it has numbers",
         "formula",
