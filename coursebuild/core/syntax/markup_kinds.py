@@ -197,7 +197,7 @@ BROKEN = {
         "a link is `[text](address)`, with no blank before the `(` and none in the address",
     ),
     "bracket": MarkupKind(
-        r"(?<![\\\w])\[(?=[^\W\d_]{2})(?![^\[\]]*\])",
+        r"(?<![\\\w])\[(?=[^\W\d_]{2})(?![^\[\]]*\])|(?<=[^\W\d_])\[(?=(?-i:[a-z]))(?![^\[\]]*\])",
         "no link begins here",
         "a link is `[text](address)`; write a backslash before a bracket that is meant to be seen",
     ),

@@ -71,7 +71,7 @@ _PLAIN = re.compile(r"(?<![\w.\\/-])[A-Za-z]\w+[^\W_](?:\.(?:md|py|toml|xml)\b)?
 """A word of inline code that is no part of a path."""
 _TOKEN = re.compile(
     r"(?<!\S)(?=\S*[A-Za-z_]{4})(?!\w+(?!\S))\S{6,}(?!\S)"
-    r"|(?<!\S)\w*[\\;,'\[\]]\w{3,}(?!\S)"
+    r"|(?<!\S)\w*[\\<;,'\[\]]\w{3,}(?!\S)"
 )
 """What stands between blanks, with a word of some length and more than that."""
 _TAIL = re.compile(r"[A-Za-z0-9]+(?!\w)")

@@ -260,7 +260,7 @@ class Resolver:
         if self.uses[name] > 1:
             return None
         message = f"nothing that the course knows is called `{name}`"
-        sign = re.fullmatch(r"([\w.]*)(\\|(?<=.)[;,'\[\]])([\w.]*\w)", name)
+        sign = re.fullmatch(r"([\w.]*)([\\<]|(?<=.)[;,'\[\]])([\w.]*\w)", name)
         if sign is not None:
             head, tail = sign[1], sign[3]  # the sign took the place of a letter, or came beside one
             lengths = {len(name), len(name) - 1} if head else {len(name)}
