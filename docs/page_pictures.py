@@ -101,7 +101,8 @@ def take(page: Page, folder: Path, name: str) -> int:
         count += 1
         height = min(PIECE, size[1] - top)
         clip = {"x": 0, "y": top, "width": size[0], "height": height}
-        page.screenshot(path=folder / f"{name}-{count:02d}.png", clip=clip, full_page=True)  # type: ignore[arg-type]
+        picture = folder / f"{name}-{count:02d}.png"
+        page.screenshot(path=picture, clip=clip, full_page=True, timeout=0)  # type: ignore[arg-type]
     return count
 
 

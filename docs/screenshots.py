@@ -4,8 +4,9 @@ Entry point: run it as a file, after `make site`: `.venv/bin/python docs/screens
 packages are those of the tests, the browser is Debian's headless Chromium: `make test` installs
 both.
 
-1. A page of `public/` is opened from the disk, in a window of a fixed size and in light colours.
-2. The subject of the picture is scrolled into sight, and the window is saved as a PNG.
+1. The site in `public/` is served on this machine, and a page is opened in light colours.
+2. What a reader would do is done: a lab is set going, a question is answered, wrongly.
+3. The window around the subject, or the subject alone, is saved as a PNG.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ from __future__ import annotations
 import argparse
 import shutil
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from playwright.sync_api import Browser, sync_playwright
+from page_pictures import ARGUMENTS, serve
+from playwright.sync_api import Browser, Page, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / "docs" / "images"
@@ -33,42 +36,64 @@ class Shot:
     """Path in the site."""
     subject: str
     """CSS selector of what is scrolled to the top of the window."""
-    margin: int
-    """Pixels that stay in sight above the subject."""
-    width: int = 1320
-    """The width of the window, in CSS pixels."""
-    height: int = 860
+    act: Callable[[Page], None] | None = None
+    """What a reader does first."""
+    alone: bool = False
+    """Whether only the subject is seen."""
 
 
+WIDTH, HEIGHT = 1320, 860
+"""Of the window, in CSS pixels."""
+MARGIN = 120
+"""Pixels that stay in sight above the subject."""
+
+
+def run_lab(page: Page) -> None:
+    """Let the box tumble until it has turned over."""
+    lab = page.locator('[data-lab="4.2-lab-1"]')
+    lab.scroll_into_view_if_needed()
+    lab.get_by_role("button", name="Play").click()
+    page.wait_for_timeout(6000)
+
+
+def answer(page: Page) -> None:
+    """Give an answer that is ten times as large as the right one."""
+    question = page.locator('#\\34 \\.2-check [data-kind="numeric"]')
+    question.scroll_into_view_if_needed()
+    question.locator("input").first.fill("0.8")
+    question.locator(".quiz-check").click()
+    page.wait_for_timeout(300)
+
+
+LESSON = "lessons/4.2-mass-and-inertia.html"
 SHOTS = (
-    Shot(
-        "lesson.png",
-        "lessons/4.2-mass-and-inertia.html",
-        'figure[data-script="examples/l4_2_inertia.py"] .output',
-        margin=120,
-    ),
+    Shot("lesson.png", LESSON, 'figure[data-script="examples/l4_2_inertia.py"] .output'),
+    Shot("lab.png", LESSON, '[data-lab="4.2-lab-1"]', run_lab),
+    Shot("quiz.png", LESSON, '#\\34 \\.2-check [data-kind="numeric"]', answer, alone=True),
 )
 
 
-def take(browser: Browser, site: Path, shot: Shot, images: Path) -> Path:
+def take(browser: Browser, site: str, shot: Shot, images: Path) -> Path:
     """Save one picture; return its path.
 
     Raises:
         ValueError: the page is not there, or the picture is too large.
     """
-    page_file = site / shot.page
-    if not page_file.is_file():
-        raise ValueError(f"there is no {page_file}: run `make site` first")
-    page = browser.new_page(
-        viewport={"width": shot.width, "height": shot.height}, color_scheme="light"
-    )
-    page.goto(page_file.as_uri())
+    page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme="light")
+    response = page.goto(site + shot.page)
+    if response is None or not response.ok:
+        raise ValueError(f"there is no {shot.page}: run `make site` first")
     page.evaluate("document.fonts.ready")
-    top = page.locator(shot.subject).first.evaluate("e => e.getBoundingClientRect().top")
-    page.evaluate("y => window.scrollTo({top: y, behavior: 'instant'})", top - shot.margin)
-    page.wait_for_timeout(300)  # the contents list marks the section in sight
-    path = images / shot.name
-    page.screenshot(path=path)
+    path, subject = images / shot.name, page.locator(shot.subject).first
+    if shot.act is not None:
+        shot.act(page)
+    if shot.alone:
+        subject.screenshot(path=path)
+    else:
+        top = subject.evaluate("e => e.getBoundingClientRect().top")
+        page.evaluate("y => window.scrollBy({top: y, behavior: 'instant'})", top - MARGIN)
+        page.wait_for_timeout(300)  # the contents list marks the section in sight
+        page.screenshot(path=path)
     page.close()
     if path.stat().st_size > LIMIT:
         raise ValueError(f"{path} has {path.stat().st_size} bytes, more than {LIMIT}")
@@ -86,12 +111,12 @@ def main() -> int:
         print("there is no chromium-headless-shell on PATH", file=sys.stderr)
         return 1
     arguments.images.mkdir(parents=True, exist_ok=True)
-    with sync_playwright() as playwright:
+    with serve(arguments.site.resolve()) as site, sync_playwright() as playwright:
         # As root, in a container, Chromium cannot make its sandbox; the page is our own.
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=chromium, args=[*ARGUMENTS])
         try:
             for shot in SHOTS:
-                path = take(browser, arguments.site.resolve(), shot, arguments.images)
+                path = take(browser, site, shot, arguments.images)
                 print(f"{path.name}: {path.stat().st_size} bytes")
         except ValueError as error:
             print(error, file=sys.stderr)

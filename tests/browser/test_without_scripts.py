@@ -31,7 +31,7 @@ EXPECTED_TEXTS = {
     "progress": "Progress is kept by a script",
     "review": "scripts are switched off here",
     "search": "needs JavaScript",
-    "offline": "This browser keeps nothing now.",
+    "offline": "This browser keeps nothing at present.",
 }
 """What pages that need a script say."""
 

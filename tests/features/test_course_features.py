@@ -73,12 +73,12 @@ BROKEN = {
     "FEATURE = 'shout'\n": " has no FEATURE",
     "raise SystemExit\n": " fails at line 1: SystemExit: ",
     SHOUT.replace('"shout",\n    f', '"quiz",\n    f'): ": two features are called `quiz`",
-    SHOUT.replace('Rule("shout"', 'Rule("output-drift"'): ": there is a rule",
+    SHOUT.replace('Rule("shout"', 'Rule("output-drift"'): ": there is already a rule",
     SHOUT.replace('name="shout",\n    f', 'name="shout",\n    check=print,\n    f'): (
         ": it would see no `shout` of the course: its block has no `summary`"
     ),
     SHOUT.replace('name="shout",\n            b', 'name="lab",\n            b'): (
-        ": the fence `lab` is read already"
+        ": there is already a fence `lab`"
     ),
 }
 
@@ -206,9 +206,9 @@ def test_broken_link_of_a_feature_page_is_reported(inventory: Folder) -> None:
 def test_page_that_cannot_be_added_is_reported(inventory: Folder) -> None:
     code = inventory.text("features/inventory.py")
     for name, message in (
-        ("search", "there is a page `search` already"),
-        ("lessons", "there is a page `lessons` already"),
-        ("home", "there is a page `home` already"),
+        ("search", "there is already a page `search`"),
+        ("lessons", "there is already a page `lessons`"),
+        ("home", "there is already a page `home`"),
         ("../x", "a page cannot be called `../x`: use small letters, digits and `-`"),
     ):
         renamed_code = code.replace('name="inventory",\n    v', f'name="{name}",\n    v')

@@ -60,7 +60,7 @@ def test_export_is_refused_where_it_would_be_in_the_way(course: Folder) -> None:
     course.write("mine.zip", b"PK\x05\x06" + bytes(18))
     course.write("public/.coursebuild-site", "{}")
     for name, out, reason in (
-        ("lessons", "models/q.csv", "lies in models/ of the project, where no export goes"),
+        ("lessons", "models/q.csv", "lies in models/ of the project, which cannot hold an export"),
         ("lessons", "notes.txt", "notes.txt exists and is not such an export"),
         ("epub", "notes.txt", "notes.txt exists and is not such an export"),
         ("page", "notes.txt", "notes.txt exists and is not such an export"),
@@ -83,7 +83,7 @@ def test_unknown_and_broken_exporters_are_reported(course: Folder) -> None:
     assert "features/lessons.py: two features are called `scorm`" in result.err
     course.replace("features/lessons.py", 'Feature(name="scorm"', 'Feature(name="own"')
     course.replace("features/lessons.py", 'name="lessons",\n', 'name="scorm",\n')
-    assert "there is an export `scorm` already" in course.main("check").out
+    assert "there is already an export `scorm`" in course.main("check").out
     usage = course.main("export", "--help").out
     assert "scorm (the course as SCORM 1.2)" in " ".join(usage.split())
 

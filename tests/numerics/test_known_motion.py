@@ -99,7 +99,9 @@ def test_an_activation_at_its_limit_is_a_jump() -> None:
     unseen = replace(pilot, jumps=())  # as of something that is not looked for
     reference = find_reference(model, unseen, quick=True)
     assert reference.kind == "self"
-    assert reference.note == "no integration: the engine in small steps tends elsewhere"
+    assert (
+        reference.note == "no integration: the engine with small steps converges to something else"
+    )
 
 
 def test_an_activation_that_looks_ahead_by_a_timestep() -> None:
@@ -165,8 +167,16 @@ def test_a_closed_form_comes_first_and_is_refused_where_it_is_of_something_else(
             text,
             "the closed form of `damped-spring-0.1` is not this scene's motion",
         ),
-        (spring(100), text.replace("[5]", "[5.1]"), "the scenario begins otherwise than the hard"),
-        (pendulum(), text.replace("damped-spring-0.1", "coin"), "the model has other joints than"),
+        (
+            spring(100),
+            text.replace("[5]", "[5.1]"),
+            "the scenario starts differently from",
+        ),
+        (
+            pendulum(),
+            text.replace("damped-spring-0.1", "coin"),
+            "the model has different joints",
+        ),
     ):
         with pytest.raises(SceneError) as caught:
             reference_of(model, toml)

@@ -235,7 +235,7 @@ def test_a_block_that_sticks_creeps_alike_in_each_measurement() -> None:
     assert repeated == (report,)
     assert (report.reference, report.smooth, report.orders) == ("self", False, ())
     assert report.notes == (
-        "no bit of the motion is other, and no time saved, with 4 iterations",
+        "the same motion to the bit, and no time saved, with 4 iterations",
         "errors follow no power of the timestep, because of contact",
         "beyond 0.01 s refsafe softens constraints: stable, but another model",
     )

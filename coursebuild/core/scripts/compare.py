@@ -353,7 +353,7 @@ def judge(
         engine: this version.
     """
     if (standing.run.outcome, standing.run.stdout) != (repeated.run.outcome, repeated.run.stdout):
-        return "unclear", "two runs of it there did not do the same"
+        return "unclear", "two runs of it there differed"
     if control is None:
         return "unclear", f"no fresh environment with MuJoCo {engine} could be made"
     if not control.holds:

@@ -204,7 +204,9 @@ def test_no_such_kind_of_place_and_no_fsspec(
 ) -> None:
     with pytest.raises(EffectError) as caught:
         shared_place("nowhere://there")
-    assert caught.value.message.startswith("there is no place like nowhere://there: protocol not")
+    assert caught.value.message.startswith(
+        "there is no such place as nowhere://there: protocol not"
+    )
     monkeypatch.setitem(sys.modules, "fsspec", None)
     with pytest.raises(EffectError) as caught:
         shared_place("s3://bucket/cache")

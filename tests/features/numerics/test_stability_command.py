@@ -80,7 +80,7 @@ def test_model_of_the_course_is_a_case_if_something_is_known_of_it(
     )
     assert run(course, "drop") == 2
     assert capsys.readouterr().err == (
-        "coursebuild: nothing is known of `drop` in theory; "
+        "coursebuild: no theory is known for `drop`; "
         "give its motion in models/drop.exact.py, or `expected` of a scenario\n"
     )
     (course / "models" / "drop.toml").write_text(
