@@ -230,6 +230,7 @@ class Reason(Struct, frozen=True):
 
 REASONS = (
     Reason("another level that a heading may have", "heading", "#+", "#{2,6} .*"),
+    Reason("without a heading, the one before it", "heading", "(?s).*", "(?s).*", "line lost"),
     Reason(
         "another formula that is whole: what it says is proven where it has numbers",
         "formula",
@@ -241,7 +242,7 @@ REASONS = (
     Reason("what is measured is the author's choice", "declarations", r"[\w.]*", r"\w+ = .*"),
     Reason("a callout without its first line is a quotation", "callout", slip="line lost"),
     Reason("a name that nothing else names", "fence", r"[\w.]*", r".*file=\S+.*"),
-    Reason("given by the author: no script prints it", "number", r"[\d.]*", r".*\{given.*"),
+    Reason("given by the author: no script prints it", "number", r"[\d.°]*", r".*\{given.*"),
     Reason("another number that the script printed", "number", r"[\d.-]*", r".*\{out.*"),
     Reason("another name of a source", "number", r"[\w ]*", r".*\{given=.*"),
     Reason("another number that a quiz may have", "quiz", r"[\d.]*", r".*\d.*"),

@@ -19,6 +19,8 @@ _PUNCTUATION = set(".,;:!?'\"()-/‘’“”–—…")
 _CODE = {"code", "pre", "math", "script", "style", "svg", "kbd", "samp"}
 _SAID = ("alt", "title", "aria-label", "content", "placeholder")
 """Attributes that hold prose."""
+_KEYS = ("data-key", "data-question")
+"""Attributes that hold what the tool made of words, such as a hash that may be a number."""
 _SAID_FIELDS = frozenset(
     "title label text note q options explain hint hints reference ylabel xlabel unit name".split()
 )
@@ -51,7 +53,7 @@ class _Reader(HTMLParser):
         for name, value in values.items():
             if name in _SAID:
                 self._say(value)
-            elif name.startswith("data-"):
+            elif name.startswith("data-") and name not in _KEYS:
                 self._read_data(value)
         if tag not in {"img", "input", "br", "meta", "link", "hr", "source", "wbr"}:
             is_comment = re.search(r"\bc1?\b", values.get("class", "")) and self._in_code()

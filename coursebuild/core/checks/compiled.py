@@ -281,6 +281,9 @@ def _check_text(
                 f"the message of the compiler does not contain `{block.error}`",
                 notes=[Note(f"it says: {result.error}", place)],
             )
+        elif (fault := _find_fault(text.code, text.lines_before, text.text)) is not None:
+            message = f"{subject} holds {fault[1]}"
+            yield diagnose("mjcf-error", fault[0], message, help=_FAULT_HELP)
         return
     if result.error:
         span = line_span(text.code, result.line, text.lines_before, block.span.first_line())

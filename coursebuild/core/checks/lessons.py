@@ -150,7 +150,21 @@ _SHORT_COMMANDS = frozenset("mu nu xi ln le ge ne in to int sum det bar sgn".spl
 """Those that one may; they are taken for commands where the text uses them as such."""
 _LETTERS = re.compile(r"\\[A-Za-z]+|\\.|[A-Za-z]+", re.DOTALL)
 _BRACKETS = re.compile(r"\\[{}]|\\[^{}]|[()\[\]]", re.DOTALL)
-_INTERVAL = re.compile(r"[()\[\]][^()\[\]]*[,;][^()\[\]]*[()\[\]]|\\(?:left|right)\s*\.|\\begin")
+_PAIR = re.compile(
+    r"\([^()\[\]]*\)|\[[^()\[\]]*[,;][^()\[\]]*[)\[]|[(\]][^()\[\]]*[,;][^()\[\]]*\]"
+    r"|\][^()\[\]]*[,;][^()\[\]]*\[|\[[^()\[\]]*\]"
+)
+"""Brackets with none between them that belong together; those of an interval may differ."""
+_JOINT = re.compile(
+    rf"[A-Za-z]{{0,2}}?({'|'.join(sorted(_COMMANDS, key=len, reverse=True))})[A-Za-z]{{0,2}}"
+)
+"""A command without its backslash that has run into a letter or two."""
+_WORDS_WITH_COMMANDS = frozenset(
+    """
+    blog chat chia chin chip clog cost costs cosy cots dote dots expo hats limb lime limp logo logs
+    meta prods seta sine sing sink sins slim slog tang tank tans taut that vecs what
+    """.split()
+)
 
 
 def _formula_uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
@@ -210,20 +224,34 @@ def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnosti
     """Report commands without their backslash, and brackets without the other one."""
     text = _WORDS.sub(lambda match: " " * len(match[0]), tex.text)
     for letters in _LETTERS.finditer(text):
-        if letters[0] in commands:
-            message = f"`{letters[0]}` would be shown as a product of letters"
-            help = f"write `\\{letters[0]}`, or `\\mathrm{{{letters[0]}}}` for a name"
-            place = tex.span(*letters.span())
-            is_string = _stands_in_fence(place)  # there a backslash may need another
-            fix = Fix(help, None if is_string else f"\\{letters[0]}")
-            yield diagnose("math-command", place, message, help=fix)
+        command, run = letters[0], letters[0]
+        if run not in commands:
+            joint = _JOINT.fullmatch(run) if run not in _WORDS_WITH_COMMANDS else None
+            if joint is None or len(run) - len(joint[1]) > (1 if len(joint[1]) < 4 else 2):
+                continue
+            command = joint[1]
+        proposal = run.replace(command, f" \\{command} ").replace("\\ ", "\\").strip()
+        message = f"`{run}` would be shown as a product of letters"
+        help = f"write `{proposal}`, or `\\mathrm{{{run}}}` for a name"
+        place = tex.span(*letters.span())
+        is_string = _stands_in_fence(place)  # there a backslash may need another
+        yield diagnose(
+            "math-command", place, message, help=Fix(help, None if is_string else proposal)
+        )
     if (prime := re.search(r"(?:^|[(\[=+,;&-])\s*(')", text)) is not None:
         message, help = "this prime follows nothing", "write the letter before it"
         yield diagnose("math-syntax", tex.span(*prime.span(1)), message, help=help)
     if (at := text.find("`")) >= 0:
         message, help = "a backtick would be shown in this formula", Fix("delete it", "", safe=True)
         yield diagnose("math-syntax", tex.span(at, at + 1), message, help=help)
-    if _INTERVAL.search(text):
+    is_one_sided = re.search(r"\\(?:left|right)\s*\.", text) is not None
+    while (rest := _PAIR.sub(lambda match: " " * len(match[0]), text)) != text:
+        text = rest
+    comma = re.search(r"(?<=[\w})]),(?=\\mathrm\s*(?:\{d\}|d\b|d[A-Z]\b))", tex.text)
+    if comma is not None and "\\int" in tex.text and text[comma.start()] == ",":
+        message, help = "a comma would be shown before this differential", Fix("write `\\,`", "\\,")
+        yield diagnose("math-syntax", tex.span(*comma.span()), message, help=help)
+    if is_one_sided:
         return
     unmatched: list[int] = []
     for bracket in _BRACKETS.finditer(text):

@@ -113,7 +113,12 @@ def _remove_front_matter(text: Excerpt, state: ParsingState) -> Excerpt:
     return text.slice(match.end())
 
 
-_TEXTS = frozenset(("", *"console log none plain plaintext raw stdout text txt".split()))
+_TEXTS = frozenset(
+    """
+    ansi console log none out plain plaintext pycon raw result results shell-session stdout
+    terminal text txt
+    """.split()
+) | {""}
 """Kinds of code blocks that may show an output."""
 
 

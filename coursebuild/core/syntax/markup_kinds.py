@@ -108,6 +108,16 @@ FOREIGN = {
         "an index or an exponent is not written in this way",
         "write a formula, `$\\mathrm{H_2O}$`, or HTML: `<sub>2</sub>`, `<sup>2</sup>`",
     ),
+    "comment": MarkupKind(
+        r"(?<![\w%])%%(?=[^\s%])[^%\n\0]+%%(?!\w)|(?<=[ \t])\^(?=[\w-]*[a-z])[\w-]{3,}\Z",
+        "comments and names of blocks are not written in this way",
+        "delete it; a comment is `<!-- text -->`, and a link leads to a heading: `[text](#id)`",
+    ),
+    "definition": MarkupKind(
+        r"(?<=[^\n]\n): {1,3}(?=\w)",
+        "no definition begins here",
+        "mark a word where it is explained: `[word]{term}`",
+    ),
     "contents": MarkupKind(
         r"^\[TOC\]$",
         "there is no such mark",
@@ -124,9 +134,10 @@ FOREIGN = {
         "write a link, a formula or code as Markdown has it",
     ),
     "directive": MarkupKind(
-        r"^\.\. [\w:+-]+::",
-        "directives of reStructuredText are not read",
-        "a callout is a quotation, `> [!note]`; an image is `![what it shows](x.svg)`",
+        r"^\.\. [\w:+-]+::|(?:(?<=\0)|(?<=\]))__?(?=[\s.,;:)]|\Z)|(?<=\w)::\Z",
+        "directives, links and blocks of reStructuredText are not read",
+        "a callout is a quotation, `> [!note]`; an image is `![what it shows](x.svg)`, a link "
+        "`[text](address)`, and code stands between two lines of three backticks",
     ),
     "magic": MarkupKind(
         r"^(?:%%[a-z]\w*|%(?:config|conda|load_ext|matplotlib|pip|run|timeit|time)\b)",
@@ -137,8 +148,10 @@ FOREIGN = {
         r"^\[(?:source|listing|NOTE|TIP|WARNING|IMPORTANT|CAUTION|stem|latexmath|verse|quote)"
         r"(?:,[^\]\n\0]*)?\]$|^(?:image|include|video|audio|toc|stem)::[^\s\[\0]*\[[^\]\n\0]*\]"
         r"|^#\+[A-Z_]+(?::|\b)|^h[1-6]\. (?=\w)|\{(?:code|panel|info|noformat)(?::[^{}\n\0]*)?\}"
-        r"|(?-i:^[AWTEDQ]> )|^[?!]> (?=\w)",
-        "markup of AsciiDoc, Docsify, Org, Textile or a wiki is not read",
+        r"|(?-i:^[AWTEDQ]> )|^[?!]> (?=\w)|^={2,6} (?=\w)[^=\n\0]+(?: ={2,6})?$|'{3}[^'\n\0]+'{3}"
+        r"|^\*{2,6} (?=(?-i:[A-Z]))|^\*\[[^\[\]\n\0]+\]:|\[/(?:b|i|u|s|code|img|list|quote|url)\]"
+        r"|^#(?:let|set|show) [\w.]+ ?[=:(]|(?<![\w&])#(?:figure|image|link|table|text)\(",
+        "markup of AsciiDoc, a forum, Docsify, Org, Textile, Typst or a wiki is not read",
         "write it as Markdown: `## Title`, `![what it shows](x.svg)`, a fence of three backticks",
     ),
     "prompt": MarkupKind(
@@ -174,7 +187,7 @@ BROKEN = {
         r"(?<!\\)!?\[[^\[\]]{0,200}(?<!\\)\][ \t]+\(" + _ADDRESS + r"[^)\n]*\)"
         r"|(?:(?<!\\)!?\[[^\[\]]{0,200})?(?<!\\)\]\([^\s)]*\)?"
         r"|\([^()\n]{1,200}\)\[" + _ADDRESS + r"[^\]\n]*\]"
-        r"|(?<!\\)!\[[^\[\]\n\0]*\]"
+        r"|(?<!\\)!\[[^\[\]\n\0]*\]|(?<!\\)!\([^()\s]+\)\[[^\[\]\n]*\]"
         r"|(?<!\\)\[[^\[\]]{1,200}(?<!\\)\]\w\([^()\s]*[:/#.][^()\s]*\)"
         rf"|(?<![\w:/.])(?-i:{_SCHEME})[\w.#/-]*\w"
         r"|(?<!\\)\[[^\[\]]{0,200}\(" + _ADDRESS + r"[^()\s]*\)(?![^\[\n]*\])"
@@ -184,7 +197,7 @@ BROKEN = {
         "a link is `[text](address)`, with no blank before the `(` and none in the address",
     ),
     "bracket": MarkupKind(
-        r"(?<![\\\w])\[(?=[^\W\d_]{2})(?![^\[\]]*\])",
+        r"(?<![\\\w])\[(?=[^\W\d_]{2})(?![^\[\]]*\])|(?<=[^\W\d_])\[(?=(?-i:[a-z]))(?![^\[\]]*\])",
         "no link begins here",
         "a link is `[text](address)`; write a backslash before a bracket that is meant to be seen",
     ),
@@ -233,6 +246,7 @@ BROKEN = {
     "item": MarkupKind(
         r"^\d{1,2}(?:[.)][.,)]|[,;]) (?=(?-i:[A-Z\0]))|^\d{1,2}[.)](?=(?-i:[A-Z][a-z]))"
         r"|\A1 (?=(?:[^\n]*\n)+?2\. )|^-(?=(?-i:[A-Z][a-z]))"
+        r"|^[•‣◦▪●] ?(?=\w)|^-- (?=\0)"
         r"|(?:^[=_]|(?<=\n)0) (?=(?-i:[A-Z][a-z]))|^[.)] (?=(?-i:[A-Z][a-z]))"
         r"|^[0=_] (?=(?-i:\0\0?[A-Z]))",
         "no item of a list begins here",
@@ -247,6 +261,11 @@ BROKEN = {
         r"<!--|</[A-Za-z][\w-]*>?|<[A-Za-z][\w-]*\s+[\w-]+\s*=[^<>\n]*>?",
         "no tag or comment was read here",
         'close it: `<tag attribute="value">`, `</tag>`, `<!-- comment -->`',
+    ),
+    "quotation": MarkupKind(
+        r"(?<=[^\W\d_])>[ \t](?=(?-i:[a-z]{2}))|(?<=[^\W\d_][ \t])<(?=(?-i:[a-z]{2,}) (?-i:[a-z]))",
+        "no quotation or tag begins here",
+        "write a comparison with blanks on both sides of its sign; a quotation begins a line",
     ),
     "entity": MarkupKind(
         rf"&(?:{'|'.join(_ENTITIES.split())})(?![\w;])",

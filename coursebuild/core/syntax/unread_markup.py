@@ -51,10 +51,11 @@ _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
 _MARKS = r"{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f"
 _SIGN = re.compile(
     rf"[{_MARKS}!?=:._'´‘’(](?:(?<=[{_MARKS}])|(?<=[!?=:._'])[!?=:._']|(?<=:)\w"
-    r"|(?<=[´‘’])[´‘’]{2}|(?<=\()(?:out|given)\))"
+    r"|(?<=[´‘’])[´‘’]{2}|(?<=\()(?:out|given)\))|[^\W\d_]> [a-z]|\w <[a-z]{2}"
 )
 _FIRST_SIGN = re.compile(
-    r"\d{1,2}[.,;)][^\d\s]|\d{1,2}[,;] |-[A-Z]|[0=_.)] |h\d\. |[A-Z?!]> |1 |import |_\Z"
+    r"\d{1,2}[.,;)][^\d\s]|\d{1,2}[,;] |-[A-Z]|[0=_.)] |h\d\. |[A-Z?!]> |1 |import "
+    r"|_[_.,;:)]?(?:\Z| )|: +\w|[•‣◦▪●]|-- "
 )
 """What all unread markup has at least once, in a text or where a line of it begins, so that most
 texts are passed over quickly; or it mentions a lesson, or is a letter directly after a formula."""
@@ -68,6 +69,9 @@ _LONE_DOLLAR = re.compile(
     r"(?<![\w$])\$(?!(?-i:[A-Z_]{3,})\b)(?:[A-Za-z\\(|{]|[-+][A-Za-z])"
     r"|(?:(?<![A-Za-z])(?<!\d )(?:[a-z]{1,2}|(?-i:[A-Z](?!\$ ?\d)))|[)}])\$(?![\w$])"
     r"|(?<![\w$])[-+(]*[A-Za-z][\w\\{}().-]*[*/^_=<>+][\w\\{}().*/^_=<>+-]*[0-9]\$(?![\w$])"
+    r"|(?<![\w$])\$\d[^\s$]*\\[A-Za-z]{2,}|(?<![\w$])\$\d[\d.]*[+^*][\w(\\]"
+    r"|(?<![\w$])\$(?=[^$\n=]*(?:[*/^+]|[A-Za-z]))(?:[\d.]+|[A-Za-z](?![A-Za-z])|[-+*/^() ])+="
+    r"|(?<![\w$])\$[-+=][:;,.](?!\d)"
     r"|(?<!\$)\$ [A-Za-z](?: ?[=<>+*/^_-] ?[\w.]+)* \$(?!\$)"
 )
 """Dollar signs that were surely meant for a formula, with a character of it."""
@@ -286,8 +290,15 @@ def find_stars(
 def find_repetitions(content: Excerpt) -> Iterator[Diagnostic]:
     """Report lines that begin with the same words twice, as half an edit leaves them.
 
-    What ends with punctuation, or is repeated again and again, is meant.
+    What ends with punctuation, or is repeated again and again, is meant. With the mark of a
+    quotation or a list between them, a few letters suffice.
     """
+    for line in re.finditer(
+        r"^(\S.{2,22}\w)(?:[-*+>]|#+|\d+\.) (?=\1)", content.text, re.MULTILINE
+    ):
+        message = f"`{shorten(line[0])}` stands here twice"
+        help = Fix("delete it once", "")
+        yield diagnose("text-repeated", content.span(*line.span()), message, help=help)
     for line in re.finditer(r"^\S.{23,}", content.text, re.MULTILINE):
         at = line[0].find(line[0][:12], 12)
         half = re.sub(r"(?:[-*+>]|#+|\d+\.) ?\Z", "", line[0][: max(at, 0)])

@@ -234,6 +234,31 @@ def slips_of(name: str) -> frozenset[str]:
     return frozenset(slips - {name})
 
 
+def is_one_edit(word: str, name: str) -> bool:
+    """Whether a letter of a name was dropped, added, mistyped or swapped with the next one.
+
+    Endings, as of a plural, and other digits are no slips; a short name has another letter only
+    where its key is beside the right one.
+    """
+    shorter, longer = sorted((word, name), key=len)
+    if len(longer) - len(shorter) > 1 or longer in (f"{shorter}s", f"{shorter}d", f"{shorter}r"):
+        return False
+    if re.findall("[0-9]", word) != re.findall("[0-9]", name) or not word.isascii():
+        return False
+    pairs = enumerate(zip(word, name, strict=False))
+    start = next((n for n, (a, b) in pairs if a != b), len(shorter))
+    rest, longer_rest = shorter[start:], longer[start:]
+    if len(shorter) < len(longer):
+        is_doubled = word[start - 1 : start] == word[start : start + 1]
+        return rest == longer_rest[1:] and (len(name) > 3 or is_doubled)
+    if len(name) < 4:
+        return False
+    if rest[1:] == longer_rest[1:]:
+        is_beside = word[start:].lower()[:1] in _NEARBY.get(name[start:].lower()[:1], ())
+        return len(name) > 6 or is_beside
+    return rest[1::-1] == longer_rest[:2] and rest[2:] == longer_rest[2:]
+
+
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     """The fix that writes the nearest known name instead, or a help that lists them if few.
 

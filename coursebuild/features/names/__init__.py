@@ -20,12 +20,14 @@ from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.features.names.claims import GUESSES, course_names, document_names, names_of
-from coursebuild.features.names.engine import EngineTable, KnownName, engine_names, list_names
-from coursebuild.features.names.resolve import (
-    Resolver,
+from coursebuild.features.names.engine import (
+    EngineTable,
+    KnownName,
     Unknown,
-    resolver_of,
+    engine_names,
+    list_names,
 )
+from coursebuild.features.names.resolve import Resolver, resolver_of
 
 _HELP = "say `{code}` after it if it is no name, or list it under `names` in `[verify]`"
 

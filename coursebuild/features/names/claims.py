@@ -61,6 +61,7 @@ _NEAR_FILE = re.compile(r"(?!.*[A-Z]{3})[\w.-]+/[\w./-]*\w\.(?:md|py|toml|xml)")
 """What is a file of the course only if it is like the name of one."""
 _CODE_WORD = re.compile(
     r"\b\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
+    r"|(?<=\")[A-Za-z]\w+(?=\")"
 )
 """A word of code that inline code could mean."""
 _CODE = (
@@ -68,10 +69,13 @@ _CODE = (
 ) | model.Recording
 _PLAIN = re.compile(r"(?<![\w.\\/-])[A-Za-z]\w+[^\W_](?:\.(?:md|py|toml|xml)\b)?(?![\w./\\-])")
 """A word of inline code that is no part of a path."""
-_TOKEN = re.compile(r"(?<!\S)(?=\S*[A-Za-z_]{4})(?!\w+(?!\S))\S{6,}(?!\S)")
+_TOKEN = re.compile(
+    r"(?<!\S)(?=\S*[A-Za-z_]{4})(?!\w+(?!\S))\S{6,}(?!\S)"
+    r"|(?<!\S)\w*[\\<;,'\[\]]\w{3,}(?!\S)"
+)
 """What stands between blanks, with a word of some length and more than that."""
-_TAIL = re.compile(r"[A-Za-z]+(?!\w)")
-"""Letters directly after code."""
+_TAIL = re.compile(r"[A-Za-z0-9]+(?!\w)")
+"""Letters or digits directly after code."""
 _MOST_PLAIN = 3
 """How many uses of a plain word are kept of a document: what is used again is no slip."""
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
@@ -243,7 +247,8 @@ def claims_of(code: model.CodeSpan) -> Iterator[tuple[Claim, Span]]:
     tail, last = _TAIL.match(code.span.source.text, code.span.end), re.search(r"\w+\Z", text)
     if tail is not None and last is not None:
         finds.append(("torn", f"{last[0]} {tail[0]}", last[0]))
-    plain = (word for word in _PLAIN.findall(text) if word not in used_words)
+    is_markup = "`" in text  # it shows how inline code is written
+    plain = (w for w in _PLAIN.findall(text) if w not in used_words and not is_markup)
     finds += (("plain", word, word) for word in dict.fromkeys(plain))
     finds += (("token", token, token) for token in _TOKEN.findall(text))
     for number, (kind, name, part) in enumerate(finds):

@@ -11,6 +11,7 @@ import functools
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TypeAlias
 
 import msgspec
 from msgspec import Struct
@@ -179,6 +180,19 @@ class KnownName(Struct, frozen=True):
     """The shape of an array."""
     engine: bool = False
     """Whether it is a name of MuJoCo or MJCF, which another version may have lost."""
+
+
+class Unknown(Struct, frozen=True):
+    """Why there is nothing of a name."""
+
+    message: str
+    help: str = ""
+    part: str = ""
+    """The part of the name that is wrong."""
+
+
+Answer: TypeAlias = KnownName | Unknown | None
+"""`None` means that nobody can say."""
 
 
 def find_engine_name(engine: EngineNames, name: str) -> KnownName | None:

@@ -1,7 +1,7 @@
 """Resolves the names in inline code: what each one means, or why there is nothing of that name.
 
-Entry points: `resolver_of`, a course; `KnownName` and `Unknown`, its answers. `None` means that
-nobody can say: the name belongs to something that is read nowhere, such as another program.
+Entry point: `resolver_of` a course. Its answer `None` means that nobody can say: the name belongs
+to something that is read nowhere, such as another program.
 """
 
 from __future__ import annotations
@@ -12,28 +12,34 @@ import keyword
 import re
 from collections import Counter
 from collections.abc import Iterable
-from typing import TypeAlias
-
-from msgspec import Struct
 
 from coursebuild import MANUAL
 from coursebuild.core.model import Course, document_scripts
 from coursebuild.core.model.addresses import line_anchor
-from coursebuild.core.syntax.course_schema import CourseFile
 from coursebuild.core.syntax.html import ELEMENTS
-from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest, propose, slips_of
-from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, course_names, words_of
+from coursebuild.core.text.diagnostics import (
+    did_you_mean,
+    is_one_edit,
+    misspelt,
+    nearest,
+    propose,
+    slips_of,
+)
+from coursebuild.features.names import claims, own_names
+from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, course_names
 from coursebuild.features.names.engine import (
     ITEM_CLASSES,
+    Answer,
     EngineName,
     EngineNames,
     EngineTable,
     KnownName,
+    Unknown,
     class_href,
     element_href,
     find_engine_name,
 )
-from coursebuild.features.names.own_names import known_keys, options_by_command, tables_of
+from coursebuild.features.names.own_names import known_keys, options_by_command
 
 _MANUAL_ID = "coursebuild-manual"
 """The id of the manual, in docs/content/course.toml."""
@@ -44,17 +50,6 @@ _HTML = ELEMENTS | frozenset(
     "option output script select style template textarea".split()
 )
 
-
-class Unknown(Struct, frozen=True):
-    """Why there is nothing of a name."""
-
-    message: str
-    help: str = ""
-    part: str = ""
-    """The part of the name that is wrong."""
-
-
-Answer: TypeAlias = KnownName | Unknown | None
 
 _resolvers: list[Resolver] = []
 """The one that was asked last."""
@@ -81,6 +76,7 @@ class Resolver:
         self.course = course
         table = course.references.get("names")
         self.engine = engine
+        self._names_by_page: dict[int, frozenset[str]] = {}
         if engine is None and isinstance(table, EngineTable):
             self.engine = table.names
 
@@ -89,7 +85,7 @@ class Resolver:
         """The words of all code of the course."""
         words: set[str] = {model.name for model in self.course.models}
         for model in self.course.models:
-            words |= words_of(model.source.text)
+            words |= claims.words_of(model.source.text)
         for names in course_names(self.course):
             words |= names.words
             words |= names.definitions.keys()
@@ -113,9 +109,9 @@ class Resolver:
             return True
         documents = course_names(self.course)
         modules = {module for names in documents for module in names.imports.values()}
-        claims = (claim for names in documents for claim in names.claims if claim.kind == "word")
+        uses = (claim for names in documents for claim in names.claims if claim.kind == "word")
         return any(module.split(".")[0] == "mujoco" for module in modules) or any(
-            ENGINE_WORD.fullmatch(claim.name) for claim in claims
+            ENGINE_WORD.fullmatch(claim.name) for claim in uses
         )
 
     def resolve(self, claim: Claim, names: CodeNames) -> Answer:
@@ -130,17 +126,17 @@ class Resolver:
             case "attribute":
                 return self._attribute(*claim.name.split(" "))
             case "command":
-                return self._command(claim.name)
+                return own_names.resolve_command(self._manual("commands"), claim.name)
             case "option":
-                return self._option(*claim.name.split(" "))
+                return own_names.resolve_option(self._manual("commands"), *claim.name.split(" "))
             case "table":
-                return self._table(*claim.name.split(" "))
+                return own_names.resolve_table(self._manual("course-map"), *claim.name.split(" "))
             case "file":
                 return self._file(claim.name)
             case "plain":
                 return self._plain(claim.name, names)
             case "token":
-                return self._token(claim.name)
+                return self._token(claim.name, names)
             case "half":
                 return self._half(claim.name)
             case "torn":
@@ -178,17 +174,19 @@ class Resolver:
     @functools.cached_property
     def uses(self) -> Counter[str]:
         """How often inline code has each word and each token that may be no name."""
-        claims = (claim for names in course_names(self.course) for claim in names.claims)
-        return Counter(claim.name for claim in claims if claim.kind in ("plain", "token"))
+        uses = (claim for names in course_names(self.course) for claim in names.claims)
+        return Counter(claim.name for claim in uses if claim.kind in ("plain", "token"))
 
     @functools.cached_property
     def plain_words(self) -> dict[str, int]:
         """Words without the shape of a name, each with the least length that is telling."""
         uses, engine = self.uses, self.engine
-        files = (path.rpartition("/")[2] for path in self.files)
         common_words = {*known_keys(), *self.imports, *options_by_command(), *keyword.kwlist}
+        common_words |= {"jupyter", "pytest", "python", "python3"}
+        common_words.update(part for module in self.imports.values() for part in module.split("."))
         common_words.update(vars(builtins), *(() if engine is None else engine.modules.values()))
-        own_words = {*self.words, *files, *(word for word, count in uses.items() if count > 1)}
+        own_words = {*self.words, *self.file_names}
+        own_words.update(word for word, count in uses.items() if count > 1)
         frequent_words = {word for word, count in uses.items() if count > 4 and len(word) > 3}
         engine_words = engine.words if engine is not None and self.has_engine else ()
         sets = ((common_words, 6), (own_words, 4), (engine_words, 4), (frequent_words, 3))
@@ -213,42 +211,71 @@ class Resolver:
 
     def _plain(self, name: str, names: CodeNames) -> Answer:
         lengths, is_constant = self.plain_words, name.isupper()
-        if name in lengths or name in names.words or (is_constant and len(name) < 7):
+        is_initials = is_constant and len(name) < 7 and name.isalpha()
+        if name in lengths or name in names.words or is_initials:
             return None
+        page_names = self._page_names(names) if self.engine is not None or len(name) > 4 else ()
+        near = {word for word in page_names if is_one_edit(name, word)}
+        # Of 20,000 usual words of a language some 500 differ by a letter from any name: `weight` is
+        # no slip of `height`. In other languages than English, longer ones do as well.
         slips = {slip.upper() for slip in slips_of(name.lower())} if is_constant else slips_of(name)
-        near = {
+        is_english = self.course.language.partition("-")[0] == "en"
+        near |= {
             word
             for word in slips
             if len(word) >= lengths.get(word, len(word) + 1)
-            and (word[0] == name[0] or self.uses[word] > 1)  # `fields` is no slip of `hfields`
+            # `fields` is no slip of `hfields`
+            and (word[0] == name[0] or len(word) > 8 or self.uses[word] > 1)
+            and (
+                sorted(word) == sorted(name)
+                or (is_english and (len(word) > 6 or re.sub(r"(.)\1", r"\1", name) == word))
+            )
         }
-        # Of 9,600 words of prose, 8 have another letter inside than a long name of MuJoCo, but some
-        # 500 differ by a letter from any name: `weight` is no slip of `height`.
-        if len(name) > 5 or re.search("[0-9]", name):
-            splits = [(name[:n], name[n:]) for n in range(1, len(name) - 1)]
-            words = {head + tail[1:] for head, tail in splits}
-            words |= {
-                head + letter + tail[1:]
-                for head, tail in splits
-                for letter in "abcdefghijklmnopqrstuvwxyz_"
-            }
+        if is_english and name.isascii() and (len(name) > 5 or re.search("[0-9]", name)):
+            letters = ("", *"abcdefghijklmnopqrstuvwxyz_")
+            middle = range(1, len(name) - 1)
+            words = {name[:n] + letter + name[n + 1 :] for n in middle for letter in letters}
             near |= words & self.long_words
         if (likely := min(near, default=None)) is None:
             return None
         message = f"nothing that the course knows is called `{name}`"
         return Unknown(message, propose(name, likely, near), name)
 
-    def _token(self, name: str) -> Answer:
+    def _page_names(self, names: CodeNames) -> frozenset[str]:
+        """The names of a document, of three letters or more, for which others may be slips."""
+        key = id(names)
+        if key not in self._names_by_page:
+            words = {*names.words, *names.definitions, *names.imports}
+            words.update(part for module in names.imports.values() for part in module.split("."))
+            for claim in names.claims:
+                if claim.kind not in claims.GUESSES:
+                    words.update(re.findall(r"\w+", claim.name))
+                elif claim.kind == "plain" and claim.name in self.plain_words:
+                    words.add(claim.name)
+            self._names_by_page[key] = frozenset(word for word in words if len(word) > 2)
+        return self._names_by_page[key]
+
+    def _token(self, name: str, names: CodeNames) -> Answer:
         """A token that is another one of the course but for a slip in or beside a word."""
         if self.uses[name] > 1:
             return None
+        message = f"nothing that the course knows is called `{name}`"
+        sign = re.fullmatch(r"([\w.]*)([\\<]|(?<=.)[;,'\[\]])([\w.]*\w)", name)
+        if sign is not None:
+            head, tail = sign[1], sign[3]  # the sign took the place of a letter, or came beside one
+            lengths = {len(name), len(name) - 1} if head else {len(name)}
+            candidates = {*self._page_names(names), *self.file_names, *self.long_words}
+            likely = {c for c in candidates if c.startswith(head) and c.endswith(tail)}
+            if (
+                candidate := min((c for c in likely if len(c) in lengths), default=None)
+            ) is not None:
+                return Unknown(message, f"did you mean `{candidate}`?", name)
         words = [word.span() for word in re.finditer("[A-Za-z_]{4,}", name)]
         for candidate in slips_of(name):
-            if self.uses[candidate] > 1 or candidate in self.files:
+            if self.uses[candidate] > 1 or candidate in self.files or candidate in self.file_names:
                 pairs = enumerate(zip(name, candidate, strict=False))
                 at = next((n for n, (a, b) in pairs if a != b), len(name))
                 if any(start - 1 <= at <= end + 1 for start, end in words):
-                    message = f"nothing that the course knows is called `{name}`"
                     return Unknown(message, f"did you mean `{candidate}`?", name)
         return None
 
@@ -391,39 +418,6 @@ class Resolver:
 
     # --- coursebuild and the course
 
-    def _command(self, name: str) -> Answer:
-        if name in options_by_command():
-            return KnownName(self._manual("commands"))
-        help = did_you_mean(name, options_by_command())
-        return Unknown(f"coursebuild has no command `{name}`", help, name)
-
-    def _option(self, command: str, name: str) -> Answer:
-        commands = options_by_command()
-        options = commands.get(command)
-        if options is None:
-            options = frozenset(option for options in commands.values() for option in options)
-        if name in options:
-            return KnownName(self._manual("commands"))
-        if not command and nearest(name, options, cutoff=0.85) is None:
-            return None  # of another program
-        subject = f"`coursebuild {command}`" if command else "coursebuild"
-        return Unknown(f"{subject} has no option `{name}`", did_you_mean(name, options), name)
-
-    def _table(self, table: str, key: str) -> Answer:
-        name = table.lstrip("[")
-        tables = tables_of(CourseFile)
-        if name not in tables:
-            likely = misspelt(name, tables) if len(name) > 3 else None
-            if likely is None:
-                return None
-            return Unknown(
-                f"the course map has no table `{name}`", propose(name, likely, tables), name
-            )
-        if key and tables[name] and key not in tables[name]:
-            help = did_you_mean(key, tables[name])
-            return Unknown(f"the table `{name}` of the course map has no key `{key}`", help, key)
-        return KnownName(self._manual("course-map"))
-
     def _manual(self, page: str) -> str:
         """A page of the manual: in the manual's own course its file, else its address if known."""
         path = f"reference/{page}.md"
@@ -439,6 +433,11 @@ class Resolver:
             return None
         help = _propose(path, self.files) or "write it, or say `{code}` after the name"
         return Unknown(f"the course has no file `{path}`", help, path)
+
+    @functools.cached_property
+    def file_names(self) -> frozenset[str]:
+        """The names of its files without their folders."""
+        return frozenset(path.rpartition("/")[2] for path in self.files)
 
     @functools.cached_property
     def files(self) -> frozenset[str]:
