@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from coursebuild.cli.arguments import add_lessons, add_long, add_running, options_of, print_report
+from coursebuild.cli.arguments import (
+    add_executors,
+    add_lessons,
+    add_long,
+    add_running,
+    options_of,
+    print_report,
+)
 from coursebuild.pipeline.outputs import update
 
 EXAMPLES = """\
@@ -17,6 +24,7 @@ examples:
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_running(parser)
+    add_executors(parser)
     add_lessons(parser)
     add_long(parser)
     parser.add_argument(

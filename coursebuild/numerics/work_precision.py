@@ -380,6 +380,7 @@ def _measure_setting(
         "lucky": "",
         "own": setting == basis.baseline,
         "front": False,
+        "same": False,
     }
     row = WorkPrecisionRow(**figures)
     try:
