@@ -12,6 +12,7 @@ from coursebuild.cli.arguments import (
     options_of,
     print_report,
 )
+from coursebuild.core.files.errors import UsageError
 from coursebuild.pipeline.outputs import update
 
 EXAMPLES = """\
@@ -34,6 +35,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Record what scripts print now."""
+    if arguments.long and arguments.executor:  # what is recorded says which machine made it
+        raise UsageError(f"--long cannot be combined with {arguments.executor[0].option}")
     options = options_of(arguments)
     report = update(options, tuple(arguments.lessons), dry_run=arguments.dry_run)
     return print_report(report, "text", options)

@@ -312,5 +312,7 @@ def test_what_is_not_there(
         2,
         "coursebuild: there is no option `--cluster`; install `plugins/cluster` of coursebuild\n",
     )
+    result = run(folder, "update", "--long", "--cluster", "local")
+    assert result.err == "coursebuild: --long cannot be combined with --cluster\n"
     result = run(folder, "check", "--cluster", "local", "--against", "3.13.0")
     assert result.err == "coursebuild: --against cannot be combined with --cluster\n"
