@@ -153,15 +153,15 @@ def compare(name: str, first: str, second: str) -> None:
 
 
 def print_ratios(
-    name: str, rounds: int, own: Callable[[], float], there: Callable[[], float]
+    name: str, rounds: int, time_here: Callable[[], float], time_there: Callable[[], float]
 ) -> None:
     """Time two ways by turns."""
     ratios = []
     for turn in range(rounds):
         if turn % 2:
-            seconds_there, seconds = there(), own()
+            seconds_there, seconds = time_there(), time_here()
         else:
-            seconds, seconds_there = own(), there()
+            seconds, seconds_there = time_here(), time_there()
         ratios.append(seconds_there / seconds)
         print(
             f"  {name}: here {seconds:.1f} s, two workers {seconds_there:.1f} s, ×{ratios[-1]:.2f}"

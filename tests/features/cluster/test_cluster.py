@@ -152,24 +152,30 @@ def test_scripts_do_the_same_as_on_one_machine(
         info = "timeout=1" if name == "loops" else ""
         lesson += block(f"{name}.py", code, output, info=info)
     lesson += block("writes.py", WRITES, info="writes=runs")
-    here, there = twins(make, lesson)
-    for folder in (here, there):
+    first_course, second_course = twins(make, lesson)
+    for folder in (first_course, second_course):
         folder.replace("content/course.toml", "[course]\n", f"{LIMITS}\n[course]\n")
-    reports = [run(here, "check"), run(there, "check", "--cluster", address)]
+    reports = [run(first_course, "check"), run(second_course, "check", "--cluster", address)]
     assert [report.status for report in reports] == [1, 1], reports[1].err
-    first, second = map(without_place, (here, there), (report.out for report in reports))
+    first, second = map(
+        without_place, (first_course, second_course), (report.out for report in reports)
+    )
     assert second == first
     for outcome in ("ok", "drift", "failed", "timeout"):
         assert re.search(rf"^{outcome} ", first, re.MULTILINE), first
-    assert there.read("runs/new.txt") == here.read("runs/new.txt") == b"7"
-    reports = [run(here, "update"), run(there, "update", "--cluster", address)]
-    first, second = map(without_place, (here, there), (report.out for report in reports))
+    assert second_course.read("runs/new.txt") == first_course.read("runs/new.txt") == b"7"
+    reports = [run(first_course, "update"), run(second_course, "update", "--cluster", address)]
+    first, second = map(
+        without_place, (first_course, second_course), (report.out for report in reports)
+    )
     assert second == first
-    lessons = [folder.text(folder.lesson()) for folder in (here, there)]
-    assert lessons[1].replace(str(there.root), "") == lessons[0].replace(str(here.root), "")
+    lessons = [folder.text(folder.lesson()) for folder in (first_course, second_course)]
+    assert lessons[1].replace(str(second_course.root), "") == lessons[0].replace(
+        str(first_course.root), ""
+    )
     assert "1 2 3" in lessons[0]
     # What a worker has found out is remembered like what this machine has.
-    results = [run(folder, "check", "-v") for folder in (here, there)]
+    results = [run(folder, "check", "-v") for folder in (first_course, second_course)]
     paths = [
         set(re.findall(r"^  (examples/\S+\.py)", result.err, re.MULTILINE)) for result in results
     ]
@@ -179,28 +185,37 @@ def test_scripts_do_the_same_as_on_one_machine(
 def test_measurements_are_the_same_as_on_one_machine(
     make: Make, run: Callable[..., CommandResult], address: str
 ) -> None:
-    here, there = twins(make, GOOD)
-    for folder in (here, there):
+    first_course, second_course = twins(make, GOOD)
+    for folder in (first_course, second_course):
         folder.write("models/arm.toml", SCENARIO.format([0.01 * (n + 1) for n in range(20)]))
-    assert run(here, "bench", "--record").status == 0
+    assert run(first_course, "bench", "--record").status == 0
     folder = "content/reports"
-    for name, data in here.tree(folder).items():
-        there.write(f"{folder}/{name}", data)
+    for name, data in first_course.tree(folder).items():
+        second_course.write(f"{folder}/{name}", data)
     arguments = ("bench", "--check", "--format", "json")
-    first, second = run(here, *arguments), run(there, *arguments, "--cluster", address)
+    first, second = (
+        run(first_course, *arguments),
+        run(second_course, *arguments, "--cluster", address),
+    )
     assert second.out == first.out
     assert "measured here" not in second.err
     assert len(json.loads(first.out)["scenes"][0]["sweeps"][0]["rows"]) == 20
 
-    first, second = run(here, "diet", "--fix"), run(there, "diet", "--fix", "--cluster", address)
+    first, second = (
+        run(first_course, "diet", "--fix"),
+        run(second_course, "diet", "--fix", "--cluster", address),
+    )
     assert first.status == second.status == 0, second.err
     assert "measured here" not in second.err
-    assert there.read("models/arm.xml") == here.read("models/arm.xml")
-    assert b"unused" not in there.read("models/arm.xml")
+    assert second_course.read("models/arm.xml") == first_course.read("models/arm.xml")
+    assert b"unused" not in second_course.read("models/arm.xml")
     assert "changed models/arm.xml: unused-site" in second.out
 
     arguments = ("stability", "projectile", "--format", "json")
-    first, second = run(here, *arguments), run(there, *arguments, "--cluster", address)
+    first, second = (
+        run(first_course, *arguments),
+        run(second_course, *arguments, "--cluster", address),
+    )
     reports = [json.loads(result.out) for result in (first, second)]
     for report in reports:
         assert [case.pop("costs") != [] for case in report] == [True]
@@ -220,8 +235,8 @@ def test_a_killed_worker_costs_its_task_only(
         "    while True: pass\n"
         "print(7)"
     )
-    others = "".join(block(f"{n}.py", f"print({n})", f"{n}") for n in "12")
-    folder = make("## One\n\n" + block("waits.py", code, "7") + others)
+    rest = "".join(block(f"{n}.py", f"print({n})", f"{n}") for n in "12")
+    folder = make("## One\n\n" + block("waits.py", code, "7") + rest)
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     arguments = ("check", "--cluster", address)
     with kill_at_end(folder.start(*arguments, env=environment(path), **pipes)) as process:
@@ -236,8 +251,8 @@ def test_a_script_that_kills_its_worker_each_time(
     make: Make, run: Callable[..., CommandResult], address: str
 ) -> None:
     kills = block("kills.py", f"{WORKER}os.kill(worker, 9)\nprint(1)", "1")
-    others = "".join(block(f"{n}.py", f"print({n})", f"{n}") for n in "1234")
-    result = run(make("## One\n\n" + kills + others), "check", "--cluster", address)
+    rest = "".join(block(f"{n}.py", f"print({n})", f"{n}") for n in "1234")
+    result = run(make("## One\n\n" + kills + rest), "check", "--cluster", address)
     assert result.status == 1
     assert len(re.findall("^ok ", result.out, re.MULTILINE)) == 4
     assert "the worker that ran this script died, 3 times" in result.out
@@ -279,10 +294,10 @@ def tasks_of(address: str) -> int:
 def test_a_worker_of_another_version_is_refused(
     make: Make, run: Callable[..., CommandResult], path: str, tmp_path: Path
 ) -> None:
-    other = tmp_path / "other/numpy-9.9.dist-info"
-    other.mkdir(parents=True)
-    (other / "METADATA").write_text("Name: numpy\nVersion: 9.9\n")
-    with local_cluster(tmp_path / "workers", 1, f"{other.parent}:{path}") as address:
+    package = tmp_path / "other/numpy-9.9.dist-info"
+    package.mkdir(parents=True)
+    (package / "METADATA").write_text("Name: numpy\nVersion: 9.9\n")
+    with local_cluster(tmp_path / "workers", 1, f"{package.parent}:{path}") as address:
         result = run(make(GOOD), "check", "--cluster", address)
     assert result.status == 1
     *_, message, help = result.err.splitlines()
