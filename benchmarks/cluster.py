@@ -127,7 +127,7 @@ def run_and_kill(cluster: LocalCluster, root: Path, *arguments: str, events: int
     process = begin(root, *arguments, "--cluster", cluster.scheduler_address)
     while process.poll() is None and scheduler.transition_counter < before + events:
         time.sleep(0.01)
-    victim = cluster.workers[0].pid
+    victim = next(iter(cluster.workers.values())).pid
     if process.poll() is None:
         os.kill(victim, signal.SIGKILL)
         print(f"  worker {victim} was killed midway")

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from support.local_cluster import local_cluster
+from support.sandboxes import require_sandbox
 from support.scratch_course import (
     GOOD,
     ROOT,
@@ -221,6 +222,19 @@ def test_measurements_are_the_same_as_on_one_machine(
         assert [case.pop("costs") != [] for case in report] == [True]
     assert reports[1] == reports[0]
     assert "measured here" not in second.err
+
+
+def test_the_sandbox_holds_on_a_worker(
+    make: Make, run: Callable[..., CommandResult], address: str, tmp_path: Path
+) -> None:
+    secret = tmp_path / "secret"
+    secret.write_text("of somebody")
+    code = f"import os\nprint(os.path.exists({str(secret)!r}), os.getpid() < 100)"
+    folder = make("## One\n\n" + block("looks.py", code, "False True"))
+    require_sandbox(folder.root)
+    result = run(folder, "check", "--sandbox", "--cluster", address)
+    assert result.status == 0, result.out + result.err
+    assert run(folder, "check", "--no-cache", "--cluster", address).status == 1
 
 
 def test_a_killed_worker_costs_its_task_only(
