@@ -101,13 +101,13 @@ def add_running(parser: argparse.ArgumentParser) -> None:
 def add_executors(parser: argparse.ArgumentParser) -> None:
     """Declare the options of features for work in other processes."""
     parser.set_defaults(executor=None)
-    group = parser.add_mutually_exclusive_group()
-    for feature in installed_features():
-        for kind in feature.executors:
-            bind = partial(lambda kind, value: (kind, value), kind)
-            group.add_argument(
-                kind.option, dest="executor", type=bind, metavar=kind.metavar, help=kind.help
-            )
+    kinds = [kind for feature in installed_features() for kind in feature.executors]
+    group = parser.add_mutually_exclusive_group() if kinds else parser  # help needs members
+    for kind in kinds:
+        bind = partial(lambda kind, value: (kind, value), kind)
+        group.add_argument(
+            kind.option, dest="executor", type=bind, metavar=kind.metavar, help=kind.help
+        )
 
 
 def add_sandbox(parser: argparse.ArgumentParser) -> None:

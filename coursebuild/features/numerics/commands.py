@@ -259,10 +259,10 @@ def measure_part(root: Path, data: bytes) -> bytes:
 
     if (request := read_task(data)) is None:
         return b""
-    (name,), wanted_machine = request
+    (name,), timed_machine = request
     try:
         with one_processor():
-            return encode(measure_case(all_problems()[name], wanted_machine, time.thread_time_ns))
+            return encode(measure_case(all_problems()[name], timed_machine, time.thread_time_ns))
     except DisagreementError:  # which is found and told where the command is
         return b""
 

@@ -261,7 +261,7 @@ class SceneRun(MeasuringRun):
                     "bench-scenarios",
                     (*parts, n),
                     ScenarioReport,
-                    partial(self._measure_scenario, compiled_scene, n, settings),
+                    partial(self._measure_scenario, scene, compiled_scene, n, settings),
                 )
                 for n in range(len(compiled_scene.scenarios))
             ),
@@ -270,7 +270,7 @@ class SceneRun(MeasuringRun):
                     "bench-sweeps",
                     (*parts, sweep.name),
                     SweepReport,
-                    partial(self._measure_sweep, compiled_scene, sweep, settings),
+                    partial(self._measure_sweep, scene, compiled_scene, sweep, settings),
                 )
                 for sweep in scene.declarations.sweeps
             ),
@@ -281,27 +281,30 @@ class SceneRun(MeasuringRun):
         return report
 
     def _measure_scenario(
-        self, compiled_scene: Any, number: int, settings: dict[str, Any]
+        self, scene: CourseScene, compiled_scene: Any, number: int, settings: dict[str, Any]
     ) -> ScenarioReport:
-        if self.results:
-            task = self._task(compiled_scene.scene, "", number, number + 1)
-            report = decode(self.results.pop(task, b""), ScenarioReport)
-            if report is not None:
-                return report
-        report = self.measuring.run_scenario(compiled_scene, number, **settings)
-        return cast("ScenarioReport", report)
+        task = self._task(scene, "", number, number + 1)
+        report = decode(self.results.pop(task, b""), ScenarioReport)
+        run = self.measuring.run_scenario
+        return report or cast("ScenarioReport", run(compiled_scene, number, **settings))
 
     def _measure_sweep(
-        self, compiled_scene: Any, sweep: DeclaredSweep, settings: dict[str, Any]
+        self,
+        scene: CourseScene,
+        compiled_scene: Any,
+        sweep: DeclaredSweep,
+        settings: dict[str, Any],
     ) -> SweepReport:
-        tasks = list(self._pieces(compiled_scene.scene, sweep)) if self.results else []
-        reports = [decode(self.results.pop(task, b""), SweepReport) for task in tasks]
+        reports = [
+            decode(self.results.pop(task, b""), SweepReport) for task in self._pieces(scene, sweep)
+        ]
         pieces = [report for report in reports if report is not None]
-        threads = tuple(part for part in sweep.variations if part.parameter == THREADS)
-        if not pieces or len(pieces) < len(tasks):
-            threads, pieces = sweep.variations, []
-        if threads:
-            rest = replace(sweep, variations=threads)
+        rest = replace(
+            sweep, variations=tuple(p for p in sweep.variations if p.parameter == THREADS)
+        )
+        if not pieces or len(pieces) < len(reports):
+            rest, pieces = sweep, []
+        if rest.variations:
             pieces.append(self.measuring.run_sweep(compiled_scene, rest, **settings))
         return replace(pieces[0], rows=tuple(row for piece in pieces for row in piece.rows))
 
@@ -328,17 +331,22 @@ def measure_part(root: Path, data: bytes) -> bytes:
         compiled_scene = _compile(root, name, digest, quick=quick)
         if not sweep_name:
             return encode(measuring.run_scenario(compiled_scene, first, **settings))
-        sweep = next(s for s in compiled_scene.scene.declarations.sweeps if s.name == sweep_name)
-        piece = slice(first, end)
-        return encode(measuring.run_sweep(compiled_scene, sweep, piece=piece, **settings))
+        sweeps = {sweep.name: sweep for sweep in compiled_scene.scene.declarations.sweeps}
+        run, piece = measuring.run_sweep, slice(first, end)
+        return encode(run(compiled_scene, sweeps[sweep_name], piece=piece, **settings))
     except (CannotMeasureError, LookupError):  # which is found and told where the command is
         return b""
 
 
 @lru_cache(maxsize=1)
 def _compile(root: Path, name: str, digest: str, *, quick: bool) -> measuring.CompiledScene:
-    """Compile a scene once for all its parts; `digest` is that of what it is made from."""
-    return measuring.compile_scene(root, find_scenes(root, (name,)).value[0], quick=quick)
+    """Compile a scene once for all its parts.
+
+    Raises:
+        LookupError: no scene has the digest, as its files have been edited meanwhile.
+    """
+    by_digest = {scene.digest: scene for scene in find_scenes(root, (name,)).value}
+    return measuring.compile_scene(root, by_digest[digest], quick=quick)
 
 
 _OWN_MARK, _FRONT_MARK = ">", "*"

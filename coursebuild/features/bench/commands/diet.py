@@ -265,10 +265,12 @@ def measure_part(root: Path, data: bytes) -> bytes:
     """Look at a model, as a task of `Executor.map`."""
     if (request := read_task(data)) is None:
         return b""
-    (name, _, quick, fix), wanted_machine = request
+    (name, digest, quick, fix), timed_machine = request
     run = _DietRun(Options(root, 1, Store(root, fresh=True)), (), quick=quick, fix=fix)
-    run.machine = wanted_machine
+    run.machine = timed_machine
     for scene in find_scenes(root, (name,)).value:
+        if scene.digest != digest:  # its files have been edited meanwhile
+            return b""
         model = DietModel(root, run.files, run.course, scene)
         source = scene.model.source
         paths = [source.path, *model_files(root, source.path, source.text)]
