@@ -7,9 +7,11 @@ arguments to options; `print_report`; `run_unless_unchanged`.
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import sys
 from collections.abc import Callable
+from functools import partial
 from typing import TextIO
 
 from msgspec.structs import replace
@@ -17,7 +19,7 @@ from msgspec.structs import replace
 from coursebuild.cli.output import CLEAN, FAILURE, terminal_style, write
 from coursebuild.cli.unchanged import Watcher, identify_command
 from coursebuild.core.engine.store import Store
-from coursebuild.core.registry import package_paths
+from coursebuild.core.registry import installed_features, package_paths
 from coursebuild.core.run.sandbox import find_sandbox
 from coursebuild.pipeline.options import Options, find_course, open_store
 from coursebuild.pipeline.progress import Progress
@@ -38,7 +40,14 @@ def options_of(arguments: argparse.Namespace) -> Options:
         getattr(arguments, name, False) for name in ("quiet", "long", "verbose", "strict")
     )
     progress = Progress(quiet=quiet)
-    return Options(root, jobs, store, progress, long, verbose, strict=strict, sandbox=sandbox)
+    options = Options(root, jobs, store, progress, long, verbose, strict=strict, sandbox=sandbox)
+    kind, value = getattr(arguments, "executor", None) or (None, "")
+    if kind is not None:
+        start = importlib.import_module(kind.module).start
+        executor = start(value, root, jobs, sandbox is not None, progress.say)
+        arguments.resources.callback(executor.close)
+        options = replace(options, executor=executor, run_all=executor.run)
+    return options
 
 
 def available_cores() -> int:
@@ -87,6 +96,18 @@ def add_running(parser: argparse.ArgumentParser) -> None:
         help="scripts to run at a time (default: one per core)",
     )
     add_cache(parser)
+
+
+def add_executors(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of features for work in other processes."""
+    parser.set_defaults(executor=None)
+    kinds = [kind for feature in installed_features() for kind in feature.executors]
+    group = parser.add_mutually_exclusive_group() if kinds else parser  # help needs members
+    for kind in kinds:
+        bind = partial(lambda kind, value: (kind, value), kind)
+        group.add_argument(
+            kind.option, dest="executor", type=bind, metavar=kind.metavar, help=kind.help
+        )
 
 
 def add_sandbox(parser: argparse.ArgumentParser) -> None:

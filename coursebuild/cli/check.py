@@ -8,6 +8,7 @@ import sys
 from msgspec.structs import replace
 
 from coursebuild.cli.arguments import (
+    add_executors,
     add_format,
     add_lessons,
     add_long,
@@ -42,6 +43,7 @@ examples:
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_running(parser)
+    add_executors(parser)
     add_lessons(parser)
     add_format(parser, "text", "json", "junit", "sarif", "github")
     parser.add_argument(
@@ -142,6 +144,7 @@ def _compare_with_version(arguments: argparse.Namespace) -> int:
     conflicts = [] if arguments.format in ("text", "json") else [f"--format {arguments.format}"]
     conflicts += _special_options(arguments)
     conflicts += [f"--{name}" for name in ("sandbox", "strict", "fix") if getattr(arguments, name)]
+    conflicts += [arguments.executor[0].option] if arguments.executor else []
     if conflicts:
         raise UsageError(f"--against cannot be combined with {conflicts[0]}")
     options = options_of(arguments)

@@ -14,6 +14,7 @@ begun. A library in C may make another exception of it, such as a failed import:
 from __future__ import annotations
 
 import argparse
+import contextlib
 import gc
 import importlib
 import re
@@ -57,6 +58,8 @@ _OUR_NAMES = {
     "watch": "serve",
 }
 """The names here of commands that other tools have."""
+_OPTIONS_OF_PACKAGES = {"--cluster": "install `plugins/cluster` of coursebuild"}
+"""Where options come from that are not of the core."""
 _FILES_NEEDED = 64
 """For pipes of processes, the store, event loops, and what scripts open."""
 _SIGNALS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
@@ -171,10 +174,10 @@ def _choose_command(directory: str | None, words: list[str]) -> int:
             or "`coursebuild help` lists them"
         )
         raise UsageError(f"there is no command `{name}`", help=help)
-    arguments = parser_of(command).parse_args(
-        rest, argparse.Namespace(root=directory, words=tuple(words))
-    )
-    return int(importlib.import_module(command.module).run(arguments))
+    with contextlib.ExitStack() as resources:  # what has been started by the arguments ends here
+        namespace = argparse.Namespace(root=directory, words=tuple(words), resources=resources)
+        arguments = parser_of(command).parse_args(rest, namespace)
+        return int(importlib.import_module(command.module).run(arguments))
 
 
 def known_commands(*, installed: bool = True) -> dict[str, Command]:
@@ -219,6 +222,7 @@ class _Parser(argparse.ArgumentParser):
         options = [name[2:] for name in self._option_string_actions if name.startswith("--")]
         closest = nearest(option[1][2:], options)
         help = f"did you mean `--{closest}`?" if closest else f"`{self.prog} --help` lists them"
+        help = _OPTIONS_OF_PACKAGES.get(option[1], help)
         raise UsageError(f"there is no option `{option[1]}`", help=help)
 
 

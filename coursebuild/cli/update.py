@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from coursebuild.cli.arguments import add_lessons, add_long, add_running, options_of, print_report
+from coursebuild.cli.arguments import (
+    add_executors,
+    add_lessons,
+    add_long,
+    add_running,
+    options_of,
+    print_report,
+)
+from coursebuild.core.files.errors import UsageError
 from coursebuild.pipeline.outputs import update
 
 EXAMPLES = """\
@@ -17,6 +25,7 @@ examples:
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_running(parser)
+    add_executors(parser)
     add_lessons(parser)
     add_long(parser)
     parser.add_argument(
@@ -26,6 +35,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Record what scripts print now."""
+    if arguments.long and arguments.executor:  # what is recorded says which machine made it
+        raise UsageError(f"--long cannot be combined with {arguments.executor[0].option}")
     options = options_of(arguments)
     report = update(options, tuple(arguments.lessons), dry_run=arguments.dry_run)
     return print_report(report, "text", options)

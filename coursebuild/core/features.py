@@ -1,7 +1,7 @@
 """The interface of features: kinds of fences and pages, files of a site, exports, commands.
 
 Entry point: `Feature`, with `FenceKind`, `PageKind`, `ModelPart`, `PagePart`, `PageCopy`,
-`Trials`, `Exporter` and `Command`.
+`Trials`, `Exporter`, `Command` and `ExecutorKind`.
 
 A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
 points `coursebuild.features` of any installed package, or in a file that the course map names
@@ -18,7 +18,7 @@ on know no feature. What asks features, from parsing a fence to listing pages, i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Generic, Literal, Protocol, TypeAlias, TypeVar
 
@@ -47,6 +47,7 @@ from coursebuild.core.pages.urls import Place
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.run_store import RunStore
 from coursebuild.core.run.script_environment import Interpreter
+from coursebuild.core.run.script_server import RunAll
 from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import Rule
@@ -261,6 +262,39 @@ class Command(Struct, frozen=True, kw_only=True):
     since commands are a layer above features."""
 
 
+class Executor(Protocol):
+    """Other processes, perhaps on other machines, that do what a command would do in this one."""
+
+    @property
+    def run(self) -> RunAll:
+        """Runs scripts, as `ScriptServer.run` does."""
+
+    def map(self, function: str, root: Path, tasks: Sequence[bytes]) -> Iterator[bytes]:
+        """Apply a function, given as `module:name`, to tasks; yield the results in their order.
+
+        It is called with the folder of a copy of the course that lies at `root`, and with a task.
+        An empty result means that the task is left to this process.
+        """
+
+    def close(self) -> None:
+        """End all that runs."""
+
+
+class ExecutorKind(Struct, frozen=True, kw_only=True):
+    """An option of `check`, `update`, `bench`, `stability` and `diet` that names an executor."""
+
+    option: str
+    """Such as `--cluster`."""
+    metavar: str
+    """What stands for its value in the help."""
+    help: str
+    module: str
+    """The module with `start(value, root, jobs, sandbox, say)`, which returns an `Executor`: of the
+    option's value, the course's folder, the number of processes that this machine can run, whether
+    scripts run in a sandbox, and what tells the user of what takes long. It may raise
+    `EffectError`."""
+
+
 class Trial(Struct, frozen=True):
     """Something in a course that is tried when the course is verified."""
 
@@ -371,3 +405,5 @@ class Feature(Struct, frozen=True, kw_only=True):
     """Formats of `coursebuild export`."""
     commands: tuple[Command, ...] = ()
     """Further commands; only an installed feature can have some, not one of a course."""
+    executors: tuple[ExecutorKind, ...] = ()
+    """Options for work in other processes; likewise."""

@@ -73,10 +73,12 @@ def measure_sweep(
     clocks: tuple[Clock, Clock] | None,
     *,
     quick: bool = False,
+    piece: slice | None = None,
 ) -> SweepReport:
     """Measure a model (`MjSpec`) with its parameters at other values.
 
-    `clocks`: processor time of the thread and wall time, in ns; `None`: nothing is timed.
+    `clocks`: processor time of the thread and wall time, in ns; `None`: nothing is timed. `piece`:
+    which of the values, over all parameters.
 
     Raises:
         SceneError: a parameter or a value is none of the model.
@@ -84,7 +86,9 @@ def measure_sweep(
     base = _runnable(spec.compile())
     threads = [part for part in sweep.variations if part.parameter == THREADS]
     parts = [part for part in sweep.variations if part.parameter != THREADS]
-    variants = [variant for part in parts for variant in _variants(spec, scene.scenario, part)]
+    values = [(part, value) for part in parts for value in part.values]
+    values = values if piece is None else values[piece]
+    variants = [_variant(spec, scene.scenario, part, value) for part, value in values]
     base_run = simulate(Setup(scenario=scene.scenario), base, thickness(base))
     states = base_run.states if base_run.judgement.ok else None
     rows = [_measure_variant(scene, base, states, row, model) for row, model in variants]
@@ -97,22 +101,23 @@ def measure_sweep(
     return SweepReport(sweep.name, sweep.title or sweep.name, scene.name, sweep.show, tuple(rows))
 
 
-def _variants(spec: Any, scenario: Scenario, part: Variation) -> Iterator[tuple[SweepRow, Any]]:
-    """The model with the parameter at each of its values, and a row on which nothing is known."""
-    for value in part.values:
-        changed_spec = spec.copy()
-        before, after = _change(changed_spec, part, value)
-        try:
-            model = _runnable(changed_spec.compile())
-            scenario.steps(float(model.opt.timestep))
-        except ValueError as error:
-            message = (
-                f"`{part.parameter}` cannot be {_value_text(value)}: {' '.join(str(error).split())}"
-            )
-            raise SceneError(message, part.span) from None
-        text = f"{100 * (float(value) - 1):+g} %" if part.relative else _value_text(value)  # type: ignore[arg-type]
-        is_own = all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
-        yield SweepRow(part.parameter, text, own=is_own, status="ok"), model
+def _variant(
+    spec: Any, scenario: Scenario, part: Variation, value: SweepValue
+) -> tuple[SweepRow, Any]:
+    """A row on which nothing is known, and the model with the parameter at this value."""
+    changed_spec = spec.copy()
+    before, after = _change(changed_spec, part, value)
+    try:
+        model = _runnable(changed_spec.compile())
+        scenario.steps(float(model.opt.timestep))
+    except ValueError as error:
+        message = (
+            f"`{part.parameter}` cannot be {_value_text(value)}: {' '.join(str(error).split())}"
+        )
+        raise SceneError(message, part.span) from None
+    text = f"{100 * (float(value) - 1):+g} %" if part.relative else _value_text(value)  # type: ignore[arg-type]
+    is_own = all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
+    return SweepRow(part.parameter, text, own=is_own, status="ok"), model
 
 
 def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], list[Any]]:

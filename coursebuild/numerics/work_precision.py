@@ -295,8 +295,7 @@ def _notes(
         notes.append(
             f"errors count until {reference.horizon:.6g} s: the motion is not known beyond"
         )
-    drivers = driving_force(model, pilot.scene.scenario)
-    if drivers:
+    if drivers := driving_force(model, pilot.scene.scenario):
         notes.append(f"energy is not judged: {drivers}")
     states = np.abs(np.hstack([reference.states.qpos, reference.states.qvel, reference.states.act]))
     if np.any((states > 0) & (states < np.finfo(np.float64).tiny)):
@@ -367,10 +366,9 @@ def _measure_setting(
     model, pilot, cone = basis.model, basis.pilot, basis.cones[setting.cone]
     variant = with_setting(model, setting)
     steps, energy = round(pilot.scene.scenario.duration / setting.timestep), basis.energy
-    figures: dict[str, Any] = dict.fromkeys(WorkPrecisionRow.__struct_fields__)
-    figures |= {  # as of a run that MuJoCo refuses
+    figures: dict[str, Any] = dict.fromkeys(WorkPrecisionRow.__struct_fields__) | {
         "setting": setting,
-        "status": "diverged",
+        "status": "diverged",  # as of a run that MuJoCo refuses
         "reasons": (),
         "penetration": 0.0,
         "model_error": cone.model_error,
@@ -379,7 +377,7 @@ def _measure_setting(
         "evaluations": steps * (4 if setting.integrator == Integrator.RK4.value else 1),
         "lucky": "",
         "own": setting == basis.baseline,
-        "front": False,
+        **dict.fromkeys(("front", "same"), False),
     }
     row = WorkPrecisionRow(**figures)
     try:

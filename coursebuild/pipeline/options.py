@@ -27,6 +27,7 @@ from coursebuild.core.text.diagnostics import did_you_mean, nearest
 from coursebuild.pipeline.progress import Progress
 
 if TYPE_CHECKING:
+    from coursebuild.core.features import Executor
     from coursebuild.core.model.results import ScriptRun
     from coursebuild.core.run.sandbox import Sandbox
     from coursebuild.core.run.script_environment import Interpreter
@@ -50,6 +51,8 @@ class Options(Struct, frozen=True):
     """Whether to say why each script runs."""
     run_all: RunAll | None = None
     """Runs scripts, where a `ScriptServer` stays warm from run to run."""
+    executor: Executor | None = None
+    """Other processes that do the work of this one; `run_all` is theirs then."""
     on_start: Callable[[str, float | None], object] | None = None
     """Takes the path of each script that begins, and the seconds that it took the last time."""
     on_result: Callable[[ScriptRun], object] | None = None

@@ -18,17 +18,19 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_cache, add_format, add_quiet
+from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import require
 from coursebuild.core.pages import urls
 from coursebuild.core.run.script_environment import engine_version, machine, one_processor
 from coursebuild.core.text.diagnostics import nearest
+from coursebuild.core.values import decode, encode
 from coursebuild.features.bench.commands import bench
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
@@ -38,6 +40,7 @@ from coursebuild.features.bench.commands.measurement import (
     grid_lines,
     measurement_json,
     plain_text,
+    read_task,
     run_measurement,
     write_records,
 )
@@ -84,6 +87,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     add_format(parser, "text", "json")
     add_report_options(parser)
     add_cache(parser)
+    add_executors(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -213,28 +217,54 @@ def _check_problems(options: Options, names: tuple[str, ...]) -> Measurement[Cas
 class _CaseRun(MeasuringRun):
     """Measures hard cases one after the other."""
 
+    function = f"{__name__}:measure_part"
+
     def all(self, problems: list[str]) -> Measurement[CaseReport]:
         """Measure the problems of these names."""
-        self.here, self.code = machine(pinned=True), code_digest(*_CODE)
+        self.machine, self.code = machine(pinned=True), code_digest(*_CODE)
         with one_processor():
             return self.measure_each(problems, self._measure_once)
 
     def _measure_once(self, name: str) -> CaseReport | None:
-        parts = (name, self.code, self.here)
         return self.load_or_measure(
-            name, "stability", parts, CaseReport, lambda: self._measure(name)
+            name, "stability", self._parts(name), CaseReport, lambda: self._measure(name)
         )
+
+    def _parts(self, name: str) -> tuple[object, ...]:
+        return name, self.code, self.machine
+
+    def tasks(self, name: str) -> Iterator[tuple[Any, ...]]:
+        """The case, if it is not stored."""
+        if self.load("stability", self._parts(name), CaseReport) is None:
+            yield (name,)
 
     def _measure(self, name: str) -> CaseReport | None:
         from coursebuild.numerics.cases import DisagreementError, measure_case
         from coursebuild.numerics.problems import all_problems
 
+        if (report := decode(self.results.pop((name,), b""), CaseReport)) is not None:
+            return report
         try:
-            return measure_case(all_problems()[name], self.here, time.thread_time_ns)
+            return measure_case(all_problems()[name], self.machine, time.thread_time_ns)
         except DisagreementError as error:
             help = "neither is known to be right, so errors against them mean nothing"
             self.failures.append(ReportFailure(str(error), help))
             return None
+
+
+def measure_part(root: Path, data: bytes) -> bytes:
+    """Measure a hard case, as a task of `Executor.map`."""
+    from coursebuild.numerics.cases import DisagreementError, measure_case
+    from coursebuild.numerics.problems import all_problems
+
+    if (request := read_task(data)) is None:
+        return b""
+    (name,), timed_machine = request
+    try:
+        with one_processor():
+            return encode(measure_case(all_problems()[name], timed_machine, time.thread_time_ns))
+    except DisagreementError:  # which is found and told where the command is
+        return b""
 
 
 def _problem_names() -> tuple[str, ...]:

@@ -14,18 +14,22 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
-from typing import Any, TypeVar
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any, TypeVar, cast
 
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_cache, add_format, add_quiet
+from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import require
+from coursebuild.core.model.scenarios import DeclaredSweep, keyframe_scenarios
 from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.values import decode, encode
 from coursebuild.features.bench.commands import measuring
 from coursebuild.features.bench.commands.measurement import (
+    CannotMeasureError,
     Measurement,
     MeasuringRun,
     add_report_options,
@@ -34,6 +38,7 @@ from coursebuild.features.bench.commands.measurement import (
     grid_lines,
     measurement_json,
     plain_text,
+    read_task,
     run_measurement,
     write_records,
 )
@@ -47,6 +52,7 @@ from coursebuild.numerics.reports.scene_report import (
     WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.shown_errors import is_idle
+from coursebuild.numerics.sweep import THREADS
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.pipeline.shown_reports import read_record
@@ -60,6 +66,8 @@ _CODE = (
 )
 """The code on which reports depend."""
 _INDENT = "  "
+_PIECE = 16
+"""Settings of a sweep that are measured together."""
 EXAMPLES = """\
 examples:
   coursebuild bench --quick              a first look at all models
@@ -79,6 +87,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     add_report_options(parser)
     add_cache(parser)
+    add_executors(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -180,6 +189,8 @@ def _compare(recorded: SceneReport, report: SceneReport, scene: CourseScene) -> 
 class SceneRun(MeasuringRun):
     """Measures scenes one after the other."""
 
+    function = f"{__name__}:measure_part"
+
     def __init__(
         self,
         options: Options,
@@ -200,11 +211,36 @@ class SceneRun(MeasuringRun):
 
     def measure(self, scene: CourseScene) -> SceneReport | None:
         """Report on a scene; `None` if it cannot be measured."""
-        parts = (scene.name, scene.digest, self.quick, self.code, self.machine)
+        parts = self._parts(scene)
         all_parts = (*parts, self.cards)
         return self.load_or_measure(
             scene.name, "bench", all_parts, SceneReport, lambda: self._report(scene, parts)
         )
+
+    def _parts(self, scene: CourseScene) -> tuple[object, ...]:
+        return scene.name, scene.digest, self.quick, self.code, self.machine
+
+    def tasks(self, scene: CourseScene) -> Iterator[tuple[Any, ...]]:
+        """The scenarios of a scene, and its sweeps in pieces, that are not stored."""
+        parts = self._parts(scene)
+        if self.load("bench", (*parts, self.cards), SceneReport) is not None:
+            return
+        for number in range(
+            len(scene.declarations.scenarios or keyframe_scenarios(scene.facts.keyframes))
+        ):
+            if self.load("bench-scenarios", (*parts, number), ScenarioReport) is None:
+                yield self._task(scene, "", number, number + 1)
+        for sweep in scene.declarations.sweeps:
+            if self.load("bench-sweeps", (*parts, sweep.name), SweepReport) is None:
+                yield from self._pieces(scene, sweep)
+
+    def _pieces(self, scene: CourseScene, sweep: DeclaredSweep) -> Iterator[tuple[Any, ...]]:
+        count = sum(len(part.values) for part in sweep.variations if part.parameter != THREADS)
+        for first in range(0, count, _PIECE):
+            yield self._task(scene, sweep.name, first, min(first + _PIECE, count))
+
+    def _task(self, scene: CourseScene, sweep: str, first: int, end: int) -> tuple[Any, ...]:
+        return scene.name, scene.digest, self.quick, self.use_store, sweep, first, end
 
     def _report(self, scene: CourseScene, parts: tuple[object, ...]) -> SceneReport:
         # A check compares no times, so it measures none.
@@ -225,7 +261,7 @@ class SceneRun(MeasuringRun):
                     "bench-scenarios",
                     (*parts, n),
                     ScenarioReport,
-                    partial(self.measuring.run_scenario, compiled_scene, n, **settings),
+                    partial(self._measure_scenario, scene, compiled_scene, n, settings),
                 )
                 for n in range(len(compiled_scene.scenarios))
             ),
@@ -234,7 +270,7 @@ class SceneRun(MeasuringRun):
                     "bench-sweeps",
                     (*parts, sweep.name),
                     SweepReport,
-                    partial(self.measuring.run_sweep, compiled_scene, sweep, **settings),
+                    partial(self._measure_sweep, scene, compiled_scene, sweep, settings),
                 )
                 for sweep in scene.declarations.sweeps
             ),
@@ -243,6 +279,34 @@ class SceneRun(MeasuringRun):
             tell("what it is made of")
             report = self.measuring.add_card(root, scene, report)
         return report
+
+    def _measure_scenario(
+        self, scene: CourseScene, compiled_scene: Any, number: int, settings: dict[str, Any]
+    ) -> ScenarioReport:
+        task = self._task(scene, "", number, number + 1)
+        report = decode(self.results.pop(task, b""), ScenarioReport)
+        run = self.measuring.run_scenario
+        return report or cast("ScenarioReport", run(compiled_scene, number, **settings))
+
+    def _measure_sweep(
+        self,
+        scene: CourseScene,
+        compiled_scene: Any,
+        sweep: DeclaredSweep,
+        settings: dict[str, Any],
+    ) -> SweepReport:
+        reports = [
+            decode(self.results.pop(task, b""), SweepReport) for task in self._pieces(scene, sweep)
+        ]
+        pieces = [report for report in reports if report is not None]
+        rest = replace(
+            sweep, variations=tuple(p for p in sweep.variations if p.parameter == THREADS)
+        )
+        if not pieces or len(pieces) < len(reports):
+            rest, pieces = sweep, []
+        if rest.variations:
+            pieces.append(self.measuring.run_sweep(compiled_scene, rest, **settings))
+        return replace(pieces[0], rows=tuple(row for piece in pieces for row in piece.rows))
 
     def _load_or_measure_part(
         self, kind: str, parts: tuple[object, ...], report_type: type[_T], measure: Callable[[], _T]
@@ -253,6 +317,36 @@ class SceneRun(MeasuringRun):
             report = measure()
             self.save(kind, parts, report)
         return report
+
+
+def measure_part(root: Path, data: bytes) -> bytes:
+    """Measure a scenario, or a piece of a sweep, as a task of `Executor.map`."""
+    if (request := read_task(data, timed=False)) is None:
+        return b""
+    name, digest, quick, timed, sweep_name, first, end = request[0]
+    if timed and read_task(data) is None:
+        return b""
+    settings = {"quick": quick, "timed": timed, "tell": lambda text: None}
+    try:
+        compiled_scene = _compile(root, name, digest, quick=quick)
+        if not sweep_name:
+            return encode(measuring.run_scenario(compiled_scene, first, **settings))
+        sweeps = {sweep.name: sweep for sweep in compiled_scene.scene.declarations.sweeps}
+        run, piece = measuring.run_sweep, slice(first, end)
+        return encode(run(compiled_scene, sweeps[sweep_name], piece=piece, **settings))
+    except (CannotMeasureError, LookupError):  # which is found and told where the command is
+        return b""
+
+
+@lru_cache(maxsize=1)
+def _compile(root: Path, name: str, digest: str, *, quick: bool) -> measuring.CompiledScene:
+    """Compile a scene once for all its parts.
+
+    Raises:
+        LookupError: no scene has the digest, as its files have been edited meanwhile.
+    """
+    by_digest = {scene.digest: scene for scene in find_scenes(root, (name,)).value}
+    return measuring.compile_scene(root, by_digest[digest], quick=quick)
 
 
 _OWN_MARK, _FRONT_MARK = ">", "*"

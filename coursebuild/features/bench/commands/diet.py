@@ -17,25 +17,31 @@ JSON.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar, cast
 
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_cache, add_format, add_quiet
+from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
+from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_course
+from coursebuild.core.files.write import FileChange, change_files
+from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.values import decode, encode
 from coursebuild.features.bench.commands.diet_model import DietModel, Reruns
 from coursebuild.features.bench.commands.measurement import (
+    CannotMeasureError,
     Measurement,
     MeasuringRun,
     forbid_quick,
     measurement_json,
+    read_task,
     run_measurement,
     write_records,
 )
@@ -84,6 +90,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="short runs, rough times")
     add_format(parser, "text", "json")
     add_cache(parser)
+    add_executors(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -147,6 +154,7 @@ class _DietRun(MeasuringRun):
     """Looks at models one after the other."""
 
     stage, success = "looking at models", "looked at"
+    function = f"{__name__}:measure_part"
 
     def __init__(
         self, options: Options, diagnostics: Sequence[Diagnostic], *, quick: bool, fix: bool
@@ -166,7 +174,33 @@ class _DietRun(MeasuringRun):
             scene.name, "diet", self._parts(model), DietReport, lambda: self._report(model)
         )
 
+    def tasks(self, scene: CourseScene) -> Iterator[tuple[Any, ...]]:
+        """The model, if no report on it is stored."""
+        model = DietModel(self.options.root, self.files, self.course, scene)
+        if self.load("diet", self._parts(model), DietReport) is None:
+            yield self._task(scene)
+
+    def _task(self, scene: CourseScene) -> tuple[Any, ...]:
+        return scene.name, scene.digest, self.quick, self.fix
+
     def _report(self, model: DietModel) -> DietReport | None:
+        """Look at a model here, or take what another process has found and changed."""
+        result = decode(
+            self.results.pop(self._task(model.scene), b""), cast("type[_Result]", _Result)
+        )
+        if result is None:
+            return self.report_here(model)
+        report, changes, remarks = result
+        try:
+            change_files(self.options.root, [FileChange(*change) for change in changes])
+        except EffectError as error:
+            self.failures.append(ReportFailure(error.message, error.help))
+            return None
+        self.remarks += remarks
+        return report
+
+    def report_here(self, model: DietModel) -> DietReport | None:
+        """Look at a model in this process."""
         with silent():  # MuJoCo would write its warnings into the working directory
             report = self._fix(model) if self.fix else self._survey(model).report
         return None if report is None else replace(report, digest=model.digest())
@@ -221,6 +255,34 @@ class _DietRun(MeasuringRun):
         """Store a report, unless this run or somebody else has changed the files meanwhile."""
         if isinstance(value, DietReport) and value.digest == parts[0]:
             super().save(kind, parts, value)
+
+
+_Result = tuple[DietReport, tuple[tuple[str, bytes, bytes], ...], tuple[str, ...]]
+"""A report, the files that `--fix` has changed, before and after, and what is said of that."""
+
+
+def measure_part(root: Path, data: bytes) -> bytes:
+    """Look at a model, as a task of `Executor.map`."""
+    if (request := read_task(data)) is None:
+        return b""
+    (name, digest, quick, fix), timed_machine = request
+    run = _DietRun(Options(root, 1, Store(root, fresh=True)), (), quick=quick, fix=fix)
+    run.machine = timed_machine
+    for scene in find_scenes(root, (name,)).value:
+        if scene.digest != digest:  # its files have been edited meanwhile
+            return b""
+        model = DietModel(root, run.files, run.course, scene)
+        source = scene.model.source
+        paths = [source.path, *model_files(root, source.path, source.text)]
+        before = {path: (root / path).read_bytes() for path in paths if (root / path).is_file()}
+        try:
+            report = run.report_here(model)
+        except CannotMeasureError:  # which is found and told where the command is
+            return b""
+        after = {path: (root / path).read_bytes() for path in before}
+        changes = tuple((p, before[p], after[p]) for p in before if before[p] != after[p])
+        return b"" if report is None else encode((report, changes, tuple(run.remarks)))
+    return b""
 
 
 _EDITS = 6

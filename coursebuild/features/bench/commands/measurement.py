@@ -23,14 +23,17 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import options_of, style_of
 from coursebuild.cli.output import CLEAN, FAILURE, write
+from coursebuild.core.features import Executor
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.files.write import resolve_inside, write_atomic
+from coursebuild.core.model.results import Machine
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.pages.strings import Strings
+from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
-from coursebuild.core.values import fingerprint
+from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.features.bench.grids import Grid
 from coursebuild.numerics.reports.records import RecordCheck, ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
@@ -178,6 +181,9 @@ class MeasuringRun:
 
     stage, success = "measuring", "measured"
     """Words of the progress display: for the stage, and for a thing that was measured."""
+    function = ""
+    """Measures a task in another process: `module:name`, as in `Executor.map`."""
+    machine: Machine
 
     def __init__(
         self, options: Options, diagnostics: Iterable[Diagnostic] = (), *, use_store: bool = True
@@ -188,6 +194,8 @@ class MeasuringRun:
         self.diagnostics = list(diagnostics)
         self.failures: list[ReportFailure] = []
         self.remarks: list[str] = []
+        self.results: dict[tuple[Any, ...], bytes] = {}
+        """What other processes have measured, by tasks."""
         self.progress = options.progress
         options.store.listen(self.progress.say)
 
@@ -198,6 +206,8 @@ class MeasuringRun:
         reports: list[_T | None] = []
         if things:
             with self.progress.stage(self.stage, len(things)):
+                if self.options.executor is not None:
+                    self._measure_elsewhere(self.options.executor, things)
                 reports = [measure(thing) for thing in things]
         return Measurement(
             tuple(report for report in reports if report is not None),
@@ -205,6 +215,21 @@ class MeasuringRun:
             failures=tuple(self.failures),
             remarks=tuple(self.remarks),
         )
+
+    def _measure_elsewhere(self, executor: Executor, things: Sequence[Any]) -> None:
+        """Have other processes measure what nobody has measured, so far as they can."""
+        tasks = [task for thing in things for task in self.tasks(thing)]
+        data = [encode((task, self.machine)) for task in tasks]
+        for task, result in zip(
+            tasks, executor.map(self.function, self.options.root, data), strict=True
+        ):
+            self.results[task] = result
+        if left := sum(not result for result in self.results.values()):
+            self.progress.say(f"{left} of {plural(len(tasks), 'part')} can only be measured here")
+
+    def tasks(self, thing: Any) -> Iterable[tuple[Any, ...]]:
+        """What there is to measure of a thing, each part by plain values."""
+        return ()
 
     def load_or_measure(
         self,
@@ -245,6 +270,20 @@ class MeasuringRun:
         """Store a report under the parts on which it depends."""
         if self.use_store:
             self.options.store.put_value(kind, fingerprint(parts), value)
+
+
+def read_task(data: bytes, *, timed: bool = True) -> tuple[tuple[Any, ...], Machine] | None:
+    """The task that another process has sent, and its machine, of which times have to be true.
+
+    `None` if it is to be timed, and this is another machine than that.
+    """
+    task, timed_machine = decode(data, tuple[tuple[object, ...], Machine]) or ((), None)
+    if timed_machine is None:
+        return None
+    own_machine = replace(
+        machine(), processors=timed_machine.processors, pinned=timed_machine.pinned
+    )
+    return None if timed and own_machine != timed_machine else (task, timed_machine)
 
 
 def forbid_quick(option: str, *, quick: bool) -> None:

@@ -110,8 +110,9 @@ def run_sweep(
     quick: bool,
     timed: bool,
     tell: Callable[[str], None],
+    piece: slice | None = None,
 ) -> SweepReport:
-    """Measure a sweep that the course declares.
+    """Measure a sweep that the course declares, or some of its settings, but no threads.
 
     Raises:
         CannotMeasureError: this is not possible.
@@ -123,11 +124,13 @@ def run_sweep(
     single_thread = tuple(part for part in sweep.variations if part.parameter != THREADS)
     reports = []
     with report_errors(compiled_scene.scene):
-        for variations in filter(None, (single_thread, threads)):
+        for variations in filter(None, (single_thread, threads if piece is None else ())):
             part = replace(sweep, variations=variations)
             # One processor, unless what is measured is how it goes on several.
             with one_processor() if variations is single_thread else nullcontext():
-                report = measure_sweep(compiled_scene.spec, scenario, part, clocks, quick=quick)
+                report = measure_sweep(
+                    compiled_scene.spec, scenario, part, clocks, quick=quick, piece=piece
+                )
             reports.append(report)
     return replace(reports[0], rows=tuple(row for report in reports for row in report.rows))
 

@@ -1,0 +1,544 @@
+"""A command's work on the workers of a Dask scheduler.
+
+Entry point: `start`, which makes a `Cluster`.
+
+1. A worker is used after it was compared: another version of what decides results refuses it.
+2. A worker gets a task for each of its threads, never more, and first those of the course's files
+   that it has not. So the death of a worker costs the tasks that it was doing. They are done again,
+   each alone on a worker, and one whose worker dies again and again is told as such.
+3. A script's result counts if all that it looked at is the same here. Where it is not (a hidden
+   file, another version of a package, a file of the worker's system) the script runs here.
+4. What a script printed of its worker's folders is replaced by the folders of here.
+5. However a command ends, its tasks are cancelled, and workers end what they do for it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import os
+import queue
+import re
+import secrets
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+from msgspec.structs import replace
+
+from coursebuild.core.engine.store import Store
+from coursebuild.core.files.course_root import DECISIVE
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.locks import temporary_folder
+from coursebuild.core.files.write import resolve_inside
+from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
+from coursebuild.core.run.dependencies import Dependency, Kind
+from coursebuild.core.run.run_store import States
+from coursebuild.core.run.sandbox import find_sandbox
+from coursebuild.core.run.script_environment import Interpreter
+from coursebuild.core.run.script_server import (
+    Claim,
+    OnFinish,
+    OnStart,
+    RunAll,
+    RunStoppedError,
+    ScriptServer,
+)
+from coursebuild_cluster import worker
+from coursebuild_cluster.course_copy import CourseReader
+from coursebuild_cluster.messages import Answer, Request, WorkerFacts, pack, unpack
+
+LOCAL = "local"
+MOST_DEATHS = 3
+"""How often the worker of a task may die."""
+_PATIENCE = 10.0
+"""Seconds in which a scheduler has to answer."""
+_INTERVAL = 0.2
+"""Seconds between two looks at what is wanted, and at the workers."""
+_MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFound|Import)Error\b", re.MULTILINE)
+_MOST_SENDINGS = 3
+"""How often files are sent that change all the time."""
+
+
+def start(
+    address: str, root: Path, jobs: int, sandbox: bool, say: Callable[[str], None]
+) -> Cluster:
+    """Connect with the scheduler at an address, or start one here.
+
+    Raises:
+        EffectError: there is none, or Dask is not installed.
+    """
+    try:
+        dask, distributed = map(importlib.import_module, ("dask", "distributed"))  # without types
+    except ImportError as error:
+        help = "run `pip install 'dask[distributed]'`"
+        raise EffectError(f"--cluster needs the package {error.name}", help=help) from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is told here
+    resources = ExitStack()
+    try:
+        if address == LOCAL:
+            local = distributed.LocalCluster(
+                n_workers=jobs,
+                threads_per_worker=1,
+                memory_limit=0,  # scripts have limits of their own
+                dashboard_address=None,
+                silence_logs=logging.CRITICAL,
+                preload=worker.__name__,  # for its `dask_setup`
+                local_directory=resources.enter_context(temporary_folder()),
+                # Other users of this machine can reach its ports.
+                protocol="tls://",
+                security=distributed.Security.temporary(),
+            )
+            resources.callback(local.close, timeout=_PATIENCE)
+            client = distributed.Client(local, set_as_default=False)
+        else:
+            patience = dask.config.get("distributed.comm.timeouts.connect")
+            patience = min(dask.utils.parse_timedelta(patience), _PATIENCE)
+            client = distributed.Client(address, timeout=patience, set_as_default=False)
+        resources.callback(client.close, timeout=_PATIENCE)
+    except (OSError, ValueError, TypeError, RuntimeError) as error:
+        resources.close()
+        cause = str(error.__cause__ or error).strip().splitlines()[:1] or [type(error).__name__]
+        help = "`dask scheduler` starts one and says its address, `local` starts one here"
+        message = f"--cluster: there is no Dask scheduler at `{address}`: {cause[0]}"
+        raise EffectError(message, help=help) from None
+    except BaseException:
+        resources.close()
+        raise
+    return Cluster(client, address, root, say, resources, sandbox=sandbox)
+
+
+class _Task(Struct, eq=False):
+    """Something to be done by a worker."""
+
+    number: int
+    request: Request
+    """Without the course, which is read when it begins."""
+    deaths: int = 0
+
+
+class _Assignment(Struct, eq=False):
+    """A task that a worker does."""
+
+    task: _Task
+    worker: str
+    """Its address."""
+
+
+class Cluster:
+    """The workers of a scheduler."""
+
+    def __init__(
+        self,
+        client: Any,
+        address: str,
+        root: Path,
+        say: Callable[[str], None],
+        resources: ExitStack,
+        *,
+        sandbox: bool,
+    ) -> None:
+        self._client, self._address, self._say = client, address, say
+        self._resources, self._sandbox = resources, sandbox
+        self._reader = CourseReader(root)
+        self._session = secrets.token_hex(8)
+        self._count = 0
+        self._threads: dict[str, int] = {}
+        """Of each worker that is used."""
+        self._refusals: dict[str, str] = {}
+        self._sent: dict[str, str] = {}
+        """The digest of the course that each worker has."""
+        self._looked = 0.0
+        self._is_waiting = False
+        self._running: dict[Any, _Assignment] = {}
+        """By their futures."""
+        self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def close(self) -> None:
+        """Cancel what runs, and leave the scheduler."""
+        try:
+            self._cancel()
+        finally:
+            self._resources.close()
+
+    @property
+    def run(self) -> RunAll:
+        """Run scripts, as `ScriptServer.run` does."""
+        return self._run
+
+    def map(self, function: str, root: Path, tasks: Sequence[bytes]) -> Iterator[bytes]:
+        """Apply a function to tasks; a task that ends its workers is left to this process."""
+        requests = iter([Request("", {}, function=function, task=task) for task in tasks])
+        numbers = iter(range(len(tasks)))
+        results: dict[int, bytes] = {}
+        yielded = 0
+        try:
+            for task, answer in self._answers(
+                lambda: next((_Task(n, request) for n, request in zip(numbers, requests)), None),  # noqa: B905
+                lambda: False,
+            ):
+                results[task.number] = answer.result
+                while yielded in results:
+                    yield results.pop(yielded)
+                    yielded += 1
+        finally:
+            self._cancel()
+
+    def _run(
+        self,
+        root: Path,
+        jobs: Sequence[ScriptJob],
+        *,
+        parallel: int,
+        on_start: OnStart = lambda path: None,
+        on_finish: OnFinish = lambda run: None,
+        interpreter: Interpreter | None = None,
+        is_unwanted: Callable[[frozenset[str]], bool] | None = None,
+        claim: Claim = lambda job: True,
+    ) -> tuple[ScriptRun, ...]:
+        """See `ScriptServer.run`; `parallel` counts only for what runs here."""
+        if interpreter is not None:
+            message = f"--cluster: scripts of this course run with {interpreter.python}"
+            help = "only the Python of the workers can run them there: take `python` out of the map"
+            raise EffectError(message, help=help)
+        runs: dict[int, ScriptRun] = {}
+        pending, left = list(range(len(jobs))), list[int]()
+        states = States(root, Store(root))
+
+        def take() -> _Task | None:
+            for index in [*pending]:
+                answer = claim(jobs[index])
+                if answer is False:
+                    continue
+                pending.remove(index)
+                if answer is True:
+                    on_start(jobs[index].path)
+                    return _Task(index, Request("", {}, self._sandbox, jobs[index]))
+                runs[index] = answer
+            return None
+
+        def is_wanted() -> None:
+            running = frozenset(
+                jobs[assignment.task.number].path for assignment in self._running.values()
+            )
+            if is_unwanted is not None and is_unwanted(running):
+                raise RunStoppedError
+
+        try:
+            for task, answer in self._answers(take, lambda: bool(pending), is_wanted):
+                job = jobs[task.number]
+                run = _lost_run(job) if answer.is_lost else _as_here(answer, states.places)
+                if run is None or (not answer.is_lost and _differs(answer, states)):
+                    left.append(task.number)
+                    continue
+                for path, data in answer.written:
+                    _write(root, job, path, data)
+                runs[task.number] = run
+                on_finish(run)
+        finally:
+            self._cancel()
+        if left:
+            sandbox = find_sandbox(root) if self._sandbox else None
+            with ScriptServer(sandbox=sandbox) as server:
+                jobs_here = [jobs[number] for number in left]
+                runs_here = server.run(
+                    root,
+                    jobs_here,
+                    parallel=parallel,
+                    on_start=on_start,
+                    on_finish=on_finish,
+                    is_unwanted=is_unwanted,
+                )
+            runs |= dict(zip(left, runs_here, strict=True))
+        return tuple(runs[number] for number in range(len(jobs)))
+
+    # --- tasks
+
+    def _answers(
+        self,
+        take: Callable[[], _Task | None],
+        is_more_to_come: Callable[[], bool],
+        look: Callable[[], None] = lambda: None,
+    ) -> Iterator[tuple[_Task, Answer]]:
+        """Have tasks done as workers are free; yield the answers as they come.
+
+        `take` gives a task that may begin now. A task whose worker died waits for a worker that
+        does nothing else, and has it for itself.
+        """
+        suspects: list[_Task] = []
+        is_empty = False
+        while True:
+            look()
+            self._look_at_workers()
+            for address in self._free_workers():
+                is_idle = all(assignment.worker != address for assignment in self._running.values())
+                task = None if is_empty else take()
+                if task is None and suspects and is_idle:
+                    task = suspects.pop()
+                if task is None:
+                    is_empty = not is_more_to_come()
+                    continue
+                self._begin(task, address)
+            if is_empty and not self._running and not suspects:
+                return
+            for task, answer in self._collect():
+                if not answer.is_lost:
+                    yield task, answer
+                    continue
+                task.deaths += 1
+                if task.deaths >= MOST_DEATHS:
+                    yield task, answer
+                else:
+                    suspects.append(task)
+
+    def _free_workers(self) -> list[str]:
+        """Each worker as often as it has free threads, but none that does a suspect alone."""
+        free: list[str] = []
+        for address, threads in self._threads.items():
+            tasks = [
+                assignment.task
+                for assignment in self._running.values()
+                if assignment.worker == address
+            ]
+            if not any(task.deaths for task in tasks):
+                free += [address] * (threads - len(tasks))
+        return free
+
+    def _begin(self, task: _Task, address: str) -> None:
+        """Give a task to a worker, with the course as it is now."""
+        environment = {name: os.environ[name] for name in DECISIVE if name in os.environ}
+        try:
+            course = self._send_course(address)
+        except _WorkerLostError:
+            self._threads.pop(address, None)
+            self._done.put(None)
+            self._running[object()] = _Assignment(task, "")  # found to be lost by `_collect`
+            return
+        request = replace(task.request, course=course, environment=environment)
+        self._count += 1
+        future = self._client.submit(
+            worker.perform,
+            pack(request),
+            key=f"coursebuild-{self._session}-{self._count}",
+            workers=[address],
+            allow_other_workers=False,
+            pure=False,
+        )
+        self._running[future] = _Assignment(task, address)
+        future.add_done_callback(self._done.put)
+
+    def _collect(self) -> list[tuple[_Task, Answer]]:
+        """Wait a moment for answers; those of workers that are gone say that they are lost."""
+        answers: list[tuple[_Task, Answer]] = []
+        try:
+            futures = [self._done.get(timeout=_INTERVAL)]
+            while not self._done.empty():
+                futures.append(self._done.get())
+        except queue.Empty:
+            futures = []
+        for future in futures:
+            assignment = self._running.pop(future, None)
+            if assignment is not None:
+                answers.append((assignment.task, self._answer_of(future, assignment)))
+        for future, assignment in list(self._running.items()):
+            if assignment.worker not in self._threads:
+                del self._running[future]
+                if assignment.worker:
+                    future.cancel()
+                answers.append((assignment.task, Answer(is_lost=True)))
+        return answers
+
+    def _answer_of(self, future: Any, assignment: _Assignment) -> Answer:
+        from distributed import KilledWorker
+
+        if future.status == "error":
+            error = future.exception()
+            if isinstance(error, KilledWorker):
+                return Answer(is_lost=True)
+            raise EffectError(f"--cluster: {assignment.worker} cannot do anything: {error}")
+        if future.status != "finished":
+            raise EffectError(f"--cluster: the scheduler at `{self._address}` is gone")
+        answer = unpack(future.result(), Answer)
+        if answer.refusal:
+            raise EffectError(f"--cluster: {assignment.worker}: {answer.refusal}", help=answer.help)
+        if answer.bug:
+            raise RuntimeError(f"on the worker {assignment.worker}:\n{answer.bug}")
+        return answer
+
+    def _cancel(self) -> None:
+        """Cancel what runs."""
+        futures = [future for future, assignment in self._running.items() if assignment.worker]
+        self._running.clear()
+        if futures:
+            self._client.cancel(futures, force=True)
+
+    # --- workers
+
+    def _look_at_workers(self) -> None:
+        """See which workers there are; compare those that are new."""
+        if time.monotonic() < self._looked + _INTERVAL and self._threads:
+            return
+        self._looked = time.monotonic()
+        try:
+            threads: dict[str, int] = dict(self._client.nthreads())
+        except OSError:
+            raise EffectError(f"--cluster: the scheduler at `{self._address}` is gone") from None
+        new = [address for address in threads if address not in self._threads]
+        new = [address for address in new if address not in self._refusals]
+        for address, reply in self._call(new, worker.describe).items():
+            if isinstance(reply, BaseException):
+                if not isinstance(reply, OSError):
+                    self._refuse(address, f"it cannot run coursebuild-cluster: {reply}")
+            else:
+                facts, own_facts = (unpack(data, WorkerFacts) for data in (reply, _own_facts()))
+                for name, version in own_facts.versions.items():
+                    their_version = facts.versions.get(name, "none")
+                    if their_version != version:
+                        self._refuse(address, f"it has {name} {their_version}, here is {version}")
+                if address not in self._refusals:
+                    self._threads[address] = 0
+        self._threads = {a: n for a, n in threads.items() if a in self._threads}
+        self._sent = {a: digest for a, digest in self._sent.items() if a in self._threads}
+        if self._threads:
+            return
+        if threads and all(address in self._refusals for address in threads):
+            address = next(iter(threads))
+            help = "install the same there as here"
+            raise EffectError(
+                f"--cluster: no worker can be used: {self._refusals[address]}", help=help
+            )
+        if not self._is_waiting:
+            self._is_waiting = True
+            self._say(f"the cluster at {self._address} has no worker: waiting for one")
+        time.sleep(_INTERVAL)
+
+    def _refuse(self, address: str, reason: str) -> None:
+        self._refusals[address] = f"{address} is refused: {reason}"
+        self._say(f"the worker {self._refusals[address]}")
+
+    def _call(self, addresses: Iterable[str], function: Any, *arguments: object) -> dict[str, Any]:
+        """What a function returns on workers, at once, whatever they do; or what it raises."""
+        addresses = list(addresses)
+        if not addresses:
+            return {}
+        replies: dict[str, Any] = self._client.run(
+            function, *arguments, workers=addresses, on_error="return"
+        )
+        return replies
+
+    def _send_course(self, address: str) -> str:
+        """Let a worker have the course as it is now; return the digest of its copy."""
+        for _ in range(_MOST_SENDINGS):
+            digest = self._reader.read()
+            if self._sent.get(address) == digest:
+                return digest
+            reply = self._ask(address, worker.missing, pack(self._reader.digests()))
+            digests = unpack(reply, list[str])
+            if not digests:
+                self._sent[address] = digest
+                return digest
+            for pieces in self._reader.pieces(digests):
+                self._ask(address, worker.store, pack(pieces), self._session)
+            if not unpack(self._ask(address, worker.missing, pack(digests)), list[str]):
+                self._sent[address] = digest
+                return digest
+        raise EffectError("--cluster: files of the course change all the time")
+
+    def _ask(self, address: str, function: Any, *arguments: object) -> Any:
+        reply = self._call([address], function, *arguments).get(address)
+        if isinstance(reply, OSError) and reply.errno:
+            raise EffectError(f"--cluster: {address}: {reply}")
+        if isinstance(reply, OSError) or (reply is None and function is not worker.store):
+            raise _WorkerLostError
+        if isinstance(reply, BaseException):
+            raise EffectError(f"--cluster: {address}: {reply}")
+        return reply
+
+
+class _WorkerLostError(Exception):
+    """A worker does not answer any more."""
+
+
+_facts = b""
+
+
+def _own_facts() -> bytes:
+    global _facts
+    _facts = _facts or worker.describe()
+    return _facts
+
+
+# --- results
+
+
+def _lost_run(job: ScriptJob) -> ScriptRun:
+    text = f"the worker that ran this script died, {MOST_DEATHS} times, each time another one\n"
+    return ScriptRun(job.path, Outcome.KILLED, 9, "", text, 0.0)
+
+
+def _as_here(answer: Answer, places: Iterable[tuple[str, str]]) -> ScriptRun | None:
+    """A run with the folders of here in the place of those of the worker."""
+    if answer.run is None:
+        return None
+    replace_all = _replacer(answer, places, ("course", "library", "prefix", "base"))
+    replace_own = _replacer(answer, places, ("course", "library"))
+    parts = msgspec.to_builtins(replace(answer.run, stdout=""), builtin_types=(bytes,))
+    run = msgspec.convert(_map_texts(parts, replace_all), ScriptRun)
+    return replace(run, stdout=replace_own(answer.run.stdout))
+
+
+def _differs(answer: Answer, states: States) -> bool:
+    """Whether the script would have seen something else here."""
+    run = answer.run
+    assert run is not None
+    if run.outcome is Outcome.SKIPPED or _MISSING_MODULE.search(run.stderr):
+        return True
+    replace_all = _replacer(answer, states.places, ("course", "library", "prefix", "base"))
+    needs = (replace(d, name=replace_all(d.name)) for d in answer.dependencies)
+    return any(_state_here(need, states) != need.state for need in needs)
+
+
+def _state_here(dependency: Dependency, states: States) -> str:
+    # The path of a folder is another one on a worker, and is replaced where it was printed.
+    return dependency.state if dependency.kind is Kind.PLACE else states.now(dependency.need)
+
+
+def _replacer(
+    answer: Answer, places: Iterable[tuple[str, str]], names: Sequence[str]
+) -> Callable[[str], str]:
+    own_folders = dict(places)
+    pairs = [
+        (folder.rstrip("/"), own_folders[name].rstrip("/"))
+        for name, folder in answer.places  # longer ones come first
+        if name in names and len(folder) > 1 and folder != own_folders[name]
+    ]
+    if not pairs:
+        return lambda text: text
+    targets = dict(pairs)
+    alternatives = "|".join(map(re.escape, targets))
+    pattern = re.compile(rf"(?<![\w./-])(?:{alternatives})(?![\w.-])")
+    return lambda text: pattern.sub(lambda match: targets[match[0]], text)
+
+
+def _map_texts(value: Any, change: Callable[[str], str]) -> Any:
+    """A value of plain parts with all texts changed."""
+    if isinstance(value, str):
+        return change(value)
+    if isinstance(value, list | tuple):
+        return [_map_texts(part, change) for part in value]
+    if isinstance(value, dict):
+        return {key: _map_texts(part, change) for key, part in value.items()}
+    return value
+
+
+def _write(root: Path, job: ScriptJob, path: str, data: bytes) -> None:
+    """Write what a script has written where it may."""
+    if not any(path.startswith(f"{folder.rstrip('/')}/") for folder in job.writes):
+        raise EffectError(f"--cluster: {job.path} may not write {path}")
+    target = resolve_inside(root, path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_bytes(data)
