@@ -25,6 +25,11 @@ from coursebuild.core.files.errors import require
 from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands import measuring
+from coursebuild.features.bench.commands.engines import (
+    bench_engines,
+    chosen_engines,
+    engines_text,
+)
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     MeasuringRun,
@@ -47,7 +52,7 @@ from coursebuild.numerics.reports.scene_report import (
     WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.shown_errors import is_idle
-from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.pipeline.shown_reports import read_record
 from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
@@ -64,6 +69,7 @@ EXAMPLES = """\
 examples:
   coursebuild bench --quick              a first look at all models
   coursebuild bench pendulum --record    what pages show of it
+  coursebuild bench pendulum --engines   the same model in other engines
 """
 
 
@@ -77,6 +83,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quick", action="store_true", help="fewer settings and rough times, for a first look"
     )
+    parser.add_argument(
+        "--engines",
+        nargs="?",
+        const="",
+        metavar="NAMES",
+        help="measure other engines instead: all that are installed, or some, as in mjx,warp",
+    )
     add_report_options(parser)
     add_cache(parser)
 
@@ -85,6 +98,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure models, or check their recorded reports."""
     require("scipy", "measure", "`coursebuild bench`")
     names, quick = tuple(arguments.scenes), arguments.quick
+    if arguments.engines is not None:
+        return _run_engines(arguments, names)
 
     def measure(options: Options) -> Measurement[Any]:
         if arguments.check:
@@ -96,6 +111,23 @@ def run(arguments: argparse.Namespace) -> int:
         measure,
         lambda reports, style: "" if arguments.check else bench_text(reports, style),
         lambda measurement: measurement_json({"scenes": measurement.reports}, measurement),
+        empty="there is no model to measure\n",
+    )
+
+
+def _run_engines(arguments: argparse.Namespace, names: tuple[str, ...]) -> int:
+    """Measure models in other engines."""
+    if arguments.check:
+        message = "--check takes no --engines: 32 bits do not repeat from one device to the next"
+        raise UsageError(message)
+    chosen, remarks = chosen_engines(arguments.engines)
+    return run_measurement(
+        arguments,
+        lambda options: bench_engines(
+            options, names, chosen, remarks, quick=arguments.quick, record=arguments.record
+        ),
+        engines_text,
+        lambda measurement: measurement_json({"engines": measurement.reports}, measurement),
         empty="there is no model to measure\n",
     )
 
