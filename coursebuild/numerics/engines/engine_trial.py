@@ -1,7 +1,7 @@
 """What an engine is asked in a child process: one motion, and what a step of many worlds costs.
 
 Entry points: `Engine`, the table that an engine's module fills in; `Variant`, `Trial`;
-`begin(engine, …)`, then `run_motion(begun, trial)` and `run_costs(begun, trial, clock)`.
+`begin(engine, …)`, then `run_motion(batch, trial)` and `run_costs(batch, trial, clock)`.
 
 1. The motion begins as the scenario does, in one world, and is looked at where the reference is.
 2. The worlds of a batch begin a little apart, so that they do not all take the same branches.
@@ -42,7 +42,7 @@ class Variant(Struct, frozen=True):
 
 
 class Worlds(Protocol):
-    """Copies of a model that an engine has begun to simulate."""
+    """Copies of a model that an engine simulates."""
 
     def advance(self, steps: int) -> None:
         """Make so many steps in every world, and wait until they are made."""
@@ -117,7 +117,7 @@ _REPEAT, _SLOWEST = 0.1, 20.0
 beyond which an engine is not timed."""
 
 
-class Begun(Struct, frozen=True, eq=False):
+class Batch(Struct, frozen=True, eq=False):
     """Worlds that are ready to be advanced."""
 
     model: Any
@@ -126,29 +126,29 @@ class Begun(Struct, frozen=True, eq=False):
     compile_seconds: float
 
 
-def begin(engine: Engine, variant: Variant, trial: Trial, count: int, clock: Clock) -> Begun:
+def begin(engine: Engine, variant: Variant, trial: Trial, count: int, clock: Clock) -> Batch:
     """Start an engine, and let it compile what it needs for so many worlds."""
     model = mujoco.MjModel.from_binary_path(trial.model)
     data = initial_data(trial.scenario, model)
     velocities = np.tile(data.qvel, (count, 1))
     # The first world begins as the scenario does.
     velocities[1:] += nudges(model, 2 * count, _SPREAD)[: count - 1, 1]
-    started: list[Worlds] = []
+    instances: list[Worlds] = []
 
     def first() -> None:
-        started.append(engine.start(model, data, velocities, variant))
-        started[0].advance(1)
+        instances.append(engine.start(model, data, velocities, variant))
+        instances[0].advance(1)
 
     with silent():
         took = _time(first, clock)
-        took -= _time(partial(started[0].advance, 1), clock)
-    return Begun(model, started[0], count, max(0.0, took))
+        took -= _time(partial(instances[0].advance, 1), clock)
+    return Batch(model, instances[0], count, max(0.0, took))
 
 
-def run_motion(begun: Begun, trial: Trial) -> EngineMotion:
+def run_motion(batch: Batch, trial: Trial) -> EngineMotion:
     """The motion of a trial in one world."""
-    scenario, worlds, states = trial.scenario, begun.worlds, []
-    steps = scenario.steps(float(begun.model.opt.timestep))
+    scenario, worlds, states = trial.scenario, batch.worlds, []
+    steps = scenario.steps(float(batch.model.opt.timestep))
     with silent():
         worlds.reset()
         for _, command in zip(range(trial.count), scenario.commands(scenario.sample), strict=False):
@@ -157,7 +157,7 @@ def run_motion(begun: Begun, trial: Trial) -> EngineMotion:
             worlds.advance(steps)
             states.append(worlds.state())
     qpos, qvel = (np.array(part) for part in zip(*states, strict=True))
-    return EngineMotion(_finite(qpos), _finite(qvel), begun.compile_seconds)
+    return EngineMotion(_finite(qpos), _finite(qvel), batch.compile_seconds)
 
 
 def _finite(table: Array) -> list[list[float | None]]:
@@ -165,13 +165,13 @@ def _finite(table: Array) -> list[list[float | None]]:
     return rows
 
 
-def run_costs(begun: Begun, trial: Trial, clock: Clock) -> EngineCost:
-    """What a step of one world costs among those that were begun.
+def run_costs(batch: Batch, trial: Trial, clock: Clock) -> EngineCost:
+    """What a step of one world costs among those of a batch.
 
     Raises:
         RefusalError: it takes too long to be timed.
     """
-    model, worlds, count = begun.model, begun.worlds, begun.count
+    model, worlds, count = batch.model, batch.worlds, batch.count
     until = trial.scenario.holds()[0][1]  # until the command changes
     most = round(until / float(model.opt.timestep))
     with silent():
@@ -191,19 +191,21 @@ def run_costs(begun: Begun, trial: Trial, clock: Clock) -> EngineCost:
 
         data = initial_data(trial.scenario, model)
         beginning = full_state(model, data)
-        repeats = max(1, 1000 // steps)  # a step of MuJoCo takes a microsecond or so
 
-        def yardstick() -> None:
+        def own_steps(repeats: int) -> None:
             for _ in range(repeats):
                 mujoco.mj_setState(model, data, beginning, STATE)
                 mujoco.mj_step(model, data, steps)
 
-        _, timing = time_jobs([yardstick, work], 0, clock, quick=True)
+        # What takes as long is disturbed as often.
+        repeats = max(1, round(_REPEAT / _time(partial(own_steps, 1), clock)))
+
+        _, timing = time_jobs([partial(own_steps, repeats), work], 0, clock, quick=True)
     share = repeats / count
     return EngineCost(
         timing.nanoseconds.scale(1e-9 / (steps * count)),
         timing.ratio.scale(share),
-        begun.compile_seconds,
+        batch.compile_seconds,
         steps,
     )
 

@@ -38,7 +38,7 @@ class EngineBasis(Struct, frozen=True, eq=False):
     reference: KnownMotion
     energy: float | None
     """The scale for changes of energy, J; `None` where energy is not conserved."""
-    own: EngineStates
+    baseline: EngineStates
     """The motion in MuJoCo itself, at the model's own setting."""
 
     @property
@@ -69,8 +69,8 @@ def engine_basis(model: Any, scene: Scene, *, quick: bool = False) -> EngineBasi
     setting = own_setting(model, pilot)
     reference = find_references(model, pilot, quick=quick)[setting.cone].reference
     energy, _ = find_conserved(model, pilot, reference)
-    own = with_integrator(model, integrator_of(model), scene.timestep)
-    return EngineBasis(model, pilot, reference, energy, simulate(pilot.setup, own).states)
+    own_model = with_integrator(model, integrator_of(model), scene.timestep)
+    return EngineBasis(model, pilot, reference, energy, simulate(pilot.setup, own_model).states)
 
 
 def judge_motion(basis: EngineBasis, row: EngineRow, motion: EngineMotion) -> EngineRow:
@@ -96,7 +96,7 @@ def judge_motion(basis: EngineBasis, row: EngineRow, motion: EngineMotion) -> En
             return replace(row, status="diverged", message=message)
     exact, count = motion_of(model, reference.states), len(reference.states.times)
     near = errors(motion_of(model, states.head(count)), exact, reference.floor)
-    apart = position_distances(model, states.qpos[:count], basis.own.qpos[:count])
+    apart = position_distances(model, states.qpos[:count], basis.baseline.qpos[:count])
     drift = None if basis.energy is None else energy_drift(energies, basis.energy)
     return replace(row, **asdict(near), apart=float(apart.max()), energy_drift=drift)
 

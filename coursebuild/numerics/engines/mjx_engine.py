@@ -26,9 +26,12 @@ class BatchedWorlds:
         with jax.default_device(self._device):
             self._model = mjx.put_model(model, device=self._device, impl="jax")
             world = mjx.put_data(model, data, device=self._device, impl="jax")
-            batch = jax.tree.map(lambda leaf: jax.numpy.stack([leaf] * count), world)
+            batch = jax.tree.map(
+                lambda leaf: jax.numpy.broadcast_to(leaf, (count, *jax.numpy.shape(leaf))), world
+            )
             batch = batch.replace(qvel=jax.numpy.asarray(velocities, dtype=world.qvel.dtype))
-            self._beginning = self._batch = batch
+            # Placed as results are: a function is compiled again for what is placed otherwise.
+            self._beginning = self._batch = jax.device_put(batch, self._device)
             step = jax.vmap(mjx.step, in_axes=(None, 0))
 
             def advance(model: Any, batch: Any, steps: Any) -> Any:
@@ -47,9 +50,9 @@ class BatchedWorlds:
         """Give this command to all worlds."""
         import jax
 
-        old = self._batch.ctrl
-        new = jax.device_put(np.broadcast_to(np.asarray(control, old.dtype), old.shape))
-        self._batch = self._batch.replace(ctrl=jax.device_put(new, self._device))
+        before = self._batch.ctrl
+        table = np.broadcast_to(np.asarray(control, before.dtype), before.shape)
+        self._batch = self._batch.replace(ctrl=jax.device_put(table, self._device))
 
     def reset(self) -> None:
         """Go back to the beginning."""

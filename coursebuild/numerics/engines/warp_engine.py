@@ -1,8 +1,8 @@
 """MuJoCo Warp: MuJoCo in Warp, in 32 bits, on the processor and on the first CUDA device.
 
 It was written for CUDA, where the launches of a step are recorded once and played back as a graph.
-On the processor each is made by Python, in every step. Its kernels are compiled into the working
-directory, which is the child process's own: what was compiled before would hide what it takes.
+On the processor each is made by Python, in every step. Warp keeps the kernels that it has compiled,
+so that the time for this is shorter where a like model ran before.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ class WarpWorlds:
         import mujoco_warp
         import warp
 
-        warp.config.kernel_cache_dir = "warp-kernels"
         self._device = warp.get_device(variant.device)
         with warp.ScopedDevice(self._device):
             self._model = mujoco_warp.put_model(model)

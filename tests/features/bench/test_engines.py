@@ -43,12 +43,12 @@ def course(tmp_path: Path) -> Path:
     return course
 
 
-def chosen(names: Sequence[str]) -> tuple[ChosenEngine, ...]:
+def choose(names: Sequence[str]) -> tuple[ChosenEngine, ...]:
     return chosen_engines(",".join(names), FAKES)[0]
 
 
 def rows(course: Path, *names: str, seconds: float = 900.0) -> dict[str, EngineRow]:
-    engines = chosen(names)
+    engines = choose(names)
     (report,) = bench_engines(
         options(course), ("box",), engines, quick=True, seconds=seconds
     ).reports
@@ -100,20 +100,20 @@ def test_engines_agree_with_mujoco_where_they_are_mujoco(course: Path) -> None:
     assert measurement.remarks == (f"wrote {PATH}",)
     report = ENGINES.decode((course / PATH).read_bytes(), "box")
     assert report == measurement.reports[0]
-    one, threads = report.scenarios[0].rows
-    assert one.apart == 0 and threads.apart is not None and threads.apart < 1e-12
-    assert [cost.worlds for cost in one.costs] == [1]
+    single, threads = report.scenarios[0].rows
+    assert single.apart == 0 and threads.apart is not None and threads.apart < 1e-12
+    assert [cost.worlds for cost in single.costs] == [1]
     assert [cost.worlds for cost in threads.costs] == [1, 64, 4096]
 
 
 def test_engines_are_chosen_by_name() -> None:
-    names = [engine.name for engine in chosen(("crash", " single", "crash"))]
+    names = [engine.name for engine in choose(("crash", " single", "crash"))]
     assert names == ["crash", "single"]
     with pytest.raises(UsageError) as unknown:
-        chosen(("singel",))
+        choose(("singel",))
     assert str(unknown.value).startswith("there is no engine `singel`; did you mean `single`?")
     with pytest.raises(EffectError) as absent:
-        chosen(("absent",))
+        choose(("absent",))
     assert (absent.value.message, absent.value.help) == (
         "the engine `absent` needs the package an_engine_that_nobody_has",
         "run `pip install 'coursebuild[engines]'`",

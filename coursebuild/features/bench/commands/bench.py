@@ -120,11 +120,11 @@ def _run_engines(arguments: argparse.Namespace, names: tuple[str, ...]) -> int:
     if arguments.check:
         message = "--check takes no --engines: 32 bits do not repeat from one device to the next"
         raise UsageError(message)
-    chosen, remarks = chosen_engines(arguments.engines)
+    engines, remarks = chosen_engines(arguments.engines)
     return run_measurement(
         arguments,
         lambda options: bench_engines(
-            options, names, chosen, remarks, quick=arguments.quick, record=arguments.record
+            options, names, engines, remarks, quick=arguments.quick, record=arguments.record
         ),
         engines_text,
         lambda measurement: measurement_json({"engines": measurement.reports}, measurement),

@@ -87,9 +87,9 @@ def _answer(request: Request) -> Reply:
         return Reply(tuple(engine.variants(request.processors)))
     assert request.variant is not None and request.trial is not None
     trial, clock = request.trial, time.perf_counter_ns
-    begun = begin(engine, request.variant, trial, request.worlds, clock)
-    motion = run_motion(begun, trial) if request.action == "motion" else None
-    return Reply(motion=motion, cost=run_costs(begun, trial, clock))
+    batch = begin(engine, request.variant, trial, request.worlds, clock)
+    motion = run_motion(batch, trial) if request.action == "motion" else None
+    return Reply(motion=motion, cost=run_costs(batch, trial, clock))
 
 
 def _words(error: Exception) -> str:

@@ -152,8 +152,8 @@ def bench_engines(
     records = (
         (ENGINES.path(report.model), ENGINES.encode(report)) for report in measurement.reports
     )
-    written = write_records(options.root, measurement, records)
-    return replace(written, remarks=(*measurement.remarks, *written.remarks))
+    outcome = write_records(options.root, measurement, records)
+    return replace(outcome, remarks=(*measurement.remarks, *outcome.remarks))
 
 
 class _EngineRun(MeasuringRun):
@@ -169,42 +169,42 @@ class _EngineRun(MeasuringRun):
 
     def measure(self, scene: CourseScene) -> EngineReport | None:
         """Report on a scene; `None` if it cannot be measured."""
-        versions = [(chosen.name, chosen.versions) for chosen in self.engines]
+        versions = [(choice.name, choice.versions) for choice in self.engines]
         parts = (scene.name, scene.digest, self.quick, self.code, self.machine, versions)
         return self.load_or_measure(
             scene.name, "bench-engines", parts, EngineReport, lambda: self._engine_report(scene)
         )
 
     def _engine_report(self, scene: CourseScene) -> EngineReport:
-        compiled = measuring.compile_scene(self.options.root, scene, quick=self.quick)
+        compiled_scene = measuring.compile_scene(self.options.root, scene, quick=self.quick)
         load, scenarios = os.getloadavg()[0], []
         with measuring.report_errors(scene), tempfile.TemporaryDirectory() as folder:
             path = str(Path(folder, "model.mjb"))
-            mujoco.mj_saveModel(compiled.model, path, None)
-            for physics in compiled.scenarios:
+            mujoco.mj_saveModel(compiled_scene.model, path, None)
+            for physics in compiled_scene.scenarios:
                 self.progress.describe(scene.name, f"{physics.name}: the reference")
-                basis = engine_basis(compiled.model, physics, quick=self.quick)
+                basis = engine_basis(compiled_scene.model, physics, quick=self.quick)
                 trial = Trial(path, physics.scenario, len(physics.scenario.times))
                 rows = tuple(
-                    row for chosen in self.engines for row in self._rows(chosen, basis, trial)
+                    row for choice in self.engines for row in self._rows(choice, basis, trial)
                 )
                 scenarios.append(replace(basis.report, rows=rows))
         return EngineReport(
             scene.name, scene.digest, self.quick, self.machine, load, tuple(scenarios)
         )
 
-    def _rows(self, chosen: ChosenEngine, basis: EngineBasis, trial: Trial) -> Iterator[EngineRow]:
+    def _rows(self, choice: ChosenEngine, basis: EngineBasis, trial: Trial) -> Iterator[EngineRow]:
         """A row for each way to run an engine; one that says why there is none."""
         row = EngineRow(
-            engine=chosen.name,
-            title=chosen.engine.title,
-            versions=chosen.versions,
+            engine=choice.name,
+            title=choice.engine.title,
+            versions=choice.versions,
             status="ok",
             position=None,
             attitude=None,
             velocity=None,
         )
-        with _EngineChild(chosen, self.seconds) as child:
+        with _EngineChild(choice, self.seconds) as child:
             reply = child.ask(action="list")
         if reply.refusal:
             yield _refuse(row, reply)
@@ -212,7 +212,7 @@ class _EngineRun(MeasuringRun):
         for variant in reply.variants:
             named_row = replace(row, **msgspec.structs.asdict(variant))
             self.progress.describe(basis.pilot.scene.name, row_name(named_row))
-            with _EngineChild(chosen, self.seconds) as child:
+            with _EngineChild(choice, self.seconds) as child:
                 reply = child.ask(action="motion", variant=variant, trial=trial)
                 if reply.motion is None:
                     yield _refuse(named_row, reply)
@@ -220,7 +220,7 @@ class _EngineRun(MeasuringRun):
                 named_row = judge_motion(basis, named_row, reply.motion)
                 counts = WORLDS[:2] if self.quick else WORLDS
                 costs = [_batch_cost(1, reply)]
-                if chosen.engine.batched:
+                if choice.engine.batched:
                     costs += _costs(child, variant, trial, counts[1:], self.seconds)
                 yield replace(named_row, costs=tuple(costs))
 
@@ -254,8 +254,8 @@ def _batch_cost(worlds: int, reply: Reply) -> BatchCost:
 class _EngineChild:
     """The process of an engine; it is started again after it died."""
 
-    def __init__(self, chosen: ChosenEngine, seconds: float) -> None:
-        self._chosen, self._seconds = chosen, seconds
+    def __init__(self, choice: ChosenEngine, seconds: float) -> None:
+        self._choice, self._seconds = choice, seconds
         # It is killed after ten times as long as it may compute, which is not limited here.
         self._child = JsonChild(engine_main.__file__, seconds / 10, memory=_MEMORY)
 
@@ -267,10 +267,10 @@ class _EngineChild:
 
     def ask(self, **request: object) -> Reply:
         """What the engine says; a refusal where its process crashed or took too long."""
-        chosen, processors = self._chosen, machine().processors
-        asked = Request(tuple(sys.path), chosen.module, chosen.name, processors, **request)  # type: ignore[arg-type]
+        choice, processors = self._choice, machine().processors
+        question = Request(tuple(sys.path), choice.module, choice.name, processors, **request)  # type: ignore[arg-type]
         try:
-            answer = self._child.ask(msgspec.to_builtins(asked))
+            answer = self._child.ask(msgspec.to_builtins(question))
         except EffectError as error:
             return Reply(refusal=error.message)
         if answer is not None:
