@@ -104,11 +104,18 @@ _FELT = 0.05
 
 
 def _cost_text(row: EngineRow, worlds: int) -> str:
-    """The time of a step, and how many times that of MuJoCo in one world."""
+    """The time of a step, and how many times that of MuJoCo in one world, or between which."""
     cost = next((cost for cost in row.costs if cost.worlds == worlds), BatchCost(worlds))
     if cost.seconds is None or cost.ratio is None:
         return "–" if cost.remark else ""
-    return f"{1e6 * cost.seconds.value:.3g} µs (×{cost.ratio.value:.2g})"
+    ratio = f"{cost.ratio.value:.2g}"
+    if cost.ratio.half_width > _UNCERTAIN:
+        ratio = f"{cost.ratio.low:.2g} – {cost.ratio.high:.2g}"
+    return f"{1e6 * cost.seconds.value:.3g} µs (×{ratio})"
+
+
+_UNCERTAIN = 0.1
+"""The relative half width of an interval from which on both of its ends are told."""
 
 
 def _remark(words: Strings, row: EngineRow) -> str:

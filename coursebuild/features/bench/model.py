@@ -136,11 +136,15 @@ def _check(bench: Bench, course: Course) -> Iterator[Diagnostic]:
     scenarios = declared_scenarios(course, bench.model)
     if scenarios:
         yield from _check_scenario(bench, scenarios)
-    kinds = {BENCH: bench.shows != ("engines",), ENGINES: "engines" in bench.shows}
-    for kind, is_shown in kinds.items():
-        if is_shown and kind.path(bench.model) not in course.files:
+    commands: dict[str, str] = {}
+    if bench.shows != ("engines",):
+        commands[BENCH.path(bench.model)] = BENCH.command(bench.model)
+    if "engines" in bench.shows:
+        commands[ENGINES.path(bench.model)] = ENGINES.command(bench.model)
+    for path, command in commands.items():
+        if path not in course.files:
             message = f"nothing was recorded of the model `{bench.model}`, and the page says so"
-            help = f"measure it with `{kind.command(bench.model)}`"
+            help = f"measure it with `{command}`"
             yield diagnose("bench-unrecorded", bench.model_span, message, help=help)
 
 

@@ -236,10 +236,9 @@ def measurements_view(library: Library, place: urls.Place, model: MjcfModel) -> 
         sweeps=tuple(
             scenario_view(words, sweep, scenario_anchor(f"sweep-{sweep.name}")) for sweep in sweeps
         ),
-        engines=tuple(
-            engine_view(words, scenario, engines)
-            for scenario in (() if engines is None else engines.scenarios)
-        ),
+        engines=()
+        if engines is None
+        else tuple(engine_view(words, scenario, engines) for scenario in engines.scenarios),
         engines_machine="" if engines is None else machine_text(words, engines.machine),
         engines_file="" if engines is None else place.href(urls.file_path(ENGINES.path(name))),
     )

@@ -13,6 +13,7 @@ Entry points: `Engine`, the table that an engine's module fills in; `Variant`, `
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Literal, Protocol, TypeAlias
@@ -112,9 +113,9 @@ class EngineCost(Struct, frozen=True):
 
 _SPREAD = 1e-3
 """How far apart the worlds of a batch begin, as `pilot.nudges` has it."""
-_REPEAT, _SLOWEST = 0.1, 20.0
-"""Seconds that a repeat takes at least, unless that is the whole scenario; seconds of a single step
-beyond which an engine is not timed."""
+_REPEAT, _SLOWEST = 0.004, 20.0
+"""Seconds that a repeat takes at least, unless that is the whole scenario: as short as a turn that
+a busy system gives to one program. Seconds of a step beyond which an engine is not timed."""
 
 
 class Batch(Struct, frozen=True, eq=False):
@@ -161,8 +162,8 @@ def run_motion(batch: Batch, trial: Trial) -> EngineMotion:
 
 
 def _finite(table: Array) -> list[list[float | None]]:
-    rows: list[list[float | None]] = np.where(np.isfinite(table), table, None).tolist()
-    return rows
+    rows: list[list[float]] = table.tolist()
+    return [[value if math.isfinite(value) else None for value in row] for row in rows]
 
 
 def run_costs(batch: Batch, trial: Trial, clock: Clock) -> EngineCost:

@@ -5,6 +5,7 @@ Its implementation in JAX, `impl="jax"`; that in Warp is an engine of its own.
 
 from __future__ import annotations
 
+import importlib
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,9 @@ class BatchedWorlds:
     """A batch that one compiled function advances."""
 
     def __init__(self, model: Any, data: Any, velocities: Array, variant: Variant) -> None:
-        import jax
         from mujoco import mjx
 
+        jax: Any = importlib.import_module("jax")
         jax.config.update("jax_enable_x64", variant.bits == 64)
         self._device = jax.devices(variant.device)[0]
         count = len(velocities)
@@ -41,8 +42,7 @@ class BatchedWorlds:
 
     def advance(self, steps: int) -> None:
         """Make so many steps in every world, and wait for them."""
-        import jax
-
+        jax: Any = importlib.import_module("jax")
         with jax.default_device(self._device):
             self._batch = jax.block_until_ready(self._advance(self._model, self._batch, steps))
 
