@@ -32,11 +32,13 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(VENV)/.made),$(CURDIR))
 .PHONY: $(VENV)/.made
 endif
 
-.PHONY: help site pages serve quick test test-slow test-oldest fuzz lint format types dist vscode lock npm system clean distclean
+.PHONY: help site pages release-files version serve quick test test-slow test-oldest fuzz lint format types dist vscode lock npm system clean distclean
 
 help:
 	@echo 'make site       make the environment, install, build the course into public/, the manual into docs/public/'
 	@echo 'make pages      build both anew, with their addresses, as they are published: into build/pages/'
+	@echo 'make release-files  that, the packages, the extension: what a tag publishes, into build/release/'
+	@echo 'make version    write VERSION=0.2.0 wherever the version stands, before a release'
 	@echo 'make serve      the same, then serve it and rebuild on every change'
 	@echo 'make quick      run the tests that need no browser, no lab engine and no whole site'
 	@echo 'make test       do all set-up and run every test (PYTEST_ARGS=..., WORKERS=$(WORKERS))'
@@ -54,29 +56,34 @@ site: $(VENV)/.site
 	$(BIN)/coursebuild build
 	$(BIN)/coursebuild -C docs build
 
-# What is published: the course, and the manual in docs/ below it. Where it will be is said in
-# coursebuild/__init__.py; if nothing is said there, what needs an address is left out.
+# What is published: the course, and in docs/ below it the manual. The manuals of earlier releases,
+# which are kept as files of these, are taken from MANUALS and get folders of their own there.
 PAGES := build/pages
+MANUALS := build/manuals
+RELEASE := build/release
 pages: $(VENV)/.site
 	rm -rf $(PAGES) build/sources
 	mkdir -p build/sources
 	git archive HEAD content docs lib matplotlibrc models runs | tar -x -C build/sources
-	cd build/sources && ../../$(BIN)/python -c "$$ADDRESSES"
+	$(BIN)/python docs/release.py maps build/sources
 	$(BIN)/coursebuild -C build/sources build --strict
 	$(BIN)/coursebuild -C build/sources/docs build --strict
 	mv build/sources/public $(PAGES)
 	mv build/sources/docs/public $(PAGES)/docs
+	$(BIN)/python docs/release.py manuals $(PAGES) $(MANUALS) $(RELEASE)
 
-define ADDRESSES
-from pathlib import Path
-from coursebuild import MANUAL, REPOSITORY, SITE
-for name, address in (("content", SITE), ("docs/content", MANUAL)):
-    map_file = Path(name, "course.toml")
-    links = {"base_url": address, "repository": REPOSITORY}
-    lines = "".join(f'{key} = "{link}"\n' for key, link in links.items() if link)
-    map_file.write_text(map_file.read_text().replace("[course]\n", f"[course]\n{lines}", 1))
-endef
-export ADDRESSES
+# All that a pushed tag publishes, from what is committed; a tag that is not the version is refused.
+release-files: $(VENV)/.site
+	$(BIN)/python docs/release.py check
+	rm -rf $(RELEASE)
+	$(MAKE) pages dist vscode
+	cp dist/* $(RELEASE)
+	cp editors/vscode/dist/coursebuild.vsix $(RELEASE)/$$(basename dist/*.tar.gz .tar.gz).vsix
+	$(BIN)/python docs/release.py notes $(RELEASE)
+
+version: $(VENV)/.site
+	$(BIN)/python docs/release.py version $(VERSION)
+	$(BIN)/python docs/release.py check
 
 serve: $(VENV)/.site
 	$(BIN)/coursebuild serve
@@ -124,11 +131,11 @@ types: $(VENV)/.dev npm
 	$(BIN)/mypy
 	PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" site/node_modules/.bin/tsc -p site
 
-vscode:
+vscode: $(VENV)/.site
 	cd editors/vscode && PATH="$$PATH:$$(../../$(BIN)/python ../../site/bundle.py node)" && \
 	  npm ci --ignore-scripts && npm test && npm run package
 
-dist: $(VENV)/.dev
+dist: $(VENV)/.site
 	rm -rf dist
 	$(BIN)/python -m hatchling build
 

@@ -57,7 +57,7 @@ def main(arguments: list[str] | tuple[str, ...] | None = None) -> int:
                 return status
         from coursebuild.cli.commands import run
     except MemoryError:
-        return say(FAILURE, "coursebuild: there is not enough memory to begin")
+        return say(FAILURE, "coursebuild: not enough memory to start")
     except OSError as error:
-        return say(FAILURE, f"coursebuild: it cannot be loaded: {error}")
+        return say(FAILURE, f"coursebuild: loading failed: {error}")
     return run(directory, words, alone=alone)

@@ -53,7 +53,7 @@ def available_cores() -> int:
 
 def add_quiet(parser: argparse.ArgumentParser) -> None:
     """Declare `--quiet`."""
-    parser.add_argument("--quiet", "-q", action="store_true", help="print only what is wrong")
+    parser.add_argument("--quiet", "-q", action="store_true", help="print only problems")
 
 
 def add_cache(parser: argparse.ArgumentParser) -> None:
@@ -61,32 +61,30 @@ def add_cache(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cache",
         metavar="PLACE",
-        help="share results at a folder or a URL such as s3://… (default: $COURSEBUILD_CACHE)",
+        help="share results in a folder or at a URL such as s3://… (default: $COURSEBUILD_CACHE)",
     )
     parser.add_argument(
         "--no-cache",
         action="store_true",
-        help="run and make everything again, and keep the new results",
+        help="ignore kept results, and keep the new ones",
     )
     parser.add_argument(
         "--cache-size",
         metavar="SIZE",
-        help="what .coursebuild may take, such as 500M (default: $COURSEBUILD_CACHE_SIZE, or 1G)",
+        help="size limit of .coursebuild, such as 500M (default: $COURSEBUILD_CACHE_SIZE, or 1G)",
     )
 
 
 def add_running(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of commands that run scripts."""
     add_quiet(parser)
-    parser.add_argument(
-        "--verbose", "-v", action="store_true", help="say of each script why it runs"
-    )
+    parser.add_argument("--verbose", "-v", action="store_true", help="say why each script runs")
     parser.add_argument(
         "--jobs",
         "-j",
         type=_parse_jobs,
         metavar="N",
-        help="scripts at a time (default: one per core)",
+        help="scripts to run at a time (default: one per core)",
     )
     add_cache(parser)
 
@@ -96,7 +94,7 @@ def add_sandbox(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sandbox",
         action="store_true",
-        help="run each script without network, and with nothing to write or to see but the course",
+        help="run each script without network, able to see and write only the course",
     )
 
 
@@ -105,7 +103,7 @@ def add_strict(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strict",
         action="store_true",
-        help="count warnings as errors, and refuse scripts that are not run",
+        help="treat warnings as errors, and reject scripts that are not run",
     )
 
 
@@ -135,7 +133,7 @@ def add_long(parser: argparse.ArgumentParser) -> None:
 def add_format(parser: argparse.ArgumentParser, *formats: str) -> None:
     """Declare `--format`."""
     parser.add_argument(
-        "--format", choices=formats, default="text", help="how to print it (default: %(default)s)"
+        "--format", choices=formats, default="text", help="output format (default: %(default)s)"
     )
 
 

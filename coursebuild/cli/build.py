@@ -24,7 +24,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--out",
         default="public",
         metavar="FOLDER",
-        help="where the site goes, from the course's folder (default: %(default)s)",
+        help="folder of the site, from the course's folder (default: %(default)s)",
     )
 
 

@@ -1,4 +1,4 @@
-"""`coursebuild check`: verify, publish nothing."""
+"""`coursebuild check`: verify everything without publishing."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ examples:
   coursebuild check                      the whole course
   coursebuild check 4.2                  one lesson
   coursebuild check -v                   why each script runs
-  coursebuild check --fix                mend what can be mended in one way
+  coursebuild check --fix                fix what has a single cure
   coursebuild check --format github      annotations in GitHub Actions
   coursebuild check --strict             in CI: warnings are errors
   coursebuild check --sandbox            somebody else's branch
@@ -47,44 +47,44 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--shard",
         metavar="I/N",
-        help="run only the I-th of N parts of the scripts and labs, for several machines",
+        help="run only part I of N of the scripts and labs, for use on several machines",
     )
     parser.add_argument(
         "--timings",
         metavar="FILE",
         action="append",
         default=[],
-        help="how long each takes, so that the parts take equally long; the same for each part",
+        help="run times that make the parts equally long; give every part the same file",
     )
-    parser.add_argument(
-        "--write-timings", metavar="FILE", help="write how long each takes into this file"
-    )
+    parser.add_argument("--write-timings", metavar="FILE", help="write run times to this file")
     add_long(parser)
     add_sandbox(parser)
     add_strict(parser)
     parser.add_argument(
         "--fix",
         action="store_true",
-        help="mend the mistakes that have one right cure; `undo` takes it back",
+        help="fix mistakes that have a single cure; `undo` reverts it",
     )
     parser.add_argument(
-        "--unsafe", action="store_true", help="with --fix: also what is only likely to be meant"
+        "--unsafe",
+        action="store_true",
+        help="with --fix: also make fixes that are only likely to be right",
     )
     parser.add_argument(
         "--sensitivity",
         action="store_true",
-        help="repeat what was recorded, move initial states and halve timesteps, and say which "
+        help="repeat recorded runs, move initial states, halve timesteps, and report which "
         "digits hold",
     )
     parser.add_argument(
         "--truth",
         action="store_true",
-        help="list the numbers and the arithmetic that nothing proves",
+        help="list numbers and arithmetic that nothing proves",
     )
     parser.add_argument(
         "--against",
         metavar="VERSION",
-        help="run the scripts with this version of MuJoCo, or `latest`, and say what it changes",
+        help="run the scripts with this MuJoCo version, or `latest`, and report what it changes",
     )
 
 
@@ -93,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.against is not None:
         return _compare_with_version(arguments)
     if arguments.unsafe and not arguments.fix:
-        raise UsageError("--unsafe says how much --fix may change, which is not given")
+        raise UsageError("--unsafe needs --fix")
     if arguments.fix:
         return _fix(arguments)
 
@@ -107,7 +107,7 @@ def run(arguments: argparse.Namespace) -> int:
             truth=arguments.truth,
         )
         safe = sum(diagnostic.safe for diagnostic in report.diagnostics)
-        hint = f"`coursebuild check --fix` mends {safe} of {len(report.diagnostics)}"
+        hint = f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}"
         return replace(report, remarks=(*report.remarks, *([hint] if safe else [])))
 
     # Other formats say how long it took, which the report of before would not.

@@ -57,7 +57,7 @@ _GRACE = 10.0
 _WARM_UP = 1.0
 """Seconds after which a server without work imports what commands need."""
 _NEEDED = (
-    *(f"coursebuild.cli.{n}" for n in ("build", "check", "export", "extract", "update")),
+    *(f"coursebuild.cli.{n}" for n in ("build", "check", "export", "extract", "undo", "update")),
     *(f"coursebuild.features.authoring.commands.{n}" for n in ("fmt", "new", "rename")),
     "coursebuild.core.run.script_server",
     "coursebuild.features.lab.trial",
@@ -155,16 +155,18 @@ def _serve(
     for stream in range(3):
         os.dup2(null, stream)
     _close_all_but(listener.fileno(), events.fileno())
-    state, is_warm = process_state(), False
+    wait: float | None = _WARM_UP
+    state, modules = process_state(), list(_NEEDED)
     while True:
-        ready, _, _ = select.select([listener, events], [], [], None if is_warm else _WARM_UP)
+        ready, _, _ = select.select([listener, events], [], [], wait)
         if events in ready:  # nothing comes here but the end
             return
-        if not ready:
-            for module in _NEEDED:
-                importlib.import_module(module)
+        if not ready and modules:  # one at a time, as commands may come
+            importlib.import_module(modules.pop(0))
+            wait = 0.0
+        elif not ready:
             installed_features()
-            is_warm = True
+            wait = None
             gc.collect()
             gc.freeze()  # copies share what is not looked through
         if listener in ready:
@@ -194,9 +196,9 @@ def _attend(
             send(connection, preview)
         case {"ask": "command", "words": [command, *_]} if command in COMMANDS:
             if request["root"] != root or len(files) != 4:
-                send(connection, {"refusal": "is of another course"})
+                send(connection, {"refusal": "belongs to another course"})
             elif state is None or request["state"] != state:
-                reason = "is of another version or another Python environment"
+                reason = "runs another version or Python environment"
                 send(connection, {"refusal": reason})
             else:
                 _supervise(connection, events, request, files)

@@ -71,8 +71,8 @@ commands:
 anywhere on the line:
   -C DIR         the course's folder (default: the nearest one with content/course.toml)
 
-`coursebuild help COMMAND` says what a command takes, `coursebuild explain RULE` what a message
-means, `coursebuild --version` which version this is.
+Run `coursebuild help COMMAND` for the arguments of a command, `coursebuild explain RULE` for the
+meaning of a message, `coursebuild --version` for the version.
 """
 if MANUAL:
     _OVERVIEW += f"The manual: {MANUAL}\n"

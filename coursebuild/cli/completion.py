@@ -1,4 +1,4 @@
-"""`coursebuild completion`: print the completion script of a shell.
+"""`coursebuild completion`: print a shell completion script.
 
 The script calls this command with the words of the line behind `--`, to get the completions of the
 last word. Where there are none the shell completes names of files.
@@ -52,7 +52,7 @@ complete -c coursebuild -a '(coursebuild completion fish -- \\
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("shell", choices=_SCRIPTS, metavar="SHELL", help=", ".join(_SCRIPTS))
-    parser.add_argument("line", nargs="*", metavar="WORD", help="of the line to complete")
+    parser.add_argument("line", nargs="*", metavar="WORD", help="words of the line to complete")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""`coursebuild explain`: say what a rule means, or why something would run again.
+"""`coursebuild explain`: explain a rule, or why something would run again.
 
 Of a path it says whether it would run again, why, and what depends on it. The lessons are read and
 parsed; nothing is run, compiled or written, and neither NumPy nor MuJoCo is imported.
@@ -96,7 +96,7 @@ class Explanation(Struct, frozen=True):
 
 def rule_text(rule: Rule, page: str) -> str:
     """What a rule means: its section of the page of rules, or else its summary."""
-    section = re.search(rf"^## {rule.name}\n+(.*?)\s*(?=^## |\Z)", page, re.DOTALL | re.MULTILINE)
+    section = re.search(rf"^### {rule.name}\n+(.*?)\s*(?=^##|\Z)", page, re.DOTALL | re.MULTILINE)
     text = section[1] if section else f"{rule.severity.capitalize()}. {rule.summary}"
     return f"{rule.name}\n\n{text}\n"
 
@@ -249,7 +249,7 @@ class _Explainer:
         if not dependents and not whole and not (self.root / path).exists():
             closest = nearest(name, [*self.scripts, *self.labs, *self.documents, *RULES])
             help = f"did you mean `{closest}`?" if closest is not None else ""
-            raise UsageError(f"nothing of this course is called `{name}`", help=help)
+            raise UsageError(f"nothing in this course is called `{name}`", help=help)
         return self._explain_file(path, "file", dependents)
 
     def _find_by_name(self, name: str) -> Explanation | None:

@@ -19,7 +19,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--adopt",
         action="store_true",
-        help="bring extracted files that were edited by hand back into their lessons",
+        help="copy edits of extracted files back into their lessons",
     )
 
 

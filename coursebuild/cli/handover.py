@@ -38,16 +38,17 @@ from coursebuild.core.files.trust import state_folder
 if TYPE_CHECKING:
     import socket
 
-COMMANDS = frozenset({"build", "check", "export", "extract", "fmt", "new", "rename", "update"})
-"""Commands that work on the files of a course, as a preview does."""
+COMMANDS = frozenset("build check export extract fmt new rename undo update".split())
+"""Commands that work on the files of a course, as a preview does. Others read only, make another
+course, or measure this machine for minutes and write in a moment."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """Signals that end a command, and that are passed on."""
 _DECISIVE = ("PYTHON", "LD_", "DYLD_", "OMP_", "OPENBLAS_", "MKL_")
 """Beginnings of the names of environment variables that are read when a process starts."""
 _LONGEST = 100
 """Bytes of a socket's path: systems allow 103 or 107."""
-_PATIENCE = 10.0
-"""Seconds in which a preview answers."""
+_PATIENCE = 30.0
+"""Seconds in which a preview answers, on a busy machine too."""
 
 
 def socket_place(root: str) -> str | None:
@@ -199,7 +200,7 @@ def _run_there(
     if answer is None or "refusal" in answer:
         reason = "does not answer" if answer is None else answer["refusal"]
         if not {"-q", "--quiet"} & {*words}:
-            say(0, f"the preview of this course {reason}; this command does without it")
+            say(0, f"the preview of this course {reason}; this command runs without it")
         return None
     return _wait(connection, int(answer["process"]))
 
@@ -231,7 +232,7 @@ def _wait(connection: socket.socket, process: int) -> int:
             signal.signal(number, signal.SIG_DFL)
     if answer is None:
         message = f"coursebuild: the preview's process {process}, which did this, has ended"
-        return say(FAILURE, f"{message}\n  help: files are whole; run the command again")
+        return say(FAILURE, f"{message}\n  help: no file was damaged; run the command again")
     return int(answer["status"])
 
 

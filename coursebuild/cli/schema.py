@@ -1,4 +1,4 @@
-"""`coursebuild schema`: print a JSON Schema for an editor."""
+"""`coursebuild schema`: print a JSON Schema for editors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ examples:
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
-        "name", metavar="SCHEMA", help="lab, course, model, or of a feature, as quiz"
+        "name", metavar="SCHEMA", help="lab, course, model, or a feature's schema, such as quiz"
     )
 
 

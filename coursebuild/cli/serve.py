@@ -49,22 +49,22 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--port",
         type=_parse_port,
         default=_PORT,
-        help="default: %(default)s; 0: any free one",
+        help="port to listen on (default: %(default)s; 0: any free port)",
     )
     parser.add_argument(
         "--host",
         default="127.0.0.1",
-        help="address to listen on (default: %(default)s, this machine only); any other one "
-        "answers only browsers that open the printed link, with its token",
+        help="address to listen on (default: %(default)s, this machine only); with any "
+        "other address, browsers need the printed link with its token",
     )
-    parser.add_argument("--open", action="store_true", help="open it in a browser")
+    parser.add_argument("--open", action="store_true", help="open the preview in a browser")
     parser.add_argument(
         "--embed",
         action="append",
         type=_parse_origin,
         default=[],
         metavar="ORIGIN",
-        help="let pages of this origin show it in a frame, such as vscode-webview:",
+        help="let pages of this origin show the preview in a frame, such as vscode-webview:",
     )
 
 

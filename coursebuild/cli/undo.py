@@ -1,4 +1,4 @@
-"""`coursebuild undo`: take back what `check --fix` has changed."""
+"""`coursebuild undo`: undo the last change of `check --fix` or of a click in the preview."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ from coursebuild.pipeline.progress import Progress
 
 EXAMPLES = """\
 examples:
-  coursebuild undo                after `coursebuild check --fix`
+  coursebuild undo                after `check --fix`, or *Fix it* in the preview
 """
+
+
+_HELP = "what `check --fix` changed can be undone, and what was fixed or accepted in the preview"
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -23,9 +26,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Give the files their texts of before; those that were edited since stay."""
     outcome = take_back(find_course(arguments.root), Progress().say)
     if outcome is None:
-        return fail(FAILURE, "there is nothing to undo", "`check --fix` is what can be undone")
+        return fail(FAILURE, "there is nothing to undo", _HELP)
     restored_paths, edited_paths = outcome
     status = write("".join(f"restored {path}\n" for path in restored_paths), CLEAN)
     for path in edited_paths:
-        status = fail(FAILURE, f"{path} was edited since, so it stays as it is")
+        status = fail(FAILURE, f"{path} has been edited since, and was left as it is")
     return status

@@ -54,15 +54,15 @@ CORE_FENCES = ("mjcf", "output", "python", "text")
 """The kinds of fences that the core reads."""
 CORE_COMMANDS = {
     "build": "verify everything and publish the site",
-    "check": "verify, publish nothing",
+    "check": "verify everything without publishing",
     "update": "bring recorded outputs up to date",
-    "undo": "take back what `check --fix` has changed",
+    "undo": "undo the last change of `check --fix` or the preview",
     "extract": "write the scripts to examples/",
-    "serve": "preview: build, serve, rebuild and reload on change",
-    "export": "verify everything and write the course as one file",
-    "explain": "say what a rule means, or why something would run again",
-    "schema": "print a JSON Schema for an editor",
-    "completion": "print the completion script of a shell",
+    "serve": "preview the course and follow every change",
+    "export": "verify everything and export the course as one file",
+    "explain": "explain a rule, or why something would run again",
+    "schema": "print a JSON Schema for editors",
+    "completion": "print a shell completion script",
 }
 """The core's own commands with a summary, each in the module `coursebuild.cli.NAME`."""
 
@@ -132,11 +132,11 @@ def find_clash(candidate: Feature, installed: Iterable[Feature]) -> str:
         return f"a page cannot be called `{odd[0]}`: use small letters, digits and `-`"
     core_rules = RULES.keys() - _names(_of_course, "rules")
     for field, core_names, message in (
-        ("rules", core_rules, "there is a rule `{}` already"),
-        ("fences", CORE_FENCES, "the fence `{}` is read already"),
-        ("pages", (*CORE_PAGES, *_FOLDERS), "there is a page `{}` already"),
-        ("exporters", (), "there is an export `{}` already"),
-        ("commands", CORE_COMMANDS, "there is a command `{}` already"),
+        ("rules", core_rules, "there is already a rule `{}`"),
+        ("fences", CORE_FENCES, "there is already a fence `{}`"),
+        ("pages", (*CORE_PAGES, *_FOLDERS), "there is already a page `{}`"),
+        ("exporters", (), "there is already an export `{}`"),
+        ("commands", CORE_COMMANDS, "there is already a command `{}`"),
     ):
         if twice := _names((candidate,), field) & _names(installed, field).union(core_names):
             return message.format(min(twice))

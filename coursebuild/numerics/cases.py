@@ -209,7 +209,7 @@ def closed_motion(
     problem, place = all_problems()[declaration.closed_form], declaration.place("reference")
     case_model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     if (case_model.jnt_type.tolist(), case_model.nq) != (model.jnt_type.tolist(), model.nq):
-        message = f"the model has other joints than the hard case `{declaration.closed_form}`"
+        message = f"the model has different joints from the hard case `{declaration.closed_form}`"
         raise SceneError(message, place)
     scene_start, case_start = _start(model, scene.scenario), _start(case_model, problem.scenario)
     shift = scene_start.position - case_start.position
@@ -218,8 +218,8 @@ def closed_motion(
     free_columns = np.repeat(of_free, widths)
     speeds = np.abs(scene_start.velocity - case_start.velocity).max(initial=0.0)
     if np.abs(shift[:, ~free_columns]).max(initial=0.0) > 1e-9 or speeds > 1e-9:
-        message = f"the scenario begins otherwise than the hard case `{declaration.closed_form}`"
-        raise SceneError(message, place, "its closed form holds for its own beginning only")
+        message = f"the scenario starts differently from the hard case `{declaration.closed_form}`"
+        raise SceneError(message, place, "its closed form holds for its own start only")
     turn = quat_mul(scene_start.attitude, quat_conj(case_start.attitude))
     motion = problem.reference.solution.motion(times)
     attitude = quat_mul(turn, motion.attitude)

@@ -320,7 +320,7 @@ def verdict(
     if row.parted is not None:
         return RowVerdict(False, None, None, None, is_noticeable, _verdict_of_chaos(rows, row))
     if own_place is None:
-        text = "nothing was timed, so that no setting can be called better"
+        text = "nothing was timed, so no setting can be called better"
         return RowVerdict(False, None, None, None, is_noticeable, text + remark)
     if error is not None and error >= 1:
         remark += _cheapest_unseen(

@@ -86,7 +86,7 @@ CONSERVED = 1e-8
 """The relative change, over the reference, below which a quantity counts as conserved."""
 _STEP = 1e-6
 """s, of the model whose accelerations are integrated: `refsafe` softens nothing then."""
-_TENDS_ELSEWHERE = "the engine in small steps tends elsewhere"
+_TENDS_ELSEWHERE = "the engine with small steps converges to something else"
 
 
 class KnownMotion(Struct, frozen=True):
@@ -259,7 +259,7 @@ def _exact_states(
     }
     shapes = (states.qpos.shape, states.qvel.shape)
     if any((motion.qpos.shape, motion.qvel.shape) != shapes for motion in course_states.values()):
-        message = f"`{exact.span.path}` gives other numbers of coordinates than the model has"
+        message = f"`{exact.span.path}` gives numbers of coordinates that differ from the model's"
         raise SceneError(message, exact.span, "they are those of `qpos`, and perhaps of `qvel`")
     return course_states
 

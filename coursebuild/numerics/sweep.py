@@ -148,7 +148,7 @@ def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], l
             raise SceneError(message, part.span) from None
         after.append(np.array(getattr(element, field), copy=True))
         if part.relative and not np.isfinite(after[-1]).all():
-            message = f"`{part.parameter}` is not given in the MJCF, so that it has no share"
+            message = f"`{part.parameter}` is not given in the MJCF, so it cannot be scaled"
             raise SceneError(message, part.span)
     return before, after
 

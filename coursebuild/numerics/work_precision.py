@@ -287,7 +287,9 @@ def _notes(
         notes.append(f"costs are relative to {text}, as the scene's own setting does not run")
     idle = [", ".join(solving_parts(r.setting, basis.baseline)) for r in rows if is_idle(r)]
     if idle:
-        notes.append(f"no bit of the motion is other, and no time saved, with {'; '.join(idle)}")
+        notes.append(
+            f"not a bit of the motion differs, and no time is saved, with {'; '.join(idle)}"
+        )
     if pilot.jumps:
         reasons = ", ".join(pilot.jumps)
         notes.append(f"errors follow no power of the timestep, because of {reasons}")

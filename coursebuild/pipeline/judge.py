@@ -118,7 +118,7 @@ def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diag
         names = " and ".join(f"`{name}`" for name in reasons)
         are = "are" if len(reasons) > 1 else "is"
         reason = f"{names} {are} not installed" if line.missing else "its fence says `norun`"
-        cure = f"install {names}" if line.missing else "take `norun` away"
+        cure = f"install {names}" if line.missing else "remove `norun`"
         unproven = unproven_things(line) or "that it runs"
         yield diagnose(
             "script-unproven",

@@ -47,7 +47,7 @@ class Options(Struct, frozen=True):
     long: bool = False
     """Whether scripts run that have a recorded run in the course."""
     verbose: bool = False
-    """Whether to say of each script why it runs."""
+    """Whether to say why each script runs."""
     run_all: RunAll | None = None
     """Runs scripts, where a `ScriptServer` stays warm from run to run."""
     on_start: Callable[[str, float | None], object] | None = None
@@ -79,7 +79,7 @@ def find_course(directory: str | None) -> Path:
     try:
         start = Path.cwd()
     except OSError:
-        raise UsageError("the working directory is not there any more") from None
+        raise UsageError("the working directory no longer exists") from None
     root = find_root(None if directory is None else Path(directory), start)
     check_path(root)
     undo_changes(root, Progress().say)
@@ -121,7 +121,7 @@ def open_store(root: Path, location: str | None, size: str | None, *, fresh: boo
     if location is None:
         location = os.environ.get("COURSEBUILD_CACHE") or None
     elif not location:
-        raise UsageError("--cache names no place")
+        raise UsageError("--cache needs a place")
     shared = None
     if location is not None:
         from coursebuild.core.engine.shared_place import shared_place

@@ -259,7 +259,7 @@ def extract(options: Options, *, adopt: bool = False) -> Report:
 
 def _list_changes(extracted_scripts: ExtractedScripts) -> list[str]:
     removals = (
-        f"removed {path}, which no lesson has any more" for path in extracted_scripts.files.removed
+        f"removed {path}, which no lesson has now" for path in extracted_scripts.files.removed
     )
     return [*(f"wrote {path}" for path in extracted_scripts.files.written), *removals]
 

@@ -80,7 +80,7 @@ def export(options: Options, name: str, lesson: str, out: Path | None) -> Report
     exporter = _find_exporter(options.root, name)
     if exporter.of_lesson and not lesson:
         raise UsageError(
-            f"`export {name}` writes one lesson, and none is named",
+            f"`export {name}` writes one lesson, but none was named",
             help=f"name it, as in `coursebuild export {name} 1.1`",
         )
     if lesson and not exporter.of_lesson:
@@ -204,7 +204,9 @@ def check_target(root: Path, out: Path, mark: str, *, archive: bool) -> None:
     place = Path(os.path.realpath(out))
     for name in _AUTHOR_FOLDERS:
         if place.is_relative_to(os.path.realpath(root / name)):
-            raise PublishRefusedError(f"{out} lies in {name}/ of the project, where no export goes")
+            raise PublishRefusedError(
+                f"{out} lies in {name}/ of the project, which cannot hold an export"
+            )
     if any((folder / MARKER).is_file() for folder in place.parents):
         raise PublishRefusedError(
             f"{out} lies in a published site, which the next build replaces",

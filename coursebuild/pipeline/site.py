@@ -42,7 +42,14 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Names, compressed_files
 from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
 from coursebuild.core.pages.context import NotedPage, SiteContext
-from coursebuild.core.pages.frame import FrameInputs, PageFrame, parts_by_mark, robots, sitemap
+from coursebuild.core.pages.frame import (
+    FrameInputs,
+    PageFrame,
+    parts_by_mark,
+    robots,
+    sitemap,
+    versions,
+)
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import PageRecord
@@ -222,6 +229,8 @@ class Site:
         files += compressed_files(files, keep)
         files += (*self._downloads.files, *self._added_files[0], *self._page_files())
         files.append(OutputFile(urls.ROBOTS, robots(course)))
+        if course.version:
+            files.append(OutputFile(urls.VERSIONS, versions(course)))
         if course.base_url:
             indexed = (path for path, entry in self._pages.items() if entry.record.indexed)
             files.append(OutputFile(urls.SITEMAP, sitemap(course, indexed)))

@@ -66,7 +66,7 @@ class Access(Struct, frozen=True):
             return "this preview answers only as localhost"
         scheme, separator, rest = target.lower().partition(":")
         if separator and scheme in ("http", "https") and re.split("[/?#]", rest)[2:3] != [host]:
-            return "the request is to another host than it names"
+            return "the request went to a different host from the one that it names"
         origin = headers.get("Origin")
         if origin is None and method == "POST":
             return "a request that changes something says where it comes from"

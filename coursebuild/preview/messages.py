@@ -24,7 +24,7 @@ from typing import Any
 from msgspec import Struct
 
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.files.write import write_atomic
+from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model import (
     Document,
     Recording,
@@ -97,8 +97,8 @@ def page_news(session: Session, path: str) -> str:
 def accept(session: Session, path: str, ids: str) -> str:
     """Write what is offered on a page under these ids; return why that failed, or an empty text.
 
-    With spaces between them there may be several, of which all or none are still offered. The lock
-    is held: two browsers cannot accept the same at once.
+    With spaces between them there may be several, of which all or none are still offered.
+    `coursebuild undo` takes them back together.
     """
     with session.condition:
         news = _collect_news(session, path)
@@ -111,17 +111,16 @@ def accept(session: Session, path: str, ids: str) -> str:
         for offer in accepted_offers:
             for edit in offer.edits:
                 edits.setdefault(edit.span.source, []).append(edit)
-        changes = [
-            (source.path, source.text.encode(), apply_edits(source.text, edits_there).encode())
-            for source, edits_there in edits.items()
-        ]
-        changes += [(o.path, o.old, o.new) for o in accepted_offers if not o.edits]
-        try:
-            for file, old, new in changes:
-                write_atomic(session.root, file, new, expected=old)
-        except EffectError as error:
-            return error.message
-        return ""
+    changes = [
+        FileChange(s.path, s.text.encode(), apply_edits(s.text, edits_there).encode())
+        for s, edits_there in edits.items()
+    ]
+    changes += [FileChange(o.path, o.old, o.new) for o in accepted_offers if not o.edits]
+    try:  # if two browsers accept the same at once, the second one meets another text
+        change_files(session.root, changes, keep=True, beside_commands=True)
+    except EffectError as error:
+        return error.message
+    return ""
 
 
 def _collect_news(session: Session, path: str) -> dict[str, Any]:

@@ -345,7 +345,7 @@ def open_in_editor(session: Session, place: str) -> str:
     """Open a place in the editor; return why that failed, or an empty text."""
     span = next((d.span for d in session.diagnostics() if location(d.span) == place), None)
     if span is None:
-        return "nothing is wrong there any more"
+        return "nothing is wrong there now"
     words = _find_editor()
     if not words:
         return "no editor that opens a window was found: set VISUAL to one, such as `code`"

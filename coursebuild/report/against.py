@@ -31,7 +31,7 @@ _STATUSES = {
     "same": "the same",
     "changed": "changed by MuJoCo {}",
     "fails": "failing with MuJoCo {}",
-    "unclear": "different for a reason that is not clear",
+    "unclear": "different for an unclear reason",
     "drifted": "drifted already",
     "uncompared": "not compared",
 }

@@ -195,7 +195,7 @@ def lab_line(line: TrialLine, style: Style) -> str:
     verdict = style.paint(f"{line.status:<8}", GREEN if line.status == "ok" else RED)
     parts = [] if line.steps_per_second is None else [f"{line.steps_per_second:,} steps/s"]
     if line.status == "ok" and line.tried == 0:
-        return f"{verdict} {line.name}  {style.paint('not tried: a kind of its own', FAINT)}"
+        return f"{verdict} {line.name}  {style.paint('not tried: a custom kind of lab', FAINT)}"
     parts += [plural(line.tried, "thing") + " tried"] + ([line.parity] if line.parity else [])
     parts += [f"motion fills {100 * line.fill:.1f} %"] if line.fill is not None else []
     parts += [f"no Python export: {line.unexported}"] if line.unexported else []

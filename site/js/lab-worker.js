@@ -1,5 +1,5 @@
 /**
- * The labs' worker: physics, lab code and plots, away from the page's thread. docs/explanation/how-labs-run.md has the protocol.
+ * The labs' worker: physics, lab code and plots, away from the page's thread. lab/worker/session.js has the protocol.
  */
 
 import loadMujoco from '@mujoco/mujoco'

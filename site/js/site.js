@@ -13,6 +13,7 @@ import { leaveQuizzes, mountQuizzes } from './page/quizzes.js'
 import { addSearch } from './page/search.js'
 import { addThemeSwitch } from './page/theme.js'
 import { unfoldLinked } from './page/unfold.js'
+import { showVersions } from './page/versions.js'
 import { readWords } from './page/words.js'
 import { showProgress } from './progress/index.js'
 import { rekeyAnswers } from './progress/rekey.js'
@@ -43,6 +44,7 @@ openForPrint(window)
 keepOffline(window, words)
 followLines(window)
 unfoldLinked(window)
+showVersions(document)
 
 // In a preview, parts of the page are replaced while it is open.
 document.addEventListener('coursebuild:changed', ({ detail: { added, removed } }) => {

@@ -149,7 +149,7 @@ def test_page_that_is_not_there_leads_back_when_there_is_a_network(
     with host.away():
         page.goto(f"{host.url}lessons/9.9-none.html?x=<b>&y")
         expect(page).to_have_url(re.compile(rf"^{re.escape(host.url)}offline/\?from="))
-        expect(page.locator("h1")).to_have_text("Without a network")
+        expect(page.locator("h1")).to_have_text("Offline reading")
         missing = page.locator(".keep-missing")
         expect(missing).to_contain_text("/course/lessons/9.9-none.html?x=%3Cb%3E&y")
         again = missing.get_by_role("link", name="Try again")

@@ -207,7 +207,7 @@ def test_what_was_searched_before_is_offered_and_can_be_forgotten(
     page.wait_for_url("**/lessons/1.2-two.html")
     open_by_key(page)
     options = page.locator(".search-option")
-    becomes(page, lambda: options.all_inner_texts()[:2], ["mj_forward", "Clear these"])
+    becomes(page, lambda: options.all_inner_texts()[:2], ["mj_forward", "Clear recent searches"])
     options.first.click()
     until(page, SHOWS_QUERY, "mj_forward")
     expect(page.locator(".search-input")).to_be_focused()

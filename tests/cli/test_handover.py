@@ -82,11 +82,16 @@ COMMANDS = (
     ("new", "lesson", "1.3", "Third"),
     ("fmt", "--check"),
     ("fmt",),
+    ("SLIP",),
+    ("check", "--fix"),
+    ("undo",),
+    ("check", "--fix"),
     ("extract", "-q"),
     ("rename", "1.2", "1.4"),
     ("update", "--dry-run"),
     ("update",),  # after this, the preview runs the script again
 )
+EDITS = {"DRIFT": ("2.5\n```", "2.4\n```"), "SLIP": ("```text\n2.4", "```tetx\n2.4")}
 
 
 def test_commands_do_what_they_do_without_a_preview(make: Make, runtime: str) -> None:
@@ -99,9 +104,9 @@ def test_commands_do_what_they_do_without_a_preview(make: Make, runtime: str) ->
     with preview_of(served, runtime) as preview:
         preview.wait_for_line("checked: ")
         for words in COMMANDS:
-            if words == ("DRIFT",):
+            if words[0] in EDITS:
                 for folder in (alone, served):
-                    folder.replace(folder.lesson(), "2.5\n```", "2.4\n```")
+                    folder.replace(folder.lesson(), *EDITS[words[0]])
                 continue
             result = normalize(served.run(*words, env=env), served)
             assert result == normalize(alone.run(*words), alone), words
@@ -229,10 +234,12 @@ def test_a_command_goes_on_after_the_preview(make: Make, runtime: str) -> None:
     with preview_of(folder, runtime) as preview:
         preview.wait_for_line("running examples/slow.py")
         with started_check(folder, runtime, preview) as process:
+            (server,) = (p for p in children(preview.process.pid) if is_copy(p, preview))
             preview.process.kill()
             folder.write("go", "")
             assert process.wait(300) == 0
         preview.process.wait()
+        wait_until(lambda: not Path(f"/proc/{server}/cwd").exists(), "the server's end")
         result = folder.run("check", "1.1", env={"XDG_RUNTIME_DIR": runtime})
         assert (result.status, "preview" in result.err) == (0, False)  # its socket means nothing
     wait_until_alone(folder)
@@ -276,8 +283,8 @@ def test_another_python_environment_does_without_the_preview(make: Make, runtime
         env = {"XDG_RUNTIME_DIR": runtime, "PYTHONHASHSEED": "1"}
         result = folder.run("check", "1.1", env=env)
         message = (
-            "the preview of this course is of another version or another Python environment; "
-            "this command does without it\n"
+            "the preview of this course runs another version or Python environment; "
+            "this command runs without it\n"
         )
         assert (result.status, result.err.count(message)) == (0, 1)
         assert folder.run("check", "-q", env=env).err == ""
@@ -320,7 +327,7 @@ def test_the_server_refuses_what_is_no_command_for_it(make: Make, runtime: str) 
             ({"ask": "command", "words": ["lsp"]}, "does not know this command"),
             ({"ask": "command", "words": []}, "does not know this command"),
             ({"ask": "else"}, "does not know this command"),
-            ({"ask": "command", "words": ["check"], "root": "/"}, "is of another course"),
+            ({"ask": "command", "words": ["check"], "root": "/"}, "belongs to another course"),
         ):
             with socket.socket(socket.AF_UNIX) as connection:
                 connection.connect(place)
@@ -413,5 +420,5 @@ def test_a_listener_that_does_not_answer_is_left(
             os._exit(0)
         assert hand_over(None, ["check"]) is None
         os.waitpid(process, 0)
-    message = "the preview of this course does not answer; this command does without it\n"
+    message = "the preview of this course does not answer; this command runs without it\n"
     assert capfd.readouterr().err == message

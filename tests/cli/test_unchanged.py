@@ -323,5 +323,5 @@ def test_working_directory_that_is_gone_gives_2(make: Make) -> None:
     )
     result = run_code(code, "check", cwd=folder_gone)
     assert (result.returncode, result.stdout) == (2, "")
-    assert result.stderr.endswith("the working directory is not there any more\n")
+    assert result.stderr.endswith("the working directory no longer exists\n")
     assert "Traceback" not in result.stderr

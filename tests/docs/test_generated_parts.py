@@ -5,7 +5,7 @@ between `<!-- generated: WORDS -->` and `<!-- end -->`. The words are those of `
 
 - `contents`: links to the page's sections;
 - `fields lab SimLab`: the fields of a structure in the schema `lab`; `beyond` or `within` and the
-  name of another one leave out those that it has, or has not;
+  name of another one, of this schema or of `lab`, leave out those that it has, or has not;
 - `commands`, and `command check`: all of them, and what one takes; `options`: those of several.
 """
 
@@ -64,14 +64,24 @@ def _fields(
 ) -> str:
     definitions = json.loads(json_schema(schema))["$defs"]
     structure = definitions[name]
-    other_fields = definitions[other_name]["properties"] if other_name else {}
-    rows = []
+    other_fields = {}
+    if other_name:
+        is_here = other_name in definitions
+        base = definitions if is_here else json.loads(json_schema("lab"))["$defs"]
+        other_fields = base[other_name]["properties"]
+    rows: list[tuple[str, str, str]] = []
+    long_lists: dict[str, str] = {}
     for field, field_schema in structure["properties"].items():
         if (field in other_fields) != (relation == "within") or (other_fields and field == "kind"):
             continue
         meaning = field_schema.get("description") or _describe(field_schema, definitions)
         required = ", required" * (field in structure.get("required", ()))
-        rows.append((f"`{field}`{required}", _value(field_schema), meaning))
+        value = _value(field_schema)
+        for words, first_field in long_lists.items():
+            value = value.replace(words, f"list as in `{first_field}`")
+        if value.count('"') > 10:
+            long_lists[value] = field
+        rows.append((f"`{field}`{required}", value, meaning))
     return _table("field | value | meaning", rows)
 
 
@@ -86,7 +96,7 @@ def _value(schema: dict[str, Any]) -> str:
     value = _kind(schema)
     default = schema.get("default")
     if default not in (None, "", [], {}, False):
-        value += f"; `{json.dumps(default)}` without it"
+        value += f"; default `{json.dumps(default)}`"
     return value
 
 
@@ -98,24 +108,25 @@ def _kind(schema: dict[str, Any]) -> str:
         return ", ".join(f"`{json.dumps(choice)}`" for choice in schema["enum"])
     match schema.get("type"):
         case "array":
-            inner = schema.get("items", {})
-            return f"list of {_kind(inner)}" if inner else "list"
+            inner = _kind(schema["items"]) if schema.get("items") else ""
+            inner = re.sub(r"^(table|text|number|integer|list)\b", r"\1s", inner)
+            return f"list of {inner}" if inner else "list"
         case "string":
             return "Markdown" if "contentMediaType" in schema else "text"
         case "boolean":
-            return "`true` or `false`"
+            return "boolean"
         case "integer" | "number" as kind:
-            return ("whole " * (kind == "integer")) + "number" + _bounds(schema)
+            return kind + _bounds(schema)
     return "table"
 
 
 def _bounds(schema: dict[str, Any]) -> str:
     low, high = schema.get("minimum"), schema.get("maximum")
     if "exclusiveMinimum" in schema:
-        return f" above {schema['exclusiveMinimum']:g}"
+        return f" > {schema['exclusiveMinimum']:g}"
     if low is not None and high is not None:
         return f", {low} to {high}"
-    return f" from {low}" if low is not None else ""
+    return f" ≥ {low}" if low is not None else ""
 
 
 # ------------------------------------------------------------------------------------- commands
@@ -135,12 +146,11 @@ def _actions(name: str) -> Iterator[argparse.Action]:
 
 
 def _shared() -> dict[tuple[str, str], list[str]]:
-    """Options that at least three commands take, with the commands."""
+    """Arguments that at least three commands take, with the commands."""
     commands_by_row: dict[tuple[str, str], list[str]] = {}
     for name in known_commands():
         for action in _actions(name):
-            if action.option_strings:
-                commands_by_row.setdefault(_row(action), []).append(name)
+            commands_by_row.setdefault(_row(action), []).append(name)
     return {row: names for row, names in commands_by_row.items() if len(names) > 2}
 
 
@@ -158,7 +168,7 @@ def _options(text: str) -> str:
         (name, ", ".join(f"`{command}`" for command in commands), meaning)
         for (name, meaning), commands in _shared().items()
     )
-    return _table("option | of | meaning", rows)
+    return _table("argument | of | meaning", rows)
 
 
 def _command(text: str, name: str) -> str:
@@ -168,7 +178,7 @@ def _command(text: str, name: str) -> str:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             rows = [*chain.from_iterable(_kinds(action))]
-    parts = [f"{command.summary[:1].upper()}{command.summary[1:]}."]
+    parts = []
     if rows:
         parts.append(_table("argument | meaning", rows))
     if parser.epilog:

@@ -132,9 +132,7 @@ def test_a_page_weighs_what_it_loads(course: Folder) -> None:
 
 def test_a_base_that_cannot_be_had(course: Folder, tmp_path: Path) -> None:
     result = course.main("diff", "nowhere")
-    message = (
-        "coursebuild: `nowhere` is neither a folder with a course nor a revision of git here\n"
-    )
+    message = "coursebuild: `nowhere` is neither a folder with a course nor a Git revision here\n"
     assert (result.status, result.out, result.err) == (2, "", message)
     first = git(course.root, "rev-parse", "HEAD")
     (course.root / "content/course.toml").rename(tmp_path / "map")

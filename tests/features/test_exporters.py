@@ -60,7 +60,7 @@ def test_export_is_refused_where_it_would_be_in_the_way(course: Folder) -> None:
     course.write("mine.zip", b"PK\x05\x06" + bytes(18))
     course.write("public/.coursebuild-site", "{}")
     for name, out, reason in (
-        ("lessons", "models/q.csv", "lies in models/ of the project, where no export goes"),
+        ("lessons", "models/q.csv", "lies in models/ of the project, which cannot hold an export"),
         ("lessons", "notes.txt", "notes.txt exists and is not such an export"),
         ("epub", "notes.txt", "notes.txt exists and is not such an export"),
         ("page", "notes.txt", "notes.txt exists and is not such an export"),

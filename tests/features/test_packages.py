@@ -97,7 +97,7 @@ def test_example_of_the_docs_adds_a_command(tmp_path: Path, stores: Path) -> Non
     assert re.fullmatch(r" +\d+\.\d\d s  examples/hello\.py\n", result.out)
     code = (package / "__init__.py").read_text()
     (package / "__init__.py").write_text(code.replace('name="slowest"', 'name="check"', 1))
-    assert "there is a command `check` already" in run(folder, tmp_path, "--help").err
+    assert "there is already a command `check`" in run(folder, tmp_path, "--help").err
 
 
 MISTAKES = {

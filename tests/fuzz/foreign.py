@@ -1,8 +1,9 @@
-"""What others send: figures of scripts, courses of other tools, messages of an editor."""
+"""What others send: figures, lists of sources, courses of other tools, messages of an editor."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import functools
 import io
 import json
@@ -21,12 +22,16 @@ from typing import Any
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import UsageError
+from coursebuild.core.registry import installed_features
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.importer.convert import convert
 from coursebuild.features.importer.source_files import SourceFiles
+from coursebuild.features.references import csl
+from coursebuild.features.references.bibtex import check_identifier, read_works
+from coursebuild.features.references.csl import StyleFailure, format_works
 from coursebuild.pipeline.options import Options
 from coursebuild.preview.session import Session
 from fuzz.texts import FIXTURES, MAP, PATH, ROOT, describe
@@ -99,6 +104,49 @@ def figures() -> Iterator[bytes]:
     yield b'a,"b\r\nc",\r1e999,nan\n"'
     yield _png(3, 2)
     yield _png(1 << 15, 1 << 15)
+
+
+# --- lists of sources
+
+_STYLE = b"\n@@STYLE@@\n"
+"""Comes before a style of citations."""
+
+
+def sources(data: bytes) -> None:
+    """What is wrong is reported, or what can be read is formatted."""
+    text, _, style_text = data.decode("utf-8", "replace").partition(_STYLE.decode())
+    installed_features()  # they have the rules
+    source = Source("content/references.bib", text)
+    works = read_works(source).value
+    style = Source("content/references.csl", style_text) if style_text else None
+    with contextlib.suppress(StyleFailure):
+        formatted = format_works(source, style, "en", tuple(work.key for work in works))
+        for work in works:
+            check_identifier(work)
+            assert "<script" not in formatted.entries[work.key]
+            formatted.mark(work.key, "p. 12")
+
+
+def source_lists() -> Iterator[bytes]:
+    style = (Path(csl.__file__).parent / "style.csl").read_bytes()
+    entries = _SOURCES.split(b"\n\n")
+    yield from (_SOURCES, *entries, _SOURCES + _STYLE + style)
+
+
+_SOURCES = rb"""
+@string{sp = "Springer"}
+
+@book{euler1758, author = {Euler, Leonhard and van der Berg, Jr, A. and {The Group}},
+  title = {Du mouvement {\'e} $x^2$ \textbf{b}}, year = 1758, publisher = sp # " Verlag",
+  edition = {2nd}, pages = {1--2}, isbn={978-3-16-148410-0}}
+
+@article{a:b, title="Quoted {""} <script>", doi = {10.1000/abc\_d}, month = jan, year = {c. 2000},
+  author = {et al. and others and \input{x}}, url={https://example.org/~a}, crossref={euler1758}}
+
+% words between entries
+@comment{more of them}
+@preamble{"\newcommand{\a}{b}"}
+"""
 
 
 # --- courses of other tools

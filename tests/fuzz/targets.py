@@ -31,6 +31,7 @@ TARGETS = {
     "declarations": Target(texts.declaration_files, _text(texts.declarations)),
     "comparison": Target(texts.outputs, _text(texts.comparison), repeatable=False),
     "figure": Target(foreign.figures, foreign.figure, repeatable=False),
+    "sources": Target(foreign.source_lists, foreign.sources),
     "entry": Target(kept.entries, kept.entry, repeatable=False),
     "journal": Target(kept.journals, kept.journal, repeatable=False),
     "manifest": Target(kept.manifests, kept.manifest, repeatable=False),
@@ -43,6 +44,7 @@ WORDS = [
     *(piece.encode("utf-8", "surrogatepass") for piece in PIECES),
     *(b"-- a.md --\n", b" -> ", b"_toc.yml", b"mkdocs.yml", b"file:///COURSE/", b'"old":null'),
     *(b"<style>", b"url(#", b"href=", b"xlink:", b"&#", b"\\62 ", b"<g id='"),
+    *(b"@book{a, ", b" and ", b'" # "', b"\\input", b"<macro ", b"<choose>", b"variable='title'"),
     *(b"\\(", b"\\)", b"\\[", b"\\]", b"\\begin{align}", b"{{", b"[[", b":::x\n", b"!!! note\n"),
 ]
 """What Atheris puts into inputs besides what it finds itself."""

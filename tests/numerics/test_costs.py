@@ -230,7 +230,7 @@ def test_a_verdict_where_an_error_is_not_known_or_nothing_was_timed() -> None:
         "whether its error can be seen is not known"
     )
     judgement = verdict(front([row(own=True, cost=None, seen=0.5)]), [False])
-    assert judgement.text.startswith("nothing was timed, so that no setting can be called better; ")
+    assert judgement.text.startswith("nothing was timed, so no setting can be called better; ")
 
 
 def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:

@@ -99,7 +99,9 @@ def test_an_activation_at_its_limit_is_a_jump() -> None:
     unseen = replace(pilot, jumps=())  # as of something that is not looked for
     reference = find_reference(model, unseen, quick=True)
     assert reference.kind == "self"
-    assert reference.note == "no integration: the engine in small steps tends elsewhere"
+    assert (
+        reference.note == "no integration: the engine with small steps converges to something else"
+    )
 
 
 def test_an_activation_that_looks_ahead_by_a_timestep() -> None:

@@ -8,6 +8,7 @@ import platform
 import shutil
 import signal
 import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -296,14 +297,45 @@ def test_version_that_cannot_be_installed_leaves_nothing(make: Make, wheels: Pat
     result = check_against(course, "-q", version="9.0.9")
     assert result.status == 1
     assert result.err.startswith("coursebuild: pip finds no MuJoCo 9.0.9 for Python ")
-    assert "\n  help: without a network let pip find the wheels in a folder" in result.err
+    assert "\n  help: without a network, point pip to a folder of wheels" in result.err
     wheel(wheels, "9.2.0", "raise ImportError('built for another numpy')")
     result = check_against(course, "-q", version="9.2.0")
     assert result.err == (
-        "coursebuild: MuJoCo 9.2.0 cannot be imported beside the other packages of here: "
+        "coursebuild: MuJoCo 9.2.0 cannot be imported together with the other installed packages: "
         "ImportError: built for another numpy\n"
     )
     assert environments(course) == []
+
+
+UV = """\
+#!{python}
+import os, sys
+pip, install, option, target, progress, *words = sys.argv[1:]
+assert [pip, install, option, progress] == ["pip", "install", "--python", "--no-progress"]
+os.execv(sys.executable, [sys.executable, "-m", pip, option, target, install, *words])
+"""
+"""A stand-in that installs as uv would."""
+
+
+def test_uv_installs_where_there_is_no_pip(
+    make: Make, wheels: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    course = make(f"## A\n\n{NUMBER}")
+    monkeypatch.setitem(sys.modules, "pip", None)
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    result = check_against(course, "-q")
+    assert result.err == (
+        "coursebuild: this Python has no pip, and there is no uv, so nothing can be installed\n"
+        "  help: run `python -m ensurepip`\n"
+    )
+    (tmp_path / "bin").mkdir()
+    uv = tmp_path / "bin/uv"
+    uv.write_text(UV.format(python=sys.executable))
+    uv.chmod(0o755)
+    assert f"changed by MuJoCo {NEW_VERSION}" in check_against(course, "-q").out
+    result = check_against(course, "-q", version="9.0.9")
+    assert result.err.startswith("coursebuild: uv finds no MuJoCo 9.0.9 for Python ")
+    assert result.err.endswith("the environment variables UV_FIND_LINKS and UV_OFFLINE\n")
 
 
 SLOW = """\

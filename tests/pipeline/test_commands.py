@@ -125,7 +125,7 @@ WRONG_USAGE = [
     ),
     ("check --cache-size -1", "--cache-size"),
     ("check --cache gopher://x/y", "gopher"),
-    ("check --cache=", "coursebuild: --cache names no place\n"),
+    ("check --cache=", "coursebuild: --cache needs a place\n"),
     ("build --out .", " is the project itself"),
     ("build --out ..", " holds the project"),
     ("build --out content/site", "content/site lies in content/ of the project"),
@@ -170,7 +170,10 @@ def test_help_version_and_schemas_are_printed_anywhere(tmp_path: Path) -> None:
     for arguments in (["--help"], ["-h"], ["help"]):
         result = folder.main(*arguments)
         assert (result.status, result.err) == (0, "")
-        for line in ("  check        verify, publish nothing\n", "  bench        measure speed"):
+        for line in (
+            "  check        verify everything without publishing\n",
+            "  bench        measure speed",
+        ):
             assert line in result.out
     in_build = ["-C", "build", "bench", "--help"]  # a folder with the name of a command
     assert folder.main(*in_build) == folder.main("help", "bench")

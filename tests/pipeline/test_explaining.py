@@ -137,7 +137,7 @@ def test_explain_says_why_a_script_would_run(
     lines = verbose(course)
     assert "examples/reads.py: models/data.txt is gone\n" in lines
     assert "examples/hello.py" not in lines
-    all_again = "examples/helper.py: everything is to run again\n"
+    all_again = "examples/helper.py: everything was asked to run again\n"
     assert all_again in verbose(course, "1.2", "--no-cache")
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
     text = explain(course, "examples/hello.py")
@@ -204,7 +204,8 @@ def test_explain_tells_what_a_rule_means_anywhere(tmp_path: Path) -> None:
     result = folder.main("explain", "footnote-unused")
     assert (result.status, result.err) == (0, "")
     assert result.out.startswith(
-        "footnote-unused\n\nWarning. A footnote is defined but never referred to.\n\n"
+        "footnote-unused\n\nWarning. A footnote is defined but not used. No fix: "
+        "only you know what was meant.\n\n"
     )
     assert "\nwarning[footnote-unused]: " in result.out
     page = (ROOT / "docs/reference/rules.md").read_text()
@@ -217,11 +218,11 @@ def test_explain_tells_what_a_rule_means_anywhere(tmp_path: Path) -> None:
 
 def test_explain_what_cannot_be_explained_gives_2(course: Folder) -> None:
     result = course.main("explain", "output-drif")
-    message = "nothing of this course is called `output-drif`; did you mean `output-drift`?"
+    message = "nothing in this course is called `output-drif`; did you mean `output-drift`?"
     assert (result.status, result.err) == (2, f"coursebuild: {message}\n")
     result = course.main("explain", "examples/helo.py")
     message = (
-        "nothing of this course is called `examples/helo.py`; did you mean `examples/hello.py`?"
+        "nothing in this course is called `examples/helo.py`; did you mean `examples/hello.py`?"
     )
     assert (result.status, result.err) == (2, f"coursebuild: {message}\n")
     course.write("content/course.toml", "[")

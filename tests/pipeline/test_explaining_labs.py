@@ -61,7 +61,7 @@ def test_explain_says_which_labs_would_be_tried_and_why(course: Folder) -> None:
         f"1.1-lab-2 would be tried\n{unknown}  of 1.1, not run yet on this machine\n"
     )
     assert course.main("explain", "1.1-lap-2").err == (
-        "coursebuild: nothing of this course is called `1.1-lap-2`; did you mean `1.1-lab-2`?\n"
+        "coursebuild: nothing in this course is called `1.1-lap-2`; did you mean `1.1-lab-2`?\n"
     )
     assert tried_labs(course) == ["1.1-lab-1", "1.1-lab-2"]
     assert "1 script and 2 labs, of which none would run\n" in explain(course, "1.1")

@@ -54,7 +54,7 @@ def test_files_are_written_once_and_removed_with_their_scripts(make: Make) -> No
     folder.write(folder.lesson(), GOOD)
     result = folder.main("extract")
     assert result.status == 0
-    assert "removed examples/sub/b.py, which no lesson has any more" in result.out
+    assert "removed examples/sub/b.py, which no lesson has now" in result.out
     assert set(folder.tree("examples")) == {".extracted.json", "hello.py", "mine.txt"}
     assert not (folder.root / "examples/sub").exists()
 

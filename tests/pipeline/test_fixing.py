@@ -52,7 +52,10 @@ def test_undo_leaves_what_was_edited_since(make: Make) -> None:
     result = folder.main("undo")
     assert result.status == 1
     assert result.out == f"restored {folder.lesson(2)}\n"
-    assert result.err == f"coursebuild: {folder.lesson()} was edited since, so it stays as it is\n"
+    assert (
+        result.err
+        == f"coursebuild: {folder.lesson()} has been edited since, and was left as it is\n"
+    )
     assert folder.text(folder.lesson()) == new_text
     assert folder.text(folder.lesson(2)).startswith("[a](lesson:one)")
 
@@ -121,3 +124,21 @@ def test_options_that_do_not_go_with_fix(make: Make) -> None:
     folder = make(GOOD)
     for words in (["--unsafe"], ["--fix", "--truth"], ["--fix", "--against", "latest"]):
         assert folder.main("check", *words).status == 2
+
+
+def test_fix_mends_one_misspelt_name_of_a_model_after_the_other(make: Make) -> None:
+    """MuJoCo tells the first one only."""
+    model = (
+        "<mujoco>\n  <worldbody>\n    <bdoy>\n      <joint dampping='1' type='hindge'/>\n"
+        "      <gom size='1'/>\n    </bdoy>\n  </worldbody>\n</mujoco>\n"
+    )
+    mended = model
+    for slip, name in (("bdoy", "body"), ("dampping", "damping"), ("hindge", "hinge")):
+        mended = mended.replace(slip, name)
+    mended = mended.replace("gom", "geom")
+    folder = make(f"{GOOD}```mjcf\n{model}```\n")
+    folder.write("models/ball.xml", model)
+    result = folder.main("check", "--fix")
+    assert folder.text(folder.lesson()) == f"{GOOD}```mjcf\n{mended}```\n"
+    assert folder.text("models/ball.xml") == mended
+    assert "\nfixed 8 mistakes in 2 files (mjcf-error 4, model-error 4);" in result.out

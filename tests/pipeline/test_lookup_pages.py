@@ -23,7 +23,7 @@ $$I = \\int_V \\rho\\,\\mathrm dV$$ {#eq:tensor}
 and more. First. A [principal *axes*]{term="Principal axis"} is $x$ & `<b>`, [see](lesson:1.2).
 Last.
 
-- An [item]{term} in a list, `1 < 2`.
+- An [item]{term} in a list, `1 < 2`, of [](#tab:sizes) and [](#eq:tensor).
 
 ## Law
 
@@ -43,7 +43,7 @@ Table: Sizes & *names*. {#tab:sizes}
 ls
 ```
 
-### Detail
+### Detail of [](#tab:sizes)
 
 #### Its end
 
@@ -73,7 +73,9 @@ def site(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> dict[str, st
     result = folder.main("build")
     assert result.status == 0, result.out + result.err
     return {
-        path: data.decode() for path, data in folder.tree("public").items() if path[-5:] == ".html"
+        path: data.decode()
+        for path, data in folder.tree("public").items()
+        if path.endswith(".html") or path.startswith("assets/search/")
     }
 
 
@@ -106,7 +108,7 @@ def test_an_entry_is_two_sentences_or_one_and_the_formula_that_it_leads_to(
     assert text(tensor).startswith("inertia tensor For a body of volume V, the inertia tensor is I")
     assert '<math display="block"' in tensor
     assert text(terms["item"]).startswith(
-        "item An item in a list, 1 < 2. Defined in 1.1 Lesson one"
+        "item An item in a list, 1 < 2, of Table 1.1.1 and (1) of Lesson 1.1. Defined in 1.1 Lesson"
     )
     axis = terms["principal-axis"]
     assert text(axis).startswith(
@@ -131,7 +133,7 @@ def test_an_entry_says_where_the_term_is_defined_and_used(site: dict[str, str]) 
 
 
 def test_nothing_hostile_is_markup(site: dict[str, str]) -> None:
-    for page in site.values():
+    for page in (page for path, page in site.items() if path.endswith(".html")):
         assert "<script>alert" not in page
         assert "<i>" not in page
     assert "&lt;script&gt;alert(1)" in site["glossary/index.html"]
@@ -160,6 +162,14 @@ def test_tables_and_listings_have_numbers_of_their_lesson(site: dict[str, str]) 
     assert '<a href="1.1-one.html#tab%3Asizes">Table 1.1.1</a>' in second
 
 
+def test_links_without_a_text_are_named_in_contents_and_search(site: dict[str, str]) -> None:
+    contents = site["lessons/1.1-one.html"].partition('class="toc')[2].partition("</nav>")[0]
+    assert "Detail of Table 1.1.1" in text(contents)
+    search = "".join(data for path, data in site.items() if path.startswith("assets/search/"))
+    assert "By Listing 1.1.1 and Table 1.1.1." in search
+    assert "the (1) of Lesson 1.1, the (*) of Lesson 1.1" in search
+
+
 def test_the_index_of_symbols(site: dict[str, str]) -> None:
     page = site["symbols/index.html"]
     declared_part, _, undeclared_part = page.partition('<section class="undeclared"')
@@ -167,7 +177,7 @@ def test_the_index_of_symbols(site: dict[str, str]) -> None:
     assert rows == [
         "q˙ rate <i> 1/s 1.1 Law",
         "V volume (1.1) m³ 1.1 Core, also in 1.2 voltage (1.2)",
-        "w width 1.1 Detail",
+        "w width 1.1 Detail of Table 1.1.1",
     ]
     symbols = [text(item) for item in undeclared_part.partition("</section>")[0].split("<li>")[1:]]
     assert [item.split()[0] for item in symbols] == ["a", "I", "x", "z", "ρ"]

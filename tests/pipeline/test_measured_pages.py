@@ -68,7 +68,7 @@ class Course:
 
     def record(self) -> None:
         self.write_bench(self.bench())
-        self.write_diet("nobody reads it")
+        self.write_diet("nothing reads it")
         self.write_cases("it swings")
 
     def write_bench(self, report: SceneReport) -> None:

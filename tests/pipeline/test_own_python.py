@@ -217,6 +217,6 @@ def test_nothing_runs_without_a_sandbox(
     assert (result.status, result.out) == (1, "")
     assert result.err == (
         "coursebuild: `--sandbox` needs Bubblewrap, but there is no program `bwrap`\n"
-        "  help: install it, as by `apt-get install bubblewrap`\n"
+        "  help: install it, for example with `apt-get install bubblewrap`\n"
     )
     assert not (folder.root / "examples").exists()

@@ -194,7 +194,7 @@ def test_page_that_goes_and_one_that_comes(make: Make, browser: Browser) -> None
             page = window.page
             folder.write("content/course.toml", map_.replace('"two"', '"zwei"'))
             (folder.root / folder.lesson(2)).rename(folder.root / "content/lessons/1.2-zwei.md")
-            see(page.locator(".preview-button", has_text="this page is gone"))
+            see(page.locator(".preview-button", has_text="this page no longer exists"))
             window.check_unbroken()
             with PreviewPage(browser, preview, "lessons/1.2-two.html") as missing:
                 expect(missing.page.locator("main")).to_contain_text("There is no page")

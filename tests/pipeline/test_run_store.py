@@ -74,7 +74,7 @@ UNSTORED_OUTCOMES: list[tuple[Outcome, dict[str, object], str]] = [
     (Outcome.NORUN, {}, "its lesson says `norun`"),
     (Outcome.FAILED, {"stderr": "x\nModuleNotFoundError: jax"}, "it did not find a module"),
     (Outcome.FAILED, {"stderr": "ImportError: cannot import"}, "it did not find a module"),
-    (Outcome.OK, {"trace": None}, "nobody could watch what it looks at"),
+    (Outcome.OK, {"trace": None}, "what it reads could not be observed"),
     (Outcome.OK, {"trace": replace(EMPTY_TRACE, opaque="it starts others")}, "it starts others"),
     (Outcome.OK, outside("/dev/random"), "it reads /dev/random"),
     (Outcome.OK, outside("/proc/stat"), "it reads /proc/stat"),

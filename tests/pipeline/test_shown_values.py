@@ -263,6 +263,7 @@ FRAME = FrameInputs(
     engine="3.14.0",
     python="3.11.7",
     templates=(),
+    version="1.2",
     is_manual=False,
     names=Names(
         style="assets/site.1.css",

@@ -433,7 +433,7 @@ def test_place_opens_in_each_kind_of_editor(
     assert arguments_of_editor("vim", "not-there") == ["code", "--goto", f"{file}:3:9"]
     calls.unlink()
     for other_place in (f"{folder.lesson()}:3:8", "content/course.toml:1:1", "/etc/passwd:1:1", ""):
-        assert open_in_editor(session, other_place) == "nothing is wrong there any more"
+        assert open_in_editor(session, other_place) == "nothing is wrong there now"
     assert not calls.exists()
     install("gvim", ends=3)
     monkeypatch.setenv("VISUAL", "gvim")

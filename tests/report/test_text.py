@@ -184,7 +184,7 @@ def test_labs_are_listed_like_scripts() -> None:
         "ok       1.1-lab-1  64,206 steps/s, 13 things tried, bit-identical, 1.24 s\n"
         "ok       1.1-lab-2  1,000 steps/s, 1 thing tried, no Python export: a `switch`, cached\n"
         "failed   1.1-lab-3  0 things tried, 0.50 s\n"
-        "ok       1.1-lab-4  not tried: a kind of its own\n"
+        "ok       1.1-lab-4  not tried: a custom kind of lab\n"
         "\n"
         "1 lesson, 0 scripts run, 4 labs tried: everything holds\n"
     )
@@ -242,4 +242,4 @@ def test_sarif_names_the_page_of_a_rule() -> None:
     assert rule["id"] == "math-syntax"
     known_address = f"{MANUAL}rules.html#math-syntax"
     assert rule.get("helpUri") == (known_address if MANUAL else None)
-    assert "\n## math-syntax\n" in (ROOT / "docs/reference/rules.md").read_text()
+    assert "\n### math-syntax\n" in (ROOT / "docs/reference/rules.md").read_text()

@@ -41,7 +41,7 @@ def box(card: SceneCard | None = CARD) -> SceneReport:
 def finding(kind: str = "sensor-unread", **overrides: object) -> Finding:
     fields: dict[str, object] = {
         "kind": kind,
-        "message": "nobody reads <this> sensor",
+        "message": "nothing reads <this> sensor",
         "places": (ModelPlace("tip", "mujoco/sensor/framepos", "models/box.xml", 3, 5),),
         "label": PROVED_LABEL,
         "difference": 0.0,

@@ -43,6 +43,7 @@ from coursebuild.core.text.diagnostics import (
     diagnose,
     did_you_mean,
     nearest,
+    propose,
 )
 from coursebuild.core.text.source import Excerpt, Source, Span
 
@@ -113,13 +114,13 @@ def check_compiled(
     for model in course.models:
         result = models[model.name]
         if result.error and model.name not in included:
-            diagnostics.append(diagnose_model(model, result, readable))
+            diagnostics.append(diagnose_model(model, result, readable, course.models))
         elif not result.error and (fault := _find_fault(model.source.excerpt(), 0)) is not None:
             message = f"the model `{model.name}` holds {fault[1]}"
             diagnostics.append(diagnose("model-error", fault[0], message, help=_FAULT_HELP))
     facts: dict[tuple[str, int], ModelFacts] = {}
     for text, result in texts:
-        diagnostics += _check_text(text, result, readable)
+        diagnostics += _check_text(text, result, readable, course.models)
         if result.facts is not None:
             facts[_block_key(text.block)] = result.facts
 
@@ -139,9 +140,12 @@ def check_compiled(
 
 
 def diagnose_model(
-    model: MjcfModel, result: CompileResult, readable: Callable[[str], str]
+    model: MjcfModel,
+    result: CompileResult,
+    readable: Callable[[str], str],
+    models: Sequence[MjcfModel] = (),
 ) -> Diagnostic:
-    """The diagnostic of a model that does not compile."""
+    """The diagnostic of a model that does not compile; `models` may be included by it."""
     span = line_span(model.source.excerpt(), result.line, 0, model.source.span(0, 0))
     if result.timeout:
         return _diagnose_timeout(span, f"the model `{model.name}`", result)
@@ -154,7 +158,36 @@ def diagnose_model(
             expat.ParserCreate().Parse(f"{text}{closing}".encode(), True)
             edit = Edit(model.source.span(len(text), len(text)), closing)
             help = Fix("end it with `</mujoco>`", edits=(edit,), safe=True)
+    span, help = _propose_name(result, Excerpt.of_span(model.source.span()), 0, models) or (
+        span,
+        help,
+    )
     return diagnose("model-error", span, message, help=help, notes=notes)
+
+
+def _propose_name(
+    result: CompileResult, code: Excerpt, offset: int, models: Sequence[MjcfModel]
+) -> tuple[Span, Fix] | None:
+    """Where a name is misspelt that the compiler does not know, and the fix.
+
+    `code` begins at this offset of the text that was compiled; the name may also be in a model that
+    it includes.
+    """
+    if (misspelling := result.misspelling) is None:
+        return None
+    if misspelling.path:
+        sources = (m.source for m in models if m.source.path == misspelling.path)
+        code, offset = next((Excerpt.of_span(s.span()) for s in sources), code), 0
+    word, likely = misspelling.word, misspelling.candidates[0]
+    parts = [code.slice(a - offset, b - offset) for a, b in misspelling.places if a >= offset]
+    if len(parts) < len(misspelling.places) or any(part.text != word for part in parts):
+        return None
+    place, *others = (part.span() for part in parts)
+    fix = propose(word, likely, misspelling.candidates)
+    if fix.new is not None:
+        edits = tuple(Edit(span, likely) for span in others)
+        fix = Fix(fix, fix.new, fix.old, edits=edits, safe=fix.safe)
+    return place, fix
 
 
 def _diagnose_timeout(span: Span, subject: str, result: CompileResult) -> Diagnostic:
@@ -219,7 +252,10 @@ def _note_opening(code: Excerpt, lines_before: int, error: str) -> tuple[Note, .
 
 
 def _check_text(
-    text: MjcfText, result: CompileResult, readable: Callable[[str], str]
+    text: MjcfText,
+    result: CompileResult,
+    readable: Callable[[str], str],
+    models: Sequence[MjcfModel],
 ) -> Iterator[Diagnostic]:
     block = text.block
     subject = "this block"
@@ -251,6 +287,8 @@ def _check_text(
         help = ""
         if isinstance(block, Mjcf) and block.fragment is None and "<mujoco" not in text.text:
             help = 'if it is a part of a model say so: `fragment="worldbody"`'
+        offset = text.text.index("\n") + 1 if text.lines_before else 0
+        span, help = _propose_name(result, text.code, offset, models) or (span, help)
         message = f"{subject} does not compile: {readable(result.error)}"
         notes = _note_opening(text.code, text.lines_before, result.error)
         yield diagnose("mjcf-error", span, message, help=help, notes=notes)

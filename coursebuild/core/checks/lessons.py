@@ -238,5 +238,5 @@ def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnosti
         at = unmatched[-1]
         end = at + (2 if text[at] == "\\" else 1)
         help = "write the other one, or `\\lbrack`, `\\rbrack` where one stands alone"
-        message = f"`{text[at:end]}` has no bracket that belongs to it"
+        message = f"`{text[at:end]}` has no matching bracket"
         yield diagnose("math-brackets", tex.span(at, end), message, help=help)

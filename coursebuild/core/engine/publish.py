@@ -123,7 +123,7 @@ def _replace(
         open_slot(root, slot)
         entries, paths = site.fill(slot, jobs, stage)
         if not holds(slot, entries):
-            raise EffectError(f"somebody else changes what is being written to {place}")
+            raise EffectError(f"another process is changing what is being written to {place}")
         # The permissions of the site's folder: those it has already, else the usual ones.
         slot.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o755)
         _swap(slot, place)
@@ -142,7 +142,7 @@ def _check_place(root: Path, out: Path, place: Path) -> None:
     if path.is_relative_to(root) and not place.is_relative_to(root):
         raise PublishRefusedError(
             f"{out} is a link that leads out of the project",
-            help="a course may bring such a link: name the folder itself by `--out`",
+            help="such a link may come with a course: name the folder itself with `--out`",
         )
     if root.is_relative_to(place):
         relation = "is the project itself" if place == root else "holds the project"
@@ -151,7 +151,9 @@ def _check_place(root: Path, out: Path, place: Path) -> None:
         )
     for name in _AUTHOR_FOLDERS:
         if place.is_relative_to(os.path.realpath(root / name)):
-            raise PublishRefusedError(f"{out} lies in {name}/ of the project, where no site may go")
+            raise PublishRefusedError(
+                f"{out} lies in {name}/ of the project, which cannot hold a site"
+            )
     _recover(place)
     if os.path.lexists(place) and not place.is_dir():
         raise PublishRefusedError(f"{out} is not a folder")

@@ -129,7 +129,7 @@ def shared_place(address: str, key: bytes = b"") -> SharedPlace:
     except ImportError as error:
         raise EffectError(f"the cache {address} needs a package: {in_words(error)}") from None
     except ValueError as error:
-        raise EffectError(f"there is no place like {address}: {in_words(error)}") from None
+        raise EffectError(f"there is no such place as {address}: {in_words(error)}") from None
     return SharedPlace(address, RemoteFiles(files, top), key)
 
 

@@ -139,7 +139,7 @@ def find_store(root: str) -> tuple[str, str]:
     key = store_key(root)
     if not key:
         reason = (
-            "needs a key of this user's, and there is no place for it: "
+            "needs a key of its user's own, and there is nowhere to keep it: "
             f"set HOME, XDG_STATE_HOME or {_SECRET}"
         )
         return _NOWHERE, reason

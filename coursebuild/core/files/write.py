@@ -2,7 +2,7 @@
 
 Entry points: `write_atomic`, `check_writable`, `check_unchanged`, `remove_leftovers`;
 `change_files(root, changes)`; `undo_changes(root)`, before a command reads a course; `take_back`,
-what a command that kept its journal has changed.
+the last changes whose journal was kept.
 
 1. The new bytes go into a temporary file in the same folder, locked as long as its writer is alive.
 2. They are synced to the disk, with the permissions and the owner of the file that they replace.
@@ -16,7 +16,7 @@ next run removes. Of several files,
    that no course can bring one along, and is sealed.
 2. The files are written and removed one after the other, each whole.
 3. The journal is removed, or put beside as the last change that can be taken back, which completes
-   the change.
+   the change. Earlier ones stay, so that one after the other can be taken back.
 
 If step 2 fails, the changes so far are undone. If the process was killed, the next command undoes
 them: a file with the new content gets the old one back; one that was edited since stays. Where the
@@ -176,7 +176,9 @@ def _move(temporary: str, target: Path, path: str, *, new: bool) -> None:
             os.link(temporary, target)
             return
         except FileExistsError:
-            raise FileChangedError(f"{path} was made by somebody else in the meantime") from None
+            raise FileChangedError(
+                f"{path} was created by another program in the meantime"
+            ) from None
         except OSError:
             pass  # a file system without links
     Path(temporary).replace(target)
@@ -202,7 +204,7 @@ def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
     if current is None:
         raise FileChangedError(f"{path} was removed in the meantime")
     if expected is None:
-        raise FileChangedError(f"{path} was made by somebody else in the meantime")
+        raise FileChangedError(f"{path} was created by another program in the meantime")
     raise FileChangedError(
         f"{path} was changed in the meantime", help="nothing was written; run the command again"
     )
@@ -214,6 +216,10 @@ def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
 _CLOSED = frozenset({".git", ".venv", FOLDER})
 """Folders of the project in which nothing is made."""
 _NAME = "changes"
+_LOCK = "changes-lock"
+"""The lock of journals, which is held for a moment; that of the course before it, if both are."""
+_KEPT = 20
+"""How many changes can be taken back."""
 
 
 class FileChange(Struct, frozen=True):
@@ -230,15 +236,18 @@ def change_files(
     on_wait: Callable[[str], None] | None = None,
     *,
     keep: bool = False,
+    beside_commands: bool = False,
 ) -> bool:
     """Make all changes, or none; return whether `take_back` can undo them, as with `keep` it can.
 
-    `on_wait` gets a message if another command must end first.
+    `on_wait` gets a message if another command must end first. With `beside_commands` none must,
+    as if the changes were made in an editor.
 
     Raises:
         EffectError: a file cannot be written, or has changed since it was read.
     """
-    with project_lock(root, on_wait):
+    course_lock = contextlib.nullcontext() if beside_commands else project_lock(root, on_wait)
+    with course_lock, project_lock(root, name=_LOCK):
         _undo(root, on_wait)
         for change in changes:
             check_unchanged(_check_path(root, change), change.path, change.old)
@@ -259,7 +268,11 @@ def change_files(
                 journal.unlink()
             raise
         if journal is not None and keep:
-            journal.replace(_undo_journal(journal))
+            kept_journals = _kept_journals(journal)
+            last = int(kept_journals[-1].suffix[1:]) if kept_journals else 0
+            journal.replace(journal.with_name(f"{journal.name}.{last + 1:09}"))
+            for old_journal in kept_journals[: 1 - _KEPT]:
+                old_journal.unlink(missing_ok=True)
         elif journal is not None:
             journal.unlink()
     return keep and journal is not None
@@ -270,35 +283,36 @@ def take_back(
 ) -> tuple[list[str], list[str]] | None:
     """Undo the last changes that were kept; return the paths of the files that are as before.
 
-    The second list has those that were edited since, which stay. `None`: nothing was kept.
+    The second list has those that were edited since, which stay. `None`: nothing was kept. The next
+    call undoes the changes before.
 
     Raises:
         EffectError: a file cannot be written; then none is.
     """
-    journal = journal_path(root)
-    try:
-        data = _undo_journal(journal).read_bytes() if journal is not None else b""
-        changes = msgspec.msgpack.decode(
-            unseal(_NAME, data, store_key(str(root))) or b"", type=tuple[FileChange, ...]
-        )
-    except (*DAMAGE, FileNotFoundError):
-        return None
-    unedited, edited_paths = [], []
-    for change in changes:
+    current_journal = journal_path(root)
+    for journal in reversed(_kept_journals(current_journal) if current_journal else []):
         try:
-            check_unchanged(_check_path(root, change), change.path, change.new)
-            unedited.append(FileChange(change.path, change.new, change.old))
-        except FileChangedError:
-            edited_paths.append(change.path)
-    change_files(root, unedited, on_wait)
-    if journal is not None and unedited:
-        _undo_journal(journal).unlink()
-    return [change.path for change in unedited], edited_paths
+            data = unseal(_NAME, journal.read_bytes(), store_key(str(root)))
+            changes = msgspec.msgpack.decode(data or b"", type=tuple[FileChange, ...])
+        except (*DAMAGE, FileNotFoundError):
+            journal.unlink(missing_ok=True)
+            continue
+        unedited, edited_paths = [], []
+        for change in changes:
+            try:
+                check_unchanged(_check_path(root, change), change.path, change.new)
+                unedited.append(FileChange(change.path, change.new, change.old))
+            except FileChangedError:
+                edited_paths.append(change.path)
+        change_files(root, unedited, on_wait)
+        journal.unlink(missing_ok=True)
+        return [change.path for change in unedited], edited_paths
+    return None
 
 
-def _undo_journal(journal: Path) -> Path:
-    """Where the journal of changes lies that can be taken back."""
-    return journal.with_name(f"{journal.name}.last")
+def _kept_journals(journal: Path) -> list[Path]:
+    """The journals of changes that can be taken back, the last one at the end."""
+    return sorted(journal.parent.glob(f"{journal.name}.{'[0-9]' * 9}"))
 
 
 def undo_changes(root: Path, tell: Callable[[str], None] | None = None) -> None:
@@ -309,7 +323,7 @@ def undo_changes(root: Path, tell: Callable[[str], None] | None = None) -> None:
     """
     journal = journal_path(root)
     if journal is not None and journal.exists():
-        with project_lock(root):  # a command still at work holds it
+        with project_lock(root), project_lock(root, name=_LOCK):  # whoever is at work holds it
             _undo(root, tell)
 
 
@@ -338,8 +352,8 @@ def _undo(root: Path, tell: Callable[[str], None] | None) -> None:
     except (*DAMAGE, OutsideProjectError):
         journal.replace(journal.with_suffix(".damaged"))
         message = (
-            "a command that was interrupted has left a damaged journal, so nothing was undone: "
-            "look at what it was changing"
+            "an interrupted command left a damaged journal, so nothing was undone: "
+            "check the files that it was changing"
         )
     else:
         message = _restore(root, changes)

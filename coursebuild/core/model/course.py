@@ -332,6 +332,8 @@ class Course(Struct, frozen=True):
     """Where notebooks can be run; its `repository` is set."""
     theme: Theme = Theme()
     words: Words = Words()
+    version: str = ""
+    """Of the course, the name of a folder; sites of several may stand beside each other."""
     bibliography: Source | None = None
     """The list of sources, `BIBLIOGRAPHY`."""
     citation_style: Source | None = None

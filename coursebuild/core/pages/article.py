@@ -125,7 +125,7 @@ def contents(page: PageContext, document: Document) -> tuple[ContentsEntry, ...]
     for block in document.blocks:
         if not isinstance(block, Heading) or block.level > 3:
             continue
-        title = page.inlines(without_links(block.children))
+        title = page.inlines(without_links(block.children, page.reference))
         entry = ContentsEntry(block.anchor, title, block.goes_further)
         if block.level == 3 and entries:
             entries[-1] = replace(entries[-1], children=(*entries[-1].children, entry))
@@ -150,7 +150,7 @@ def draw(
         values["article"] = article(page, document)
         values["title_anchor"] = document.title_anchor
         if head.kind == "page":
-            head = replace(head, description=_first_sentences(document))
+            head = replace(head, description=_first_sentences(page, document))
     kind = page_kind(head.kind)
     if kind is not None and kind.draw is not None:
         values |= {"title": head.title, "content": kind.draw(renderer, values)}
@@ -171,8 +171,9 @@ def _draw_value(value: object, renderer: Renderer) -> object:
             return value
 
 
-def _first_sentences(document: Document) -> str:
+def _first_sentences(page: PageContext, document: Document) -> str:
     """The first paragraph, cut at a word, for search engines."""
     first = next((b for b in document.blocks if isinstance(b, Paragraph)), None)
-    text = " ".join(plain_text(first.children).split()) if first is not None else ""
+    inlines = () if first is None else without_links(first.children, page.reference)
+    text = " ".join(plain_text(inlines).split())
     return text if len(text) <= 200 else text[:200].rsplit(" ", 1)[0] + " …"

@@ -2,7 +2,8 @@
 
 Entry points: `FrameInputs`, what frames show of a course; `PageFrame`, whose `render` puts the
 frame around the body of a page; `course_data` and `lesson_data`, structured data; `sitemap`,
-`robots`. Whatever needs the site's full address is left out if the course does not give that.
+`versions`, `robots`. Whatever needs the site's full address is left out if the course does not give
+that.
 
 Pages are drawn in two steps because a page's head refers to the style sheet by a hash of its
 content, and the style sheet names the fonts, which depend on the characters of all pages.
@@ -131,6 +132,8 @@ class FrameInputs(Struct, frozen=True):
     python: str
     templates: Texts
     """The course's own."""
+    version: str
+    """See `Course.version`."""
     is_manual: bool
     """See `Course.is_manual`."""
     names: Names
@@ -151,6 +154,7 @@ class FrameInputs(Struct, frozen=True):
             engine=results.engine,
             python=results.python,
             templates=course.theme.template_texts,
+            version=course.version,
             is_manual=course.is_manual,
             names=names,
         )
@@ -338,6 +342,11 @@ def sitemap(course: Course, paths: Iterable[str]) -> bytes:
         '<?xml version="1.0" encoding="UTF-8"?>\n'
         '<urlset xmlns="http://www.sitemaps.org/schemas/sitemap/0.9">\n' + rows + "</urlset>\n"
     ).encode()
+
+
+def versions(course: Course) -> bytes:
+    """The list of versions of a course with one: this one, whose site is where the list is."""
+    return f"{json.dumps([{'version': course.version, 'root': './'}])}\n".encode()
 
 
 def robots(course: Course) -> bytes:

@@ -1,7 +1,7 @@
 r"""Numbers of formulas, figures, tables, listings and labs.
 
-Entry points: `number_items`; `items_of`, for other pages; `item_name` and `name_elsewhere`, the
-texts of references.
+Entry points: `number_items`; `items_of`, for other pages; `item_name`, `name_elsewhere` and
+`name_outside`, the texts of references; `fill_in`, for texts that are kept without them.
 
 1. What has a label has a number, in the order of the text, and nothing else: a number is there to
    be referred to. Each kind is counted for itself.
@@ -15,15 +15,23 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterator
 from html import unescape
+from typing import TypeVar
+from urllib.parse import unquote
+
+from markupsafe import Markup
 
 from coursebuild.core.model import (
     LABEL_KINDS,
     Document,
+    Lesson,
     LessonTarget,
     NumberedItem,
+    Owner,
     PageTarget,
     Target,
+    UrlTarget,
     display_formulas,
     labelled_blocks,
     resolve,
@@ -31,6 +39,8 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import Mathml
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.strings import Strings
+
+TextT = TypeVar("TextT", str, Markup)
 
 _COUNTER_CLASS = 'class="tml-eqn"'
 _TAG_CLASS = 'class="tml-tag"'
@@ -80,6 +90,28 @@ def item_name(item: NumberedItem, prefix: str, words: Strings) -> str:
 def number_prefix(id: str) -> str:
     """What stands before numbers in a lesson."""
     return f"{id}."
+
+
+UNNAMED = "\0"
+"""Stands for the name of a link's target in texts that are kept of a document: the names depend on
+other documents. No text of a course has this character."""
+
+
+def fill_in(text: TextT, names: Iterator[str]) -> TextT:
+    """A text, or HTML, with names in the place of `UNNAMED`."""
+    head, *rest = text.split(UNNAMED)
+    for part in rest:
+        head = head + next(names, "") + part
+    return head
+
+
+def name_outside(library: Library, owner: Owner, target: Target) -> str:
+    """The name of what a link of a lesson or page leads to, for a page that quotes it."""
+    target = resolve(target, library.course, owner.path)
+    if isinstance(target, UrlTarget) and target.url.startswith("#"):
+        kind = LessonTarget if isinstance(owner, Lesson) else PageTarget
+        target = kind(owner.id, unquote(target.url[1:]))
+    return name_elsewhere(library, "", target)
 
 
 def name_elsewhere(library: Library, path: str, target: Target) -> str:

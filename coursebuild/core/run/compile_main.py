@@ -3,9 +3,10 @@
 Entry point: run as a file by `mjcf`, in a temporary folder, where MuJoCo may leave its log.
 
 The protocol: JSON lines. First this process says that it is ready. A request has a path (where the
-text stands, or would: includes and assets are relative to it), a text, and seconds; one that takes
-more processor time ends this process by SIGPROF. The reply is a message, which is empty where it
-compiles, the facts of `results.ModelFacts`, and the seconds that it took.
+model stands, or would: includes and assets are relative to it), texts by their paths, which hide
+files that are there, and seconds; one that takes more processor time ends this process by SIGPROF.
+The reply is a message, which is empty where it compiles, the facts of `results.ModelFacts`, and the
+seconds that it took. A request for no model is answered by what MuJoCo says of names in MJCF.
 """
 
 from __future__ import annotations
@@ -31,17 +32,29 @@ def main() -> None:
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
     print("ready", file=replies, flush=True)
     for line in sys.stdin:
-        path, text, seconds = json.loads(line)
+        path, texts, seconds = json.loads(line)
+        if path is None:
+            print(json.dumps(_vocabulary(mujoco)), file=replies, flush=True)
+            continue
         start = time.process_time()
         signal.setitimer(signal.ITIMER_PROF, seconds)
-        reply = _compile(mujoco, path, text)
+        reply = _compile(mujoco, path, texts)
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         print(json.dumps((*reply, time.process_time() - start)), file=replies, flush=True)
 
 
-def _compile(mujoco: Any, path: str, text: str) -> tuple[str, dict[str, Any] | None]:
+def _vocabulary(mujoco: Any) -> tuple[str, list[str]]:
+    """The schema as it is printed, and the keywords that have a number in MuJoCo."""
+    enums = (enum for name, enum in vars(mujoco).items() if name.startswith("mjt"))
+    members = [name for enum in enums for name in getattr(enum, "__members__", ())]
+    keywords = sorted({name.partition("_")[2] for name in members} - {""})
+    return mujoco.mj_printSchema(False, False), keywords
+
+
+def _compile(mujoco: Any, path: str, texts: dict[str, str]) -> tuple[str, dict[str, Any] | None]:
+    assets = {name: text.encode() for name, text in texts.items()}
     try:
-        model = mujoco.MjModel.from_xml_path(path, assets={path: text.encode()})
+        model = mujoco.MjModel.from_xml_path(path, assets=assets)
     except (ValueError, RuntimeError, mujoco.FatalError, MemoryError) as error:
         return str(error) or type(error).__name__, None
     return "", _facts(model)

@@ -192,7 +192,7 @@ def reason_forgotten(run: ScriptRun) -> str:
         case _:
             assert_never(run.outcome)
     if run.trace is None:
-        return "nobody could watch what it looks at"
+        return "what it reads could not be observed"
     changing = next((p for p in run.trace.outside if p.startswith(_VOLATILE_FOLDERS)), None)
     if changing is not None and changing != "/dev/null":
         return f"it reads {changing}"
@@ -241,7 +241,7 @@ def _change(old: Dependency, now: str) -> str:
             return f"the list of files in {old.name} changed"
         case Kind.SOUGHT:
             folder = parse_sought(old.name)[0]
-            return f"{folder} has a file now with the name of a module: {now}"
+            return f"{folder} has now a file with the name of a module: {now}"
         case Kind.MODULE:
             if not now:
                 return f"{old.name} is no longer installed (it was {old.state})"

@@ -4,7 +4,7 @@ Entry points: `InstalledPackages`, which says which package in which version pro
 importing nothing; `distributions`, `module_files`, for archives of scripts.
 `prepare_environment` makes an environment with another version of MuJoCo and, apart from that, the
 packages installed here; `check_other_version`, for what the user names; `latest_version`, the one
-that pip finds.
+that the installer finds.
 
 Reading what each distribution provides takes a quarter of a second, so the whole map is stored
 under the names in the folders with installed packages, which say their versions. A module that no
@@ -15,7 +15,8 @@ distribution names, and one of this tool's own, is identified by the content of 
 2. A new one is made under a temporary name, and renamed when MuJoCo can be imported in it, so that
    none is ever incomplete. What a killed process left is removed the next time.
 3. pip, as the user has configured it, installs MuJoCo with the packages that it consists of, and
-   nothing else. All other packages are used from where they are installed here.
+   nothing else. All other packages are used from where they are installed here. uv makes
+   environments without pip: in these uv installs.
 """
 
 from __future__ import annotations
@@ -25,7 +26,6 @@ import functools
 import hashlib
 import importlib.metadata
 import importlib.util
-import json
 import os
 import platform
 import re
@@ -188,13 +188,10 @@ _VERSION = re.compile(
     r"\d+(\.\d+){0,3}((a|b|rc)\d+)?(\.post\d+)?(\.dev\d+)?(\+[a-z0-9.]+)?", re.ASCII
 )
 _ENGINE = "mujoco"
-_INSTALL = ("install", "--no-deps", "--no-input", "--progress-bar", "off", "--only-binary", ":all:")
+_NO_VERSION = rf"there is no version of {_ENGINE}|{_ENGINE}\S* was not found"
+"""What uv says."""
 _LINES = 4
-"""The most lines of pip's that an error quotes."""
-_OFFLINE = (
-    "without a network let pip find the wheels in a folder, by the environment variables "
-    "PIP_FIND_LINKS and PIP_NO_INDEX"
-)
+"""The most lines of an installer's that an error quotes."""
 
 
 def check_other_version(text: str) -> str:
@@ -211,19 +208,18 @@ def check_other_version(text: str) -> str:
 
 
 def latest_version() -> str:
-    """The newest version of MuJoCo that pip, as the user has configured it, would install here.
+    """The newest version of MuJoCo that pip or uv, as configured, would install here.
 
     Raises:
         EffectError: it finds none.
     """
-    _require_pip()
-    pip = [sys.executable, "-m", "pip", *_INSTALL, "--dry-run", "--ignore-installed", "--quiet"]
-    status, output = _run([*pip, "--report", "-", _ENGINE])
-    if status:
-        raise _pip_error("at all", output)
-    report, _ = json.JSONDecoder().raw_decode(output, output.index("{"))  # among pip's warnings
-    version: str = report["install"][0]["metadata"]["version"]
-    return version
+    command = _install_command(sys.executable)
+    anew = ["--ignore-installed"] if _has_pip() else ["--reinstall", "--upgrade"]
+    status, output = _run([*command, "--dry-run", *anew, _ENGINE])
+    versions = re.findall(rf"\b{_ENGINE}[-=]+([0-9]\S*)", output.rpartition("Would install")[2])
+    if status or not versions:
+        raise _install_error("at all", output)
+    return str(versions[-1])  # uv first names the one that it would remove
 
 
 def _without_zeros(version: str) -> str:
@@ -254,7 +250,7 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
             for path in rest[_MAX_ENVIRONMENTS - 1 :]:
                 shutil.rmtree(path, ignore_errors=True)
     except OSError as error:
-        raise EffectError(f"{prefix.name} cannot be made: {reason(error)}") from None
+        raise EffectError(f"{prefix.name} cannot be created: {reason(error)}") from None
     return Interpreter(
         prefix.name,
         f"{prefix}/bin/python",
@@ -278,7 +274,7 @@ def environment_prefix(root: Path, engine: str) -> Path:
     if state is None:
         raise EffectError(
             f"there is no place for an environment with MuJoCo {engine}",
-            help="HOME or XDG_STATE_HOME gives one, outside of the course",
+            help="set HOME or XDG_STATE_HOME to a folder outside the course",
         )
     return Path(state, _FOLDER, name)
 
@@ -288,16 +284,25 @@ def _packages(prefix: Path) -> Path:
     return prefix / "lib" / f"python{version}" / "site-packages"
 
 
-def _require_pip() -> None:
-    if importlib.util.find_spec("pip") is None:
-        raise EffectError(
-            "pip is not installed for this Python, and nothing can be installed without it",
-            help="run `python -m ensurepip`",
-        )
+def _has_pip() -> bool:
+    return importlib.util.find_spec("pip") is not None
+
+
+def _install_command(python: str) -> list[str]:
+    """The command that installs packages for a Python, without what they need."""
+    plain = ["--no-deps", "--only-binary", ":all:"]
+    if _has_pip():
+        pip = [sys.executable, "-m", "pip", "--python", python, "install"]
+        return [*pip, "--no-input", "--progress-bar", "off", *plain]
+    if uv := shutil.which("uv"):
+        return [uv, "pip", "install", "--python", python, "--no-progress", *plain]
+    raise EffectError(
+        "this Python has no pip, and there is no uv, so nothing can be installed",
+        help="run `python -m ensurepip`",
+    )
 
 
 def _create_environment(prefix: Path, engine: str) -> None:
-    _require_pip()
     new = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=prefix.parent))
     try:
         venv.create(new, symlinks=True)
@@ -310,7 +315,9 @@ def _create_environment(prefix: Path, engine: str) -> None:
         (_packages(new) / "packages_of_here.pth").write_text("".join(lines))
         status, output = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
         if status:
-            message = f"MuJoCo {engine} cannot be imported beside the other packages of here"
+            message = (
+                f"MuJoCo {engine} cannot be imported together with the other installed packages"
+            )
             output_lines = [line.strip() for line in output.splitlines() if line.strip()]
             last_line = output_lines[-1] if output_lines else "no reason"
             raise EffectError(f"{message}: {last_line}")
@@ -321,12 +328,12 @@ def _create_environment(prefix: Path, engine: str) -> None:
 
 def _install_engine(python: str, packages: Path, engine: str) -> None:
     """Install MuJoCo, and the packages of its own that it requires, and theirs in turn."""
-    pip = [sys.executable, "-m", "pip", "--python", python, *_INSTALL]
+    command = _install_command(python)
     requirements, installed = {f"{_ENGINE}=={engine}"}, set[str]()
     while requirements:
-        status, output = _run([*pip, *sorted(requirements)])
+        status, output = _run([*command, *sorted(requirements)])
         if status:
-            raise _pip_error(engine, output)
+            raise _install_error(engine, output)
         installed |= requirements
         requirements = _mujoco_requirements(packages) - installed
 
@@ -341,22 +348,27 @@ def _mujoco_requirements(packages: Path) -> set[str]:
     return {need for need in needs if need.startswith(f"{_ENGINE}-") and "extra ==" not in need}
 
 
-def _pip_error(engine: str, output: str) -> EffectError:
-    """Why pip did not install this version of MuJoCo, mostly in its own words."""
-    if f"No matching distribution found for {_ENGINE}" in output:
+def _install_error(engine: str, output: str) -> EffectError:
+    """Why this version of MuJoCo was not installed, mostly in the installer's words."""
+    tool, offline = ("pip", "PIP_NO_INDEX") if _has_pip() else ("uv", "UV_OFFLINE")
+    if re.search(rf"No matching distribution found for {_ENGINE}|{_NO_VERSION}", output):
         host = f"Python {'.'.join(platform.python_version_tuple()[:2])} on {platform.machine()}"
-        return EffectError(f"pip finds no MuJoCo {engine} for {host}", help=_OFFLINE)
+        help = (
+            f"without a network, point {tool} to a folder of wheels with the environment variables "
+            f"{tool.upper()}_FIND_LINKS and {offline}"
+        )
+        return EffectError(f"{tool} finds no MuJoCo {engine} for {host}", help=help)
     lines = [line.strip() for line in output.splitlines() if line.strip()]
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
     reasons = errors if errors != ["Exception:"] else lines[-1:]  # pip's own traceback
     return EffectError(
-        f"pip cannot install MuJoCo {engine}: {'; '.join((reasons or lines)[-_LINES:])}"
+        f"{tool} cannot install MuJoCo {engine}: {'; '.join((reasons or lines)[-_LINES:])}"
     )
 
 
 def _run(command: Sequence[str]) -> tuple[int, str]:
     """Run a program: its status and output; an interrupt ends it with its children."""
-    # Variables for this process's Python, such as warnings as errors, would disturb pip's.
+    # Variables for this process's Python, such as warnings as errors, would disturb an installer's.
     excluded = ("PYTHON", "PIP_TARGET", "PIP_PREFIX", "PIP_PYTHON")
     outer = {name: value for name, value in os.environ.items() if not name.startswith(excluded)}
     ours = {"PIP_USER": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1", "LC_ALL": "C.UTF-8"}

@@ -198,7 +198,7 @@ class RunStore:
     def reasons(self, inputs: Inputs) -> list[str]:
         """Why a result of these inputs is not used."""
         if self.fresh:
-            return ["everything is to run again"]
+            return ["everything was asked to run again"]
         last = self.last_record(inputs.path)
         if last is None:
             aside = self.store.set_aside
@@ -229,7 +229,7 @@ class RunStore:
         """
         states = ((path, self.states(Need(Kind.FILE, path))) for path in sorted(files))
         dependencies = tuple(Dependency(Kind.FILE, path, state) for path, state in states)
-        reason = "" if lasting else "it may end in another way the next time"
+        reason = "" if lasting else "it may end differently next time"
         outcome = Outcome.OK if ok else Outcome.FAILED
         run = ScriptRun(inputs.path, outcome, 0, "", "", seconds)
         self._note(record_of(inputs, dependencies, timestamp, reason, run))
@@ -255,7 +255,7 @@ class RunStore:
                 if not is_same or old.stdout != run.stdout:
                     self.differing_runs.append((old, run))
                     if run.unrepeated:  # else the lesson says what varies
-                        varies = "two runs of it did not do the same"
+                        varies = "two runs of it differed"
         record = record_of(inputs, dependencies, int(time.time()), reason or varies, run)
         if not reason:  # one that varies takes the place of the one that is kept
             assert run.outcome in STORABLE_OUTCOMES
@@ -272,7 +272,7 @@ class RunStore:
             return _REASON.format("its file")
         since = self._started.get(inputs.path)
         if since is None:
-            return "nobody knows when it began"
+            return "its starting time is unknown"
         for dependency in dependencies:
             match dependency.kind:
                 case Kind.FILE | Kind.LISTING:

@@ -54,7 +54,7 @@ _NAMESPACES = """
 _HIDDEN = ("/proc/keys", "/proc/key-users", "/proc/timer_list", "/proc/kcore")
 """Files of the system that tell of what is outside."""
 _ALLOW = (
-    "it takes Bubblewrap 0.8 or newer, and user namespaces: on Ubuntu, `sudo sysctl "
+    "it needs Bubblewrap 0.8 or newer, and user namespaces: on Ubuntu, `sudo sysctl "
     "kernel.apparmor_restrict_unprivileged_userns=0` allows them; containers often forbid them"
 )
 _TRIAL = """
@@ -65,9 +65,9 @@ sys.stdin.read()
 """
 """Prints what must be as in `_FAULTS`, and ends with its input."""
 _FAULTS = (
-    ("the supervisor is not the first process in there", "1"),
-    ("system calls are not filtered in there", "2"),
-    ("scripts have capabilities in there", "0"),
+    ("the supervisor is not the first process in the sandbox", "1"),
+    ("system calls are not filtered in the sandbox", "2"),
+    ("scripts have capabilities in the sandbox", "0"),
 )
 """What is wrong where a value is another one."""
 
@@ -101,7 +101,7 @@ def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[SandboxPart, ...]
     program, machine = shutil.which("bwrap"), platform.machine()
     if program is None:
         problem = "needs Bubblewrap, but there is no program `bwrap`"
-        help = "install it, as by `apt-get install bubblewrap`"
+        help = "install it, for example with `apt-get install bubblewrap`"
         return None, (SandboxPart("Bubblewrap", problem, help),)
     system_calls = compile_filter(machine)
     if system_calls is None:
@@ -168,7 +168,7 @@ def _try_sandbox(sandbox: Sandbox, root: Path) -> str:
     faults = (
         fault for (fault, value), actual in zip(_FAULTS, state, strict=True) if actual != value
     )
-    fault = next(faults, "" if is_watched else "what it takes cannot be seen in /proc")
+    fault = next(faults, "" if is_watched else "its memory and processes cannot be seen in /proc")
     return fault and f"does not work here: {fault}"
 
 
@@ -311,7 +311,7 @@ def sandbox_difference(job: ScriptJob, trace: Trace, sources: Iterable[str]) -> 
     The states of files outside the project count only for files that the sandbox shows.
     """
     if job.writes:
-        return "what it wrote went with its sandbox"
+        return "what it wrote was lost with its sandbox"
     folders = tuple(f"{path}/" for path in sources)
     hidden = (path for path in trace.outside if not f"{path}/".startswith(folders))
     return next((f"its sandbox does not show {path}" for path in hidden), "")

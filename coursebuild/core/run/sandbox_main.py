@@ -18,7 +18,7 @@ if __name__ == "__main__":
     if libc.syscall(KEYCTL[platform.machine()], JOIN_SESSION_KEYRING, None) < 0:
         error = ctypes.get_errno()
         if error not in (errno.ENOSYS, errno.EPERM):  # there it reaches no keyring whatever
-            sys.exit(f"a session keyring cannot be had: {os.strerror(error)}")
+            sys.exit(f"a session keyring cannot be created: {os.strerror(error)}")
     for limit, most in ((resource.RLIMIT_NOFILE, 1024), (resource.RLIMIT_MSGQUEUE, 0)):
         _, hard = resource.getrlimit(limit)
         most = most if hard == resource.RLIM_INFINITY else min(most, hard)

@@ -403,8 +403,8 @@ def _lost_run(path: str, status: int, excess: tuple[Outcome, str] | None) -> Scr
         raise RuntimeError(f"the supervisor of {path} failed with status {status}")
     if excess is not None:
         outcome, text = excess
-        text = f"its sandbox was ended, as what ran in there {text}\n"
+        text = f"its sandbox was stopped, because what ran in it {text}\n"
         return ScriptRun(path, outcome, -status, "", text, 0.0)
     name = signal.Signals(-status).name
-    text = f"the process that supervises this script was ended by {name}\n"
+    text = f"the process that supervises this script was killed by {name}\n"
     return ScriptRun(path, Outcome.KILLED, -status, "", text, 0.0)

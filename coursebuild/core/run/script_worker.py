@@ -125,7 +125,7 @@ class Worker:
         if self._has_started and seconds > timeout + _GRACE:
             self.excess = Outcome.TIMEOUT, "did not end at its time limit"
         elif seconds > _START and not (self._has_started and self._watch.is_ready()):
-            self.excess = Outcome.KILLED, f"did not begin within {_START:g} s"
+            self.excess = Outcome.KILLED, f"did not start within {_START:g} s"
         elif excess := self._watch.excess(memory):
             self.excess = Outcome.KILLED, excess
         if self.excess is not None:
@@ -249,7 +249,7 @@ class SandboxWatch:
                 fd = os.open(f"{root}{point}", os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
                 self._folders.append(fd)
                 if os.fstat(fd).st_dev != device:  # a script may put something in its place
-                    raise OSError("not mounted there any more")
+                    raise OSError("no longer mounted there")
         except OSError:
             self.close()
             return False

@@ -77,7 +77,7 @@ NETWORK = "it uses the network"
 NATIVE = "it loads native code of the project"
 DATABASE = "it opens a database"
 LISTS_OUTSIDE = "it lists folders outside the project"
-UNSEEN_MUJOCO = "it imports MuJoCo where nobody looked for that"
+UNSEEN_MUJOCO = "it imports MuJoCo where this was not expected"
 TOO_MUCH = "it opens too many files to keep track of"
 
 

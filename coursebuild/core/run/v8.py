@@ -83,8 +83,8 @@ def start() -> None:
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < _ADDRESSES:
         raise EffectError(
-            f"V8 needs more than the {limit >> 30} GiB of addresses that this process may have",
-            help="`ulimit -v unlimited` takes the limit away; it reserves addresses, not memory",
+            f"V8 needs more than the {limit >> 30} GiB of address space that this process may use",
+            help="`ulimit -v unlimited` removes the limit; V8 reserves addresses, not memory",
         )
     try:
         from py_mini_racer import init_mini_racer

@@ -308,15 +308,15 @@ def _mismatch(
         return diagnose(
             "binding-mismatch",
             binding.text_span,
-            f"`{binding.text}` does not stand in the output of `{path}`",
-            help="write it as it is printed, or take `{out}` away",
+            f"`{binding.text}` is not in the output of `{path}`",
+            help="write it as it is printed, or remove `{out}`",
         )
     if (stray := bound_text.stray) and replace(bound_text, before="", after="").is_in(lines):
         return diagnose(
             "binding-mismatch",
             binding.text_span,
             f"`{path}` printed no `{stray}` beside the number in `{binding.text}`",
-            help=Fix(f"take the `{stray}` away", "", stray),
+            help=Fix(f"remove the `{stray}`", "", stray),
         )
     label, better = _propose(bound_text, lines, list(map(PrintedLine, before)))
     return diagnose(

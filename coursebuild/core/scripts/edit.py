@@ -147,7 +147,7 @@ def _update_lines(
     def refuse(line: int, label: str) -> Diagnostic:
         span = body.span(*recorded.origin(line, 0, len(recorded.lines[line])))
         message = f"an output with `{ELLIPSIS}` cannot be brought up to date here"
-        help = f"write the line anew by hand, or take the `{ELLIPSIS}` away and update again"
+        help = f"write the line anew by hand, or remove the `{ELLIPSIS}` and update again"
         return refusal(span, message, help, label)
 
     lines: list[str] = []

@@ -191,7 +191,7 @@ def silence_diagnostic(recording: Recording, path: str) -> Diagnostic:
         "script-silent",
         recording.caption_span,
         f"an output is recorded here, but `{path}` printed nothing",
-        help="print what is recorded, or take the recorded output away",
+        help="print what is recorded, or remove the recorded output",
     )
 
 
@@ -276,7 +276,7 @@ def divergence_diagnostics(
             reason = "none of its simulations did"
             yield _false_claim(extraction, "script-stable", "diverges", reason)
         if script.deep and not deep:
-            reason = "no bodies lay deep in each other"
+            reason = "no bodies overlapped deeply"
             yield _false_claim(extraction, "script-shallow", "deep", reason)
     if script.diverges or not divergences:
         return
@@ -285,7 +285,7 @@ def divergence_diagnostics(
         message = f"a simulation of `{script.path}` diverged"
         yield _incident_diagnostic("script-diverged", extraction, lost, scripts, message, _DIVERGES)
     elif deep and not script.deep:  # bodies of a lost simulation may lie anywhere
-        message = f"bodies of `{script.path}` lie deep in each other"
+        message = f"bodies of `{script.path}` overlap deeply"
         yield _incident_diagnostic("script-penetration", extraction, deep, scripts, message, _DEEP)
 
 
@@ -313,7 +313,7 @@ def _lost_simulations(run: ScriptRun) -> tuple[Divergence, ...]:
 def _false_claim(extraction: Extraction, rule: str, key: str, reason: str) -> Diagnostic:
     fence = extraction.script.span.first_line()
     message = f"`{extraction.path}` says `{key}`, and {reason}"
-    return diagnose(rule, fence, message, help=Fix(f"take `{key}` away", "", f" {key}", safe=True))
+    return diagnose(rule, fence, message, help=Fix(f"remove `{key}`", "", f" {key}", safe=True))
 
 
 def _incident_diagnostic(

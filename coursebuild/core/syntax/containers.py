@@ -226,7 +226,7 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
         is_in_text = is_in_text or is_doubled
     if is_in_text and ">>" in marks[0]:
         message = "a quotation begins in the middle of a paragraph"
-        help = "take one `>` away, or leave a line with nothing but `>` above it"
+        help = "remove one `>`, or leave a line with nothing but `>` above it"
         place = source.span(at := source.line_start(line), at + len(marks[0].rstrip()))
         yield diagnose("markup-unread", place, message, help=help)
     lost = line - 1  # the line above, or one of those above it, of which only the blank is left
@@ -256,7 +256,7 @@ def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterat
         return
     gap = Span(source, before.span.end, block.span.start)
     if isinstance(block, model.Heading) and block.span.text.strip() == before.span.text.strip():
-        place, message = block.span.first_line(), "this heading stands here twice"
+        place, message = block.span.first_line(), "this heading is repeated here"
         yield diagnose("text-repeated", place, message, help=Fix("delete it once", ""))
     if isinstance(before, model.Callout) and isinstance(block, model.BlockQuote):
         last = before.span.text.rstrip(" \t\r\n>")[-1:]
@@ -323,5 +323,5 @@ def _diagnose_lost_mark(source: Source, at: int, mark: str) -> Diagnostic:
     place = source.span(at - 1, at + 1)
     container = "list" if mark == "-" else "quotation"
     message = f"a mark of a {container} may be lost here: only its blank is left"
-    help = f"begin the line with `{mark} `, or take the blank away"
+    help = f"begin the line with `{mark} `, or remove the blank"
     return diagnose("markup-unread", place, message, help=help)

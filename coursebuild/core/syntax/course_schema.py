@@ -169,6 +169,9 @@ Language: TypeAlias = Annotated[
 Version: TypeAlias = Annotated[
     str, matching(r"^[0-9]+\.[0-9]+\.[0-9]+$", "a version of three numbers, as in `3.14.0`")
 ]
+Edition: TypeAlias = Annotated[
+    str, matching(r"^[0-9][0-9A-Za-z.+-]*$", "a version, as in `2026` or `1.2.0`")
+]
 FeaturePath: TypeAlias = Annotated[
     str,
     matching(
@@ -218,6 +221,10 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
     licence: Annotated[
         str, Meta(description="its name, as in `CC-BY-4.0`, shown in the footer")
     ] = ""
+    version: Annotated[
+        Edition | None,
+        Meta(description="of the course, as in `2026` or `1.2.0`: shown in the head of each page"),
+    ] = None
     engine: Annotated[
         Version | None,
         Meta(description="the version of MuJoCo that the course needs; another one is an error"),

@@ -122,6 +122,7 @@ def _build_course(
         base_url=settings.base_url or "",
         repository=settings.repository or "",
         licence=settings.licence,
+        version=settings.version or "",
         folds=settings.folds,
         id=settings.id or "",
         engine=settings.engine,

@@ -191,7 +191,7 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
             message = "there is a space beside the `=` of a key"
             spaced = info.span(at, end)
             edit = Edit(spaced, re.sub(r"\s*=\s*", "=", spaced.text, count=1))
-            help = Fix("take it away", edits=(edit,), safe=True)
+            help = Fix("remove it", edits=(edit,), safe=True)
             place = info.span(equals, equals + 1)
             diagnostics.append(diagnose("fence-info", place, message, help=help))
         elif end < len(text) and not text[end].isspace():

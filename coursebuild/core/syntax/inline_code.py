@@ -53,7 +53,7 @@ def check_inline_code(content: Excerpt, start: int, end: int, code: str) -> Iter
     while (shorter := _PAIR.sub(lambda pair: "_" * len(pair[0]), rest)) != rest:
         rest = shorter
     if bracket := re.search(r"(?<=\w)[()\[\]{}](?=\w)", rest):
-        message = f"`{bracket[0]}` has no bracket that belongs to it"
+        message = f"`{bracket[0]}` has no matching bracket"
         yield diagnose("markup-unread", span, message, help="write the other one, or a blank")
     # A letter and a backtick change places easily, as in "i`mpratio`" and "`body_mass `while".
     letter, first = _LETTER_BEFORE.search(text, max(start - 2, 0), start), start - 1

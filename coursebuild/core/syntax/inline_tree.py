@@ -136,7 +136,7 @@ class _TokenReader:
                 if token.markup[:1] == "\\" and text in tuple(",;/?@"):
                     place = self.content.span(token.start, token.end)
                     message = f"the backslash before `{text}` is not shown and does nothing"
-                    help = Fix("take it away; write two for one that readers should see", text)
+                    help = Fix("remove it; write two for one that readers should see", text)
                     self.report(diagnose("markup-unread", place, message, help=help))
                 if text:
                     literal = kind == "text" or text == token.markup
@@ -343,7 +343,7 @@ class _TokenReader:
             url = ""
         if not alt.strip():
             help = "say in the brackets what it shows, for readers who cannot see it"
-            message = "the image has no text alternative"
+            message = "the image has no alternative text"
             self.report(diagnose("image-alt", span, message, help=help))
         return Image(span, url, alt, str(token.attrs.get("title", "")), place)
 

@@ -111,7 +111,7 @@ FOREIGN = {
     "contents": MarkupKind(
         r"^\[TOC\]$",
         "there is no such mark",
-        "take it away: each page lists its headings by itself",
+        "remove it: each page lists its headings by itself",
     ),
     "tab": MarkupKind(
         r"^ {0,3}===[!+]? \"[^\"\n\0]*\"",

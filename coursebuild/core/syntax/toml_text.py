@@ -54,7 +54,7 @@ def parse_toml(text: Source | Excerpt, *, rule: str = "map-syntax") -> Parsed[Ob
         reader = _Reader(body)
         return Parsed(reader.read_document(), tuple(reader.diagnostics))
     except RecursionError:
-        diagnostic = diagnose(rule, body.span(0, 0), "tables, arrays or keys nest too deep")
+        diagnostic = diagnose(rule, body.span(0, 0), "tables, arrays or keys are nested too deeply")
     except ValueError as error:
         diagnostic = _diagnose_repeated_key(body, str(error)) or diagnose_syntax(
             body, str(error), rule

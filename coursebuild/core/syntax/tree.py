@@ -93,7 +93,7 @@ class TextReader:
                 self.state.notes.add(FootnoteText(label, label_span, self._span(token), read))
         deep_token = next((token for token in self.tokens if token.info == TOO_DEEP), None)
         if deep_token is not None:
-            message = "quotes, lists or footnotes nest too deep here"
+            message = "quotations, lists or footnotes are nested too deeply here"
             place = self._span(deep_token).first_line()
             self.state.report(diagnose("nesting-deep", place, message))
 

@@ -294,7 +294,7 @@ def find_repetitions(content: Excerpt) -> Iterator[Diagnostic]:
         is_begun = re.search(r"[^\W\d_]{2,} \S", half) and not re.search(r"[.,:;!?]\W*\Z", half)
         if is_begun and line[0].startswith(half, at) and line[0].count(half.rstrip()) == 2:
             span = content.span(line.start() + at, line.start() + at + len(half))
-            message = f"`{shorten(half)}` stands here twice"
+            message = f"`{shorten(half)}` is repeated here"
             yield diagnose("text-repeated", span, message, help=Fix("delete it once", ""))
 
 
@@ -337,7 +337,7 @@ def check_indented_fence(code: Excerpt, state: ParsingState) -> None:
     if is_closed and not is_known_kind(opening[2]):
         return
     message = "this fence is indented by a tab or four blanks, so its block is shown as text"
-    help = Fix("take the white space before it away", edits=outdent(code), safe=True)
+    help = Fix("remove the white space before it", edits=outdent(code), safe=True)
     place = code.span(opening.start(1), opening.end())
     state.report(diagnose("fence-indented", place, message, help=help))
     state.closes_indented = not is_closed

@@ -106,24 +106,24 @@ FEATURE = Feature(
     check=check,
     unproven=unproven,
     rules=(
-        Rule("formula-arithmetic", "error", "A number in a formula is not what comes out."),
+        Rule("formula-arithmetic", "error", "A number in a formula is not the result."),
         Rule(
             "formula-identity",
             "error",
-            "A formula that says `check` does not hold, or may not.",
-            "Either side may be the wrong one.",
+            "A formula marked `check` does not hold, or cannot be checked.",
+            "either side may be wrong",
         ),
         Rule(
             "symbol-value",
             "error",
-            "A symbol has two values in one section, or cannot have one.",
-            "Only its author knows which value holds.",
+            "A symbol has two values in a section, or cannot have a value.",
+            "only you know which value holds",
         ),
         Rule(
             "formula-unread",
             "warning",
-            "Arithmetic in a formula is not understood.",
-            "Nothing has to be wrong in it.",
+            "The arithmetic in a formula cannot be computed.",
+            "nothing need be wrong with it",
         ),
     ),
 )

@@ -10,11 +10,11 @@
 from coursebuild.core.features import Command, Feature
 
 _SUMMARIES = {
-    "init": "make a small complete course to begin with",
+    "init": "create a small, complete course",
     "new": "add a lesson, a level, a page, a model, a template or a feature",
-    "rename": "give a lesson another id, wherever the course names it",
+    "rename": "change a lesson's id wherever the course names it",
     "fmt": "format lessons and pages",
-    "doctor": "say what works on this machine, and how to mend what does not",
+    "doctor": "check this machine, and say how to fix what does not work",
 }
 FEATURE = Feature(
     name="authoring",

@@ -177,7 +177,7 @@ def _check_free(course: Course, id: str) -> None:
         raise UsageError(f"the map has no level for `{id}`", help=help)
     for lesson in course.lessons:
         if lesson.id.casefold() == id.casefold():
-            raise UsageError(f"there is a lesson {lesson.id} already: {lesson.title}")
+            raise UsageError(f"there is already a lesson {lesson.id}: {lesson.title}")
 
 
 def _insert(course: Course, id: str, lines: Sequence[str]) -> str:

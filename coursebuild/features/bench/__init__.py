@@ -38,12 +38,12 @@ FEATURE = Feature(
     commands=(
         Command(
             name="bench",
-            summary="measure speed against error of the course's models",
+            summary="measure speed against error for the course's models",
             module="coursebuild.features.bench.commands.bench",
         ),
         Command(
             name="diet",
-            summary="say what models hold that their scenarios do not need",
+            summary="find what models contain but their scenarios do not need",
             module="coursebuild.features.bench.commands.diet",
         ),
     ),

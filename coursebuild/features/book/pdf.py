@@ -80,7 +80,7 @@ def _find_chromium() -> str:
     if program is None:
         message = f"`{choice}`, which {_PATH} names, is not a program" if choice else ""
         raise EffectError(
-            message or "there is no Chromium on this machine, which `export pdf` prints with",
+            message or "`export pdf` prints with Chromium, and there is none on this machine",
             help=f"install Chromium or Chrome, or name one in the variable {_PATH}; or print the "
             "page of `coursebuild export page` in any browser",
         )

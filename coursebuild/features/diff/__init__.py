@@ -12,7 +12,7 @@ FEATURE = Feature(
     commands=(
         Command(
             name="diff",
-            summary="say what a change does to outputs, figures, labs, truth and page weight",
+            summary="show what a change does to outputs, figures, labs, truth and page weight",
             module=f"{__name__}.commands",
         ),
     ),

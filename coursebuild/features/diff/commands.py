@@ -97,13 +97,13 @@ def report(base: str, old: CourseState, new: CourseState) -> str:
         _outputs_section(_scripts(old.course), _scripts(new.course)),
         section(
             "Figures",
-            "What scripts draw, as it is recorded.",
+            "What scripts draw, as recorded.",
             ("figure", "change"),
             [(code_span(path), change) for path, change in figures],
         ),
         section(
             "Labs",
-            "What readers run. Whether each does what it promises is what `check` says.",
+            "What readers run. `check` tells whether each does what it promises.",
             ("in", "lab", "change"),
             [(*map(escape_text, lab), change) for lab, change in labs],
         ),
@@ -158,7 +158,7 @@ def _outputs_section(before: Mapping[str, ScriptState], now: Mapping[str, Script
         (code_span(path), escape_text((now.get(path) or before[path]).owner), changes[path])
         for path in changes
     ]
-    meaning = "What scripts print, as it is recorded. Whether they print it is what `check` says."
+    meaning = "What scripts print, as recorded. `check` tells whether they still print it."
     parts = [section("Outputs", meaning, ("script", "in", "change"), rows)]
     for path in [path for path in changes if path in before and path in now][:_ROWS]:
         pairs = zip_longest(before[path].outputs, now[path].outputs)
@@ -258,7 +258,7 @@ def _truth_section(old: Course, new: Course) -> str:
     return section(
         "Truth",
         "Numbers in the text, and those that a script prints, a formula computes, or the author"
-        " gives with a source. Whether they hold is what `check` says.",
+        " gives with a source. `check` tells whether they hold.",
         ("in", "numbers", "printed", "computed", "given", "no source", "unproven", "proven"),
         [
             (
@@ -291,8 +291,8 @@ def weight_section(old: Path, new: Path) -> str:
             rows.append((name, f"{a / 1000:.1f} kB", f"{b / 1000:.1f} kB", change))
     return section(
         "Page weight",
-        "A page with the styles, scripts and pictures that it names, as they lie on the disk; a"
-        f" server sends less. Pages that change by less than {_SHARE:.0%} are not listed.",
+        "A page with the styles, scripts and pictures that it names, as stored on disk; a "
+        f"server sends less. Pages that change by less than {_SHARE:.0%} are not listed.",
         ("page", "before", "now", "change"),
         rows,
     )
@@ -328,7 +328,7 @@ examples:
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("base", metavar="BASE", help="a revision of git, or a folder with a course")
+    parser.add_argument("base", metavar="BASE", help="a Git revision, or a folder with a course")
     for name, subject in (("--base-site", "BASE"), ("--site", "this course")):
         help = f"where `build` published {subject}, for the weight of pages"
         parser.add_argument(name, metavar="FOLDER", help=help)
@@ -338,7 +338,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the report; the exit status does not depend on differences."""
     root, sites = options_of(arguments).root, (arguments.base_site, arguments.site)
     if sites.count(None) == 1:
-        raise UsageError("--site and --base-site belong together: one is compared with the other")
+        raise UsageError("--site and --base-site need each other: one is compared with the other")
     with _open_base(root, arguments.base) as (name, folder):
         text = report(name, _load_state(folder), _load_state(root))
     if None not in sites:
@@ -358,7 +358,7 @@ def _open_base(root: Path, name: str) -> Iterator[tuple[str, Path]]:
         return
     commit = _git(root, "rev-parse", "--verify", "--quiet", "--end-of-options", name + "^{commit}")
     if not commit:
-        raise UsageError(f"`{name}` is neither a folder with a course nor a revision of git here")
+        raise UsageError(f"`{name}` is neither a folder with a course nor a Git revision here")
     since = (_git(root, "merge-base", commit.decode().strip(), "HEAD") or commit).decode().strip()
     with temporary_folder() as folder:
         with tarfile.open(fileobj=io.BytesIO(_git(root, "archive", since))) as archive:

@@ -4,7 +4,8 @@ Entry points: `document_terms`; `definition_of(inlines, term)`; `glossary_values
 
 A definition is the sentence with the term and the next one, as HTML. If they continue in a
 displayed formula, the formula is part of it. Links lose their addresses, since the glossary is
-another page; of links to formulas of the document the numbers remain.
+another page; those without a text become the names of what they lead to, such as "Figure 4.2.3".
+These depend on other documents and are filled in when the page is drawn.
 
 A sentence ends at a full stop, a question or exclamation mark, with closing marks, before white
 space; not after an initial or a usual abbreviation, and not before a small letter. The marks of
@@ -17,10 +18,10 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterator
 from itertools import groupby
-from urllib.parse import unquote
 
 from markupsafe import Markup
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.model import (
@@ -34,7 +35,6 @@ from coursebuild.core.model import (
     Target,
     Term,
     TermTarget,
-    UrlTarget,
     sibling_groups,
     walk_inlines,
     without_links,
@@ -50,7 +50,7 @@ from coursebuild.core.pages.document_inputs import (
 )
 from coursebuild.core.pages.library import Library, links
 from coursebuild.core.pages.markup import HtmlWriter
-from coursebuild.core.pages.numbering import number_items
+from coursebuild.core.pages.numbering import UNNAMED, fill_in, name_outside
 from coursebuild.core.text.diagnostics import Parsed
 
 
@@ -69,6 +69,8 @@ class DefinedTerm(Struct, frozen=True):
     title: Markup
     """The name as HTML."""
     definition: tuple[DefinitionPart, ...]
+    targets: tuple[Target, ...] = ()
+    """Where links without a text lead, in their order; each is `UNNAMED` there."""
 
 
 class DocumentTerms(Struct, frozen=True):
@@ -99,11 +101,11 @@ class _ExcerptWriter(HtmlWriter):
 
 def _find_terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
     writer = _ExcerptWriter(mathml)
-    items = number_items(document, mathml).values()
-    names = {f"#{i.id}": f"({i.number})" for i in items if i.number and i.kind == "eq"}
+    targets: list[Target] = []
 
     def reference(target: Target) -> str:
-        return names.get(unquote(target.url), "") if isinstance(target, UrlTarget) else ""
+        targets.append(target)
+        return UNNAMED
 
     def html(inlines: tuple[Inline, ...]) -> Markup:
         return writer.inlines(without_links(inlines, reference))
@@ -115,11 +117,12 @@ def _find_terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
             for term in walk_inlines(block.children):
                 if not isinstance(term, Term):
                     continue
+                targets.clear()
                 following = siblings[number + 1] if number + 1 < len(siblings) else None
                 title = Markup.escape(term.name) if term.renamed else html(term.children)
                 definition = definition_of(block.children, term)
                 pieces = tuple(_split_definition(definition, following, html, writer))
-                yield DefinedTerm(term.id, term.name, title, pieces)
+                yield DefinedTerm(term.id, term.name, title, pieces, tuple(targets))
 
 
 def _split_definition(
@@ -256,6 +259,10 @@ def _term_entries(library: Library, place: urls.Place) -> Iterator[TermEntry]:
         for term in document_terms.terms:
             if term.id not in ids:
                 ids.add(term.id)
+                names = (name_outside(library, owner, target) for target in term.targets)
+                title = fill_in(term.title, names)
+                pieces = tuple(replace(p, html=fill_in(p.html, names)) for p in term.definition)
+                term = replace(term, title=title, definition=pieces, targets=())
                 term_users = [user for user in users.get(term.id, ()) if user is not owner]
                 link = owner_link(place, owner, f"term:{term.id}")
                 yield TermEntry(term, link, owner_links(place, term_users))

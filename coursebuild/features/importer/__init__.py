@@ -21,7 +21,7 @@ FEATURE = Feature(
     commands=(
         Command(
             name="import",
-            summary="make a course from one that was written for another tool",
+            summary="convert a course that was written for another tool",
             module="coursebuild.features.importer.commands",
         ),
     ),

@@ -92,7 +92,7 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError) as error:
-        context.add_leftover(f"a cell that is no Python is shown and not run: {error}")
+        context.add_leftover(f"a cell that is not Python is shown and not run: {error}")
         return ""
     if cell.shows_value is not False:
         text = _print_last_value(cell, text, tree, context)

@@ -59,9 +59,9 @@ examples:
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = (
-        "Write a course of another tool as one of coursebuild: a course.json with Markdown,\n"
-        "Jupyter notebooks, MyST, Quarto or MkDocs. Its folder is only read, its code is run:\n"
-        "what the cells and scripts of strangers may do is limited by --sandbox."
+        "Convert a course of another tool: a course.json with Markdown, Jupyter notebooks,\n"
+        "MyST, Quarto or MkDocs. The folder is only read, but its code is run: use --sandbox\n"
+        "to limit what the cells and scripts of strangers can do."
     )
     add_running(parser)
     add_sandbox(parser)
@@ -78,7 +78,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the course as one of coursebuild in a new folder, try its scripts, and check it."""
     if arguments.root is not None:
-        raise UsageError("import takes no -C: the new course's folder is named by --out")
+        raise UsageError("import does not take -C: name the new course's folder with --out")
     files = SourceFiles(Path(arguments.source))
     out = Path(os.path.realpath(arguments.out or files.name))
     check_path(out)

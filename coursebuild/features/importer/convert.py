@@ -88,7 +88,7 @@ def convert(files: SourceFiles) -> ConvertedCourse:
         unused = (path for path in files if path.endswith(TEXTS) and path not in paths)
         leftovers += [Leftover(path, "", "a text that the map does not name") for path in unused]
         leftovers += [
-            Leftover(map_path, "", f"the prerequisite {name} of {text.id}, which is no lesson")
+            Leftover(map_path, "", f"the prerequisite {name} of {text.id}, which is not a lesson")
             for text in texts
             for name in text.prerequisites
             if name not in ids
@@ -122,13 +122,13 @@ def write_course(course: ConvertedCourse, target: Path, files: SourceFiles, stor
                 old = read_bytes(target, path)
             trial = fingerprint((path, data, old))
             if old != data and (old is None or store.peek(TRIED, trial, bytes) is None):
-                raise UsageError(f"{target} has {path} already; name an empty folder with --out")
+                raise UsageError(f"{target} already has {path}; name an empty folder with --out")
         if old != data:
             changes.append(FileChange(path, old, data))
     try:
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise EffectError(f"{target} cannot be made: {reason(error)}") from None
+        raise EffectError(f"{target} cannot be created: {reason(error)}") from None
     change_files(target, changes)
 
 
@@ -287,7 +287,7 @@ def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
         return {}
     value = read_yaml(files.read_text(path))
     if value is None:
-        raise UsageError(f"{path} is no YAML, or too large")
+        raise UsageError(f"{path} is not YAML, or too large")
     return value if isinstance(value, dict) else {"chapters": value}
 
 

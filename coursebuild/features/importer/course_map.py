@@ -65,9 +65,9 @@ def read_course_json(path: str, files: SourceFiles) -> ImportedCourse:
         # A number such as 4.10 is the name of a lesson.
         data = json.loads(text, parse_float=str, parse_int=str)
     except RecursionError:
-        raise UsageError(f"{path} is no JSON: the text is nested too deeply") from None
+        raise UsageError(f"{path} is not JSON: the text is nested too deeply") from None
     except ValueError as error:
-        raise UsageError(f"{path} is no JSON: {error}") from None
+        raise UsageError(f"{path} is not JSON: {error}") from None
     reader = _Reader(files)
     course = reader.fields(data, _COURSE_FIELDS)
     levels = tuple(map(reader.level, _read_items(course, "levels")))

@@ -301,7 +301,7 @@ class SourceFiles:
             elif not real:
                 self._leave(link, _LINK_OUT)
             elif not os.path.lexists(self.folder / real) or Path(self.folder, real).is_symlink():
-                self._leave(link, "a link that leads nowhere")
+                self._leave(link, "a broken link")
             elif real not in folders:
                 self._leave(link, "a link to what is not imported")
         self._real_paths = dict(sorted(self._real_paths.items(), key=lambda e: e[0].split("/")))

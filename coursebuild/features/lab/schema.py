@@ -144,10 +144,7 @@ class TraceFields(Struct, frozen=True, forbid_unknown_fields=True):
     expr: Annotated[Text, Meta(description="an expression that gives a number")]
     dash: Annotated[
         bool | Annotated[tuple[NotNegative, ...], Meta(min_length=1)],
-        Meta(
-            description="dashed, or the lengths of dashes and gaps in px; without it the first "
-            "trace is solid, and each further one has a pattern of its own"
-        ),
+        Meta(description="dashed, or the lengths of dashes and gaps in px; else by its place"),
     ] = False
 
 
@@ -240,9 +237,7 @@ class Verify(Struct, frozen=True, forbid_unknown_fields=True):
     rtol: Annotated[
         NotNegative | None, Meta(description="relative difference allowed to the native engine")
     ] = None
-    deep: Annotated[
-        bool, Meta(description="whether bodies are meant to lie deep in each other")
-    ] = False
+    deep: Annotated[bool, Meta(description="whether bodies are meant to overlap deeply")] = False
 
 
 class CommonLab(Struct, frozen=True):

@@ -38,7 +38,7 @@ _EXPLANATIONS = {
     ),
     "deep": (
         "lab-penetration",
-        "bodies lie deep in each other{time}: {message}",
+        "bodies overlap deeply{time}: {message}",
         "MuJoCo does not warn of this: try a smaller timestep, stiffer contacts (`solref`), or a "
         "narrower range; if that is intended, say so: {deep}",
     ),
@@ -166,9 +166,9 @@ def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
 
 def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
-        message = "the lab says `deep`, but no bodies lay deep in each other"
+        message = "the lab says `deep`, but no bodies overlapped deeply"
         span = lab.place(("verify", "deep"))
-        fix = Fix("take `deep` away", "false", "true", safe=True)
+        fix = Fix("remove `deep`", "false", "true", safe=True)
         yield diagnose("lab-shallow", span, message, help=fix)
 
 

@@ -7,11 +7,11 @@ from coursebuild.core.features import Command, Feature
 
 FEATURE = Feature(
     name="language_server",
-    needs=("authoring", "glossary", "names", "symbols"),
+    needs=("authoring", "glossary", "names", "references", "symbols"),
     commands=(
         Command(
             name="lsp",
-            summary="serve an editor: diagnostics, completion and more while one types",
+            summary="run the language server for an editor",
             module=f"{__name__}.commands.lsp",
         ),
     ),

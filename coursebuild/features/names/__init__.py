@@ -137,6 +137,6 @@ FEATURE = Feature(
     against=lost_names,
     check=check,
     rules=(
-        Rule("name-unknown", "error", "Inline code has the shape of a name, and nothing has it."),
+        Rule("name-unknown", "error", "Inline code looks like a name, but nothing has this name."),
     ),
 )

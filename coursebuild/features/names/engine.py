@@ -17,6 +17,7 @@ from msgspec import Struct
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
+from coursebuild.core.run import mjcf
 from coursebuild.core.run.child import JsonChild
 from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
 from coursebuild.core.text.source import key_of
@@ -135,7 +136,8 @@ def engine_names(
 
 @functools.cache
 def _code() -> str:
-    return Path(introspect.__file__).read_text("utf-8")
+    files = (introspect.__file__, mjcf.__file__)
+    return "".join(Path(file).read_text("utf-8") for file in files)
 
 
 _in_memory: dict[str, bytes] = {}
@@ -161,7 +163,8 @@ def list_names(python: str, modules: Iterable[str] = ()) -> EngineNames:
         answer = child.ask(sorted(modules))
         if answer is None:
             raise EffectError(f"listing the names of MuJoCo {child.death()}")
-    return msgspec.convert(answer, EngineNames)
+    elements = mjcf.read_schema(answer.pop("schema"))
+    return msgspec.convert({**answer, "elements": elements}, EngineNames)
 
 
 class KnownName(Struct, frozen=True):

@@ -21,7 +21,6 @@ from types import ModuleType
 from typing import Any
 
 _TYPE = re.compile(r"->\s*(?:\w+(?:\.|::))*_?(\w+)")
-_SCHEMA_LINE = re.compile(r"( *)(?:\((\w+)\))?(\w+) \(.\) +(.*)|( {20,})(\S.*)")
 
 
 def main() -> None:
@@ -34,7 +33,7 @@ def main() -> None:
     for line in sys.stdin:
         names = {
             **_engine(mujoco),
-            "elements": _elements(mujoco),
+            "schema": mujoco.mj_printSchema(False, False),
             "modules": {name: sorted(set(_module(name))) for name in json.loads(line)},
         }
         print(json.dumps(names), file=replies, flush=True)
@@ -98,29 +97,6 @@ def _members(cls: type, fields: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         first = text.split("\n")[0] if callable(value) else ""
         description = fields.get(name, {"text": first, "doc": doc})
         yield name, {**description, "type": types[-1] if types else ""}
-
-
-def _elements(mujoco: Any) -> dict[str, dict[str, list[str]]]:
-    """The elements of MJCF: of each the elements that it stands in, with its attributes there."""
-    elements: dict[str, dict[str, list[str]]] = {"include": {"mujoco": ["file", "prefix"]}}
-    elements["mujocoinclude"] = {"": []}
-    elements["worldbody"] = {"mujoco": ["name"]}
-    elements["frame"] = {"body": "axisangle childclass euler name pos quat xyaxes zaxis".split()}
-    elements["replicate"] = {"body": "count euler offset sep".split()}  # not in what is printed
-    parents: dict[int, str] = {}
-    attributes: list[str] = []
-    for match in map(_SCHEMA_LINE.match, mujoco.mj_printSchema(False, False).splitlines()):
-        if match is None:
-            continue
-        if match[6]:
-            attributes += match[6].split()
-            continue
-        depth, name = len(match[1]), match[3]
-        parent = next((parents[d] for d in sorted(parents, reverse=True) if d < depth), "")
-        parents = {d: p for d, p in parents.items() if d < depth} | {depth: name}
-        attributes = elements.setdefault(name, {}).setdefault(parent, [])
-        attributes += match[4].split()
-    return elements
 
 
 def _module(name: str) -> Iterator[str]:

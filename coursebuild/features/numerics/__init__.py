@@ -20,7 +20,7 @@ FEATURE = Feature(
     commands=(
         Command(
             name="stability",
-            summary="measure MuJoCo on hard cases, beside theory",
+            summary="measure MuJoCo on hard cases and compare with theory",
             module="coursebuild.features.numerics.commands",
         ),
     ),

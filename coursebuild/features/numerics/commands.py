@@ -142,7 +142,7 @@ def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], t
         has_theory = any(scenario.expected for scenario in scene.declarations.scenarios)
         if not has_theory and not (options.root / exact_file(scene.name)).is_file():
             help = f"give its motion in {exact_file(scene.name)}, or `expected` of a scenario"
-            raise UsageError(f"nothing is known of `{scene.name}` in theory", help=help)
+            raise UsageError(f"no theory is known for `{scene.name}`", help=help)
     return models, tuple(name for name in names if name not in models)
 
 
@@ -232,7 +232,7 @@ class _CaseRun(MeasuringRun):
         try:
             return measure_case(all_problems()[name], self.here, time.thread_time_ns)
         except DisagreementError as error:
-            help = "neither can be told to be right: no error against them means anything"
+            help = "neither is known to be right, so errors against them mean nothing"
             self.failures.append(ReportFailure(str(error), help))
             return None
 

@@ -5,7 +5,6 @@ Entry points: `numerics_values(library)`; `case_view`, of one case.
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from operator import attrgetter
@@ -78,7 +77,6 @@ class CaseView(Struct, frozen=True):
     plots: tuple[Markup, ...]
     grids: tuple[Grid, ...]
     notes: tuple[str, ...]
-    command: str
     page: str
     """The address of the model's page, for a case of the course's own; else empty."""
 
@@ -111,7 +109,6 @@ def numerics_values(library: Library) -> dict[str, object]:
         "integrators": INTEGRATORS,
         "where": dict.fromkeys(machine_text(words, report.machine) for report in cases),
         "file": place.href(urls.file_path(STABILITY.path())),
-        "command": STABILITY.command(),
     }
 
 
@@ -178,7 +175,6 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
         ),
         tuple(grid for grid in grids if grid is not None),
         tuple(_notes(words, report)),
-        f"coursebuild {shlex.join(('bench', model) if model else ('stability', report.name))}",
         place.href(urls.model_page_path(model)) if model else "",
     )
 

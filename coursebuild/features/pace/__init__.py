@@ -115,8 +115,8 @@ FEATURE = Feature(
         Rule(
             "lesson-minutes",
             "warning",
-            "A lesson takes more or less time than its map says.",
-            "The estimate is rough, and the map may be right.",
+            "A lesson takes more or less time than the map says.",
+            "the estimate is rough, and the map may be right",
         ),
     ),
 )

@@ -29,30 +29,30 @@ FEATURE = Feature(
         ),
     ),
     rules=(
-        Rule("source-unknown", "error", "A text cites a source that the list does not have."),
+        Rule("source-unknown", "error", "A text cites a source that is not in the list."),
         Rule(
             "source-malformed",
             "error",
             "An entry of the list of sources cannot be read.",
-            "Only its author knows what was meant.",
+            "only you know what was meant",
         ),
         Rule(
             "source-style",
             "error",
             "The course's style for citations cannot be used.",
-            "A file has to be written anew; an edit changes texts only.",
+            "a file has to be added, moved or replaced",
         ),
         Rule(
             "source-unused",
             "warning",
-            "No text cites a source of the list.",
-            "Only its author knows what was meant.",
+            "No text cites this source.",
+            "only you know what was meant",
         ),
         Rule(
             "source-identifier",
             "warning",
-            "A source has no DOI or ISBN, or not a valid one.",
-            "The number is in the work, or in a catalogue.",
+            "A source has no valid DOI or ISBN.",
+            "the number is in the work, or in a catalogue",
         ),
     ),
 )

@@ -79,7 +79,10 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
     from bibtexparser.model import DuplicateBlockKeyBlock, ImplicitComment, MiddlewareErrorBlock
 
     logging.getLogger("bibtexparser").disabled = True
-    for name in ("bibtexparser.entrypoint", "bibtexparser.splitter", "pylatexenc.latexwalker"):
+    for name in (
+        *("bibtexparser.entrypoint", "bibtexparser.splitter"),
+        *("pylatexenc.latexwalker", "pylatexenc.latex2text"),
+    ):
         logging.getLogger(name).disabled = True
     library = parse_string(
         source.text.replace("\r\n", "\n").replace("\r", "\n"),
@@ -159,7 +162,8 @@ def _plain(text: str, field: str = "") -> str:
     if field in _IDENTIFIERS:
         text = text.replace("\\", "")
     elif "\\" in text or "$" in text or "~" in text:
-        with contextlib.suppress(ValueError, RecursionError):  # it stays as it is written
+        # What this raises at broken LaTeX is whatever meets it; the text stays as it is written.
+        with contextlib.suppress(Exception):
             text = LatexNodes2Text(math_mode="text").latex_to_text(text)
     return " ".join(re.sub(r"[{}\ue000-\uf8ff]", "", text).replace("--", "–").split())
 

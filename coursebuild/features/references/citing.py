@@ -1,7 +1,7 @@
 """Citations on pages, the references of the course, and what is wrong with both.
 
 Entry points: `document_citations`, for one page; `references_values`, for the page of all
-references; `check_sources`.
+references; `check_sources`; `works_of` and `reference_text`, for editors.
 """
 
 from __future__ import annotations
@@ -30,15 +30,18 @@ def _cited_works(document: Document) -> Iterator[CitedWork]:
         yield from citation.works
 
 
-def _format(course: Course) -> FormattedWorks | None:
-    """The cited works of a course; `None` where nothing formats them."""
+def _format(course: Course, *further_keys: str) -> FormattedWorks | None:
+    """The cited works of a course, and further ones; `None` where nothing formats them."""
     if course.bibliography is None or not _is_installed():
         return None
-    keys = (work.key for document in course.documents for work in _cited_works(document))
+    keys = [work.key for document in course.documents for work in _cited_works(document)]
     language = course.language or "en"
     try:
         return format_works(
-            course.bibliography, course.citation_style, language, tuple(dict.fromkeys(keys))
+            course.bibliography,
+            course.citation_style,
+            language,
+            tuple(dict.fromkeys((*keys, *further_keys))),
         )
     except StyleFailure:
         return None
@@ -48,7 +51,8 @@ def _is_installed() -> bool:
     return all(find_spec(name) is not None for name in ("bibtexparser", "citeproc"))
 
 
-def _works(course: Course) -> Mapping[str, Work]:
+def works_of(course: Course) -> Mapping[str, Work]:
+    """The sources of a course by their keys; none where nothing reads them."""
     if course.bibliography is None or not _is_installed():
         return {}
     return {work.key: work for work in read_works(course.bibliography).value}
@@ -70,6 +74,13 @@ def _reference(formatted: FormattedWorks, work: Work) -> Markup:
     return Markup(" ").join((html, *(link + "." for link in links)))
 
 
+def reference_text(course: Course, key: str) -> str:
+    """A reference as plain text; empty where there is no such source, or nothing formats it."""
+    work = works_of(course).get(key)
+    formatted = None if work is None else _format(course, key)
+    return "" if work is None or formatted is None else _reference(formatted, work).striptags()
+
+
 def _anchor(key: str, prefix: str = "ref") -> str:
     return f"{prefix}:{key}"
 
@@ -80,7 +91,7 @@ def document_citations(library: Library, place: urls.Place, document: Document) 
     formatted = _format(library.course) if citations else None
     if formatted is None:
         return Citations()
-    works, texts, cited = _works(library.course), dict[int, Markup](), dict[str, None]()
+    works, texts, cited = works_of(library.course), dict[int, Markup](), dict[str, None]()
     for citation in citations:
         parts: list[Markup] = []
         for work in citation.works:
@@ -120,7 +131,7 @@ class ListedReference(Struct, frozen=True):
 def references_values(library: Library) -> dict[str, object]:
     """Return the values for the template of the page: the references of the course."""
     course = library.course
-    formatted, works = _format(course), _works(course)
+    formatted, works = _format(course), works_of(course)
     users: dict[str, list[Owner]] = {}
     if formatted is None:
         return {"entries": ()}
@@ -140,7 +151,7 @@ def references_values(library: Library) -> dict[str, object]:
 
 def check_sources(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:
     """Compare citations with the list of sources; given the whole course, check the list too."""
-    source, works = course.bibliography, _works(course)
+    source, works = course.bibliography, works_of(course)
     is_whole = len(documents) == len(course.documents)
     if source is not None and not _is_installed():
         if is_whole:

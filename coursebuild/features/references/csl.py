@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from markupsafe import Markup, escape
 from msgspec import Struct
@@ -83,6 +84,9 @@ _MARKS = {
     "Subscript": "sub",
     "SmallCaps": "",
 }
+_CSL = "{http://purl.org/net/xbiblio/csl}"
+_MAX_CALLS = 10_000
+"""How often the macros of a style may call others: the largest styles do so some hundred times."""
 _FIRST = 0xE100
 """The private character that opens the first of these marks; the next one closes it."""
 
@@ -139,8 +143,13 @@ def format_works(
     works = {work.key: work for work in read_works(source).value}
     cited_works = [works[key] for key in dict.fromkeys(keys) if key in works]
     try:
+        if style_source is not None:
+            _check_size(style_source.text)
         formatted = _format(cited_works, style_source, language, {})
         labels = [str(formatted.mark(work.key, "")) for work in cited_works]
+        for label in _LOCATORS:  # so that a style which cannot name places is not used
+            for work in cited_works[:1]:
+                formatted.mark(work.key, f"{label} 1")
         counts, given_counts = Counter(labels), Counter[str]()
         suffixes: dict[str, str] = {}
         order = [*formatted.entries]
@@ -154,6 +163,23 @@ def format_works(
         if style_source is None:
             raise
         raise StyleFailure(" ".join(f"{error}".split())[:200] or type(error).__name__) from error
+
+
+def _check_size(style: str) -> None:
+    """Refuse a style whose macros stand for so much that no work would ever be formatted."""
+    root = ElementTree.fromstring(style)
+    calls: dict[str | None, list[str]] = {None: []}
+    for part in root.iter():
+        if part.tag == f"{_CSL}macro":
+            calls[part.get("name")] = [e.get("macro", "") for e in part.iter() if e.get("macro")]
+    calls[None] = [e.get("macro", "") for e in root.iter() if e.get("macro")]
+
+    @functools.cache
+    def size(name: str | None) -> int:
+        return 1 + sum(size(called) for called in calls.get(name, ()))
+
+    if size(None) > _MAX_CALLS:  # where macros call themselves, it is Python that refuses
+        raise StyleFailure(f"its macros call others more than {_MAX_CALLS:,} times")
 
 
 def _format(

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from html import unescape
-from typing import Literal, assert_never
+from typing import Literal, TypeAlias, assert_never
 
 from msgspec import Struct
 
@@ -64,18 +64,31 @@ _LINES = frozenset(
 )
 
 
+Reference: TypeAlias = Callable[[model.Target], str]
+"""The text of a link that has none, from its target."""
+
+
+def _unnamed(target: model.Target) -> str:
+    return ""
+
+
 class SectionReader:
     """Collects the sections of a page."""
 
     def __init__(
-        self, labels: Mapping[str, str] = {}, block_values: Mapping[int, Struct] = {}
+        self,
+        labels: Mapping[str, str] = {},
+        block_values: Mapping[int, Struct] = {},
+        reference: Reference = _unnamed,
     ) -> None:
         """Begin a page.
 
         Args:
             labels: the labels of the kinds of callouts, by name.
             block_values: the values of features' blocks, by the block's offset.
+            reference: the texts of links without one.
         """
+        self._reference = reference
         self._labels = labels
         self._block_values = block_values
         self._sections: list[Section] = []
@@ -180,6 +193,8 @@ class SectionReader:
                 return " "
             case model.Image():
                 return inline.alt
+            case model.Link(children=()):
+                return self._reference(inline.target)
             case model.RawInline():
                 return " " if inline.html.lower().startswith("<br") else ""
             case _:
@@ -248,7 +263,10 @@ def note_page(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
         return b""
     head = inputs.values.get("lesson")
     name = head.id if isinstance(head, LessonLink) else ""
-    sections = page_sections(inputs, None if page is None else page.document, body)
+    if page is None:
+        sections = page_sections(inputs, None, body)
+    else:
+        sections = page_sections(inputs, page.document, body, page.reference)
     terms = weigh_terms([name, inputs.head.title], sections)
     return visible(as_json(pack_sections(sections))).encode() + b"\0" + terms
 
@@ -259,7 +277,9 @@ def text_and_terms(note: bytes) -> tuple[bytes, bytes]:
     return text, terms
 
 
-def page_sections(inputs: PageInputs, document: Document | None, body: str) -> tuple[Section, ...]:
+def page_sections(
+    inputs: PageInputs, document: Document | None, body: str, reference: Reference = _unnamed
+) -> tuple[Section, ...]:
     """Return the sections of a page; see `note_page`."""
     head = inputs.values.get("lesson")
     lead: tuple[str, ...] = (inputs.head.description,)
@@ -267,7 +287,7 @@ def page_sections(inputs: PageInputs, document: Document | None, body: str) -> t
         lead += (", ".join(head.aliases), *head.objectives)
     document_inputs = inputs.document_inputs or DocumentInputs()
     labels = {kind: callout.label for kind, callout in document_inputs.callouts.items()}
-    reader = SectionReader(labels, document_inputs.blocks)
+    reader = SectionReader(labels, document_inputs.blocks, reference)
     for text in lead:
         reader.add("text", text)
     if document is not None:

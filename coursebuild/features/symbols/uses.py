@@ -24,6 +24,7 @@ from xml.etree import ElementTree
 
 from markupsafe import Markup
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.model import Lesson, Owner
@@ -37,6 +38,7 @@ from coursebuild.core.pages.document_inputs import (
     owner_links,
 )
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.numbering import UNNAMED, fill_in, name_outside
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 
 Element = ElementTree.Element
@@ -234,6 +236,8 @@ class SymbolUse(Struct, frozen=True):
     """MathML in its shortest form: symbols that look the same are equal."""
     section: tuple[str, str]
     """Anchor and text of the heading above it; empty before the first heading."""
+    targets: tuple[model.Target, ...] = ()
+    """Where links without a text lead in that heading; each is `UNNAMED` there."""
     meaning: str = ""
     """What it stands for, if the document declares that."""
     unit: str = ""
@@ -250,27 +254,38 @@ def document_symbols(document: model.Document, mathml: Mathml) -> Parsed[Documen
     uses: dict[str, SymbolUse] = {}
     first_declarations: dict[str, _Formula] = {}
     diagnostics: list[Diagnostic] = []
-    for formula, section in _formulas(document):
+    for formula, section, targets in _formulas(document):
         html, meaning = mathml(formula.tex.text, formula.display), formula.meaning
         only = declared_symbol(html) if meaning is not None else None
         for symbol in (only,) if only is not None else symbols(html):
-            use = uses.setdefault(symbol, SymbolUse(symbol, section))
+            use = uses.setdefault(symbol, SymbolUse(symbol, section, targets))
             if meaning is not None and not use.meaning:
-                uses[symbol] = SymbolUse(symbol, use.section, meaning.text, meaning.unit)
+                uses[symbol] = replace(use, meaning=meaning.text, unit=meaning.unit)
         if meaning is not None and html:
             diagnostics += _check_declaration(formula, only, first_declarations)
     return Parsed(DocumentSymbols(tuple(uses.values())) if uses else None, tuple(diagnostics))
 
 
-def _formulas(document: model.Document) -> Iterator[tuple[_Formula, tuple[str, str]]]:
-    """Yield all formulas, with the heading above; footnotes belong to none."""
+def _formulas(
+    document: model.Document,
+) -> Iterator[tuple[_Formula, tuple[str, str], tuple[model.Target, ...]]]:
+    """Yield all formulas, with the heading above and what it refers to; footnotes have none."""
+    targets: list[model.Target] = []
+
+    def reference(target: model.Target) -> str:
+        targets.append(target)
+        return UNNAMED
+
     for blocks in (document.blocks, *(footnote.blocks for footnote in document.footnotes)):
         section = "", ""
+        targets.clear()
         for block in model.walk_blocks(blocks):
             if isinstance(block, model.Heading) and block.level <= 3:
-                section = block.anchor, " ".join(model.plain_text(block.children).split())
+                targets.clear()
+                text = model.plain_text(model.without_links(block.children, reference))
+                section = block.anchor, " ".join(text.split())
             for formula in model.block_formulas(block):
-                yield formula, section
+                yield formula, section, tuple(targets)
 
 
 def _check_declaration(
@@ -351,6 +366,7 @@ def symbols_values(library: Library) -> dict[str, object]:
 
 def _symbol_view(library: Library, place: urls.Place, row: CourseSymbol) -> SymbolView:
     anchor, section = row.first.section
+    names = (name_outside(library, row.owners[0], target) for target in row.first.targets)
     is_ambiguous = len(row.meanings) > 1
     return SymbolView(
         Markup(f"<math>{row.first.symbol}</math>"),
@@ -359,6 +375,6 @@ def _symbol_view(library: Library, place: urls.Place, row: CourseSymbol) -> Symb
             for (text, unit), owners in row.meanings.items()
         ),
         owner_link(place, row.owners[0], anchor),
-        section,
+        fill_in(section, names),
         owner_links(place, row.owners[1:]),
     )

@@ -194,16 +194,16 @@ FEATURE = Feature(
         Rule(
             "number-unproven",
             "warning",
-            "A number that nothing in the course proves.",
-            "Only its author knows where the number is from.",
+            "Nothing in the course proves this number.",
+            "only you know where the number is from",
         ),
-        Rule("given-source", "error", "A number is not in the file that is named as its source."),
+        Rule("given-source", "error", "A number is not in the file named as its source."),
         Rule(
             "truth-share",
             "error",
-            "Fewer numbers are proven than the course map asks for.",
-            "Only their author knows where the numbers are from.",
+            "Fewer numbers are proven than the map demands.",
+            "only you know where the numbers are from",
         ),
-        Rule("truth-text", "error", "A `truth` fence holds a text, which nothing reads."),
+        Rule("truth-text", "error", "A `truth` fence is not empty."),
     ),
 )

@@ -63,23 +63,23 @@ _UNUSED = "no motion is computed of it, nothing refers to it, and no code can no
 _BESIDE = "it is computed beside the motion, and no code can notice"
 KINDS = {
     "energy-flag": FindingKind(
-        "energy is computed in every step, and nobody reads it",
+        "energy is computed in every step, and nothing reads it",
         proof=_BESIDE,
         fields="enableflags",
     ),
     "fwdinv-flag": FindingKind(
-        "forward and inverse dynamics are compared in every step, for nobody",
+        "forward and inverse dynamics are compared in every step, and nothing reads the result",
         proof=_BESIDE,
         fields="enableflags",
     ),
     "sensor-unread": FindingKind(
-        "nobody reads the {}",
+        "nothing reads the {}",
         "sensor",
         "Sensor",
         "what a sensor says moves nothing, and no code can notice",
     ),
     "actuator-idle": FindingKind(
-        "nobody commands the {}",
+        "nothing commands the {}",
         "actuator",
         "Actuator",
         "its force is a multiple of a command that is always 0",
@@ -128,13 +128,13 @@ KINDS = {
     ),
     "sleep": FindingKind("bodies at rest can sleep"),
     "island": FindingKind("all constraints can be solved at once, without islands"),
-    "multiccd": FindingKind("one contact of two meshes at a time does"),
-    "solver": FindingKind("the solver {} does"),
-    "cone": FindingKind("{} friction cones do"),
-    "jacobian": FindingKind("{} Jacobians do"),
-    "iterations": FindingKind("{} iterations of the solver do"),
-    "tolerance": FindingKind("a tolerance of {} of the solver does"),
-    "noslip_iterations": FindingKind("the solver does without its iterations against slip"),
+    "multiccd": FindingKind("one contact at a time between two meshes suffices"),
+    "solver": FindingKind("the solver {} suffices"),
+    "cone": FindingKind("{} friction cones suffice"),
+    "jacobian": FindingKind("{} Jacobians suffice"),
+    "iterations": FindingKind("{} iterations of the solver suffice"),
+    "tolerance": FindingKind("a solver tolerance of {} suffices"),
+    "noslip_iterations": FindingKind("the solver needs no iterations against slip"),
 }
 """What uses other things comes before them, so that they can go with it."""
 

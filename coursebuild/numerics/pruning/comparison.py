@@ -300,7 +300,7 @@ def _follow(base: Any, variant: Any, index: IndexMap, run: WatchedRun) -> Motion
         return MotionComparison(False, math.inf, f"the run is lost: {'; '.join(judgement.reasons)}")
     difference, words = gauge.with_sensors()
     if words and math.isfinite(run.horizon):
-        words += f", until {run.horizon:.3g} s, beyond which nobody can predict the motion"
+        words += f", until {run.horizon:.3g} s, beyond which the motion cannot be predicted"
     return MotionComparison(identical, difference, words)
 
 

@@ -109,7 +109,7 @@ class ModelText:
             except ValueError:
                 is_same = False
             if not is_same:
-                raise ModelTextError("what it includes cannot be put into one text")
+                raise ModelTextError("its includes cannot be merged into one text")
         return model
 
     def _find_ids(self) -> dict[Element, tuple[int, ...]]:

@@ -217,14 +217,14 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Mod
     opaque = sorted(filter(_may_do_anything, _WORD.findall(code)))
     reasons = [f"it uses `{opaque[0]}`"] if opaque else []
     if _INCLUDE.search(text):
-        reasons.append("it puts models together from files")
+        reasons.append("it assembles models from files")
     if is_python:
         modules = (name for match in _IMPORT.findall(text) for name in _modules(*match))
         harmless = _LEAVE_MODELS_ALONE.union(course_modules)
         reasons += [f"it imports {name}" for name in modules if name not in harmless]
-        reasons += ["it matches patterns by their place"] if _POSITIONAL.search(text) else []
+        reasons += ["it matches patterns by position"] if _POSITIONAL.search(text) else []
     elif match := _SCRIPT.search(code):
-        reasons.append(f"it goes through what there is: `{match[0]}`")
+        reasons.append(f"it lists what exists: `{match[0]}`")
     kinds = {VIEWS[word] for word in members if word in VIEWS}
     kinds |= {"Keyframe"} if "mj_resetDataKeyframe" in words else set()
     reason = next(iter(reasons), "")

@@ -210,7 +210,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         confirmed = largest_subset(unkept, lambda groups: not self._find_changed_output(groups))
         for group in unkept:
             if group not in confirmed:
-                reason = f"{self._find_changed_output([group])} says something else then"
+                reason = f"{self._find_changed_output([group])} prints something else then"
                 self._reject(group.items, group.finding.difference, reason)
         return [group for group in groups if group.finding.kept or group in confirmed]
 
@@ -303,7 +303,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         if not removable:
             smallest = min(results, key=lambda result: result.difference, default=None)
             reason_text = (
-                "it cannot go alone" if smallest is None else f"without it {smallest.shown}"
+                "it cannot be removed alone" if smallest is None else f"without it {smallest.shown}"
             )
             self._reject(items, None if smallest is None else smallest.difference, reason_text)
             return None

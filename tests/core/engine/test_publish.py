@@ -181,7 +181,7 @@ def test_places_of_the_author_are_refused(root: Path) -> None:
     (root / "link").symlink_to("content")
     inside = {name: name.partition("/")[0] for name in AUTHOR_PATHS}
     for name, folder in (inside | {"public/../models": "models", "link": "content"}).items():
-        reason = f"lies in {folder}/ of the project, where no site may go"
+        reason = f"lies in {folder}/ of the project, which cannot hold a site"
         assert refusal(root, root / name) == reason
 
 

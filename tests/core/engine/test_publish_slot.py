@@ -122,7 +122,7 @@ def test_somebody_changes_the_folder_that_is_written(spared: Path, removes: bool
         return b"new"
 
     pages = Pages()
-    with pytest.raises(EffectError, match="somebody else changes what is being written"):
+    with pytest.raises(EffectError, match="another process is changing what is being written"):
         publish(spared, spared / "public", [*pages(**SITE_FILES), CachedFile("x.html", "1", make)])
     assert texts(spared / "public") == TEXTS
     assert entries(spared) == ["content", "public"]

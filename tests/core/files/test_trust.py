@@ -139,7 +139,7 @@ def test_without_a_place_of_ones_own_outside_of_the_course_nothing_is_kept(
     assert look_up(root) == (
         None,
         [
-            "warning: .coursebuild needs a key of this user's, and there is no place for it: "
+            "warning: .coursebuild needs a key of its user's own, and there is nowhere to keep it: "
             "set HOME, XDG_STATE_HOME or COURSEBUILD_STORE_KEY; it is set aside"
         ],
     )

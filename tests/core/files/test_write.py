@@ -106,7 +106,7 @@ def test_a_link_stays_and_one_out_of_the_project_is_refused(tmp_path: Path) -> N
     [
         (b"changed", b"old", "a.md was changed in the meantime"),
         (None, b"old", "a.md was removed in the meantime"),
-        (b"changed", None, "a.md was made by somebody else in the meantime"),
+        (b"changed", None, "a.md was created by another program in the meantime"),
     ],
 )
 def test_somebody_elses_work_is_not_lost(
@@ -251,7 +251,7 @@ def test_all_are_changed(root: Path) -> None:
     [
         (FileChange("b.md", b"other", b"x"), "b.md was changed in the meantime"),
         (FileChange("b.md", b"other", None), "b.md was changed in the meantime"),
-        (FileChange("b.md", None, b"x"), "b.md was made by somebody else in the meantime"),
+        (FileChange("b.md", None, b"x"), "b.md was created by another program in the meantime"),
         (FileChange("gone.md", b"x", b"y"), "gone.md was removed in the meantime"),
         (FileChange("gone.md", b"x", None), "gone.md was removed in the meantime"),
         (FileChange("a.md/d.md", None, b"x"), "a.md/d.md cannot be written: file exists"),
@@ -351,8 +351,8 @@ def test_damaged_journal_is_told_of_once_and_set_aside(root: Path, kind: str) ->
     }
     journal.write_bytes(damaged[kind])
     assert undo(root) == [
-        "a command that was interrupted has left a damaged journal, so nothing was undone: "
-        "look at what it was changing"
+        "an interrupted command left a damaged journal, so nothing was undone: "
+        "check the files that it was changing"
     ]
     assert undo(root) == []
     assert files(root) == {"a.md": b"a\r\n", "b.md": b"b"}

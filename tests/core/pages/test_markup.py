@@ -226,7 +226,7 @@ def test_an_output_in_the_next_list_item_stays_apart_from_the_script(make: Make)
         (' volatile="[0-9.]+ s"', "verified",
          "verified: Verified with MuJoCo 3.14.0, Python 3.11.7: the same text, character by "
          "character; what matches [0-9.]+ s varies from run to run and is not compared."),
-        ("", "unchecked", "unverified: Not verified: the script was not run to its end."),
+        ("", "unchecked", "unverified: Not verified: the script did not run to completion."),
         ("", "drift", "unverified: Not verified: with MuJoCo 3.14.0, Python 3.11.7 the script "
          "prints something else."),
     ],

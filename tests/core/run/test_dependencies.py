@@ -70,7 +70,7 @@ def test_a_printed_folder_is_a_dependency_but_for_the_top_of_the_disk() -> None:
         (Kind.LISTING, "models", "1", ABSENT, "the folder models is gone"),
         (Kind.LISTING, "models", ABSENT, "1", "the folder models appeared"),
         (Kind.SOUGHT, "examples/{ast,json}", "", "json",
-         "examples has a file now with the name of a module: json"),
+         "examples has now a file with the name of a module: json"),
         (Kind.MODULE, "numpy", "numpy 2.3.1", "numpy 2.3.2", "numpy 2.3.1 → numpy 2.3.2"),
         (Kind.MODULE, "numpy", "numpy 2.3.1", "",
          "numpy is no longer installed (it was numpy 2.3.1)"),

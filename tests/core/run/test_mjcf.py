@@ -13,7 +13,7 @@ import pytest
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model import Limits
-from coursebuild.core.model.results import CompileResult, ModelFacts
+from coursebuild.core.model.results import CompileResult, Misspelling, ModelFacts
 from coursebuild.core.run import compile_main, mjcf
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.mjcf import TEXT_PATH, compile_all, model_files, readable_error
@@ -290,17 +290,70 @@ def test_files_that_include_each_other_in_many_ways_are_read_once(root: Path) ->
     assert {*model_files(root, "models/f0.xml", (root / "models/f0.xml").read_text())} == files
 
 
+@pytest.mark.parametrize(
+    ("text", "word", "candidates"),
+    [
+        ("<worldbody><geom siez='1'/></worldbody>", "siez", ("size",)),
+        ("<worldbody><gom tpye='box' size='1 1 1'/></worldbody>", "gom", ("geom",)),
+        ("<worldbody><lite pos='0 0 1' diffuse='1 1 1'/></worldbody>", "lite", ("light",)),
+        ("<worldbody><frame><gom size='1'/></frame></worldbody>", "gom", ("geom",)),
+        ("<worldbody>\n<body>\n<geom size='1'/>\n</bdoy></worldbody>", "bdoy", ("body",)),
+        ("<worldbody>\n<bdoy>\n<geom size='1'/>\n</body></worldbody>", "bdoy", ("body",)),
+        ("<include fil='child.xml'/>", "fil", ("file",)),
+        ("<option integrator='euler'/>", "euler", ("Euler",)),
+        ("<option><flag gravity='disabled'/></option>", "disabled", ("disable",)),
+        ("<default><default class='wheel'/></default><worldbody>"
+         "<geom class='weel' size='1'/></worldbody>", "weel", ("wheel",)),
+        ("<worldbody><camera mode='trakc'/></worldbody>", "trakc", ("track", "trackcom")),
+    ],
+)  # fmt: skip
+def test_likely_names_are_those_with_which_the_compiler_gets_further(
+    root: Path, text: str, word: str, candidates: tuple[str, ...]
+) -> None:
+    (result,) = texts(root, [f"<mujoco>{text}</mujoco>"])
+    assert result.misspelling is not None, result
+    assert (result.misspelling.word, result.misspelling.candidates) == (word, candidates)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<worldbody><geom type='ball'/></worldbody>",  # a keyword of joints
+        "<worldbody><geom size='1' material='x'/></worldbody>",
+        "<worldbody><body name='wheel'/><site name='wheels'/><body name='wheel'/></worldbody>",
+        "<nonsense/>",
+    ],
+)
+def test_no_name_is_likely_that_the_compiler_does_not_take(root: Path, text: str) -> None:
+    (result,) = texts(root, [f"<mujoco>{text}</mujoco>"])
+    assert result.error and result.misspelling is None
+
+
+def test_a_name_may_be_misspelt_in_a_file_that_is_included(root: Path) -> None:
+    part = "<mujoco><worldbody>\n<body>\n<gom size='1'/></body></worldbody></mujoco>"
+    (root / "models/part.xml").write_text(part)
+    (result,) = texts(root, ["<mujoco>\n\n\n<include file='part.xml'/></mujoco>"])
+    at = part.index("gom")
+    assert result.misspelling == Misspelling("models/part.xml", ((at, at + 3),), "gom", ("geom",))
+
+
+def test_no_device_is_read_for_a_likely_name(root: Path) -> None:
+    os.mkfifo(root / "models/pipe.xml")
+    (result,) = texts(root, ["<mujoco><includ file='pipe.xml'/></mujoco>"])
+    assert "unrecognized element" in result.error
+
+
 BAD_WORKER = f"""\
 import sys
 sys.path.insert(0, {str(Path(mjcf.__file__).parents[3])!r})
 import ctypes, os
 from coursebuild.core.run import compile_main
 really = compile_main._compile
-def compile(mujoco, path, text):
-    if 'crash' in text: ctypes.string_at(0)
-    if 'exit' in text: os._exit(7)
-    if 'noise' in text: print('noise'); os.write(1, b'noise')
-    return really(mujoco, path, text)
+def compile(mujoco, path, texts):
+    if 'crash' in texts[path]: ctypes.string_at(0)
+    if 'exit' in texts[path]: os._exit(7)
+    if 'noise' in texts[path]: print('noise'); os.write(1, b'noise')
+    return really(mujoco, path, texts)
 compile_main._compile = compile
 compile_main.main()
 """

@@ -122,7 +122,8 @@ def test_an_interpreter_of_the_course_that_never_reports(root: Path) -> None:
         (run,) = server.run(root, [job], parallel=1, interpreter=interpreter)
     assert run.outcome is Outcome.TIMEOUT
     assert (
-        run.stderr == "its sandbox was ended, as what ran in there did not end at its time limit\n"
+        run.stderr
+        == "its sandbox was stopped, because what ran in it did not end at its time limit\n"
     )
 
 
@@ -284,7 +285,7 @@ print(model.ngeom, helper.VALUE, old, os.getcwd(), os.path.expanduser("~"))
         (run,) = confine(f"open('runs/old.csv', 'a').write('er')\n{code}", writes=("runs",))
         assert run.stdout == "['old.csv', 'new']\n" or run.stdout == "['new', 'old.csv']\n"
         assert run.trace is not None
-        assert run.trace.opaque == "what it wrote went with its sandbox"
+        assert run.trace.opaque == "what it wrote was lost with its sandbox"
         assert [path.name for path in root.glob("runs/*")] == ["old.csv"]
         assert (root / "runs/old.csv").read_text() == "old"
 
@@ -320,7 +321,7 @@ class TestRefusals:
         with pytest.raises(EffectError) as refused:
             find_sandbox(root)
         assert refused.value.message == (
-            "`--sandbox` does not work here: the supervisor is not the first process in there"
+            "`--sandbox` does not work here: the supervisor is not the first process in the sandbox"
         )
 
     def test_machine_without_a_filter(

@@ -68,7 +68,7 @@ def test_script_that_kills_its_supervisor(root: Path, fork: bool) -> None:
     with ScriptServer(fork=fork) as server:
         a, *later_runs = server.run(root, jobs, parallel=1)
     assert (a.outcome, a.status) == (Outcome.KILLED, 9)
-    assert a.stderr == "the process that supervises this script was ended by SIGKILL\n"
+    assert a.stderr == "the process that supervises this script was killed by SIGKILL\n"
     assert [r.stdout for r in later_runs] == ["b\n", "b\n"]
     assert wait_until_ended(wait_for(root / "examples/me"))
     assert not Path((root / "examples/tmp").read_text()).parent.exists()

@@ -378,7 +378,7 @@ def test_deep_nesting_and_long_numbers_are_reported() -> None:
         (64, DEEP),
         (320, DEEP),
         (1, "a number of 5000 digits is too long"),
-        (0, "tables, arrays or keys nest too deep"),
+        (0, "tables, arrays or keys are nested too deeply"),
     ]
 
 

@@ -20,13 +20,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.registry import installed_features
 from coursebuild.core.scripts.edit import apply_edits
+from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
-from coursebuild.core.text.rules import RULES, Rule
+from coursebuild.core.text.rules import GROUPS, RULES, Rule
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.pipeline.check import check
@@ -36,103 +36,52 @@ from coursebuild.pipeline.publication import build, export
 from coursebuild.report import Style, diagnostic_text
 from coursebuild.report.text import visible
 from support.fixture_cases import Case, read_cases, rewrite
-from support.rule_cases import Layout, Workshop, parts
+from support.rule_cases import Layout, Workshop
 
-_LINES = 16
-"""How much of a file an example shows."""
-_LANGUAGES = {
-    "json": "json",
-    "md": "markdown",
-    "py": "python fragment",
-    "toml": "toml",
-    "xml": "xml",
-}
+_OTHER_GROUP = "Sources, names, numbers and time"
+"""The section of the rules that features bring."""
 
 
-class ExampleFile(Struct, frozen=True):
-    """A file of a course with a mistake."""
-
-    path: str
-    remark: str
-    """What is said of it beside its path; may be empty."""
-    text: str
-    """Empty where there is nothing to show."""
-
-
-class Example(Struct, frozen=True):
-    """A mistake, and what its author is told."""
-
-    command: str
-    """`check`, or the command that finds it."""
-    files: tuple[ExampleFile, ...]
-    output: str
-
-
-def catalogue_page(examples: Mapping[str, Example]) -> str:
+def catalogue_page() -> str:
     """`docs/reference/rules.md`."""
     errors = sum(rule.severity == "error" for rule in RULES.values())
+    names = {name for group in GROUPS.values() for name in group}
+    groups = {**GROUPS, _OTHER_GROUP: [name for name in RULES if name not in names]}
+    contents = " · ".join(f"[{title}](#{slug(title)})" for title in groups)
     head = f"""\
 # Rules
 
-Every diagnostic of `coursebuild` names its rule, as in `error[output-drift]`. There are {errors}
-errors and {len(RULES) - errors} warnings. An error keeps the site from being published, and
-nothing silences it. A warning can be silenced in `content/course.toml`, by its rule and with a
-reason:
+Each diagnostic names its rule, as in `error[output-drift]`; `coursebuild explain output-drift`
+prints its entry. There are {errors} errors and {len(RULES) - errors} warnings. An error
+keeps the site from being published. A warning can be [silenced](course-map.md#silence), an error
+cannot. `--fix` and `--unsafe` are options of [`coursebuild check`](commands.md#fix).
 
-```toml
-[[silence]]
-rule = "heading-skip"
-reason = "the levels are those of the book"
-path = "content/lessons/4.*"   # optional
-```
-
-Where it is known what to write, a diagnostic has an edit. `coursebuild check --fix` makes those
-that can only have been meant, `--fix --unsafe` also the likely ones, and `coursebuild undo` takes
-them back. The rule of a mistake that nothing mends by itself says why.
-
-{_contents("error")}
-
-{_contents("warning")}
+{textwrap.fill(contents, 120, break_on_hyphens=False)}
 """
-    return head + "".join(_entry(rule, examples.get(name)) for name, rule in RULES.items())
+    return head + "".join(
+        f"\n## {title}\n" + "".join(_entry(RULES[name]) for name in group)
+        for title, group in groups.items()
+    )
 
 
-def _contents(severity: str) -> str:
-    names = [rule.name for rule in RULES.values() if rule.severity == severity]
-    links = f"{severity.capitalize()}s: " + " · ".join(f"[`{name}`](#{name})" for name in names)
-    return textwrap.fill(links, 120, break_on_hyphens=False)
-
-
-def _entry(rule: Rule, example: Example | None) -> str:
-    parts = [f"\n## {rule.name}\n\n{rule.severity.capitalize()}. {rule.summary}\n"]
+def _entry(rule: Rule) -> str:
+    """A section with the first message of the rule's first case."""
+    case, *_ = CASES[rule.name]
+    outputs = [case.expected for case in CASES[rule.name]]
+    options = [o for o in ("--fix", "--fix --unsafe") if f"\n{o} writes" in "".join(outputs)]
+    cure = " or ".join(f"`{option}`" for option in options) + " can mend it."
     if rule.no_fix:
-        parts.append(f"\nNothing mends it by itself. {rule.no_fix}\n")
-    if example is None:
-        return parts[0]
-    for file in example.files:
-        parts.append(f"\n`{file.path}`{file.remark}\n")
-        if file.text:
-            parts.append(f"\n{_fence(_LANGUAGES.get(file.path.rpartition('.')[2], ''), file.text)}")
-    output, *writings = re.split(r"\n\n(?=--fix)", example.output)
-    parts.append(f"\n`coursebuild {example.command}` says:\n\n{_fence('', output)}")
-    for writing in writings:
-        head, diff = writing.split("\n", 1)
-        option, _, path = head.partition(" writes ")
-        parts.append(
-            f"\n`coursebuild check {option}` writes in `{path}`:\n\n{_fence('diff', diff)}"
-        )
-    return "".join(parts)
-
-
-def _fence(kind: str, text: str) -> str:
-    """A fence that no line of the text closes."""
-    lines = text.rstrip("\n").split("\n")
-    if len(lines) > _LINES and kind:
-        lines = [*lines[:_LINES], "…"]
-    body = "\n".join(lines)
-    longest = max((len(run) for run in re.findall(r"`{3,}", body)), default=2)
-    marks = "`" * (longest + 1)
-    return f"{marks}{kind}\n{body}\n{marks}\n"
+        cure = f"No fix: {rule.no_fix}."
+    if command_of(case) != "check":
+        cure += f" Reported by `coursebuild {command_of(case)}`."
+    blocks = case.expected.rstrip("\n").split("\n\n")
+    message = next(block for block in blocks if block.startswith(f"{rule.severity}[{rule.name}]"))
+    message = re.sub(r"\n  --> .*(\n +\|$)?", "", message, count=1, flags=re.MULTILINE)
+    marks = "`" * max(3, 1 + max(map(len, re.findall("`+", message)), default=2))
+    return (
+        f"\n### {rule.name}\n\n{rule.severity.capitalize()}. {rule.summary} {cure}\n\n"
+        f"{marks}\n{message}\n{marks}\n"
+    )
 
 
 installed_features()  # they add their own rules
@@ -324,35 +273,7 @@ def test_messages_keep_the_style_of_the_house() -> None:
 
 
 def test_the_page_of_rules_is_in_step(request: pytest.FixtureRequest) -> None:
-    examples = {name: example(cases[0]) for name, cases in CASES.items()}
-    page = catalogue_page(examples)
+    page = catalogue_page()
     if request.config.getoption("--rewrite-fixtures"):
         PAGE.write_text(page, encoding="utf-8")
     assert PAGE.read_text(encoding="utf-8") == page, "run pytest tests/core/text --rewrite-fixtures"
-
-
-def example(case: Case) -> Example:
-    """A case as the page of rules shows it."""
-    return Example(
-        command_of(case),
-        tuple(example_file(kind, path, body) for kind, path, body in parts(case.input)),
-        case.expected.rstrip("\n"),
-    )
-
-
-def example_file(kind: str, path: str, body: str) -> ExampleFile:
-    """A file of an input as the page of rules shows it."""
-    match kind:
-        case "later":
-            return ExampleFile(path, ", once the scripts are extracted", body)
-        case "bytes":
-            return ExampleFile(path, ", where `\\x…` is a byte", body)
-        case "link":
-            path, _, target = path.partition(" -> ")
-            return ExampleFile(path, f" is a link to `{target}`", "")
-        case "folder":
-            return ExampleFile(path, " is a folder", "")
-        case "without":
-            return ExampleFile(path, " is not there", "")
-        case _:
-            return ExampleFile(path, "", body)

@@ -140,9 +140,9 @@ def test_command_leaves_unreadable_files(make: Make) -> None:
     assert (result.status, result.out) == (1, f"changed {course.lesson(3)}\n")
     assert result.err.splitlines() == [
         f"coursebuild: {course.lesson(1)} has mistakes, and is left as it is",
-        f"  help: mend this first: {course.lesson(1)}:4:1: `{{` is never closed",
+        f"  help: fix this first: {course.lesson(1)}:4:1: `{{` is never closed",
         f"coursebuild: {course.lesson(2)} has mistakes, and is left as it is",
-        f"  help: mend this first: {course.lesson(2)} is not UTF-8",
+        f"  help: fix this first: {course.lesson(2)} is not UTF-8",
     ]
     changed_paths = {path for path, data in course.tree().items() if before[path] != data}
     assert changed_paths == {course.lesson(3)}

@@ -166,7 +166,7 @@ def test_doctor_says_what_a_sandbox_lacks(tmp_path: Path) -> None:
         "ok       Bubblewrap, for `--sandbox`\n"
         "ok       a filter of system calls, for `--sandbox`\n"
         "-        `--sandbox` does not work here, Bubblewrap says: no namespaces\n"
-        "         help: it takes Bubblewrap 0.8 or newer, and user namespaces: on Ubuntu, "
+        "         help: it needs Bubblewrap 0.8 or newer, and user namespaces: on Ubuntu, "
         "`sudo sysctl kernel.apparmor_restrict_unprivileged_userns=0` allows them; containers "
         "often forbid them\n"
     )

@@ -80,29 +80,29 @@ def test_new_lesson_is_checked_and_built_as_it_is(make: Make) -> None:
 
 
 REFUSED_COMMANDS = [
-    ("lesson 1.1 T", "there is a lesson 1.1 already: Lesson one"),
+    ("lesson 1.1 T", "there is already a lesson 1.1: Lesson one"),
     (
         "lesson 7.1 T",
         "the map has no level for `7.1`; `coursebuild new level 7 TITLE` adds it; known: `1`",
     ),
     ("lesson ../x T", "the map has no level for `../x`; known: `1`"),
-    ("lesson 1.9", "lesson 1.9 needs a title; it comes behind the id"),
+    ("lesson 1.9", "lesson 1.9 needs a title; it follows the id"),
     ("lesson Fall", "the id comes first: `coursebuild new lesson 1.2 Fall`"),
-    ("level 2", "a level needs an id and a title; it comes behind the id"),
+    ("level 2", "a level needs an id and a title; it follows the id"),
     ("level 1", "the id comes first: `coursebuild new level 2 1`"),
     ("level Two!", "the id comes first: `coursebuild new level 2 'Two!'`"),
     ("level 1 T", f"{MAP} cannot have a level 1: the level id `1` is used twice"),
     ("level a/b T", f"{MAP} cannot have a level a/b: "),
     ("page There --id A/b", f"{MAP} cannot have a page A/b: "),
-    ("page There", "there is a file content/pages/there.md already"),
+    ("page There", "there is already a file content/pages/there.md"),
     ("page \udcff", "the title is not UTF-8"),
     ("lesson 1 T", f"{MAP} cannot have a lesson 1: "),
     ("lesson 1./../x T", f"{MAP} cannot have a lesson 1./../x: "),
     ("lesson 1.3 T --slug A/b", f"{MAP} cannot have a lesson 1.3: "),
     ("lesson 1.3 \udcff", "the title is not UTF-8"),
-    ("lesson 1.7 there", "there is a file content/lessons/1.7-there.md already"),
+    ("lesson 1.7 there", "there is already a file content/lessons/1.7-there.md"),
     ("model ../x", "`../x` is not a name for a model: use letters, digits, `_` and `-`"),
-    ("model there", "there is a file models/there.xml already"),
+    ("model there", "there is already a file models/there.xml"),
     ("feature quiz", "there is a feature or a fence `quiz` already"),
     ("feature Big-1", "`Big-1` is not a name for a feature: use lower-case letters"),
     ("template lessn.html", "there is no template `lessn.html`; did you mean `lesson.html`?"),
@@ -324,14 +324,14 @@ def test_doubtful_places_are_listed_and_nothing_is_changed(make: Make) -> None:
 
 REFUSED_RENAMES = [
     ("1.9 1.8", "no lesson is called `1.9`"),
-    ("1.2 1.2", "there is a lesson 1.2 already: Lesson two"),
-    ("1.2 1.3", "there is a lesson 1.3 already: Lesson three"),
+    ("1.2 1.2", "there is already a lesson 1.2: Lesson two"),
+    ("1.2 1.3", "there is already a lesson 1.3: Lesson three"),
     (
         "1.2 9.9",
         "the map has no level for `9.9`; `coursebuild new level 9 TITLE` adds it; known: `1`",
     ),
     ("1.2 1.a/b", f"{MAP} cannot have a lesson 1.a/b: "),
-    ("1.2 1.8", "there is a file content/lessons/1.8-two.md already"),
+    ("1.2 1.8", "there is already a file content/lessons/1.8-two.md"),
 ]
 
 

@@ -1,4 +1,4 @@
-"""The workflows of docs/how-to: GitHub accepts them, and each step does what the docs say."""
+"""The workflows of a new course: GitHub accepts them, and each step does what the docs say."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ from support.workflows import Runner, Step, commit, git
 
 PAGES = ("continuous-integration", "publish")
 FENCES = [fence for page in PAGES for fence in fences(DOCS / f"how-to/{page}.md")]
-DOCUMENTED = {fence.value("file"): fence.text for fence in FENCES if fence.value("file")}
 COURSE = ".github/workflows/course.yml"
 WEEKLY = ".github/workflows/weekly.yml"
+TEMPLATES = ROOT / "coursebuild/features/authoring/course"
+WRITTEN = {path: (TEMPLATES / Path(path).name).read_text() for path in (COURSE, WEEKLY)}
 PINNED_ACTION = re.compile(
     r"[\w-]+/[\w/-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+\b.*|\./|OWNER/coursebuild@v"
     + re.escape(__version__)
@@ -44,12 +45,12 @@ ACTION = yaml.safe_load((ROOT / "action.yml").read_text())
 
 
 def workflow(path: str = COURSE) -> dict[str, Any]:
-    documented: dict[str, Any] = yaml.safe_load(DOCUMENTED[path])
-    return documented
+    data: dict[str, Any] = yaml.safe_load(WRITTEN[path])
+    return data
 
 
 def publishing_elsewhere() -> list[dict[str, Any]]:
-    """The documented workflow with each of the jobs that can replace its last one."""
+    """The workflow with each of the documented jobs that can replace its last one."""
     jobs = [yaml.safe_load(fence.text) for fence in FENCES if fence.is_("publish")]
     return [{**workflow(), "jobs": workflow()["jobs"] | job} for job in jobs]
 
@@ -71,10 +72,10 @@ def commands(steps: list[dict[str, Any]]) -> list[str]:
 
 
 @pytest.mark.site
-def test_documented_workflows_are_those_of_a_new_course(tmp_path: Path) -> None:
+def test_a_new_course_has_the_workflows(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     assert folder.main("init").status == 0
-    assert {path: folder.text(path) for path in (COURSE, WEEKLY)} == DOCUMENTED
+    assert {path: folder.text(path) for path in WRITTEN} == WRITTEN
 
 
 def test_github_takes_the_workflows_and_the_action() -> None:
@@ -115,7 +116,11 @@ def test_actions_are_pinned_and_no_expression_becomes_code() -> None:
     (example,) = (yaml.safe_load(fence.text) for fence in FENCES if fence.is_("action"))
     steps = [step for job in jobs() for step in job["steps"]] + example + ACTION["runs"]["steps"]
     texts = [path.read_text() for path in (ROOT / ".github/workflows").iterdir()]
-    texts += [fence.text for fence in FENCES] + [(ROOT / "action.yml").read_text()]
+    texts += [
+        *(fence.text for fence in FENCES),
+        *WRITTEN.values(),
+        (ROOT / "action.yml").read_text(),
+    ]
     actions = [name for text in texts for name in re.findall(r"uses: *(.*)", text)]
     assert len(actions) > 20
     assert [name for name in actions if not PINNED_ACTION.fullmatch(name)] == []

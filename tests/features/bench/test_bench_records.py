@@ -51,7 +51,7 @@ def test_the_same_bytes_are_not_written_again(course: Path) -> None:
     record(course)
     before = (course / PATH).stat()
     measurement = record(course)
-    assert measurement.remarks == (f"{PATH} is as it was",)
+    assert measurement.remarks == (f"{PATH} is unchanged",)
     assert (course / PATH).stat().st_mtime_ns == before.st_mtime_ns
 
 
@@ -109,7 +109,7 @@ def test_a_report_that_is_not_there_or_none_or_of_something_else(course: Path) -
 
 
 def test_a_part_is_not_recorded(course: Path) -> None:
-    reason = " takes no --quick: what is recorded is measured in full"
+    reason = " cannot be combined with --quick: recorded measurements are complete"
     with pytest.raises(UsageError, match=f"--record{reason}"):
         bench(options(course), quick=True, record=True, measuring=Fake())
     with pytest.raises(UsageError, match=f"--check{reason}"):

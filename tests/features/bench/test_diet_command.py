@@ -63,7 +63,7 @@ def test_diet_shows_a_finding_as_text_and_as_json(
     assert run(course) == run(course) == 1
     out, err = capsys.readouterr()
     assert err.count("swing: looked at after") == 1, "the model did not change"
-    assert "  sensor-unread: nobody reads the sensor time\n    proved; " in out
+    assert "  sensor-unread: nothing reads the sensor time\n    proved; " in out
     assert '    models/swing.xml:6:5\n    - <clock name="time"/>\n' in out
     assert "1 finding not explained, 1 of them for `coursebuild diet swing --fix`" in out
     assert "integrator and timestep are judged against a reference" in out
@@ -131,7 +131,7 @@ def test_a_finding_is_kept_with_a_reason(course: Path, capsys: pytest.CaptureFix
     declarations.write_text('[[keep]]\nfinding = "sensor-unread time"\nreason = "shown in class"\n')
     assert run(course) == 0
     out = capsys.readouterr().out
-    assert "    kept: shown in class\n" in out and "nothing in it is in vain" in out
+    assert "    kept: shown in class\n" in out and "nothing in it is useless" in out
     assert run(course, "--fix") == 0
     assert (course / "models" / "swing.xml").read_text() == MODEL
     declarations.write_text('[[keep]]\nfinding = "sensor-unread tim"\nreason = "shown in class"\n')
@@ -176,7 +176,7 @@ def test_a_part_without_which_a_script_prints_something_else_is_no_finding(
     main(["-C", str(course), "diet"])
     output = " ".join(capsys.readouterr().out.split())
     assert "far-body: what the scene is about" not in output
-    assert "because examples/a.py says something else then: far-body" in output
+    assert "because examples/a.py prints something else then: far-body" in output
 
 
 def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(

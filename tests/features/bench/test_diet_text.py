@@ -22,7 +22,7 @@ from support.model_reports import diet, finding
 EDIT = TextEdit("models/arm.xml", 9, 1, 100, 130, '    <gyro\n name="gyro"/>\n', "")
 CERTAIN_SAVING = Saving(2.2, 0.01, True, 1234, 30)
 FINDING = finding(
-    message="nobody reads the sensor gyro",
+    message="nothing reads the sensor gyro",
     places=(ModelPlace("gyro", 'mujoco/sensor/gyro[@name="gyro"]', "models/arm.xml", 9, 5),),
     saving=CERTAIN_SAVING,
     edits=(EDIT,),
@@ -64,7 +64,7 @@ def test_findings_are_shown_with_their_saving_reason_and_change(rewriting: bool)
 
 
 def test_control_characters_are_shown_and_lines_are_not_too_long() -> None:
-    odd = replace(FINDING, message="nobody reads \x1b[2J " + "word " * 40)
+    odd = replace(FINDING, message="nothing reads \x1b[2J " + "word " * 40)
     lines = diet_text([replace(REPORT, findings=(odd,))], Style(width=60)).splitlines()
     assert not any("\x1b" in line for line in lines)
     assert all(len(line) <= 60 for line in lines if "models/" not in line)

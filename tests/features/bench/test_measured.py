@@ -141,7 +141,7 @@ def test_the_diet_of_a_model(site: dict[str, str]) -> None:
     assert "proved; ×1.07 as fast, 120 B of memory, 40 B of text (swing)." in words
     assert "Because its value goes nowhere. models/box.xml:3" in words
     assert "Kept: it is the horizon." in words
-    assert "It is no fault, as examples/a.py names &lt;it&gt;." in words
+    assert "It is not a fault, because examples/a.py names &lt;it&gt;." in words
     assert 'href="../files/reports/box.diet.json"' in site["models/box.html"]
 
 
@@ -172,7 +172,7 @@ def test_the_page_of_the_hard_cases(site: dict[str, str]) -> None:
     assert "Energy RK4 −4.10 × 10<sup>−10</sup> 0 −4.1 × 10<sup>−10</sup> Euler not finite" in words
     assert "Euler 1.00 ± 0.01, bend 0.02" in words
     assert "Euler at 500 ms: diverged; 1e9 rad/s." in words
-    assert "coursebuild stability spring" in words
+    assert "coursebuild" not in words
     assert 'href="../files/reports/stability.json"' in page
     assert 'href="../numerics/index.html"' in site["models/box.html"]
     assert 'href="numerics/index.html"' in site["index.html"]
@@ -248,7 +248,7 @@ def test_a_scenario_whose_motion_the_course_knows_is_a_hard_case(make: Make) -> 
     model = scene(exact, replace(awkward(), name="awkward"), model="box")
     page = pages(make, Reports({"box": model}, cases=(case("a", 4),)))["numerics/index.html"]
     words = text(page.replace("<details", "<div").replace("</details", "</div"))
-    assert "Cases of this course box: " in words and "coursebuild bench box" in words
+    assert "Cases of this course box: " in words and "coursebuild" not in words
     assert 'href="#box/swing"' in page and 'id="box/swing"' in page
     assert 'href="../models/box.html">box: ' in page and "box/awkward" not in page
     assert "References: models/box.exact.py; " in words and "error of position" in page

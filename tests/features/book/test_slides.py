@@ -155,7 +155,7 @@ def test_right_to_left_courses_have_their_words_and_their_direction(make_course:
 def test_which_lesson_must_be_named_and_written(make_course: Make) -> None:
     folder = make_course("## One\n\nText.\n")
     for arguments, message in (
-        (("slides",), "`export slides` writes one lesson, and none is named"),
+        (("slides",), "`export slides` writes one lesson, but none was named"),
         (("slides", "1.7"), "no lesson or page is called `1.7`"),
         (("page", "1.1"), "`export page` writes the whole course, and takes no lesson"),
     ):

@@ -84,13 +84,13 @@ def test_folder_that_cannot_be_imported_is_refused(
             "course.json is no JSON: Expecting property name enclosed in double "
             "quotes: line 1 column 2 (char 1)",
         ),
-        ("course.json", "[" * 100_000, "course.json is no JSON: the text is nested too deeply"),
+        ("course.json", "[" * 100_000, "course.json is not JSON: the text is nested too deeply"),
         ("course.json", '{"levels": []}', "course.json has no `levels`"),
         ("course.json", '{"levels": [7]}', "course.json: a level or a lesson is not an object"),
         ("one.ipynb", '{"cells": 7}', "one.ipynb is not a notebook of format 4"),
         ("one.ipynb", '{"cells": [7]}', "one.ipynb is not a notebook of format 4"),
-        ("_toc.yml", "a: [", "_toc.yml is no YAML, or too large"),
-        ("_toc.yml", "chapters: &a [*a]", "_toc.yml is no YAML, or too large"),
+        ("_toc.yml", "a: [", "_toc.yml is not YAML, or too large"),
+        ("_toc.yml", "chapters: &a [*a]", "_toc.yml is not YAML, or too large"),
         ("_quarto.yml", "book: 7\nwebsite: [x]", empty_message),
     ]:
         (course / name).write_text(text)
@@ -193,7 +193,7 @@ def test_no_link_is_followed_out_of_the_folder(
     )
     followed = {"part/fig", "part/self", "part/two.md"}
     reasons = {name: OUT for name in links if name not in followed}
-    reasons |= dict.fromkeys(("gone.md", "loop.md", "pool.md"), "a link that leads nowhere")
+    reasons |= dict.fromkeys(("gone.md", "loop.md", "pool.md"), "a broken link")
     reasons |= dict.fromkeys(("part/hidden.txt", "part/pipe.md"), "a link to what is not imported")
     reasons |= dict.fromkeys(
         ("pipe.md", "socket.md"), "a pipe, socket or device, which is not read"

@@ -78,4 +78,4 @@ def test_without_network_it_is_said_what_is_missing(
     python = "{}.{}".format(*sys.version_info)
     assert result.status == 1
     assert f"coursebuild: pip finds no MuJoCo {LAB_ENGINE} for Python {python} on " in result.err
-    assert "\n  help: without a network let pip find the wheels in a folder" in result.err
+    assert "\n  help: without a network, point pip to a folder of wheels" in result.err

@@ -61,6 +61,20 @@ LINKS = """## Links
 See [the ball](model:ball), [what turns](term:moment-of-inertia), [falling](lesson:1.1#fall),
 [energy](lesson:1.1#eq:energy), [the script](examples/fall.py), Lesson 1.1 and [here](#links).
 It calls `mj_step(model, data)`, reads `body_mass` and keeps `data`; `<joint damping="2"/>` is MJCF.
+[](#tab:falls) is of [see @galilei1638, p. 3].
+
+Table: Two *falls* {#tab:falls}
+
+| height | time |
+| ------ | ---- |
+| 1      | 2    |
+"""
+SOURCES = """@book{galilei1638,
+  author = {Galilei, Galileo},
+  title = {Two new sciences},
+  year = {1638},
+  isbn = {978-3-16-148410-0},
+}
 """
 BALL = """<!-- A ball in the air. -->
 <mujoco>
@@ -80,6 +94,7 @@ def wait_for_results(editor: Editor) -> None:
 def editor(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[Editor]:
     folder = Folder((tmp_path_factory.mktemp("course") / "a cöurse").resolve())
     folder.write("models/ball.xml", BALL)
+    folder.write("content/references.bib", SOURCES)
     folder.fill([FALL, LINKS], stores)
     editor = Editor(folder)
     for path in (FIRST_LESSON, SECOND_LESSON, MAP):
@@ -107,10 +122,12 @@ def unchanged(editor: Editor) -> Iterator[None]:
 
 
 def test_mistakes_are_reported_while_typing_and_nothing_is_saved(editor: Editor) -> None:
-    editor.write(SECOND_LESSON, LINKS.replace("\n", "\r\n") + "🙂 𝄞 Lesson 9.9 is not there.\r\n")
+    text = f"{LINKS}\n🙂 𝄞 Lesson 9.9 is not there.\n"
+    editor.write(SECOND_LESSON, text.replace("\n", "\r\n"))
     (mistake,) = editor.until(SECOND_LESSON, "link-lesson")
-    place = types.Position(5, 13)  # in UTF-16, of which the two characters before take two each
-    assert mistake.range == types.Range(place, types.Position(5, 16))
+    line = LINKS.count("\n") + 1
+    # In UTF-16, of which the two characters before take two each.
+    assert mistake.range == types.Range(types.Position(line, 13), types.Position(line, 16))
     assert mistake.severity == types.DiagnosticSeverity.Error
     assert mistake.message.startswith("lesson 9.9 is not in the course map")
     address = mistake.code_description and mistake.code_description.href
@@ -233,7 +250,7 @@ HOVERS = [
     (FIRST_LESSON, "mujoco.mj_st|ep(", "Advance simulation"),
     (FIRST_LESSON, '"expr": "data.qp|os', "position"),
     (FIRST_LESSON, "`1.0|00`{out}", "after 0.002 s at 1.000 m"),
-    (FIRST_LESSON, "[!warn|ing]", "Something here goes wrong easily, or costs dearly."),
+    (FIRST_LESSON, "[!warn|ing]", "Something that easily goes wrong, or costs dearly."),
     (FIRST_LESSON, '"tit|le"', "`title`: "),
     (FIRST_LESSON, 'model_path("ba|ll")', "A ball in the air."),
     (SECOND_LESSON, "model:ba|ll", "A ball in the air.\n\n1 bodies, 1 geoms; nq = 7, nv = 6"),
@@ -248,6 +265,8 @@ HOVERS = [
     (SECOND_LESSON, "mj_st|ep(model", "mj_step(m: mujoco._structs.MjModel"),
     (SECOND_LESSON, "`body_m|ass`", "shape `(nbody,)`"),
     (SECOND_LESSON, "<joint dam|ping", "damping"),
+    (SECOND_LESSON, "@galilei|1638", "Galilei, Galileo (1638). Two new sciences."),
+    (SECOND_LESSON, "(#tab:fa|lls)", "Table 1.2.1: Two falls"),
     (MAP, "stat|us =", ""),
 ]
 
@@ -272,6 +291,7 @@ DEFINITIONS = [
     (SECOND_LESSON, "examples/fa|ll.py", f"{FIRST_LESSON}:8"),
     (SECOND_LESSON, "Lesson 1.1| and", f"{FIRST_LESSON}:1"),
     (SECOND_LESSON, "(#li|nks)", f"{SECOND_LESSON}:1"),
+    (SECOND_LESSON, "@galilei|1638", "content/references.bib:1"),
     (MAP, 'id = "1.|2"', f"{SECOND_LESSON}:1"),
 ]
 
@@ -292,6 +312,9 @@ def test_definitions(editor: Editor) -> None:
         (SECOND_LESSON, "[x](model:b|", "ball", "ball"),
         (SECOND_LESSON, "[x](term:|", "moment-of-inertia", "moment-of-inertia"),
         (SECOND_LESSON, "[x](lesson:1.1#|", "eq:energy", "eq:energy"),
+        (SECOND_LESSON, "See [](#tab|", "tab:falls", "tab:falls"),
+        (SECOND_LESSON, "As [@gal|", "galilei1638", "galilei1638"),
+        (SECOND_LESSON, "As [see @galilei1638, p. 3; @|", "galilei1638", "galilei1638"),
         (SECOND_LESSON, "`1`{out=|", "examples/fall.py", "examples/fall.py"),
         (SECOND_LESSON, "It calls `mj_for|", "mj_forward", "mj_forward"),
         (SECOND_LESSON, "In `<free|", "freejoint", "freejoint"),
@@ -315,9 +338,19 @@ def test_completions(editor: Editor, path: str, typed: str, label: str, new: str
     assert isinstance(item.text_edit, types.TextEdit)
     (text,) = editor.apply_edits({editor.places.uri(path): [item.text_edit]}).values()
     before, after = typed.split("|", 1)
-    stem = re.split(r'[\s:#=.!`(<"\[{]', before)[-1]
+    stem = re.split(r'[\s:#=.!`(<"\[{@]', before)[-1]
     start = before.removesuffix('"' + stem) if new.startswith('"') else before.removesuffix(stem)
     assert text.endswith(start + new + after.removeprefix('"'))
+
+
+def test_a_source_and_a_label_are_proposed_with_their_titles(editor: Editor) -> None:
+    for typed, name, title in (
+        ("As [@|", "galilei1638", "Two new sciences"),
+        ("See [](#|", "tab:falls", "Table 1.2.1: Two falls"),
+        ("See [](lesson:1.1#|", "eq:energy", "(1): E = m g h"),
+    ):
+        editor.write(SECOND_LESSON, f"{LINKS}\n{typed.replace('|', '')}")
+        assert editor.proposals(SECOND_LESSON, typed)[name].detail == title
 
 
 def test_existing_keys_and_those_of_other_questions_are_not_proposed(editor: Editor) -> None:
@@ -381,7 +414,7 @@ def test_renaming_a_lesson(editor: Editor) -> None:
     assert new[SECOND_LESSON] == LINKS.replace("1.1", "1.5")
     assert 'id = "1.5"' in new[MAP]
     assert 'id = "1.1"' not in new[MAP]
-    with pytest.raises(JsonRpcException, match=r"there is a lesson 1\.2 already"):
+    with pytest.raises(JsonRpcException, match=r"there is already a lesson 1\.2"):
         editor.request("rename", types.RenameParams(*place, new_name="1.2"))
     heading = editor.identifier(SECOND_LESSON), editor.place(SECOND_LESSON, "## L|inks")
     assert editor.request("prepare_rename", types.PrepareRenameParams(*heading)) is None

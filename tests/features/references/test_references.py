@@ -9,7 +9,7 @@ import pytest
 
 from coursebuild.core.text.source import Source
 from coursebuild.features.references.bibtex import read_works
-from coursebuild.features.references.csl import format_works
+from coursebuild.features.references.csl import StyleFailure, format_works
 from support.scratch_course import Folder
 
 LIST = r"""
@@ -117,6 +117,22 @@ def test_a_reference_is_in_the_language_of_the_course(
         works.mark("goldstein", "p. 12") == f"Goldstein, Poole {conjunction} Safko 2002, {locator}"
     )
     assert f"Charles P. Poole {conjunction} John Safko" in works.entries["goldstein"]
+
+
+@pytest.mark.parametrize(
+    ("call", "last_call", "reason"),
+    [
+        ('<text macro="m{}"/>', 'macro="m0"', "recursion"),
+        ('<text macro="m{0}"/><text macro="m{0}"/>', 'variable="title"', "more than 10,000 times"),
+    ],
+)
+def test_a_style_that_would_take_forever_is_refused(call: str, last_call: str, reason: str) -> None:
+    macros = [f'<macro name="m{n}">{call.format(n + 1)}</macro>' for n in range(60)]
+    macros.append(f'<macro name="m60"><text {last_call}/></macro>')
+    style = NUMERIC.replace('variable="title"', 'macro="m0"')
+    style = style.replace("<citation>", f"{''.join(macros)}<citation>", 1)
+    with pytest.raises(StyleFailure, match=reason):
+        format_works(SOURCE, Source("content/references.csl", style), "en", ("goldstein",))
 
 
 def test_a_course_may_have_a_style_of_its_own() -> None:

@@ -24,7 +24,7 @@ def apply_changes(root: Path, changes: Sequence[FileChange]) -> int:
     for change in changes:
         file = root / change.path
         if change.old is None and (file.exists() or file.is_symlink()):
-            raise UsageError(f"there is a file {change.path} already")
+            raise UsageError(f"there is already a file {change.path}")
     change_files(root, changes, Progress().say)
     lines = []
     for change in changes:

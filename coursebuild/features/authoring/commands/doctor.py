@@ -1,4 +1,4 @@
-"""`coursebuild doctor`: say what works on this machine, and how to mend what does not.
+"""`coursebuild doctor`: check this machine, and say how to fix what does not work.
 
 What can kill a process, as a driver of a graphics card can, is tried in a process of its own.
 """
@@ -134,25 +134,25 @@ def _fonts(_: Path) -> Iterator[Probe]:
     except EffectError as error:
         yield Probe(error.message, False, error.help)
         return
-    text = f"{len(fonts)} fonts and {len(templates)} templates of pages"
+    text = f"{len(fonts)} fonts and {len(templates)} page templates"
     yield Probe(text, bool(fonts and templates), "install coursebuild again")
 
 
 def _folder(folder: Path) -> Iterator[Probe]:
     ok = os.access(folder, os.W_OK)
-    cure = "give yourself the right to write there, or go to another folder"
+    cure = "get permission to write there, or use another folder"
     yield Probe(f"{folder} can be written" if ok else f"{folder} cannot be written", ok, cure)
 
 
 def _store(folder: Path) -> Iterator[Probe]:
     place, reason = find_store(str(folder))
     if not reason:
-        yield Probe(f"what is made once is kept in {place}", True)
+        yield Probe(f"results are kept in {place}", True)
     elif not store_key(str(folder)):
         cure = "set HOME, XDG_STATE_HOME or COURSEBUILD_STORE_KEY"
         yield Probe("nothing is kept: there is no place for your key", False, cure, False)
     else:
-        text = f"{FOLDER} {reason}; what is made once is kept in {place}"
+        text = f"{FOLDER} {reason}; results are kept in {place}"
         yield Probe(text, False, f"remove {folder / FOLDER}", is_required=False)
 
 
@@ -162,14 +162,14 @@ def _locks(folder: Path) -> Iterator[Probe]:
             ok = try_lock(file.fileno()) is not None
     except OSError:  # `_folder` reports it
         return
-    text = "locks, by which two commands on one course wait for each other"
-    cure = "use a disk of this machine, or run one command at a time"
+    text = "locks, with which two commands on one course wait for each other"
+    cure = "use a local disk, or run one command at a time"
     yield Probe(text if ok else f"no {text}", ok, cure, is_required=False)
 
 
 def _disk(folder: Path) -> Iterator[Probe]:
     free = shutil.disk_usage(folder).free
-    cure = "make room, or let .coursebuild take less: `--cache-size 200M`"
+    cure = "free some space, or limit .coursebuild: `--cache-size 200M`"
     yield Probe(
         f"{free / (1 << 30):.1f} GiB free on the disk", free > SIZE, cure, is_required=False
     )

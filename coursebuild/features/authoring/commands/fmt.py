@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
             mistakes = [f"{source.path} is not UTF-8"]
         if mistakes:
             message = f"{source.path} has mistakes, and is left as it is"
-            status = fail(FAILURE, message, f"mend this first: {mistakes[0]}")
+            status = fail(FAILURE, message, f"fix this first: {mistakes[0]}")
         elif new.value != source.text:
             new_texts[source] = new.value
     if arguments.diff:

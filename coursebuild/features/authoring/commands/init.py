@@ -1,4 +1,4 @@
-"""`coursebuild init`: make a small complete course to begin with."""
+"""`coursebuild init`: create a small, complete course."""
 
 from __future__ import annotations
 
@@ -42,7 +42,13 @@ _KEPT = ("README.md", "requirements.txt")
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
-    parser.add_argument("folder", nargs="?", default=".", metavar="DIR", help="default: this one")
+    parser.add_argument(
+        "folder",
+        nargs="?",
+        default=".",
+        metavar="DIR",
+        help="folder of the course (default: this one)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -62,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         root.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise EffectError(f"{folder} cannot be made: {reason(error)}") from None
+        raise EffectError(f"{folder} cannot be created: {reason(error)}") from None
     change_files(root, [FileChange(path, None, data) for path, data in files.items()])
     repository = ", in a new Git repository" if _make_repository(root) else ""
     option = "" if root == Path.cwd() else f" -C {shlex.quote(folder)}"

@@ -60,28 +60,42 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     kinds = parser.add_subparsers(metavar="KIND", required=True, prog=parser.prog)
     lesson = kinds.add_parser("lesson", help="a draft, and its entry in the course map")
-    lesson.add_argument("id", metavar="ID", help="its level's id, a dot, its own part, as in 1.4")
-    lesson.add_argument("title", metavar="TITLE", nargs="?", help="as readers see it")
-    lesson.add_argument("--slug", help="for its file and address (default: made of the title)")
+    lesson.add_argument("id", metavar="ID", help="id in the course, such as 1.4 in level 1")
+    lesson.add_argument("title", metavar="TITLE", nargs="?", help="title shown to readers")
+    lesson.add_argument("--slug", help="name in its file and address (default: from the title)")
     lesson.set_defaults(add=_new_lesson)
-    level = kinds.add_parser("level", help="a level without lessons, in the course map")
-    level.add_argument("id", metavar="ID", help="a number, or a word")
-    level.add_argument("title", metavar="TITLE", nargs="?", help="as readers see it")
+    level = kinds.add_parser("level", help="an empty level in the course map")
+    level.add_argument("id", metavar="ID", help="id in the course: a number or a word")
+    level.add_argument("title", metavar="TITLE", nargs="?", help="title shown to readers")
     level.set_defaults(add=_new_level)
-    page = kinds.add_parser("page", help="a page that is no lesson, and its entry in the map")
-    page.add_argument("title", metavar="TITLE", help="as readers see it")
-    page.add_argument("--id", help="for its file, address and links (default: made of the title)")
+    page = kinds.add_parser(
+        "page", help="a page outside the lessons, and its entry in the course map"
+    )
+    page.add_argument("title", metavar="TITLE", help="title shown to readers")
+    page.add_argument("--id", help="name in its file, address and links (default: from the title)")
     page.set_defaults(add=_new_page)
-    model = kinds.add_parser("model", help="a file of models/ with a ball above a floor")
-    model.add_argument("name", metavar="NAME", help="letters, digits, `_` and `-`; `/` for folders")
+    model = kinds.add_parser("model", help="a model of a ball above a floor, in models/")
+    model.add_argument(
+        "name", metavar="NAME", help="name of letters, digits, `_` and `-`; `/` for folders"
+    )
     model.set_defaults(add=_new_model)
-    template = kinds.add_parser("template", help="a copy of a template of pages, to be changed")
-    template.add_argument("name", metavar="NAME", help="as in base.html or blocks/callout.html")
-    template.add_argument("--print", action="store_true", help="print it, and write no file")
+    template = kinds.add_parser("template", help="a copy of a page template, for you to change")
+    template.add_argument(
+        "name",
+        metavar="NAME",
+        help="name of the template, such as base.html or blocks/callout.html",
+    )
+    template.add_argument(
+        "--print", action="store_true", help="print the template without writing a file"
+    )
     template.set_defaults(add=_new_template)
-    feature = kinds.add_parser("feature", help="a kind of fence with its tests, named by the map")
-    feature.add_argument("name", metavar="NAME", help="of its fence, in lower-case letters")
-    feature.add_argument("--script", action="store_true", help="with a script of its pages")
+    feature = kinds.add_parser(
+        "feature", help="a kind of fence with its tests, and its entry in the course map"
+    )
+    feature.add_argument("name", metavar="NAME", help="name of its fence, in lower-case letters")
+    feature.add_argument(
+        "--script", action="store_true", help="add a script that runs on its pages"
+    )
     feature.set_defaults(add=_new_feature)
 
 
@@ -98,7 +112,7 @@ def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     course = load_course(root, code="none")
     id, title = arguments.id, arguments.title
     if title is None and re.fullmatch(r"[\w-]+(\.[\w-]+)+", id):
-        raise UsageError(f"lesson {id} needs a title", help="it comes behind the id")
+        raise UsageError(f"lesson {id} needs a title", help="it follows the id")
     if title is None:
         ids = next_lesson_ids(course) or ["1.1"]
         help = f"the id comes first: `coursebuild new lesson {ids[-1]} {shlex.quote(id)}`"
@@ -118,7 +132,7 @@ def _new_level(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     course = load_course(root, code="none")
     id, title = arguments.id, arguments.title
     if title is None:
-        help = "it comes behind the id"
+        help = "it follows the id"
         if not re.fullmatch(r"[\w-]+", id) or id in (level.id for level in course.levels):
             proposal = f"coursebuild new level {next_level_id(course)} {shlex.quote(id)}"
             help = f"the id comes first: `{proposal}`"
@@ -164,7 +178,7 @@ def _new_feature(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     if not re.fullmatch("[a-z][a-z0-9]*", name) or keyword.iskeyword(name):
         raise UsageError(f"`{name}` is not a name for a feature: use lower-case letters")
     if name in {*CORE_FENCES, *fence_names(), *(feature.name for feature in features())}:
-        raise UsageError(f"there is a feature or a fence `{name}` already")
+        raise UsageError(f"there is already a feature or a fence `{name}`")
     path = f"features/{name}.py"
     templates = {path: "feature.txt", f"tests/test_{name}.py": "test.txt"}
     new_map = with_feature(course, path)

@@ -1,4 +1,4 @@
-"""`coursebuild rename`: give a lesson another id, wherever the course names it."""
+"""`coursebuild rename`: change a lesson's id wherever the course names it."""
 
 from __future__ import annotations
 
@@ -39,10 +39,8 @@ examples:
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument("old", metavar="LESSON", help="id, slug or file of the lesson")
-    parser.add_argument("new", metavar="ID", help="the id that it gets")
-    parser.add_argument(
-        "--leave", action="store_true", help="leave places that may mean it as they are"
-    )
+    parser.add_argument("new", metavar="ID", help="the new id")
+    parser.add_argument("--leave", action="store_true", help="leave ambiguous mentions as they are")
 
 
 def run(arguments: argparse.Namespace) -> int:

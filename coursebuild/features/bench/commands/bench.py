@@ -68,7 +68,7 @@ _INDENT = "  "
 EXAMPLES = """\
 examples:
   coursebuild bench --quick              a first look at all models
-  coursebuild bench pendulum --record    what pages show of it
+  coursebuild bench pendulum --record    what its page shows
   coursebuild bench pendulum --engines   the same model in other engines
 """
 
@@ -301,7 +301,7 @@ def _scene(scene: SceneReport, style: Style) -> str:
         head += "  " + style.paint("quick: fewer settings, rough times", YELLOW)
     lines = [head, *style.wrap(machine_text(english(), scene.machine), _INDENT)]
     if not scene.scenarios:
-        lines.append(f"{_INDENT}nothing can move in it, so that nothing was measured")
+        lines.append(f"{_INDENT}nothing in it can move, so nothing was measured")
     for scenario in scene.scenarios:
         lines += ["", *_scenario(scenario, style)]
     for sweep in scene.sweeps:

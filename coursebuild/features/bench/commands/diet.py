@@ -63,7 +63,7 @@ _CODE = (
 )
 EXAMPLES = """\
 examples:
-  coursebuild diet pendulum              what it could be without
+  coursebuild diet pendulum              what it could do without
   coursebuild diet --fix                 take out what changes nothing
 """
 
@@ -76,10 +76,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     writes = parser.add_mutually_exclusive_group()
     writes.add_argument(
-        "--fix", action="store_true", help="change what leaves every bit of the motion as it is"
+        "--fix", action="store_true", help="remove what does not change a single bit of the motion"
     )
     writes.add_argument(
-        "--record", action="store_true", help="write what was found to content/reports/"
+        "--record", action="store_true", help="write the findings to content/reports/"
     )
     parser.add_argument("--quick", action="store_true", help="short runs, rough times")
     add_format(parser, "text", "json")
@@ -262,7 +262,7 @@ def _model(report: DietReport, style: Style) -> str:
         lines += ["", *_finding(finding, style)]
     for entry in report.stale:
         place = f"{entry.path}:{entry.line}:{entry.column}"
-        text = f"`{entry.finding}` keeps nothing any more: take the entry out ({place})"
+        text = f"`{entry.finding}` no longer keeps anything: remove the entry ({place})"
         lines += ["", *style.wrap(text, "  ", RED)]
     lines += ["", *_summary(report, style)]
     return "\n".join(lines) + "\n"
@@ -279,7 +279,7 @@ def _summary(report: DietReport, style: Style) -> list[str]:
         lines += style.wrap(text, "  ", RED)
         lines += style.wrap(_how_to_keep(report, findings), "  ", FAINT)
     else:
-        lines.append("  " + style.paint("nothing in it is in vain", GREEN))
+        lines.append("  " + style.paint("nothing in it is useless", GREEN))
     if report.slim is not None and len(findings) > 1:
         lines += style.wrap(f"without all of them: {_saving(report.slim)}", "  ")
     if report.fixed is not None and len(fixable) > 1 and len(fixable) < len(findings):
@@ -301,7 +301,7 @@ def _how_to_keep(report: DietReport, findings: Sequence[Finding]) -> str:
     name = first.places[0].name if len(first.places) == 1 else ""
     key = f"{first.kind} {name}".strip()
     quote = "'" if '"' in key else '"'
-    place = f"what is wanted has its reason in models/{report.model}.toml: [[keep]]"
+    place = f"give the reason for what you keep in models/{report.model}.toml: [[keep]]"
     return f"{place} finding = {quote}{key}{quote}, reason = …"
 
 
@@ -329,7 +329,7 @@ def _finding(finding: Finding, style: Style) -> list[str]:
     if len(finding.edits) > _EDITS:
         lines.append(f"    … and {len(finding.edits) - _EDITS} more changes")
     if finding.doubt:
-        lines += style.wrap(f"no fault, as {finding.doubt}", "    ")
+        lines += style.wrap(f"not a fault, because {finding.doubt}", "    ")
     elif finding.unfixed and finding.is_fault:
         lines += style.wrap(f"not for --fix: {finding.unfixed}", "    ")
     return lines
@@ -344,4 +344,4 @@ def _saving(saving: Saving) -> str:
         if count:
             fewer = "fewer" if count > 0 else "more"
             parts.append(f"{abs(count):,} bytes of {place} {fewer}")
-    return ", ".join(parts) or "saves nothing that is measured"
+    return ", ".join(parts) or "saves nothing measurable"

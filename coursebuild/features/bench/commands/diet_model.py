@@ -242,7 +242,7 @@ class DietModel:
             try:
                 text = open_model(self.path, self.read, self.compile)
             except MarkupError as error:
-                message = f"{error.path}:{error.line}:{error.column} is no XML: {error.message}"
+                message = f"{error.path}:{error.line}:{error.column} is not XML: {error.message}"
                 help = "MuJoCo reads it all the same; other tools do not"
                 place = scene.model.source.span(0, 0)
                 diagnostic = diagnose("model-error", place, message, help=help)

@@ -127,7 +127,7 @@ def add_report_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for reports in the course's folder."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument(
-        "--record", action="store_true", help="write what was measured to content/reports/"
+        "--record", action="store_true", help="write the measurements to content/reports/"
     )
     group.add_argument(
         "--check",
@@ -254,7 +254,9 @@ def forbid_quick(option: str, *, quick: bool) -> None:
         UsageError: `quick` is set.
     """
     if quick:
-        raise UsageError(f"{option} takes no --quick: what is recorded is measured in full")
+        raise UsageError(
+            f"{option} cannot be combined with --quick: recorded measurements are complete"
+        )
 
 
 def write_records(
@@ -275,7 +277,7 @@ def _write_record(root: Path, path: str, data: bytes) -> str | ReportFailure:
         target = resolve_inside(root, path)
         before = target.read_bytes() if target.exists() else None
         if before == data:
-            return f"{path} is as it was"
+            return f"{path} is unchanged"
         write_atomic(root, path, data, expected=before)
     except EffectError as error:
         return ReportFailure(error.message, error.help)

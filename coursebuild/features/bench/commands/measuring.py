@@ -184,8 +184,8 @@ def _exact_motion(root: Path, scene: CourseScene) -> ExactMotion | None:
                     motions[name] = (qpos, rest[0] if rest else None)
         except (msgspec.DecodeError, ValueError):
             last = run.stderr.strip().splitlines()[-1:] or [run.outcome.value]
-            message = f"`{path}` says no motion: {last[0]}"
-            help = "it defines `motion(time, qpos, qvel)`, which gives the positions at a time in s"
+            message = f"`{path}` gives no motion: {last[0]}"
+            help = "define `motion(time, qpos, qvel)` there, for the positions at a time in s"
             raise SceneError(message, span, help) from None
         return ExactStates(motions, answer.expected)
 

@@ -1,6 +1,6 @@
 """The browser's MuJoCo in this process: V8 runs the same WebAssembly file and the same lab code.
 
-Entry points: `LabEngine.trial`, `LabEngine.check_code`. docs/explanation/how-labs-run.md describes
+Entry points: `LabEngine.trial`, `LabEngine.check_code`. `site/js/lab/trial/trial.js` describes
 requests and replies.
 
 The engine starts when it is first needed, and again after a trial that ran too long or took too
@@ -103,7 +103,7 @@ class LabEngine:
         except LimitError as error:
             return self._end(isolate, "timeout", str(error))
         except ScriptError as error:  # lab code has broken something that all labs share
-            return self._end(isolate, "engine", f"the trial broke: {str(error).splitlines()[0]}")
+            return self._end(isolate, "engine", f"the trial failed: {str(error).splitlines()[0]}")
         reply: dict[str, Any] = json.loads(text)
         if any(failure["kind"] in ("engine", "shared") for failure in reply["failures"]):
             self.close()  # an engine that failed or was changed may not run the other labs

@@ -240,7 +240,7 @@ def run_trial(engine: EquationEngine, config: dict[str, Any], seconds: float) ->
     except ScriptError as error:
         reason = str(error).splitlines()[0]
         return EquationReply(
-            (CurveFinding("lab-engine", (), f"the trial broke: {reason}"),), lasting=False
+            (CurveFinding("lab-engine", (), f"the trial failed: {reason}"),), lasting=False
         )
     findings: dict[tuple[str, Entry], CurveFinding] = {}
     worst = 0.0

@@ -24,11 +24,12 @@ from coursebuild.features.language_server.commands.fields import (
     field_place,
     possible_values,
 )
-from coursebuild.features.language_server.commands.lookup import members
+from coursebuild.features.language_server.commands.lookup import label_titles, members
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.own_names import options_by_command
 from coursebuild.features.names.resolve import resolver_of
+from coursebuild.features.references.citing import works_of
 
 _NAME = r"[A-Za-z_]\w*"
 _SUBJECTS = (
@@ -37,6 +38,7 @@ _SUBJECTS = (
     ("model", Kind.File, r"\bmodel:(?P<word>[\w/-]*)$"),
     ("model", Kind.File, r"""(?:model_path\(|"model"\s*:\s*)["'](?P<word>[\w/-]*)$"""),
     ("term", Kind.Reference, r"\bterm:(?P<word>[\w-]*)$"),
+    ("source", Kind.Reference, r"\[(?:[^\[\]{}]*[\s;])?@(?P<word>[\w.:/+-]*)$"),
     ("script", Kind.File, r"(?:\]\(|\{out=)(?P<word>e?[\w./-]*)$"),
     ("callout", Kind.EnumMember, r"^[ \t>]*>[ ]*\[!(?P<word>[\w-]*)$"),
     ("fence", Kind.Keyword, r"^[ \t>]*```[ ]*(?P<word>[\w-]*)$"),
@@ -109,6 +111,9 @@ def _find_names(
             return {model.name: model.description for model in library.course.models}
         case "term":
             return {id: f"of {owner.id}: {owner.title}" for id, owner in library.terms.items()}
+        case "source":
+            works = works_of(library.course).values()
+            return {work.key: work.field("title") for work in works}
         case "script":
             scripts = library.scripts.items()
             return {path: f"of {owner.id}: {owner.title}" for path, (_, owner) in scripts}
@@ -164,8 +169,12 @@ def _find_anchors(texts: OpenTexts, source: Source, prefix: re.Match[str]) -> Ma
         owner = library.lessons.get(id) if prefix["kind"] == "lesson" else library.pages.get(id)
         source = texts.source("" if owner is None else owner.path)
     document = texts.document(source)
-    places = {} if document is None else anchors(document)
-    return {name: place.first_line().text.lstrip("# ") for name, place in places.items()}
+    if document is None:
+        return {}
+    lines = {
+        name: place.first_line().text.lstrip("# ") for name, place in anchors(document).items()
+    }
+    return lines | label_titles(library, texts.owner(source), document)
 
 
 def _find_field_names(library: Library, place: FieldPlace) -> Mapping[str, str]:

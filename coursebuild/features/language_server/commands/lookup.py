@@ -11,6 +11,7 @@ Entry points: `hover`, `definition`, `look_up`; `members`, the names that can fo
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterable, Mapping
 from urllib.parse import unquote
@@ -25,6 +26,12 @@ from coursebuild.core.model.results import Formula, ModelFacts
 from coursebuild.core.model.walk import display_formulas
 from coursebuild.core.pages.library import Library, models_named
 from coursebuild.core.pages.marks import code_span, escape_text, fence
+from coursebuild.core.pages.numbering import (
+    item_name,
+    name_outside,
+    number_items,
+    number_prefix,
+)
 from coursebuild.core.scripts.bindings import PrintedOutputs
 from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.syntax.decode import field_description
@@ -36,6 +43,7 @@ from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.engine import EngineName, KnownName, engine_names
 from coursebuild.features.names.resolve import resolver_of
+from coursebuild.features.references.citing import reference_text, works_of
 from coursebuild.features.symbols.uses import declared_symbol, symbols
 from coursebuild.pipeline.reader import kept_formulas
 
@@ -88,6 +96,23 @@ def look_up(texts: OpenTexts, source: Source, position: types.Position) -> Refer
     return _look_up_field(texts.library, source, offset)
 
 
+def label_titles(library: Library, owner: Owner | None, document: model.Document) -> dict[str, str]:
+    """The names and captions of what has a label in a document: `Figure 1.2.1: The flip`."""
+    prefix = number_prefix(owner.id) if isinstance(owner, model.Lesson) else ""
+    items = number_items(document, library.mathml).values()
+    titles = {item.id: item_name(item, prefix, library.words) for item in items}
+    captions = {formula.id: formula.tex for formula in display_formulas(document)}
+    for block, label in model.labelled_blocks(document):
+        match block:
+            case model.Table(caption=inlines) | model.Paragraph(children=inlines):
+                captions[label.id] = model.plain_text(inlines)
+            case model.Script(path=path):
+                captions[label.id] = path
+            case _:
+                captions[label.id] = block.span.first_line().text
+    return {id: ": ".join(filter(None, (name, captions[id]))) for id, name in titles.items()}
+
+
 def _covers(span: Span, offset: int) -> bool:
     return span.start <= offset < span.end
 
@@ -125,6 +150,8 @@ class _Lookup:
                 return self.look_up_link(node, model.resolve(node.target, course, node.span.path))
             case model.Term():
                 return self.look_up_link(node, model.TermTarget(node.id))
+            case model.Citation():
+                return self.look_up_citation(node, offset)
             case model.NumberBinding():
                 return self.look_up_binding(node)
             case model.Math() | model.MathBlock():
@@ -197,7 +224,8 @@ class _Lookup:
         tex = next((f.tex for f in display_formulas(document) if name and f.id == name), None)
         if place is None:
             return None
-        line = escape_text(place.first_line().text.lstrip("# "))
+        titles = label_titles(self.library, self.texts.owner(document.source), document)
+        line = escape_text(titles.get(name) or place.first_line().text.lstrip("# "))
         return line if tex is None else fence("tex", tex.strip(), wary=True), place
 
     def describe_model(self, name: str) -> tuple[str, Span] | None:
@@ -226,12 +254,23 @@ class _Lookup:
             inlines = block.children if isinstance(block, model.Paragraph) else ()
             for term in model.walk_inlines(inlines):
                 if isinstance(term, model.Term) and term.id == id:
-                    text = model.plain_text(model.without_links(definition_of(inlines, term)))
+                    reference = functools.partial(name_outside, self.library, owner)
+                    sentences = model.without_links(definition_of(inlines, term), reference)
+                    text = model.plain_text(sentences)
                     name = f"**{escape_text(term.name)}**"
                     return _paragraphs(name, escape_text(text)), term.span
         return None
 
-    # --- formulas, numbers, code
+    # --- citations, formulas, numbers, code
+
+    def look_up_citation(self, citation: model.Citation, offset: int) -> Referent | None:
+        """Return the source that is cited at an offset, as pages show it."""
+        cited = next((work for work in citation.works if _touches(work.span, offset)), None)
+        work = None if cited is None else works_of(self.library.course).get(cited.key)
+        if cited is None or work is None:
+            return None
+        text = reference_text(self.library.course, work.key)
+        return Referent(cited.span, escape_text(text or work.field("title")), work.span)
 
     def look_up_formula(
         self, formula: model.Math | model.MathBlock, offset: int

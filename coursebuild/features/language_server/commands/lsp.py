@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
 examples:
-  coursebuild lsp -C ~/course            what an editor is told to start
+  coursebuild lsp -C ~/course            the command that an editor runs
 """
 
 
@@ -38,7 +38,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     add_cache(parser)
     parser.add_argument(
-        "--stdio", action="store_true", help="as many editors say; it does so anyway"
+        "--stdio", action="store_true", help="accepted for editors that pass it; it is always on"
     )
 
 

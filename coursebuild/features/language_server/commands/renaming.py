@@ -128,7 +128,7 @@ def _term_name(texts: OpenTexts, id: str, span: Span) -> _Name | None:
         if not new or set('{}"\n') & set(name):
             raise JsonRpcInvalidParams('a term has letters or digits, and none of `{`, `}`, `"`')
         if new != id and new in texts.library.terms:
-            raise JsonRpcInvalidParams(f"there is a term `{new}` already")
+            raise JsonRpcInvalidParams(f"there is already a term `{new}`")
         start = term.span.start + term.span.text.rindex("{")
         is_text = name == collapse_spaces(model.plain_text(term.children))
         attribute = "{term}" if is_text else f'{{term="{name}"}}'
@@ -158,7 +158,7 @@ def _label_name(texts: OpenTexts, path: str, label: str, span: Span) -> _Name | 
             form = f"`{prefix}:` and then " if is_numbered else ""
             raise JsonRpcInvalidParams(f"a label is {form}letters, digits, `-` and `_`")
         if name != label and name in anchors(document):
-            raise JsonRpcInvalidParams(f"there is an anchor `{name}` already")
+            raise JsonRpcInvalidParams(f"there is already an anchor `{name}`")
         link_edits = _edit_anchor_links(texts, path, label, name)
         return _workspace_edit(texts, [Edit(place, name), *link_edits])
 

@@ -126,7 +126,7 @@ _OPTIONS: dict[str, object] = {
             types.CodeActionKind.SourceFixAll,
         ]
     ),
-    types.TEXT_DOCUMENT_COMPLETION: types.CompletionOptions(trigger_characters=[*':.#!"/(`=']),
+    types.TEXT_DOCUMENT_COMPLETION: types.CompletionOptions(trigger_characters=[*':.#!"/(`=@']),
     types.TEXT_DOCUMENT_RENAME: types.RenameOptions(prepare_provider=True),
 }
 

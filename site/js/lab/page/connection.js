@@ -1,5 +1,5 @@
 /**
- * The worker that the page's labs share, and each lab's line to it. docs/explanation/how-labs-run.md has the protocol.
+ * The worker that the page's labs share, and each lab's line to it. worker/session.js has the protocol.
  *
  *   const line = connection(workerUrl).open(id, receive)
  *   line.send({ type: 'play' }); line.close()

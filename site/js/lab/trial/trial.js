@@ -1,14 +1,49 @@
 /**
  * A lab's trial: everything that a reader can do with the lab is tried, and each failure is reported with its entry.
  *
- *   runTrial(engine, request, bytes, now) → reply          (both plain values, see docs/explanation/how-labs-run.md)
+ *   runTrial(engine, request, bytes, now) → reply          (both plain values)
  *
  * 1. The main run: from the start, stepping as Play does. It provides the lab's static form and the record for parity.
- * 2. Every control at its ends and at its value, every option, every button, each from a fresh start and followed by some steps.
- * 3. Every claim (`expect`), from a fresh start; claims after the same steps share a run.
- * 4. The goal: its log has to reach it, and doing nothing must not.
+ * 2. Every control at its ends and at its value, every option, every button, each from a fresh start and followed by 0.5 s of steps
+ *    (at most 500). Every readout and trace is evaluated before and after.
+ * 3. Every claim (`expect`), from a fresh start; claims after the same acts share a run. The acts (`after`, here always a list) are done
+ *    at the start, with no time between them. A claim with `diverges` holds if the simulation has diverged by its time.
+ * 4. The goal: its log has to reach it, within the length of the main run after the last act and the time to hold; doing nothing must
+ *    not.
  *
- * The same request gives the same reply, but for `stepsPerSecond`.
+ * The same request gives the same reply, but for `stepsPerSecond`. The request:
+ *
+ *   config   the lab's JSON
+ *   code     the lab's functions as one expression
+ *   seconds  how long the main run is (`verify.seconds`), or `null`: until `stopAt`, or 5 s; then at most 20 000 steps
+ *   parity   whether to record what native MuJoCo needs (`true`)
+ *   mjb      the model in base64, instead of the reserved buffer
+ *
+ * The reply:
+ *
+ *   version         of the engine
+ *   tried           `[{entry, what}]` in order
+ *   failures        `[{entry, kind, message, at, during}]`: `at` is a simulated time or `null`, `during` the attempt as in `tried`. The
+ *                   kind `nan` is a value that is not finite, unless the lab's own code writes `NaN` or `Infinity`; `type` a value of
+ *                   the wrong type; `engine` an engine that ended or does not load the model. Every divergence is a failure here
+ *   stepsPerSecond  of the lab with its controller and samples, without recording
+ *   printed         by the engine
+ *   main            the main run, or `null` if the lab does not start:
+ *
+ *     seconds, steps, timestep   how long it was
+ *     stopped, diverged          `stopAt`, `code` or `null`; whether it diverged
+ *     plots                      `{times, plots: [[values of each trace]]}`, at most 1000 times; a gap is `null`
+ *     pictures                   `{time, frame, readouts}` at the start and at the end
+ *     scene                      as the page gets it, with textures of at most 256 × 256 and faces of cubes of 64 × 64
+ *     fill, mostFill             the part of the picture that what moves fills, in the mean of the run: with the lab's camera, and with
+ *                                the fitting one
+ *     arrows                     metres for each unit of momentum, angular momentum and force: the middle arrow seen is 0.3 of the
+ *                                picture's height
+ *     parity                     what native MuJoCo needs (parity.js)
+ *     resetDiffers               `null` or `{what, entry}`: the first number of the state that a reset does not restore, such as
+ *                                `qvel[0]`, and the entry that would have to set it (`[]`: unknown). The solver's warm start may differ
+ *
+ * Arrays of numbers are `{type, data}` with `f32`, `f64`, `i32`, `u32` or `u8` and little-endian base64.
  */
 
 import { EngineError } from '../core/engine.js'

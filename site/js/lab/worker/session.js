@@ -1,8 +1,49 @@
 /**
- * One lab of a page, as the worker runs it: messages in, frames out. docs/explanation/how-labs-run.md has the protocol.
+ * One lab of a page, as the worker runs it: messages in, frames out.
  *
  * Frames are sent only while the page gives their buffers back, so that a page which cannot follow slows nothing but itself. An
  * exception of lab code pauses the lab and is reported with its entry.
+ *
+ * Messages have a `type` and, except for `warm`, the `lab` that they are about. Those that arrive while a lab is loading are kept, and
+ * handled afterwards. To the worker:
+ *
+ *   warm {wasm}                       start to fetch and compile the engine (an address)
+ *   load {config, module, mjb, wasm}  fetch what is missing and start the lab; the last three are absolute addresses. A model in
+ *                                     `config.xml` replaces `mjb`
+ *   ping                              answered by `pong`, unless something takes all the worker's time
+ *   play, pause, reset
+ *   step {n}                          pause and make `n` steps
+ *   speed {factor}                    simulated seconds for each real one
+ *   control {index, value, play}      set a number or an option; with `play` the lab then runs, unless its code pauses
+ *   press {index, play}               press a button; `play` likewise
+ *   overlay {name, on}                one of `OVERLAYS` in core/frame.js
+ *   visible {on}                      a lab out of sight makes no steps and sends no frames
+ *   perturb {body, point, target}     with `point` (m, world) take hold of the body there; draw it to `target`; `null` lets go
+ *   frame {buffer}                    give a frame's buffer back (or `null` if it is lost)
+ *   replay {log}                      begin again and play the log (core/lab.js)
+ *   state                             ask for the state
+ *   restore {state}                   go to a state; `{values}` alone sets the controls and resets
+ *   dispose                           free everything
+ *
+ * To the page:
+ *
+ *   ready {version, scene, values, time}  `scene` of core/scene.js; `values` of the controls, `null` for none yet
+ *   frame {time, buffer, readouts, samples, realtime, contacts, goal}
+ *   playing
+ *   paused {reason}                   `user`, `stopAt`, `code`, `diverged`, `error`, `offscreen`
+ *   controls {values}                 after anything that lab code may have changed
+ *   diverged {time, kind, message}, warning {time, kind, message}
+ *   error {message, entry, kind, fatal}  `entry`: the way into the lab's JSON, such as `["controls", 2, "run"]`; `kind`: `throws`,
+ *                                     `type`, `engine`, `load`, or `refused` for an impossible message, which alone does not pause
+ *                                     the lab. After a `fatal` one the page ends the worker, and may start another
+ *   state {state}                     `{values, steps, time, physics, log}`
+ *
+ * Of a frame: `buffer` is laid out as core/frame.js says, and transferred, not copied. `readouts` has a number, a text or `null` (no
+ * value) each; it is `null` as a whole if one of them failed. `samples` is `{epoch, times, values}` since the last frame: for each
+ * time one number for each trace of all plots in turn, NaN for a gap; a new `epoch` means that the run began again. `realtime` is how
+ * much of the time due in the last second was simulated: 1 unless the model is too slow. `goal` is `null` or `{held, reached,
+ * counts}`: for how long its condition has held (s), when it was reached (s or `null`), and whether the reader has used the controls
+ * alone.
  */
 
 import { Clock } from '../core/clock.js'
