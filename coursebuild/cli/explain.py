@@ -48,7 +48,7 @@ from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.text.diagnostics import nearest
 from coursebuild.core.text.rules import RULES, Rule
-from coursebuild.numerics.reports.records import BENCH
+from coursebuild.numerics.reports.records import BENCH, ENGINES
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
 from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style, visible
@@ -352,7 +352,7 @@ def _uses(document: Document, path: str) -> Iterator[object]:
         if isinstance(block, FeatureBlock):
             mentioned = block.mentioned_models()
             models = {f"models/{model}.xml" for model in (*block.models(), *mentioned)}
-            if path in models.union(map(BENCH.path, mentioned)):
+            if path in models.union(map(BENCH.path, mentioned), map(ENGINES.path, mentioned)):
                 yield block
         for inline in walk_inlines(block_inlines(block)):
             match inline:

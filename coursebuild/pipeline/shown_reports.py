@@ -24,10 +24,11 @@ from coursebuild.core.text.source import Source
 if TYPE_CHECKING:  # a course without reports needs none of it
     from coursebuild.numerics.reports.case_report import CaseReport
     from coursebuild.numerics.reports.diet_report import DietReport
+    from coursebuild.numerics.reports.engine_report import EngineReport
     from coursebuild.numerics.reports.records import ReportFailure, ReportKind
     from coursebuild.numerics.reports.scene_report import SceneReport
 
-    _Scene = TypeVar("_Scene", SceneReport, DietReport)
+    _Scene = TypeVar("_Scene", SceneReport, DietReport, EngineReport)
 
 _FOLDER = "content/reports/"
 _T = TypeVar("_T")
@@ -49,10 +50,11 @@ class _Collector:
         self._diagnostics: list[Diagnostic] = []
 
     def read(self, paths: Iterable[str]) -> Parsed[Reports]:
-        from coursebuild.numerics.reports.records import BENCH, DIET, STABILITY
+        from coursebuild.numerics.reports.records import BENCH, DIET, ENGINES, STABILITY
 
         scenes: dict[str, SceneReport] = {}
         diets: dict[str, DietReport] = {}
+        engines: dict[str, EngineReport] = {}
         cases: tuple[CaseReport, ...] = ()
         for path in paths:
             name = path.removeprefix(_FOLDER)
@@ -66,7 +68,9 @@ class _Collector:
                 scenes |= self._read_for_model(BENCH, name.removesuffix(BENCH.suffix))
             elif name.endswith(DIET.suffix):
                 diets |= self._read_for_model(DIET, name.removesuffix(DIET.suffix))
-        return Parsed(Reports(scenes, diets, cases), tuple(self._diagnostics))
+            elif name.endswith(ENGINES.suffix):
+                engines |= self._read_for_model(ENGINES, name.removesuffix(ENGINES.suffix))
+        return Parsed(Reports(scenes, diets, cases, engines), tuple(self._diagnostics))
 
     def _read_for_model(self, kind: ReportKind[_Scene], name: str) -> dict[str, _Scene]:
         """Read the report on a model; return it by the model's name, if it fits."""

@@ -405,10 +405,11 @@ class Reports(Struct, frozen=True):
     """
 
     scenes: Mapping[str, Any] = field(default_factory=dict)
-    """By the model's name, as `diets`."""
+    """By the model's name, as `diets` and `engines`."""
     diets: Mapping[str, Any] = field(default_factory=dict)
     cases: tuple[Any, ...] = ()
     """Of hard cases, which belong to no model."""
+    engines: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Machine(Struct, frozen=True, forbid_unknown_fields=True):

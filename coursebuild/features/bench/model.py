@@ -5,7 +5,8 @@ Entry points: `Bench`, `declared_scenarios`; `parse_bench`, of a fence; `check_b
 model is compiled.
 
 The first word of a fence is the name of the model, as in a link (`%20` is a space). Keys:
-`scenario=swing` (default: the first), `show="plot,table"` (see `PARTS`), or `sweep=softness`.
+`scenario=swing` (default: the first), `show="plot,table"` (see `PARTS`), or `sweep=softness`. What
+other engines do, `show=engines`, is a report of its own.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
 
-BenchPart: TypeAlias = Literal["plot", "stable", "orders", "table"]
+BenchPart: TypeAlias = Literal["plot", "stable", "orders", "table", "engines"]
 """A part of a report that can be shown."""
-PARTS: tuple[BenchPart, ...] = ("plot", "stable", "orders", "table")
+PARTS: tuple[BenchPart, ...] = ("plot", "stable", "orders", "table", "engines")
 """All parts, in the order in which they are shown."""
 
 
@@ -118,7 +119,8 @@ def check_keyframes(
 
 
 def _check(bench: Bench, course: Course) -> Iterator[Diagnostic]:
-    from coursebuild.numerics.reports.records import BENCH  # late: most courses do not need it
+    # Late: most courses do not need it.
+    from coursebuild.numerics.reports.records import BENCH, ENGINES
 
     models = [model.name for model in course.models]
     if bench.model not in models:
@@ -134,10 +136,16 @@ def _check(bench: Bench, course: Course) -> Iterator[Diagnostic]:
     scenarios = declared_scenarios(course, bench.model)
     if scenarios:
         yield from _check_scenario(bench, scenarios)
-    if BENCH.path(bench.model) not in course.files:
-        message = f"nothing was recorded of the model `{bench.model}`, and the page says so"
-        help = f"measure it with `{BENCH.command(bench.model)}`"
-        yield diagnose("bench-unrecorded", bench.model_span, message, help=help)
+    commands: dict[str, str] = {}
+    if bench.shows != ("engines",):
+        commands[BENCH.path(bench.model)] = BENCH.command(bench.model)
+    if "engines" in bench.shows:
+        commands[ENGINES.path(bench.model)] = ENGINES.command(bench.model)
+    for path, command in commands.items():
+        if path not in course.files:
+            message = f"nothing was recorded of the model `{bench.model}`, and the page says so"
+            help = f"measure it with `{command}`"
+            yield diagnose("bench-unrecorded", bench.model_span, message, help=help)
 
 
 def _check_scenario(bench: Bench, names: Collection[str]) -> Iterator[Diagnostic]:

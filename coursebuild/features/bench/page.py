@@ -23,6 +23,7 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import escape_marks, guard_lines
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
+from coursebuild.features.bench.engine_view import EngineView, engine_plots, engine_view
 from coursebuild.features.bench.grids import (
     Grid,
     factor,
@@ -35,7 +36,8 @@ from coursebuild.features.bench.grids import (
 from coursebuild.features.bench.model import Bench, declared_scenarios
 from coursebuild.features.bench.scenario_view import ScenarioView, plots, scenario_view
 from coursebuild.numerics.reports.diet_report import DietReport, Finding, Saving
-from coursebuild.numerics.reports.records import BENCH, DIET
+from coursebuild.numerics.reports.engine_report import EngineReport
+from coursebuild.numerics.reports.records import BENCH, DIET, ENGINES
 from coursebuild.numerics.reports.scene_report import ScenarioReport, SceneReport, SweepReport
 
 if TYPE_CHECKING:
@@ -56,6 +58,13 @@ class BenchView(Struct, frozen=True):
     folded_table: Grid | None = None
     """The table of settings, if it is folded below something else."""
     machine: str = ""
+    engines: EngineView | None = None
+    """What other engines do; `None` also if no report fits."""
+    engines_command: str = ""
+    """Empty where other engines are not shown."""
+    engines_machine: str = ""
+    alone: bool = False
+    """Whether other engines are all that is shown."""
 
 
 def bench_view(library: Library, place: urls.Place, bench: Bench) -> BenchView:
@@ -73,7 +82,9 @@ def bench_view(library: Library, place: urls.Place, bench: Bench) -> BenchView:
         anchor = scenario_anchor(report.name)
     href = place.href(urls.model_page_path(bench.model), anchor)
     view = BenchView(bench.model, href, BENCH.command(bench.model))
-    if scene is None or report is None:
+    if "engines" in bench.shows:
+        view = _with_engines(library, place, bench, view)
+    if view.alone or scene is None or report is None:
         return view
     scenario = scenario_view(library.words, report)
     only_table, is_sweep = bench.shows == ("table",), isinstance(report, SweepReport)
@@ -91,15 +102,44 @@ def bench_view(library: Library, place: urls.Place, bench: Bench) -> BenchView:
     )
 
 
+def _with_engines(library: Library, place: urls.Place, bench: Bench, view: BenchView) -> BenchView:
+    """Add what other engines do, where it was recorded."""
+    report: EngineReport | None = library.reports.engines.get(bench.model)
+    scenarios = () if report is None else report.scenarios
+    name = bench.scenario
+    scenario = next((scenario for scenario in scenarios if name in (None, scenario.name)), None)
+    alone = bench.shows == ("engines",)
+    href = place.href(urls.model_page_path(bench.model), _ENGINES) if alone else view.href
+    command = ENGINES.command(bench.model)
+    view = replace(view, alone=alone, href=href, engines_command=command)
+    if report is None or scenario is None:
+        return view
+    return replace(
+        view,
+        engines=engine_view(library.words, scenario, report),
+        engines_machine=machine_text(library.words, report.machine),
+    )
+
+
+_ENGINES = "engines"
+"""The anchor of what other engines do, on the page of a model."""
+
+
 def draw_bench(page: PageContext, block: Bench) -> Markup:
-    """Draw the report, with its plot for wide and for narrow screens."""
+    """Draw the report, with its plots for wide and for narrow screens."""
     view = _view(page, block)
     drawings: tuple[Markup, ...] = ()
+    engine_drawings: tuple[Markup, ...] = ()
+    # The blocks of a page are numbered.
+    places = [b.span.start for b in find_blocks(page.document, Bench)]
+    number = places.index(block.span.start) + 1
     if view.scenario is not None and "plot" in block.shows:
-        # The blocks of a page are numbered.
-        places = [b.span.start for b in find_blocks(page.document, Bench)]
-        drawings = plots(f"_bench-{places.index(block.span.start) + 1}", view.scenario.report)
-    return page.template("bench/bench.html", bench=view, plots=drawings)
+        drawings = plots(f"_bench-{number}", view.scenario.report)
+    if view.engines is not None:
+        engine_drawings = engine_plots(f"_bench-engines-{number}", view.engines.scenario)
+    return page.template(
+        "bench/bench.html", bench=view, plots=drawings, engine_plots=engine_drawings
+    )
 
 
 def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
@@ -107,7 +147,7 @@ def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     from coursebuild.numerics.reports.report_plots import work_precision
 
     view = _view(writer.page, block)
-    html = writer.page.template("bench/bench.html", bench=view, plots=())
+    html = writer.page.template("bench/bench.html", bench=view, plots=(), engine_plots=())
     head, *rest = writer.html(html).split("\n\n")
     report = None if view.scenario is None else view.scenario.report
     if isinstance(report, ScenarioReport) and "plot" in block.shows:
@@ -165,6 +205,9 @@ class MeasurementsView(Struct, frozen=True):
     numerics: str
     """The address of the hard cases; empty if there are none."""
     sweeps: tuple[ScenarioView, ...]
+    engines: tuple[EngineView, ...] = ()
+    engines_machine: str = ""
+    engines_file: str = ""
 
 
 def measurements_view(library: Library, place: urls.Place, model: MjcfModel) -> MeasurementsView:
@@ -172,6 +215,7 @@ def measurements_view(library: Library, place: urls.Place, model: MjcfModel) -> 
     words, name = library.words, model.name
     scene: SceneReport | None = library.reports.scenes.get(name)
     diet: DietReport | None = library.reports.diets.get(name)
+    engines: EngineReport | None = library.reports.engines.get(name)
     scenarios = () if scene is None else scene.scenarios
     sweeps = () if scene is None else scene.sweeps
     anchors = {s: scenario_anchor(s) for s in declared_scenarios(library.course, name)}
@@ -192,6 +236,11 @@ def measurements_view(library: Library, place: urls.Place, model: MjcfModel) -> 
         sweeps=tuple(
             scenario_view(words, sweep, scenario_anchor(f"sweep-{sweep.name}")) for sweep in sweeps
         ),
+        engines=()
+        if engines is None
+        else tuple(engine_view(words, scenario, engines) for scenario in engines.scenarios),
+        engines_machine="" if engines is None else machine_text(words, engines.machine),
+        engines_file="" if engines is None else place.href(urls.file_path(ENGINES.path(name))),
     )
 
 
@@ -201,8 +250,14 @@ def draw_measurements(renderer: Renderer, view: MeasurementsView) -> Markup:
         plots(f"_plot-{n}", scenario.report) for n, scenario in enumerate(view.scenarios, 1)
     ]
     sweep_plots = [plots(f"_sweep-{n}", sweep.report) for n, sweep in enumerate(view.sweeps, 1)]
+    engine_drawings = [
+        engine_plots(f"_engines-{n}", engines.scenario) for n, engines in enumerate(view.engines, 1)
+    ]
     return renderer.render(
-        "bench/measurements.html", measurements=view, plots=scenario_plots + sweep_plots
+        "bench/measurements.html",
+        measurements=view,
+        plots=scenario_plots + sweep_plots,
+        engine_plots=engine_drawings,
     )
 
 

@@ -1,8 +1,9 @@
 """Reports as files of the course, `content/reports/…`, and how a new measurement differs from them.
 
-Entry points: `BENCH`, `DIET` and `STABILITY`, each a `ReportKind` that encodes and decodes its
-files; `RecordError`, for files that are no report; `scene_departures(record, measurement, bench)`
-and `case_departures`, the figures that left their band about the recorded ones.
+Entry points: `BENCH`, `ENGINES`, `DIET` and `STABILITY`, each a `ReportKind` that encodes and
+decodes its files; `RecordError`, for files that are no report; `scene_departures(record,
+measurement, bench)` and `case_departures`, the figures that left their band about the recorded
+ones.
 
 1. A file begins with its kind and the version of its format: `{"holds": …, "form": …, …}`.
 2. Keys are sorted, and every measured row is a line, so that a difference between two versions of a
@@ -31,6 +32,7 @@ from msgspec.structs import replace
 from coursebuild.core.model.scenarios import BenchTable
 from coursebuild.numerics.reports.case_report import CaseReport
 from coursebuild.numerics.reports.diet_report import DietReport
+from coursebuild.numerics.reports.engine_report import EngineReport
 from coursebuild.numerics.reports.scene_report import (
     FLOORS,
     FigureLine,
@@ -65,7 +67,7 @@ class ReportKind(Struct, Generic[_T], frozen=True):
     """A kind of report that a course keeps."""
 
     name: str
-    """Of the command that makes it."""
+    """Of the command that makes it, perhaps with an option."""
     field: str
     """The key of the report in its file."""
     type: type[_T]
@@ -80,8 +82,9 @@ class ReportKind(Struct, Generic[_T], frozen=True):
 
     def command(self, model: str = "") -> str:
         """The command that records the report."""
+        command, *options = self.name.split()
         names = [shlex.quote(model)] if model else []
-        return " ".join(["coursebuild", self.name, *names, "--record"])
+        return " ".join(["coursebuild", command, *names, *options, "--record"])
 
     def encode(self, report: _T) -> bytes:
         """The file."""
@@ -103,7 +106,7 @@ class ReportKind(Struct, Generic[_T], frozen=True):
         return report
 
 
-def _model_flaw(kind: str, report: SceneReport | DietReport, model: str) -> str:
+def _model_flaw(kind: str, report: SceneReport | EngineReport | DietReport, model: str) -> str:
     """Why a report is not a complete one of this model; empty where it is, or none is named."""
     if model and report.model != model:
         return f"holds a report of the model `{report.model}`"
@@ -129,6 +132,13 @@ def _case_flaw(cases: tuple[CaseReport, ...], _: str) -> str:
 
 
 BENCH = ReportKind("bench", "scene", SceneReport, ".bench.json", _scene_flaw)
+ENGINES = ReportKind(
+    "bench --engines",
+    "engines",
+    EngineReport,
+    ".engines.json",
+    partial(_model_flaw, "bench --engines"),
+)
 DIET = ReportKind("diet", "diet", DietReport, ".diet.json", partial(_model_flaw, "diet"))
 STABILITY: ReportKind[tuple[CaseReport, ...]] = ReportKind(
     "stability", "cases", tuple[CaseReport, ...], ".json", _case_flaw

@@ -28,6 +28,7 @@ from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.values import decode, encode
 from coursebuild.features.bench.commands import measuring
+from coursebuild.features.bench.commands.engines import run_engines
 from coursebuild.features.bench.commands.measurement import (
     CannotMeasureError,
     Measurement,
@@ -72,6 +73,7 @@ EXAMPLES = """\
 examples:
   coursebuild bench --quick              a first look at all models
   coursebuild bench pendulum --record    what its page shows
+  coursebuild bench pendulum --engines   the same model in other engines
 """
 
 
@@ -85,6 +87,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quick", action="store_true", help="fewer settings and rough times, for a first look"
     )
+    parser.add_argument(
+        "--engines",
+        nargs="?",
+        const="",
+        metavar="NAMES",
+        help="measure other engines instead: all that are installed, or some, as in mjx,warp",
+    )
     add_report_options(parser)
     add_cache(parser)
     add_executors(parser)
@@ -94,6 +103,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Measure models, or check their recorded reports."""
     require("scipy", "measure", "`coursebuild bench`")
     names, quick = tuple(arguments.scenes), arguments.quick
+    if arguments.engines is not None:
+        return run_engines(arguments)
 
     def measure(options: Options) -> Measurement[Any]:
         if arguments.check:

@@ -1,0 +1,106 @@
+"""The child process in which an engine runs: a crash or a hang takes nothing else along.
+
+Entry point: run as a file by `engines`, in a temporary folder, where engines leave what they
+compile.
+
+The protocol: JSON lines. First this process says that it is ready. A request is a module of engines
+with the name of one, and what to do; the reply has the result, or says why there is none.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import sys
+import time
+from typing import Literal
+
+import msgspec
+from msgspec import Struct
+
+from coursebuild.numerics.engines.engine_trial import (
+    Engine,
+    EngineCost,
+    EngineMotion,
+    Trial,
+    Variant,
+    begin,
+    run_costs,
+    run_motion,
+)
+
+
+class Request(Struct, frozen=True):
+    """What an engine is asked."""
+
+    path: tuple[str, ...]
+    """Where the tool finds modules."""
+    module: str
+    name: str
+    processors: int
+    action: Literal["list", "motion", "costs"]
+    """A motion comes with the costs of one world, so that it is compiled only once."""
+    variant: Variant | None = None
+    trial: Trial | None = None
+    worlds: int = 1
+
+
+class Reply(Struct, frozen=True):
+    """What it says: what was asked for, or why there is none."""
+
+    variants: tuple[Variant, ...] = ()
+    motion: EngineMotion | None = None
+    cost: EngineCost | None = None
+    refusal: str = ""
+    """In the engine's own words."""
+    unsupported: bool = False
+    """Whether it says that it does not have a feature."""
+
+
+_LONGEST = 300
+"""Characters of a refusal."""
+
+
+def main() -> None:
+    """Serve until the input closes."""
+    replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)  # engines print what they compile
+    os.dup2(null, 2)
+    print("ready", file=replies, flush=True)
+    for line in sys.stdin:
+        request = msgspec.json.decode(line, type=Request)
+        try:
+            reply = _answer(request)
+        except MemoryError:
+            reply = Reply(refusal="there is not enough memory")
+        except Exception as error:  # whatever it raises is its answer
+            reply = Reply(refusal=_words(error), unsupported=isinstance(error, NotImplementedError))
+        print(json.dumps(msgspec.to_builtins(reply)), file=replies, flush=True)
+
+
+def _answer(request: Request) -> Reply:
+    sys.path[:] = request.path
+    engine: Engine = importlib.import_module(request.module).ENGINES[request.name]
+    if request.action == "list":
+        return Reply(tuple(engine.variants(request.processors)))
+    assert request.variant is not None and request.trial is not None
+    trial, clock = request.trial, time.perf_counter_ns
+    batch = begin(engine, request.variant, trial, request.worlds, clock)
+    motion = run_motion(batch, trial) if request.action == "motion" else None
+    return Reply(motion=motion, cost=run_costs(batch, trial, clock))
+
+
+def _words(error: Exception) -> str:
+    """An exception in one line, cut where it gets long."""
+    text = " ".join(str(error).split())
+    name = type(error).__name__
+    if name == "RefusalError":
+        return text
+    text = f"{name}: {text}" if text else name
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+
+
+if __name__ == "__main__":
+    main()

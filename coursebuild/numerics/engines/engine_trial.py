@@ -1,0 +1,217 @@
+"""What an engine is asked in a child process: one motion, and what a step of many worlds costs.
+
+Entry points: `Engine`, the table that an engine's module fills in; `Variant`, `Trial`;
+`begin(engine, …)`, then `run_motion(batch, trial)` and `run_costs(batch, trial, clock)`.
+
+1. The motion begins as the scenario does, in one world, and is looked at where the reference is.
+2. The worlds of a batch begin a little apart, so that they do not all take the same branches.
+3. Steps are timed beside MuJoCo's own, in the same process and in turn: what slows the machine for
+   a while slows both, and their ratio holds. Time is that of the wall, since engines use threads or
+   another device.
+4. The first step compiles; how much longer it takes than the second one is told apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Literal, Protocol, TypeAlias
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+
+from coursebuild.numerics.costs import Clock, time_jobs
+from coursebuild.numerics.pilot import nudges
+from coursebuild.numerics.problem import Array, Scenario
+from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.simulation import STATE, full_state, initial_data, silent
+
+
+class Variant(Struct, frozen=True):
+    """One way to run an engine."""
+
+    device: str
+    """As the engine's own library names it, such as `cpu` or `cuda:0`."""
+    label: str
+    """What the device calls itself; empty for the processor, which the report names."""
+    bits: Literal[32, 64]
+    """Of its floating-point numbers."""
+    threads: int = 0
+    """How many it is told to use; 0 where it decides itself."""
+
+
+class Worlds(Protocol):
+    """Copies of a model that an engine simulates."""
+
+    def advance(self, steps: int) -> None:
+        """Make so many steps in every world, and wait until they are made."""
+
+    def command(self, control: tuple[float, ...]) -> None:
+        """Give this command to all worlds."""
+
+    def reset(self) -> None:
+        """Go back to the beginning."""
+
+    def state(self) -> tuple[Array, Array]:
+        """The `qpos` and `qvel` of the first world, in double precision."""
+
+
+Start: TypeAlias = Callable[[Any, Any, Array, Variant], Worlds]
+"""`mjModel`, `mjData` at the beginning, and `qvel` (worlds, nv) of each world → the worlds."""
+
+
+class Engine(Struct, frozen=True):
+    """An engine, as a table of functions."""
+
+    title: str
+    module: str
+    """The module that is there where the engine is installed."""
+    packages: tuple[str, ...]
+    """Those that its figures depend on; the first brings the module."""
+    variants: Callable[[int], list[Variant]]
+    """The ways to run it here; the argument is the number of usable processors."""
+    start: Start
+    batched: bool = True
+    """Whether it can simulate more than one world at a time."""
+
+
+class RefusalError(Exception):
+    """An engine does not do what it is asked, in words of this module: it takes too long."""
+
+
+class Trial(Struct, frozen=True):
+    """What an engine is to simulate."""
+
+    model: str
+    """A file with the compiled model (MJB)."""
+    scenario: Scenario
+    count: int
+    """The number of samples up to which the motion is compared."""
+
+
+class EngineMotion(Struct, frozen=True):
+    """The motion of one world, at each sample."""
+
+    qpos: list[list[float | None]]
+    """`None` for what is not finite, which JSON cannot say."""
+    qvel: list[list[float | None]]
+    compile_seconds: float
+
+
+class EngineCost(Struct, frozen=True):
+    """What a step of one world costs, among so many."""
+
+    seconds: Interval
+    ratio: Interval
+    """To a step of MuJoCo itself in one world, timed in turn."""
+    compile_seconds: float
+    steps: int
+    """Steps of a repeat, from the beginning of the scenario."""
+
+
+_SPREAD = 1e-3
+"""How far apart the worlds of a batch begin, as `pilot.nudges` has it."""
+_REPEAT, _SLOWEST = 0.004, 20.0
+"""Seconds that a repeat takes at least, unless that is the whole scenario: as short as a turn that
+a busy system gives to one program. Seconds of a step beyond which an engine is not timed."""
+
+
+class Batch(Struct, frozen=True, eq=False):
+    """Worlds that are ready to be advanced."""
+
+    model: Any
+    worlds: Worlds
+    count: int
+    compile_seconds: float
+
+
+def begin(engine: Engine, variant: Variant, trial: Trial, count: int, clock: Clock) -> Batch:
+    """Start an engine, and let it compile what it needs for so many worlds."""
+    model = mujoco.MjModel.from_binary_path(trial.model)
+    data = initial_data(trial.scenario, model)
+    velocities = np.tile(data.qvel, (count, 1))
+    # The first world begins as the scenario does.
+    velocities[1:] += nudges(model, 2 * count, _SPREAD)[: count - 1, 1]
+    instances: list[Worlds] = []
+
+    def first() -> None:
+        instances.append(engine.start(model, data, velocities, variant))
+        instances[0].advance(1)
+
+    with silent():
+        took = _time(first, clock)
+        took -= _time(partial(instances[0].advance, 1), clock)
+    return Batch(model, instances[0], count, max(0.0, took))
+
+
+def run_motion(batch: Batch, trial: Trial) -> EngineMotion:
+    """The motion of a trial in one world."""
+    scenario, worlds, states = trial.scenario, batch.worlds, []
+    steps = scenario.steps(float(batch.model.opt.timestep))
+    with silent():
+        worlds.reset()
+        for _, command in zip(range(trial.count), scenario.commands(scenario.sample), strict=False):
+            if command:
+                worlds.command(command)
+            worlds.advance(steps)
+            states.append(worlds.state())
+    qpos, qvel = (np.array(part) for part in zip(*states, strict=True))
+    return EngineMotion(_finite(qpos), _finite(qvel), batch.compile_seconds)
+
+
+def _finite(table: Array) -> list[list[float | None]]:
+    rows: list[list[float]] = table.tolist()
+    return [[value if math.isfinite(value) else None for value in row] for row in rows]
+
+
+def run_costs(batch: Batch, trial: Trial, clock: Clock) -> EngineCost:
+    """What a step of one world costs among those of a batch.
+
+    Raises:
+        RefusalError: it takes too long to be timed.
+    """
+    model, worlds, count = batch.model, batch.worlds, batch.count
+    until = trial.scenario.holds()[0][1]  # until the command changes
+    most = round(until / float(model.opt.timestep))
+    with silent():
+        worlds.reset()
+        steps = 1
+        while True:
+            seconds = _time(partial(worlds.advance, steps), clock)
+            if seconds > _SLOWEST:
+                raise RefusalError(f"a step of {count:,} worlds takes {seconds:.0f} s")
+            if seconds >= _REPEAT or steps == most:
+                break
+            steps = min(most, steps * (2 if seconds > _REPEAT / 10 else 8))
+
+        def work() -> None:
+            worlds.reset()
+            worlds.advance(steps)
+
+        data = initial_data(trial.scenario, model)
+        beginning = full_state(model, data)
+
+        def own_steps(repeats: int) -> None:
+            for _ in range(repeats):
+                mujoco.mj_setState(model, data, beginning, STATE)
+                mujoco.mj_step(model, data, steps)
+
+        # What takes as long is disturbed as often.
+        repeats = max(1, round(_REPEAT / _time(partial(own_steps, 1), clock)))
+
+        _, timing = time_jobs([partial(own_steps, repeats), work], 0, clock, quick=True)
+    share = repeats / count
+    return EngineCost(
+        timing.nanoseconds.scale(1e-9 / (steps * count)),
+        timing.ratio.scale(share),
+        batch.compile_seconds,
+        steps,
+    )
+
+
+def _time(work: Callable[[], None], clock: Clock) -> float:
+    before = clock()
+    work()
+    return (clock() - before) * 1e-9

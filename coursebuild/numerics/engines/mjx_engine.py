@@ -1,0 +1,89 @@
+"""MJX: MuJoCo in JAX, in 32 and in 64 bits, on the processor and on the first device of JAX.
+
+Its implementation in JAX, `impl="jax"`; that in Warp is an engine of its own.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+
+from coursebuild.numerics.engines.engine_trial import Engine, Variant
+from coursebuild.numerics.problem import Array
+
+
+class BatchedWorlds:
+    """A batch that one compiled function advances."""
+
+    def __init__(self, model: Any, data: Any, velocities: Array, variant: Variant) -> None:
+        from mujoco import mjx
+
+        jax: Any = importlib.import_module("jax")
+        jax.config.update("jax_enable_x64", variant.bits == 64)
+        self._device = jax.devices(variant.device)[0]
+        count = len(velocities)
+        with jax.default_device(self._device):
+            self._model = mjx.put_model(model, device=self._device, impl="jax")
+            world = mjx.put_data(model, data, device=self._device, impl="jax")
+            batch = jax.tree.map(
+                lambda leaf: jax.numpy.broadcast_to(leaf, (count, *jax.numpy.shape(leaf))), world
+            )
+            batch = batch.replace(qvel=jax.numpy.asarray(velocities, dtype=world.qvel.dtype))
+            # Placed as results are: a function is compiled again for what is placed otherwise.
+            self._beginning = self._batch = jax.device_put(batch, self._device)
+            step = jax.vmap(mjx.step, in_axes=(None, 0))
+
+            def advance(model: Any, batch: Any, steps: Any) -> Any:
+                return jax.lax.fori_loop(0, steps, lambda _, state: step(model, state), batch)
+
+            self._advance = jax.jit(advance)
+
+    def advance(self, steps: int) -> None:
+        """Make so many steps in every world, and wait for them."""
+        jax: Any = importlib.import_module("jax")
+        with jax.default_device(self._device):
+            self._batch = jax.block_until_ready(self._advance(self._model, self._batch, steps))
+
+    def command(self, control: tuple[float, ...]) -> None:
+        """Give this command to all worlds."""
+        import jax
+
+        before = self._batch.ctrl
+        table = np.broadcast_to(np.asarray(control, before.dtype), before.shape)
+        self._batch = self._batch.replace(ctrl=jax.device_put(table, self._device))
+
+    def reset(self) -> None:
+        """Go back to the beginning."""
+        self._batch = self._beginning
+
+    def state(self) -> tuple[Array, Array]:
+        """The state of the first world."""
+        return (
+            np.asarray(self._batch.qpos[0], dtype=np.float64),
+            np.asarray(self._batch.qvel[0], dtype=np.float64),
+        )
+
+
+def variants(_: int) -> list[Variant]:
+    """The processor, and the accelerator that JAX prefers, each in 32 and in 64 bits."""
+    import jax
+
+    devices = {device.platform: device for device in (*jax.devices("cpu")[:1], *jax.devices()[:1])}
+    return [
+        Variant(platform, "" if platform == "cpu" else device.device_kind, bits)
+        for platform, device in devices.items()
+        for bits in (32, 64)
+    ]
+
+
+ENGINES = {
+    "mjx": Engine(
+        title="MJX",
+        module="mujoco.mjx",
+        packages=("mujoco-mjx", "jax"),
+        variants=variants,
+        start=BatchedWorlds,
+    )
+}
