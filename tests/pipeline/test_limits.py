@@ -150,7 +150,7 @@ def test_too_few_addresses_for_v8_are_told(make: Make) -> None:
     folder = make(GOOD + "$a_{18}$\n")
     status, output = run_limited(folder, "-v 8388608", "check")
     assert status == 1
-    assert "coursebuild: V8 needs more than the 8 GiB of addresses" in output
+    assert "coursebuild: V8 needs more than the 8 GiB of address space" in output
     assert "`ulimit -v unlimited`" in output
     assert "Traceback" not in output
 

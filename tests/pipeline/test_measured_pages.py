@@ -130,7 +130,7 @@ def course(built_course: Folder, tmp_path: Path) -> Course:
 def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built_course: Folder) -> None:
     course = Course(built_course)
     page, lesson = course.page(), course.page(SCENARIO_LESSON)
-    assert 'class="work-precision"' in page and "Nobody reads it." in page
+    assert 'class="work-precision"' in page and "Nothing reads it." in page
     assert "It swings." in course.page(NUMERICS)
     assert (course.folder.root / "public/files/reports/box.bench.json").is_file()
     cup = course.page("models/cup.html")

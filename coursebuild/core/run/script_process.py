@@ -130,6 +130,7 @@ class PreloadedPackages:
         if (random := modules.get("numpy.random")) is not None:
             random.seed()
         # They are never freed at the end of the script: that would take longer than most scripts.
+        atexit.register(_write_lines_at_once)
         atexit.register(self._hide, modules)
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(modules))
 
@@ -163,6 +164,17 @@ class PreloadedPackages:
         for name in group:
             if "." not in name and group[name].__spec__ is not None and self._tracer is not None:
                 self._tracer.note_import(name, None)
+
+
+def _write_lines_at_once() -> None:
+    """Write what objects print while they are freed at the end.
+
+    A package that is never freed may refer to a stream, as a default argument; then the stream is
+    not freed either, and what it still holds would be lost.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(AttributeError, OSError, ValueError):  # replaced, or closed
+            stream.reconfigure(line_buffering=True)  # type: ignore[union-attr]
 
 
 class ScriptProcess:

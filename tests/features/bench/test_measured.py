@@ -137,7 +137,7 @@ def test_an_error_that_the_reference_does_not_resolve_has_no_column(make: Make) 
 def test_the_diet_of_a_model(site: dict[str, str]) -> None:
     words = text(site["models/box.html"])
     assert "One part of this model changes nothing that happens in its scenarios." in words
-    assert "sensor-unread Nobody reads &lt;this&gt; sensor." in words
+    assert "sensor-unread Nothing reads &lt;this&gt; sensor." in words
     assert "proved; ×1.07 as fast, 120 B of memory, 40 B of text (swing)." in words
     assert "Because its value goes nowhere. models/box.xml:3" in words
     assert "Kept: it is the horizon." in words

@@ -81,7 +81,7 @@ def test_folder_that_cannot_be_imported_is_refused(
         (
             "course.json",
             "{",
-            "course.json is no JSON: Expecting property name enclosed in double "
+            "course.json is not JSON: Expecting property name enclosed in double "
             "quotes: line 1 column 2 (char 1)",
         ),
         ("course.json", "[" * 100_000, "course.json is not JSON: the text is nested too deeply"),
