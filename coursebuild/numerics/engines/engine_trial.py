@@ -1,6 +1,6 @@
 """What an engine is asked in a child process: one motion, and what a step of many worlds costs.
 
-Entry points: `Engine`, the table that an engine's module fills in; `Variant`, `Trial`;
+Entry points: `Engine`, the table that an engine's module fills in; `Variant`, `EngineTrial`;
 `begin(engine, …)`, then `run_motion(batch, trial)` and `run_costs(batch, trial, clock)`.
 
 1. The motion begins as the scenario does, in one world, and is looked at where the reference is.
@@ -81,7 +81,7 @@ class RefusalError(Exception):
     """An engine does not do what it is asked, in words of this module: it takes too long."""
 
 
-class Trial(Struct, frozen=True):
+class EngineTrial(Struct, frozen=True):
     """What an engine is to simulate."""
 
     model: str
@@ -127,7 +127,7 @@ class Batch(Struct, frozen=True, eq=False):
     compile_seconds: float
 
 
-def begin(engine: Engine, variant: Variant, trial: Trial, count: int, clock: Clock) -> Batch:
+def begin(engine: Engine, variant: Variant, trial: EngineTrial, count: int, clock: Clock) -> Batch:
     """Start an engine, and let it compile what it needs for so many worlds."""
     model = mujoco.MjModel.from_binary_path(trial.model)
     data = initial_data(trial.scenario, model)
@@ -146,7 +146,7 @@ def begin(engine: Engine, variant: Variant, trial: Trial, count: int, clock: Clo
     return Batch(model, instances[0], count, max(0.0, took))
 
 
-def run_motion(batch: Batch, trial: Trial) -> EngineMotion:
+def run_motion(batch: Batch, trial: EngineTrial) -> EngineMotion:
     """The motion of a trial in one world."""
     scenario, worlds, states = trial.scenario, batch.worlds, []
     steps = scenario.steps(float(batch.model.opt.timestep))
@@ -166,7 +166,7 @@ def _finite(table: Array) -> list[list[float | None]]:
     return [[value if math.isfinite(value) else None for value in row] for row in rows]
 
 
-def run_costs(batch: Batch, trial: Trial, clock: Clock) -> EngineCost:
+def run_costs(batch: Batch, trial: EngineTrial, clock: Clock) -> EngineCost:
     """What a step of one world costs among those of a batch.
 
     Raises:

@@ -23,7 +23,7 @@ from coursebuild.numerics.engines.engine_trial import (
     Engine,
     EngineCost,
     EngineMotion,
-    Trial,
+    EngineTrial,
     Variant,
     begin,
     run_costs,
@@ -42,7 +42,7 @@ class Request(Struct, frozen=True):
     action: Literal["list", "motion", "costs"]
     """A motion comes with the costs of one world, so that it is compiled only once."""
     variant: Variant | None = None
-    trial: Trial | None = None
+    trial: EngineTrial | None = None
     worlds: int = 1
 
 

@@ -48,7 +48,7 @@ from coursebuild.features.bench.commands.measurement import (
 from coursebuild.features.bench.engine_view import engine_view
 from coursebuild.features.bench.grids import machine_text
 from coursebuild.numerics.engines import MODULES
-from coursebuild.numerics.engines.engine_trial import Engine, Trial, Variant
+from coursebuild.numerics.engines.engine_trial import Engine, EngineTrial, Variant
 from coursebuild.numerics.engines.engine_verdict import EngineBasis, engine_basis, judge_motion
 from coursebuild.numerics.reports.engine_report import (
     WORLDS,
@@ -211,7 +211,7 @@ class _EngineRun(MeasuringRun):
             for physics in compiled_scene.scenarios:
                 self.progress.describe(scene.name, f"{physics.name}: the reference")
                 basis = engine_basis(compiled_scene.model, physics, quick=self.quick)
-                trial = Trial(path, physics.scenario, len(physics.scenario.times))
+                trial = EngineTrial(path, physics.scenario, len(physics.scenario.times))
                 rows = tuple(
                     row for choice in self.engines for row in self._rows(choice, basis, trial)
                 )
@@ -220,7 +220,9 @@ class _EngineRun(MeasuringRun):
             scene.name, scene.digest, self.quick, self.machine, load, tuple(scenarios)
         )
 
-    def _rows(self, choice: ChosenEngine, basis: EngineBasis, trial: Trial) -> Iterator[EngineRow]:
+    def _rows(
+        self, choice: ChosenEngine, basis: EngineBasis, trial: EngineTrial
+    ) -> Iterator[EngineRow]:
         """A row for each way to run an engine; one that says why there is none."""
         row = EngineRow(
             engine=choice.name,
@@ -258,7 +260,7 @@ def _refuse(row: EngineRow, reply: Reply) -> EngineRow:
 
 
 def _costs(
-    child: _EngineChild, variant: Variant, trial: Trial, counts: Iterable[int], limit: float
+    child: _EngineChild, variant: Variant, trial: EngineTrial, counts: Iterable[int], limit: float
 ) -> Iterator[BatchCost]:
     """What a step costs among more and more worlds."""
     expected = 0.0
