@@ -76,10 +76,13 @@ def becomes(page: Page, value: Callable[[], object], expected: object) -> None:
 
 
 def wait_until_settled(page: Page) -> None:
-    """Wait until the page's script has run, its fonts are loaded, and the browser is idle."""
+    """Wait until the page's script has run, its fonts are loaded, and the browser is idle.
+
+    A browser that is never idle, or draws nothing, calls nobody back without a limit.
+    """
     expect(page.locator("[data-tools] select").first).to_be_attached()
     until(page, "document.fonts.status === 'loaded'")
-    page.evaluate("() => new Promise((done) => requestIdleCallback(done))")
+    page.evaluate("() => new Promise((done) => requestIdleCallback(done, { timeout: 10000 }))")
 
 
 def lab(page: Page, number: int = SWING, state: str | None = "paused") -> Locator:
