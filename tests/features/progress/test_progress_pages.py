@@ -153,7 +153,7 @@ def test_a_heading_that_has_the_quizs_id_keeps_it(make: Make) -> None:
     question = {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}
     html = make("## Check\n\nSee [it](#check).\n\n" + quiz_of(question, id="check")).html()
     assert html.count('id="check"') == 1
-    assert '<section class="quiz" data-quiz="check"' in html
+    assert '<section class="quiz" role="group" data-quiz="check"' in html
     assert 'id="check.why"' in html
 
 
