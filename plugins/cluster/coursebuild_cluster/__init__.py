@@ -1,6 +1,8 @@
 """`--cluster ADDRESS`: a course's scripts and measurements on the workers of a Dask scheduler.
 
-- `executor`: what a command asks, here: which worker does what, and what becomes of the answers
+- `connection`: a scheduler, reached or started here
+- `executor`: what a command asks, here: which worker does what
+- `results`: what becomes of the answers of scripts, here
 - `worker`: what Dask calls on a worker; the work itself is done by a process beside it
 - `child`: that process, with its copy of the course
 - `course_copy`: a course as a list of hashes, and a folder that is brought to the same state

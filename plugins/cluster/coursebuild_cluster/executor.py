@@ -14,11 +14,8 @@ Entry point: `start`, which makes a `Cluster`.
 
 from __future__ import annotations
 
-import importlib
-import logging
 import os
 import queue
-import re
 import secrets
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -26,17 +23,13 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.course_root import DECISIVE
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.files.locks import temporary_folder
-from coursebuild.core.files.write import resolve_inside
-from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
-from coursebuild.core.run.dependencies import Dependency, Kind
+from coursebuild.core.model.results import ScriptJob, ScriptRun
 from coursebuild.core.run.run_store import States
 from coursebuild.core.run.sandbox import find_sandbox
 from coursebuild.core.run.script_environment import Interpreter
@@ -49,17 +42,15 @@ from coursebuild.core.run.script_server import (
     ScriptServer,
 )
 from coursebuild_cluster import worker
+from coursebuild_cluster.connection import connect
 from coursebuild_cluster.course_copy import CourseReader
 from coursebuild_cluster.messages import Answer, Request, WorkerFacts, pack, unpack
+from coursebuild_cluster.results import lost_run, run_as_here, would_differ, write_output
 
-LOCAL = "local"
 MOST_DEATHS = 3
 """How often the worker of a task may die."""
-_PATIENCE = 10.0
-"""Seconds in which a scheduler has to answer."""
 _INTERVAL = 0.2
 """Seconds between two looks at what is wanted, and at the workers."""
-_MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFound|Import)Error\b", re.MULTILINE)
 _MOST_SENDINGS = 3
 """How often files are sent that change all the time."""
 
@@ -72,43 +63,7 @@ def start(
     Raises:
         EffectError: there is none, or Dask is not installed.
     """
-    try:
-        dask, distributed = map(importlib.import_module, ("dask", "distributed"))  # without types
-    except ImportError as error:
-        help = "run `pip install 'dask[distributed]'`"
-        raise EffectError(f"--cluster needs the package {error.name}", help=help) from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is told here
-    resources = ExitStack()
-    try:
-        if address == LOCAL:
-            local = distributed.LocalCluster(
-                n_workers=jobs,
-                threads_per_worker=1,
-                memory_limit=0,  # scripts have limits of their own
-                dashboard_address=None,
-                silence_logs=logging.CRITICAL,
-                preload=worker.__name__,  # for its `dask_setup`
-                local_directory=resources.enter_context(temporary_folder()),
-                # Other users of this machine can reach its ports.
-                protocol="tls://",
-                security=distributed.Security.temporary(),
-            )
-            resources.callback(local.close, timeout=_PATIENCE)
-            client = distributed.Client(local, set_as_default=False)
-        else:
-            patience = dask.config.get("distributed.comm.timeouts.connect")
-            patience = min(dask.utils.parse_timedelta(patience), _PATIENCE)
-            client = distributed.Client(address, timeout=patience, set_as_default=False)
-        resources.callback(client.close, timeout=_PATIENCE)
-    except (OSError, ValueError, TypeError, RuntimeError) as error:
-        resources.close()
-        cause = str(error.__cause__ or error).strip().splitlines()[:1] or [type(error).__name__]
-        help = "`dask scheduler` starts one and says its address, `local` starts one here"
-        message = f"--cluster: there is no Dask scheduler at `{address}`: {cause[0]}"
-        raise EffectError(message, help=help) from None
-    except BaseException:
-        resources.close()
-        raise
+    client, resources = connect(address, jobs)
     return Cluster(client, address, root, say, resources, sandbox=sandbox)
 
 
@@ -231,12 +186,16 @@ class Cluster:
         try:
             for task, answer in self._answers(take, lambda: bool(pending), is_wanted):
                 job = jobs[task.number]
-                run = _lost_run(job) if answer.is_lost else _as_here(answer, states.places)
-                if run is None or (not answer.is_lost and _differs(answer, states)):
+                run = (
+                    lost_run(job, task.deaths)
+                    if answer.is_lost
+                    else run_as_here(answer, states.places)
+                )
+                if run is None or (not answer.is_lost and would_differ(answer, states)):
                     left.append(task.number)
                     continue
                 for path, data in answer.written:
-                    _write(root, job, path, data)
+                    write_output(root, job, path, data)
                 runs[task.number] = run
                 on_finish(run)
         finally:
@@ -470,75 +429,3 @@ def _own_facts() -> bytes:
     global _facts
     _facts = _facts or worker.describe()
     return _facts
-
-
-# --- results
-
-
-def _lost_run(job: ScriptJob) -> ScriptRun:
-    text = f"the worker that ran this script died, {MOST_DEATHS} times, each time another one\n"
-    return ScriptRun(job.path, Outcome.KILLED, 9, "", text, 0.0)
-
-
-def _as_here(answer: Answer, places: Iterable[tuple[str, str]]) -> ScriptRun | None:
-    """A run with the folders of here in the place of those of the worker."""
-    if answer.run is None:
-        return None
-    replace_all = _replacer(answer, places, ("course", "library", "prefix", "base"))
-    replace_own = _replacer(answer, places, ("course", "library"))
-    parts = msgspec.to_builtins(replace(answer.run, stdout=""), builtin_types=(bytes,))
-    run = msgspec.convert(_map_texts(parts, replace_all), ScriptRun)
-    return replace(run, stdout=replace_own(answer.run.stdout))
-
-
-def _differs(answer: Answer, states: States) -> bool:
-    """Whether the script would have seen something else here."""
-    run = answer.run
-    assert run is not None
-    if run.outcome is Outcome.SKIPPED or _MISSING_MODULE.search(run.stderr):
-        return True
-    replace_all = _replacer(answer, states.places, ("course", "library", "prefix", "base"))
-    needs = (replace(d, name=replace_all(d.name)) for d in answer.dependencies)
-    return any(_state_here(need, states) != need.state for need in needs)
-
-
-def _state_here(dependency: Dependency, states: States) -> str:
-    # The path of a folder is another one on a worker, and is replaced where it was printed.
-    return dependency.state if dependency.kind is Kind.PLACE else states.now(dependency.need)
-
-
-def _replacer(
-    answer: Answer, places: Iterable[tuple[str, str]], names: Sequence[str]
-) -> Callable[[str], str]:
-    own_folders = dict(places)
-    pairs = [
-        (folder.rstrip("/"), own_folders[name].rstrip("/"))
-        for name, folder in answer.places  # longer ones come first
-        if name in names and len(folder) > 1 and folder != own_folders[name]
-    ]
-    if not pairs:
-        return lambda text: text
-    targets = dict(pairs)
-    alternatives = "|".join(map(re.escape, targets))
-    pattern = re.compile(rf"(?<![\w./-])(?:{alternatives})(?![\w.-])")
-    return lambda text: pattern.sub(lambda match: targets[match[0]], text)
-
-
-def _map_texts(value: Any, change: Callable[[str], str]) -> Any:
-    """A value of plain parts with all texts changed."""
-    if isinstance(value, str):
-        return change(value)
-    if isinstance(value, list | tuple):
-        return [_map_texts(part, change) for part in value]
-    if isinstance(value, dict):
-        return {key: _map_texts(part, change) for key, part in value.items()}
-    return value
-
-
-def _write(root: Path, job: ScriptJob, path: str, data: bytes) -> None:
-    """Write what a script has written where it may."""
-    if not any(path.startswith(f"{folder.rstrip('/')}/") for folder in job.writes):
-        raise EffectError(f"--cluster: {job.path} may not write {path}")
-    target = resolve_inside(root, path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_bytes(data)

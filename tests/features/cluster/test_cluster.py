@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.model.results import ScriptJob
 from support.local_cluster import local_cluster
 from support.sandboxes import require_sandbox
 from support.scratch_course import (
@@ -269,7 +271,7 @@ def test_a_script_that_kills_its_worker_each_time(
     result = run(make("## One\n\n" + kills + rest), "check", "--cluster", address)
     assert result.status == 1
     assert len(re.findall("^ok ", result.out, re.MULTILINE)) == 4
-    assert "the worker that ran this script died, 3 times" in result.out
+    assert "each of the 3 workers that ran this script died" in result.out
     assert re.search("^killed +examples/kills.py", result.out, re.MULTILINE)
 
 
@@ -345,3 +347,20 @@ def test_what_is_not_there(
     assert result.err == "coursebuild: --long cannot be combined with --cluster\n"
     result = run(folder, "check", "--cluster", "local", "--against", "3.13.0")
     assert result.err == "coursebuild: --against cannot be combined with --cluster\n"
+
+
+@pytest.mark.parametrize("path", ["content/a.md", "runs/../content/a.md", "runs/link/a.md", "runs"])
+def test_a_worker_writes_only_where_its_script_may(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: str
+) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "plugins/cluster"))
+    from coursebuild_cluster.results import write_output
+
+    (tmp_path / "content").mkdir()
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs/link").symlink_to(tmp_path / "content")
+    job = ScriptJob("examples/a.py", (), 1.0, (), writes=("runs/",))
+    with pytest.raises(EffectError, match="may not write"):
+        write_output(tmp_path, job, path, b"x")
+    write_output(tmp_path, job, "runs/new/a.txt", b"x")
+    assert [*(tmp_path / "content").iterdir()] == []
