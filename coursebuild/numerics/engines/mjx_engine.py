@@ -31,9 +31,13 @@ class BatchedWorlds:
                 lambda leaf: jax.numpy.broadcast_to(leaf, (count, *jax.numpy.shape(leaf))), world
             )
             batch = batch.replace(qvel=jax.numpy.asarray(velocities, dtype=world.qvel.dtype))
-            # Placed as results are: a function is compiled again for what is placed otherwise.
-            self._beginning = self._batch = jax.device_put(batch, self._device)
             step = jax.vmap(mjx.step, in_axes=(None, 0))
+            # A loop needs the types of a step's results: in 64 bits some are other ones than those
+            # of `put_data`. Placed as results are: a function is compiled again for what is placed
+            # otherwise.
+            types = jax.eval_shape(step, self._model, batch)
+            batch = jax.tree.map(lambda leaf, result: leaf.astype(result.dtype), batch, types)
+            self._beginning = self._batch = jax.device_put(batch, self._device)
 
             def advance(model: Any, batch: Any, steps: Any) -> Any:
                 return jax.lax.fori_loop(0, steps, lambda _, state: step(model, state), batch)
