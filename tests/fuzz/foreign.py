@@ -1,4 +1,4 @@
-"""What others send: figures, lists of sources, courses of other tools, messages of an editor."""
+"""What others send: figures, models, sources, courses of other tools, messages of an editor."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from typing import Any
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.registry import installed_features
+from coursebuild.core.run.mjcf import read_tags
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
@@ -104,6 +105,25 @@ def figures() -> Iterator[bytes]:
     yield b'a,"b\r\nc",\r1e999,nan\n"'
     yield _png(3, 2)
     yield _png(1 << 15, 1 << 15)
+
+
+# --- models
+
+
+def model(text: str) -> None:
+    """The places of its tags and attributes are those of their names and values."""
+    for tag in read_tags(text):
+        assert text[slice(*tag.place)] == tag.name
+        if tag.end_place is not None:
+            assert text[slice(*tag.end_place)] == tag.end_name
+        for name, place, value, value_place in tag.attributes:
+            assert (text[slice(*place)], text[slice(*value_place)]) == (name, value)
+
+
+def models() -> Iterator[bytes]:
+    yield b"<mujoco><!-- <a> --><worldbody><geom size='1'/>\n<![CDATA[ <b ]]></worldbody></mujoc>"
+    yield from (b"<!--", b"<![CDATA[", b'<a b="', b"<a>", b"<a b='c' ")
+    yield from (path.read_bytes() for path in sorted((ROOT / "models").glob("*.xml")))
 
 
 # --- lists of sources

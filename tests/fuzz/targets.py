@@ -31,6 +31,7 @@ TARGETS = {
     "declarations": Target(texts.declaration_files, _text(texts.declarations)),
     "comparison": Target(texts.outputs, _text(texts.comparison), repeatable=False),
     "figure": Target(foreign.figures, foreign.figure, repeatable=False),
+    "model": Target(foreign.models, _text(foreign.model)),
     "sources": Target(foreign.source_lists, foreign.sources),
     "entry": Target(kept.entries, kept.entry, repeatable=False),
     "journal": Target(kept.journals, kept.journal, repeatable=False),

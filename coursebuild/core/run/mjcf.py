@@ -1,7 +1,8 @@
 """Compile MJCF with MuJoCo itself, in a child process.
 
 Entry points: `compile_or_recall`, for results kept under a `model_key`; `compile_all`;
-`model_files`, what a model is made of; `readable_error`, for people; `read_schema`, of MJCF.
+`model_files`, what a model is made of; `readable_error`, for people; `read_schema`, of MJCF;
+`read_tags`, of a text.
 
 1. One child compiles everything; it starts again if a model crashes it or takes too long. One
    model may take half of the processor time that all may take together.
@@ -182,7 +183,8 @@ class _Compiler(JsonChild):
         texts = {path: text}
         if result.line is None or _PARSER.search(result.error):
             for file in existing_files(self.root, path, text):
-                if file.endswith(".xml") and not Path(file).is_absolute():
+                is_near = file.endswith(".xml") and not Path(file).is_absolute()
+                if is_near and (self.root / file).stat().st_size <= mujoco_files.LONGEST:
                     texts[file] = (self.root / file).read_bytes().decode("utf-8", "replace")
         schema, keywords = self._vocabulary
         names = {name for content in texts.values() for name in _NAMES.findall(content)}
@@ -296,7 +298,7 @@ _SUBJECTS = (
 )
 """What messages are about: an attribute, an element, an end tag; others are about a value."""
 _MARKUP = re.compile(
-    r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<(?P<end>/?)(?P<name>[A-Za-z_][\w:.-]*+)"
+    r"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)|<(?P<end>/?)(?P<name>[A-Za-z_][\w:.-]*+)"
     r"(?P<rest>(?:[^<>\"']|\"[^\"]*+\"|'[^']*+')*+)>",
     re.DOTALL,
 )
@@ -351,7 +353,7 @@ def _suspects(
     matches = ((subject, pattern.search(result.error)) for subject, pattern in _SUBJECTS)
     subject, match = next(((s, m) for s, m in matches if m), ("value", None))
     word, element = (*(match.groups() if match else ()), "", "")[:2]
-    tags = [t for t in _read_tags(text) if subject == "end" or result.line in (None, t.line)]
+    tags = [t for t in read_tags(text) if subject == "end" or result.line in (None, t.line)]
     match subject:
         case "end":
             for tag in tags:
@@ -387,11 +389,13 @@ def _suspects(
                     yield tuple(places), values
 
 
-def _read_tags(text: str) -> list[_Tag]:
+def read_tags(text: str) -> list[_Tag]:
     """The tags of a text, each with its end tag, up to the first one that ends another."""
     tags: list[_Tag] = []
     open_tags: list[_Tag] = []
+    line, counted = 1, 0
     for match in _MARKUP.finditer(text):
+        line, counted = line + text.count("\n", counted, match.start()), match.start()
         if match["name"] is None:
             continue
         if match["end"]:
@@ -409,7 +413,6 @@ def _read_tags(text: str) -> list[_Tag]:
             for number in (2 if a[2] is not None else 3,)
             for place in ((start + a.start(number), start + a.end(number)),)
         ]
-        line = text.count("\n", 0, match.start()) + 1
         tags.append(_Tag(match["name"], match.span("name"), line, attributes))
         if not match["rest"].endswith("/"):
             open_tags.append(tags[-1])

@@ -29,7 +29,7 @@ _CUBE = tuple(f"file{side}" for side in ("right", "left", "up", "down", "front",
 _NAMING = _MESH | {"compiler", "flexcomp", "include", "model", "texture"}
 """The elements that say where files are."""
 _DEEPEST = 32
-_LONGEST = 8 << 20
+LONGEST = 8 << 20
 """Bytes of a file that is scanned."""
 _COMMENTS = re.compile(rb"<!--.*?(?:-->|\Z)", re.DOTALL)
 _TAGS = re.compile(rb"<([A-Za-z_][\w:.-]*+)((?:[^<>\"']|\"[^\"]*+\"|'[^']*+')*+)>")
@@ -190,7 +190,7 @@ def _read_file(path: str) -> bytes | None:
         return None
     try:
         state = posix.fstat(fd)
-        if not stat.S_ISREG(state.st_mode) or state.st_size > _LONGEST:
+        if not stat.S_ISREG(state.st_mode) or state.st_size > LONGEST:
             return None
         parts = []
         while part := posix.read(fd, 1 << 20):
