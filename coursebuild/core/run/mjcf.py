@@ -393,9 +393,9 @@ def read_tags(text: str) -> list[_Tag]:
     """The tags of a text, each with its end tag, up to the first one that ends another."""
     tags: list[_Tag] = []
     open_tags: list[_Tag] = []
-    line, counted = 1, 0
+    line, offset = 1, 0
     for match in _MARKUP.finditer(text):
-        line, counted = line + text.count("\n", counted, match.start()), match.start()
+        line, offset = line + text.count("\n", offset, match.start()), match.start()
         if match["name"] is None:
             continue
         if match["end"]:
