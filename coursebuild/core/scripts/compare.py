@@ -166,11 +166,28 @@ def repeat_findings(
 ) -> tuple[Diagnostic, ...]:
     """A warning for each script; `differing_runs` are pairs of a remembered run and a new one."""
     by_path = {extraction.path: extraction for extraction in extractions}
-    return tuple(
-        _unrepeatable(by_path[now.path], before, now)
-        for before, now in differing_runs
-        if now.path in by_path and not _may_differ(course, before, now)
-    )
+    diagnostics: list[Diagnostic] = []
+    for before, now in differing_runs:
+        if now.path not in by_path or _may_differ(course, before, now):
+            continue
+        notes = []
+        if (before.outcome, before.status) != (now.outcome, now.status):
+            ends = f"before {_describe_end(before)}, now {_describe_end(now)}"
+            notes.append(Note(f"it ended otherwise: {ends}"))
+        if diff := text_diff(before.stdout, now.stdout):
+            notes.append(Note("its output:\n" + diff))
+        diagnostics.append(
+            diagnose(
+                "script-unrepeatable",
+                by_path[now.path].script.span.first_line(),
+                f"`{now.path}` behaves differently than before, though nothing that "
+                "it is known to depend on has changed",
+                help="make it do the same each time (a fixed seed, no clock, files that it opens "
+                "itself), or put `volatile` on its output",
+                notes=notes,
+            )
+        )
+    return tuple(diagnostics)
 
 
 def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
@@ -186,26 +203,6 @@ def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
         compare(r, course.comparison_of(r), run.stdout).status != "drift"
         for r in recordings
         for run in (before, now)
-    )
-
-
-def _unrepeatable(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> Diagnostic:
-    notes = []
-    if (before.outcome, before.status) != (now.outcome, now.status):
-        notes.append(
-            Note(f"it ended otherwise: before {_describe_end(before)}, now {_describe_end(now)}")
-        )
-    diff = text_diff(before.stdout, now.stdout)
-    if diff:
-        notes.append(Note("its output:\n" + diff))
-    return diagnose(
-        "script-unrepeatable",
-        extraction.script.span.first_line(),
-        f"`{extraction.path}` behaves differently than before, though nothing that "
-        "it is known to depend on has changed",
-        help="make it do the same each time (a fixed seed, no clock, files that it opens itself), "
-        "or put `volatile` on its output",
-        notes=notes,
     )
 
 
@@ -231,7 +228,12 @@ def instability_diagnostic(
     if isinstance(recording.body, Excerpt) and (
         pattern := varying_times(first, second, comparison)
     ):
-        edit = _make_volatile(recording, pattern)
+        source, end = recording.body_span.source, recording.body_span.start - 1
+        start = source.line_starts[source.position(end)[0] - 1]
+        line = source.text[start:end].rstrip()
+        key = re.search(r'\svolatile="[^"]*"', line)
+        place = key.span() if key else (len(line), len(line))
+        edit = Edit(source.span(start + place[0], start + place[1]), f' volatile="{pattern}"')
         help = Fix(f'a time varies: say `volatile="{pattern}"` on the fence', edits=(edit,))
     return diagnose(
         "output-unstable",
@@ -240,16 +242,6 @@ def instability_diagnostic(
         help=help,
         notes=notes,
     )
-
-
-def _make_volatile(recording: Recording, pattern: str) -> Edit:
-    """The edit that says on a fence what varies, in the place of what it says so far."""
-    source, end = recording.body_span.source, recording.body_span.start - 1
-    start = source.line_starts[source.position(end)[0] - 1]
-    line = source.text[start:end].rstrip()
-    key = re.search(r'\svolatile="[^"]*"', line)
-    place = key.span() if key else (len(line), len(line))
-    return Edit(source.span(start + place[0], start + place[1]), f' volatile="{pattern}"')
 
 
 _REPEAT_HELP = "make the script print the same each time (a fixed seed, no clock)"
@@ -303,25 +295,19 @@ def run_standings(
     verdicts: dict[str, list[Verdict]] = {}
     for verdict in verify(course, runs):
         verdicts.setdefault(verdict.recording.script or "", []).append(verdict)
-    return {
-        run.path: _compare_with_recordings(run, verdicts[run.path])
-        if run.path in verdicts
-        else _compare_with_current(course, current_runs[run.path], run)
-        for run in runs
-    }
-
-
-def _compare_with_recordings(run: ScriptRun, verdicts: Iterable[Verdict]) -> RunStanding:
-    compared = [verdict for verdict in verdicts if verdict.status != "volatile"]
-    return RunStanding(
-        run, bool(compared), tuple(c for verdict in compared for c in verdict.changes)
-    )
-
-
-def _compare_with_current(course: Course, current_run: ScriptRun, run: ScriptRun) -> RunStanding:
-    current, new = (Side.of(run.stdout, course.filters) for run in (current_run, run))
-    is_same = same_lines(current, new, course.comparison)
-    return RunStanding(run, True, diff="" if is_same else text_diff(current_run.stdout, run.stdout))
+    standings: dict[str, RunStanding] = {}
+    for run in runs:
+        if run.path in verdicts:
+            compared = [v for v in verdicts[run.path] if v.status != "volatile"]
+            changes = tuple(change for verdict in compared for change in verdict.changes)
+            standings[run.path] = RunStanding(run, bool(compared), changes)
+        else:
+            old, new = current_runs[run.path].stdout, run.stdout
+            here, there = (Side.of(text, course.filters) for text in (old, new))
+            is_same = same_lines(here, there, course.comparison)
+            diff = "" if is_same else text_diff(old, new)
+            standings[run.path] = RunStanding(run, True, diff=diff)
+    return standings
 
 
 def judge_comparability(standing: RunStanding) -> Judgement | None:
