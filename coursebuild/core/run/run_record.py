@@ -89,7 +89,13 @@ def record_of(
 def to_bytes(record: RunRecord, places: Iterable[tuple[str, str]]) -> bytes:
     """A record as JSON; `places` are this machine's folders by name, longer ones first."""
     run = record.stored_run
-    run = replace(run, seconds=round(run.seconds, 4), stderr=_replace_places(run.stderr, places))
+    text = run.stderr.replace(_MARK, "\ufffd")
+    for name, folder in places:
+        if folder == "/":
+            continue  # every path begins with it
+        pattern = rf"(?<![\w./-]){re.escape(folder.rstrip('/'))}(?=[/\"'\s:,;)\]]|$)"
+        text = re.sub(pattern, f"{_MARK}{name}{_MARK}", text)
+    run = replace(run, seconds=round(run.seconds, 4), stderr=text)
     # Names of files may hold bytes that are no text; JSON can hold those as escapes only.
     return json.dumps(
         msgspec.to_builtins(replace(record, stored_run=run)), ensure_ascii=True
@@ -106,16 +112,6 @@ def from_bytes(data: bytes) -> RunRecord:
         return msgspec.json.decode(data, type=RunRecord)
     except msgspec.DecodeError:  # perhaps for an escape that is half a letter
         return msgspec.convert(json.loads(data), RunRecord)
-
-
-def _replace_places(text: str, places: Iterable[tuple[str, str]]) -> str:
-    text = text.replace(_MARK, "\ufffd")
-    for name, folder in places:
-        if folder == "/":
-            continue  # every path begins with it
-        pattern = rf"(?<![\w./-]){re.escape(folder.rstrip('/'))}(?=[/\"'\s:,;)\]]|$)"
-        text = re.sub(pattern, f"{_MARK}{name}{_MARK}", text)
-    return text
 
 
 # --- from notes to a trace
