@@ -126,7 +126,14 @@ def _replace(
             raise EffectError(f"another process is changing what is being written to {place}")
         # The permissions of the site's folder: those it has already, else the usual ones.
         slot.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o755)
-        _swap(slot, place)
+        if not os.path.lexists(place):
+            slot.rename(place)
+        elif not exchange(slot, place):
+            old = _sibling(place, "old")
+            remove(old)
+            place.rename(old)
+            slot.rename(place)
+            old.rename(slot)
     finally:
         _recover(place)
         put_away(root, slot)
@@ -171,18 +178,6 @@ def _check_place(root: Path, out: Path, place: Path) -> None:
             f"{out} holds files that coursebuild did not put there: {', '.join(foreign[:3])}{rest}",
             help="move them away, or publish to another folder",
         )
-
-
-def _swap(slot: Path, place: Path) -> None:
-    """Move the new site to the place, and the old one to the slot."""
-    if not os.path.lexists(place):
-        slot.rename(place)
-    elif not exchange(slot, place):
-        old = _sibling(place, "old")
-        remove(old)
-        place.rename(old)
-        slot.rename(place)
-        old.rename(slot)
 
 
 def exchange(a: Path, b: Path) -> bool:

@@ -220,32 +220,33 @@ def _with_places(rule: BlockRule) -> BlockRule:
         token_count = len(state.tokens)
         applies = rule(state, start, end, silent)
         if applies and len(state.tokens) > token_count:
-            _set_place(state, token_count, begin)
+            opening = state.tokens[token_count]
+            assert isinstance(opening, PositionedToken)
+            last = state.line - 1
+            first = opening.map[0] if opening.map else last
+            while last > first and state.isEmpty(last):
+                last -= 1
+            opening.start, opening.end = begin, state.eMarks[last]
+            if opening.type in (
+                "fence",
+                "code_block",
+                "html_block",
+                "paragraph_open",
+                "math_block",
+            ):
+                opening.text = state.text
+                opening.meta["closed"] = state.text_end < state.line  # by a line of its own
+            elif opening.type == "heading_open":
+                opening.text = _atx_text(state, begin) if opening.markup[0] == "#" else state.text
+            elif opening.type == "table_open":
+                for token in state.tokens[token_count:]:
+                    if token.type == "tr_open" and isinstance(token, PositionedToken) and token.map:
+                        row = token.map[0]
+                        token.start = state.bMarks[row] + state.tShift[row]
+                        token.end = state.eMarks[row]
         return applies
 
     return run
-
-
-def _set_place(state: BlockState, first_token: int, begin: int) -> None:
-    """Give its place, which the state forgets soon, to the block that begins with `first_token`."""
-    opening = state.tokens[first_token]
-    assert isinstance(opening, PositionedToken)
-    last = state.line - 1
-    first = opening.map[0] if opening.map else last
-    while last > first and state.isEmpty(last):
-        last -= 1
-    opening.start, opening.end = begin, state.eMarks[last]
-    if opening.type in ("fence", "code_block", "html_block", "paragraph_open", "math_block"):
-        opening.text = state.text
-        opening.meta["closed"] = state.text_end < state.line  # by a line of its own
-    elif opening.type == "heading_open":
-        opening.text = _atx_text(state, begin) if opening.markup[0] == "#" else state.text
-    elif opening.type == "table_open":
-        for token in state.tokens[first_token:]:
-            if token.type == "tr_open" and isinstance(token, PositionedToken) and token.map:
-                row = token.map[0]
-                token.start = state.bMarks[row] + state.tShift[row]
-                token.end = state.eMarks[row]
 
 
 def _atx_text(state: BlockState, begin: int) -> Excerpt:

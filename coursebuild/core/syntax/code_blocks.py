@@ -289,7 +289,23 @@ def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
             check_stray_keys(fence, state)
             return fence.code()
         case "mjcf":
-            return _read_mjcf(fence, state)
+            parsed_keys = fence.keys(values=("fragment", "error"))
+            state.diagnostics += parsed_keys.diagnostics
+            keys, fragment = parsed_keys.value, parsed_keys.value.get("fragment")
+            if fragment is not None and not _ELEMENTS.fullmatch(fragment.value or ""):
+                message = f"`{fragment.value}` is not the name of an element"
+                help = 'name the element that it goes into, for example `fragment="worldbody"`'
+                state.report(diagnose("fence-key-value", fragment.value_span, message, help=help))
+                return fence.code()
+            if parsed_keys.diagnostics:
+                return fence.code()
+            return Mjcf(
+                fence.span,
+                fence.body,
+                keys.value("fragment"),
+                keys.value("error"),
+                keys.place("error"),
+            )
         case name if (kind := fence_kind(name)) is not None and fence.nested and not kind.nested:
             message = f"a text of a quiz or lab cannot hold a {name}"
             state.report(diagnose("fence-info", fence.head, message))
@@ -330,20 +346,3 @@ def _read_unclosed(fence: Fence, state: ParsingState) -> CodeBlock:
     if fence.kind == "python" or fence.inner is not None:
         state.script, state.has_invalid_script = None, True
     return fence.code()
-
-
-def _read_mjcf(fence: Fence, state: ParsingState) -> Mjcf | CodeBlock:
-    """An `mjcf` fence; with wrong keys it cannot be compiled, and is shown as code."""
-    parsed_keys = fence.keys(values=("fragment", "error"))
-    state.diagnostics += parsed_keys.diagnostics
-    keys, fragment = parsed_keys.value, parsed_keys.value.get("fragment")
-    if fragment is not None and not _ELEMENTS.fullmatch(fragment.value or ""):
-        message = f"`{fragment.value}` is not the name of an element"
-        help = 'name the element that it goes into, for example `fragment="worldbody"`'
-        state.report(diagnose("fence-key-value", fragment.value_span, message, help=help))
-        return fence.code()
-    if parsed_keys.diagnostics:
-        return fence.code()
-    return Mjcf(
-        fence.span, fence.body, keys.value("fragment"), keys.value("error"), keys.place("error")
-    )
