@@ -144,6 +144,10 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
                 )
     files = {_resolve(path, top) for path in values_by_kind["r"]}
     inside = {path.removeprefix(f"{top}/") for path in files if path.startswith(f"{top}/")}
+    sought_names: dict[str, set[str]] = defaultdict(set)  # by the folder where they are not
+    for record in values_by_kind["v"]:
+        folder, _, names = record.partition("\t")
+        sought_names[_make_relative(folder, top)].update(names.split(","))
     return Trace(
         files=tuple(sorted(inside - {os.path.normpath(script)})),
         folders=tuple(
@@ -156,7 +160,9 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
         effects=tuple(effects),
         is_perturbed=bool(values_by_kind["p"]),
         states=tuple(values_by_kind["s"]),
-        sought=_join_sought(values_by_kind["v"], top),
+        sought=tuple(
+            f"{folder}/{{{','.join(sorted(n))}}}" for folder, n in sorted(sought_names.items())
+        ),
     )
 
 
@@ -175,14 +181,3 @@ def _resolve(path: str, top: str) -> str:
             resolved = os.path.realpath(path)
             path = resolved if resolved.startswith(f"{top}/") else path
     return path
-
-
-def _join_sought(records: Iterable[str], top: str) -> tuple[str, ...]:
-    """The modules that were looked for in vain, as `folder/{one,two}`."""
-    names_by_folder: dict[str, set[str]] = defaultdict(set)
-    for record in records:
-        folder, _, names = record.partition("\t")
-        names_by_folder[_make_relative(folder, top)].update(names.split(","))
-    return tuple(
-        f"{folder}/{{{','.join(sorted(n))}}}" for folder, n in sorted(names_by_folder.items())
-    )

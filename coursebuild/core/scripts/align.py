@@ -190,9 +190,9 @@ def pair(
         rows, columns = range(i0, i1), range(j0, j1)
         if len(rows) * len(columns) <= _CELLS:
             pairs += _best_pairs(rows, columns, weight, is_free)
-        elif blocks := difflib.SequenceMatcher(
-            None, left[i0:i1], right[j0:j1]
-        ).get_matching_blocks()[:-1]:
+            continue
+        matcher = difflib.SequenceMatcher(None, left[i0:i1], right[j0:j1])
+        if blocks := matcher.get_matching_blocks()[:-1]:
             for block in blocks:
                 i, j = rows[block.a], columns[block.b]
                 pairs += [(i + k, j + k) for k in range(block.size)]

@@ -82,21 +82,19 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
     elif show is None and (fragment is None or has_file):
         diagnostics += check_syntax(fence.body, script=has_file)
     script = None if file is None else _build_script(fence, file, keys.value, diagnostics)
-    source = None if show is None or has_file else _read_source_part(fence, show, diagnostics)
+    source = None
+    if show is not None and not has_file:
+        path, _, part = (show.value or "").partition("#")
+        if _PATH.fullmatch(path) and not fence.nested:
+            source = SourcePart(path, part, show.value_span, fence.body_span, fence.prefix)
+        else:
+            message = f"`{path}` is not the path of a file of the project"
+            if fence.nested:
+                message = "a text of a quiz or lab cannot show a file"
+            help = "name it from the project's folder, as in `show=src/pkg/x.py#function`"
+            diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
     code = PlainCode(fence.span, fence.body, fragment is not None and file is None, source)
     return Parsed(script or code, tuple(diagnostics))
-
-
-def _read_source_part(fence: Fence, show: Word, diagnostics: list[Diagnostic]) -> SourcePart | None:
-    path, _, part = (show.value or "").partition("#")
-    if _PATH.fullmatch(path) and not fence.nested:
-        return SourcePart(path, part, show.value_span, fence.body_span, fence.prefix)
-    message = f"`{path}` is not the path of a file of the project"
-    if fence.nested:
-        message = "a text of a quiz or lab cannot show a file"
-    help = "name it from the project's folder, as in `show=src/pkg/x.py#function`"
-    diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
-    return None
 
 
 def _build_script(
@@ -111,6 +109,10 @@ def _build_script(
         if "is not below" in mistake and not fence.nested:
             help = Fix(help, f"examples/{path.rpartition('/')[2]}", path)
         diagnostics.append(diagnose("script-path", file.value_span, mistake, help=help))
+    text = fence.body.text.rstrip("\n")  # with exactly one line end at its end
+    code = Excerpt(fence.body.source, text + "\n", fence.body.pieces)
+    if len(text) < len(fence.body.text):
+        code = fence.body.slice(0, len(text) + 1)
     timeout = _read_timeout(keys.get("timeout"), diagnostics)
     requires = _read_modules(keys.get("requires"), diagnostics)
     args = _read_arguments(keys.get("args"), diagnostics)
@@ -129,7 +131,7 @@ def _build_script(
         fence.span,
         path,
         file.value_span,
-        _with_line_end(fence.body),
+        code,
         fence.prefix,
         timeout,
         requires,
@@ -142,14 +144,6 @@ def _build_script(
         once=record is not None,
         figures=figures,
     )
-
-
-def _with_line_end(body: Excerpt) -> Excerpt:
-    """The text with exactly one final line end."""
-    text = body.text.rstrip("\n")
-    if len(text) < len(body.text):
-        return body.slice(0, len(text) + 1)
-    return Excerpt(body.source, text + "\n", body.pieces)
 
 
 def _read_timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:

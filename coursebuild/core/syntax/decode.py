@@ -181,7 +181,12 @@ class _Decoder:
         self, node: NumberNode, type: inspect.IntType | inspect.FloatType, name: str
     ) -> object:
         value = node.value if isinstance(type, inspect.IntType) else _to_double(node.value)
-        problem = _check_double(node) or _check_bounds(value, node, type)
+        problem = _check_double(node)
+        for attribute, words, holds in () if problem else _BOUNDS:
+            limit = getattr(type, attribute)
+            if limit is not None and not holds(value, limit):
+                problem = f"must be {words} {limit:g}, not {node.raw}"
+                break
         if problem:
             return self.report("field-value", node.mark, f"{format_name(name)} {problem}")
         return value
@@ -330,14 +335,6 @@ _BOUNDS = (
     ("le", "at most", operator.le),
     ("lt", "less than", operator.lt),
 )
-
-
-def _check_bounds(value: float, node: NumberNode, type: inspect.IntType | inspect.FloatType) -> str:
-    for attribute, words, holds in _BOUNDS:
-        limit = getattr(type, attribute)
-        if limit is not None and not holds(value, limit):
-            return f"must be {words} {limit:g}, not {node.raw}"
-    return ""
 
 
 def _to_double(value: float) -> float:

@@ -55,7 +55,7 @@ from coursebuild.core.text.diagnostics import (
     diagnose,
     sort_diagnostics,
 )
-from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.core.text.source import Source, Span
 
 _YAML = re.compile(
     r"---[ \t]*\n(?:#[ \t].*\n)*"  # the first line, comments
@@ -76,7 +76,14 @@ def parse_document(
     read.
     """
     state = ParsingState(callouts, lesson, words)
-    base = _remove_front_matter(read_markdown(source), state)
+    base = read_markdown(source)
+    if (front := _YAML.match(base.text) or _TOML.match(base.text)) is not None:
+        message = f"a {'lesson' if lesson else 'page'} has no front matter"
+        help = "its title and everything else about it are in content/course.toml; "
+        help += "begin with the text"
+        help = Fix(help, edits=(Edit(base.span(0, front.end()), ""),))
+        state.report(diagnose("front-matter", base.span(0, 3), message, help=help))
+        base = base.slice(front.end())
     title = None if lesson else title_line(source)
     if title is not None:
         base = base.slice(len(base.text.partition("\n")[0]))
@@ -99,18 +106,6 @@ def parse_document(
         help = Fix("delete it; readers would see `\ufffd`", edits=edits, safe=True)
         state.report(diagnose("control-character", source.span(at, at + 1), message, help=help))
     return Parsed(document, sort_diagnostics(state.diagnostics))
-
-
-def _remove_front_matter(text: Excerpt, state: ParsingState) -> Excerpt:
-    match = _YAML.match(text.text) or _TOML.match(text.text)
-    if match is None:
-        return text
-    subject = "lesson" if state.lesson else "page"
-    message = f"a {subject} has no front matter"
-    help = "its title and everything else about it are in content/course.toml; begin with the text"
-    fix = Fix(help, edits=(Edit(text.span(0, match.end()), ""),))
-    state.report(diagnose("front-matter", text.span(0, 3), message, help=fix))
-    return text.slice(match.end())
 
 
 _TEXTS = frozenset(
