@@ -211,6 +211,10 @@ def _deep_paragraph(state: StateBlock, start: int, end: int, silent: bool) -> bo
     return True
 
 
+_WITH_TEXT = frozenset("fence code_block html_block paragraph_open math_block".split())
+"""Types of tokens whose content is the text that the last rule cut out."""
+
+
 def _with_places(rule: BlockRule) -> BlockRule:
     """The rule, which also gives places to its tokens."""
 
@@ -227,17 +231,18 @@ def _with_places(rule: BlockRule) -> BlockRule:
             while last > first and state.isEmpty(last):
                 last -= 1
             opening.start, opening.end = begin, state.eMarks[last]
-            if opening.type in (
-                "fence",
-                "code_block",
-                "html_block",
-                "paragraph_open",
-                "math_block",
-            ):
+            if opening.type in _WITH_TEXT:
                 opening.text = state.text
                 opening.meta["closed"] = state.text_end < state.line  # by a line of its own
-            elif opening.type == "heading_open":
-                opening.text = _atx_text(state, begin) if opening.markup[0] == "#" else state.text
+            elif opening.type == "heading_open" and opening.markup[0] != "#":
+                opening.text = state.text
+            elif (
+                opening.type == "heading_open"
+            ):  # whose rule does not cut its content by `getLines`
+                at, length = state.skipCharsStr(begin, "#"), len(state.tokens[-2].content)
+                while length and state.src[at] in MD_TRIM_CHARS:
+                    at += 1
+                opening.text = state.base.slice(at, at + length)
             elif opening.type == "table_open":
                 for token in state.tokens[token_count:]:
                     if token.type == "tr_open" and isinstance(token, PositionedToken) and token.map:
@@ -247,15 +252,6 @@ def _with_places(rule: BlockRule) -> BlockRule:
         return applies
 
     return run
-
-
-def _atx_text(state: BlockState, begin: int) -> Excerpt:
-    """The content of a `#` heading, which its rule does not cut by `getLines`."""
-    content = state.tokens[-2].content
-    at = state.skipCharsStr(begin, "#")
-    while content and state.src[at] in MD_TRIM_CHARS:
-        at += 1
-    return state.base.slice(at, at + len(content))
 
 
 def _build_parser() -> MarkdownIt:

@@ -132,13 +132,21 @@ class _Decoder:
             case inspect.StrType(), StringNode():
                 return self.decode_string(node, type, name, remarks)
             case inspect.LiteralType(), StringNode():
-                return self.decode_literal(node, type, name)
+                if node.value in type.values:
+                    return node.value
+                message = f"{format_name(name)} cannot be {format_value(node)}"
+                help = did_you_mean(node.value, map(str, type.values))
+                return self.report("field-value", node.mark, message, help)
             case inspect.IntType() | inspect.FloatType(), NumberNode():
                 return self.decode_number(node, type, name)
             case inspect.VarTupleType() | inspect.TupleType(), ArrayNode():
                 return self.decode_array(node, type, name)
             case inspect.DictType(), ObjectNode():
-                return self.decode_map(node, type)
+                values = {
+                    key: self.decode_value(member.value, type.value_type, key)
+                    for key, member in node.members.items()
+                }
+                return _INVALID if _INVALID in values.values() else values
             case inspect.StructType(), ObjectNode():
                 return self.decode_struct(node, type)
             case inspect.UnionType(), _:
@@ -169,13 +177,6 @@ class _Decoder:
         if "text" in remarks:
             self.texts.append((node, remarks["text"]))
         return value
-
-    def decode_literal(self, node: StringNode, type: inspect.LiteralType, name: str) -> object:
-        if node.value in type.values:
-            return node.value
-        message = f"{format_name(name)} cannot be {format_value(node)}"
-        help = did_you_mean(node.value, map(str, type.values))
-        return self.report("field-value", node.mark, message, help)
 
     def decode_number(
         self, node: NumberNode, type: inspect.IntType | inspect.FloatType, name: str
@@ -213,13 +214,6 @@ class _Decoder:
             for i, (item, type) in enumerate(zip(node.items, types, strict=True))
         ]
         return _INVALID if _INVALID in values else tuple(values)
-
-    def decode_map(self, node: ObjectNode, type: inspect.DictType) -> object:
-        values = {
-            key: self.decode_value(member.value, type.value_type, key)
-            for key, member in node.members.items()
-        }
-        return _INVALID if _INVALID in values.values() else values
 
     # ---------------------------------------------------------------------------------- structs
 

@@ -56,9 +56,10 @@ def parse_toml(text: Source | Excerpt, *, rule: str = "map-syntax") -> Parsed[Ob
     except RecursionError:
         diagnostic = diagnose(rule, body.span(0, 0), "tables, arrays or keys are nested too deeply")
     except ValueError as error:
-        diagnostic = _diagnose_repeated_key(body, str(error)) or diagnose_syntax(
-            body, str(error), rule
-        )
+        repeated_key = _diagnose_repeated_key(body, str(error))
+        start, end, message, help = _describe_mistake(body.text, str(error))
+        mistake = diagnose(rule, body.span(start, end), message, help=help)
+        diagnostic = repeated_key or mistake
     return Parsed(None, (diagnostic,))
 
 
@@ -246,12 +247,6 @@ def double_backslash(command: str) -> str:
     """How to write a command of TeX in a string."""
     help = f"double the backslash: `\\\\{command}`, or put the text between single quotes"
     return Fix(help, "\\\\", "\\", safe=True)
-
-
-def diagnose_syntax(body: Excerpt, message: str, rule: str) -> Diagnostic:
-    """The diagnostic of a text that `tomllib` refuses with `message`."""
-    start, end, words, help = _describe_mistake(body.text, message)
-    return diagnose(rule, body.span(start, end), words, help=help)
 
 
 _Mistake = tuple[int, int, str, str]
