@@ -151,7 +151,7 @@ class BoundText(Struct, frozen=True):
     def stray(self) -> str:
         """A sign beside the numbers that is neither a unit nor a word, as in `-9.81-`."""
         texts = (self.before.strip(), self.after.strip())
-        return next(filter(re.compile(r"[-+*/.,;:=_]+").fullmatch, texts), "")
+        return next(filter(_STRAY.fullmatch, texts), "")
 
     def _windows(self, lines: Iterable[PrintedLine]) -> Iterator[Window]:
         """All runs of as many printed numbers of one line."""

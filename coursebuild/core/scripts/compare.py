@@ -110,9 +110,19 @@ class _ChangeFinder(Struct, frozen=True):
                     for step in group:
                         yield from self._line(step)
                 case StepKind.MISSING:
-                    yield self._missing(list(group))
+                    missing = [step.recorded for step in group]
+                    start, _ = self.recorded.origin(missing[0], 0, 0)
+                    span = self._span(start, self._end_of(missing[-1]))
+                    text = "\n".join(self.recorded.lines[line] for line in missing)
+                    yield Change(DriftKind.MISSING, span, text, "")
                 case StepKind.EXTRA:
-                    yield self._extra(list(group))
+                    extra = list(group)
+                    text = "\n".join(self.printed.lines[step.printed] for step in extra)
+                    before, count = extra[0].recorded, len(self.recorded.lines)
+                    place = self._end_of(count - 1)
+                    if before < count:
+                        place = self.recorded.origin(before, 0, 0)[0]
+                    yield Change(DriftKind.EXTRA, self._span(place, place), "", text)
                 case _:
                     pass
 
@@ -130,18 +140,6 @@ class _ChangeFinder(Struct, frozen=True):
                 yield number_change(span, *texts, d.numbers)
             else:
                 yield Change(DriftKind.TEXT, span, *texts)
-
-    def _missing(self, steps: Sequence[Step]) -> Change:
-        start, _ = self.recorded.origin(steps[0].recorded, 0, 0)
-        text = "\n".join(self.recorded.lines[step.recorded] for step in steps)
-        span = self._span(start, self._end_of(steps[-1].recorded))
-        return Change(DriftKind.MISSING, span, text, "")
-
-    def _extra(self, steps: Sequence[Step]) -> Change:
-        text = "\n".join(self.printed.lines[step.printed] for step in steps)
-        before, lines = steps[0].recorded, len(self.recorded.lines)
-        place = self.recorded.origin(before, 0, 0)[0] if before < lines else self._end_of(lines - 1)
-        return Change(DriftKind.EXTRA, self._span(place, place), "", text)
 
     def _end_of(self, line: int) -> int:
         """Where a recorded line ends; 0 where none is recorded."""
@@ -303,8 +301,8 @@ def run_standings(
             standings[run.path] = RunStanding(run, bool(compared), changes)
         else:
             old, new = current_runs[run.path].stdout, run.stdout
-            here, there = (Side.of(text, course.filters) for text in (old, new))
-            is_same = same_lines(here, there, course.comparison)
+            current_side, new_side = (Side.of(text, course.filters) for text in (old, new))
+            is_same = same_lines(current_side, new_side, course.comparison)
             diff = "" if is_same else text_diff(old, new)
             standings[run.path] = RunStanding(run, True, diff=diff)
     return standings

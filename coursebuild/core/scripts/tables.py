@@ -118,7 +118,11 @@ class TableMatcher:
 
     def match(self) -> tuple[RowMatch, ...]:
         """The line of each row: with its numbers if possible, else with the rest of it."""
-        lines = self.find_matching_lines() or self._align_lines()
+        lines = self.find_matching_lines()
+        if lines is None:
+            lines = [-1] * len(self.rows)
+            for number, line in pair([_row_text(r) for r in self.rows], self.lines, self._weight):
+                lines[number] = line
         return tuple(self._match_row(row, line) for row, line in zip(self.rows, lines, strict=True))
 
     def find_matching_lines(self) -> list[int] | None:
@@ -132,13 +136,6 @@ class TableMatcher:
                 return None
             line_numbers.append(line)
             first_line = line + 1
-        return line_numbers
-
-    def _align_lines(self) -> list[int]:
-        """A line for each row that stands in one except for its numbers; -1 for other rows."""
-        line_numbers = [-1] * len(self.rows)
-        for row, line in pair([_row_text(r) for r in self.rows], self.lines, self._weight):
-            line_numbers[row] = line
         return line_numbers
 
     def _matches(self, row: Sequence[RowCell], line: int) -> bool:
