@@ -217,9 +217,19 @@ def instability_diagnostic(
     """
     steps = align(first, second, LineMatcher(comparison))
     different_steps = [step for step in steps if step.kind in _DIFFERENT]
-    notes = [
-        Note(_describe_difference(step, first, second)) for step in different_steps[:_MAX_NOTES]
-    ]
+    notes = []
+    for step in different_steps[:_MAX_NOTES]:
+        if step.kind is StepKind.MISSING:
+            line = quote(first.lines[step.recorded], _WIDTH)
+            notes.append(Note(f"{line} was printed in the first run only"))
+        elif step.kind is StepKind.EXTRA:
+            line = quote(second.lines[step.printed], _WIDTH)
+            notes.append(Note(f"{line} was printed in the second run only"))
+        else:
+            number = second.raw_line(step.printed)
+            lines = (first.lines[step.recorded], second.lines[step.printed])
+            a, b = (quote(line, _WIDTH) for line in lines)
+            notes.append(Note(f"line {number}: {a} in one run, {b} in the next"))
     if (rest := len(different_steps) - _MAX_NOTES) > 0:
         notes.append(Note(f"and {rest} more {'line' if rest == 1 else 'lines'}"))
     help = _TABLE_HELP if isinstance(recording.body, Table) else _HELP
@@ -250,16 +260,6 @@ _TABLE_HELP = f"{_REPEAT_HELP}, or record the output in a `text` fence with `vol
 
 
 _DIFFERENT = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
-
-
-def _describe_difference(step: Step, first: Side, second: Side) -> str:
-    if step.kind is StepKind.MISSING:
-        return f"{quote(first.lines[step.recorded], _WIDTH)} was printed in the first run only"
-    if step.kind is StepKind.EXTRA:
-        return f"{quote(second.lines[step.printed], _WIDTH)} was printed in the second run only"
-    a, b = first.lines[step.recorded], second.lines[step.printed]
-    number = second.raw_line(step.printed)
-    return f"line {number}: {quote(a, _WIDTH)} in one run, {quote(b, _WIDTH)} in the next"
 
 
 Status: TypeAlias = Literal["same", "changed", "fails", "unclear", "drifted", "uncompared"]

@@ -104,9 +104,12 @@ def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) 
         return False
     line, start, is_closed = start_line, run.end(), False
     while True:
-        closing = _find_closing(state.src, start, state.eMarks[line])
-        if closing is not None:
-            rest = state.src[closing + 2 : state.eMarks[line]].strip(" \t")
+        end = state.eMarks[line]
+        closing = state.src.find("$$", start, end)
+        if closing >= 0:  # the first one that no backslash escapes
+            closing = _BLOCK_TEX.match(state.src, start, end).end()  # type: ignore[union-attr]  # it matches nothing too
+        if closing >= 0 and state.src.startswith("$$", closing, end):
+            rest = state.src[closing + 2 : end].strip(" \t")
             if rest and not _LABEL.fullmatch(rest):
                 return False
             is_closed = True
@@ -124,14 +127,6 @@ def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) 
     token.map = [start_line, line]
     token.info = "" if is_closed else "unclosed"
     return True
-
-
-def _find_closing(src: str, start: int, end: int) -> int | None:
-    """The offset of the first `$$` between two offsets that no backslash escapes."""
-    if src.find("$$", start, end) < 0:
-        return None
-    tex_end = _BLOCK_TEX.match(src, start, end).end()  # type: ignore[union-attr]  # it matches nothing too
-    return tex_end if src.startswith("$$", tex_end, end) else None
 
 
 MAX_NESTING = 60

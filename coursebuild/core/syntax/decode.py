@@ -181,8 +181,14 @@ class _Decoder:
     def decode_number(
         self, node: NumberNode, type: inspect.IntType | inspect.FloatType, name: str
     ) -> object:
-        value = node.value if isinstance(type, inspect.IntType) else _to_double(node.value)
-        problem = _check_double(node)
+        double, problem = _to_double(node.value), ""
+        value = node.value if isinstance(type, inspect.IntType) else double
+        if node.raw.strip("+-") in ("inf", "nan"):
+            problem = f"must be a finite number, not {node.raw}"
+        elif math.isinf(double):
+            problem = "is too large: numbers end at about 1.8e308"
+        elif double == 0 and re.search(r"[1-9]", re.split(r"[eE]", node.raw)[0]):
+            problem = "is too small: it becomes 0"
         for attribute, words, holds in () if problem else _BOUNDS:
             limit = getattr(type, attribute)
             if limit is not None and not holds(value, limit):
@@ -336,18 +342,6 @@ def _to_double(value: float) -> float:
         return float(value)
     except OverflowError:
         return math.inf if value > 0 else -math.inf
-
-
-def _check_double(node: NumberNode) -> str:
-    """Why a number cannot be used in a calculation; empty if it can."""
-    value = _to_double(node.value)
-    if node.raw.strip("+-") in ("inf", "nan"):
-        return f"must be a finite number, not {node.raw}"
-    if math.isinf(value):
-        return "is too large: numbers end at about 1.8e308"
-    if value == 0 and re.search(r"[1-9]", re.split(r"[eE]", node.raw)[0]):
-        return "is too small: it becomes 0"
-    return ""
 
 
 def has_value(node: ObjectNode, name: str) -> bool:
