@@ -26,11 +26,7 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import CodeType, ModuleType
 from typing import Any, TypedDict
 
-from coursebuild.core.run import (
-    mujoco_tracing,
-    mujoco_watching,
-    perturbation,
-)
+from coursebuild.core.run import mujoco_tracing, mujoco_watching, perturbation
 from coursebuild.core.run.tracing import Tracer
 
 _IMPORTS = {"numpy": ("numpy", "numpy.random"), "mujoco": ("numpy", "mujoco")}

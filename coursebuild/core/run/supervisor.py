@@ -51,12 +51,7 @@ from coursebuild.core.run.script_process import (
     figure_path,
     notes_folder,
 )
-from coursebuild.core.run.watching import (
-    STDERR_KEPT,
-    STDOUT_LIMIT,
-    RunningScript,
-    has_ended,
-)
+from coursebuild.core.run.watching import STDERR_KEPT, STDOUT_LIMIT, RunningScript, has_ended
 
 LENGTH = struct.Struct(">I")
 STARTED = LENGTH.pack(0)

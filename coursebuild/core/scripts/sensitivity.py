@@ -33,13 +33,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Course, Mode, Recording
 from coursebuild.core.model.results import Change, Outcome, ScriptRun
-from coursebuild.core.model.sensitivity import (
-    PERTURBATION,
-    Doubt,
-    Flip,
-    Sensitivity,
-    Standing,
-)
+from coursebuild.core.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
 from coursebuild.core.scripts.bound_numbers import printed_lines
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import quote

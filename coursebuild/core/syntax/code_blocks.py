@@ -16,14 +16,7 @@ import shlex
 import sys
 from collections.abc import Iterator
 
-from coursebuild.core.model import (
-    Block,
-    CodeBlock,
-    Mjcf,
-    PlainCode,
-    Script,
-    SourcePart,
-)
+from coursebuild.core.model import Block, CodeBlock, Mjcf, PlainCode, Script, SourcePart
 from coursebuild.core.model.blocks import FigureName
 from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import (

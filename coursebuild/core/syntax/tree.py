@@ -19,12 +19,7 @@ from functools import partial
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.syntax.attributes import (
-    LABEL,
-    check_heading,
-    read_attributes,
-    split_label,
-)
+from coursebuild.core.syntax.attributes import LABEL, check_heading, read_attributes, split_label
 from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.code_blocks import read_block
 from coursebuild.core.syntax.containers import (
