@@ -118,7 +118,8 @@ def with_lesson_renamed(course: Course, old: Lesson, new: str, edits: Sequence[E
     _check_free(course, new)
     text = apply_edits(course.map.text, edits)
     new_course = parse_course_map(Source(course.map.path, text)).value
-    lesson = None if new_course is None else _find_lesson(new_course, new)
+    lessons = () if new_course is None else new_course.lessons
+    lesson = next((lesson for lesson in lessons if lesson.id == new), None)
     if new_course is None or lesson is None:
         return _require_valid(course, text, new)
     ids = [sibling.id for sibling in new_course.lessons if sibling.level == lesson.level]
@@ -214,10 +215,6 @@ def _require_valid(course: Course, text: str, id: str, kind: str = "lesson") -> 
         reason = f": {mistakes[0].message}" if mistakes else ""
         raise UsageError(f"{course.map.path} cannot have a {kind} {id}{reason}")
     return text
-
-
-def _find_lesson(course: Course, id: str) -> Lesson | None:
-    return next((lesson for lesson in course.lessons if lesson.id == id), None)
 
 
 def _level_id(id: str) -> str:

@@ -123,7 +123,11 @@ def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     for failure in failures:
         if failure.entry == () or failure.kind not in of_main_run:
             yield _make_diagnostic(lab, failure)
-    yield from _check_depth_claim(lab, trial)
+    if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
+        message = "the lab says `deep`, but no bodies overlapped deeply"
+        span = lab.place(("verify", "deep"))
+        fix = Fix("remove `deep`", "false", "true", safe=True)
+        yield diagnose("lab-shallow", span, message, help=fix)
     if trial.main is not None and trial.main["parity"] is not None:
         yield from _check_parity(lab, trial.main["parity"])
 
@@ -164,14 +168,6 @@ def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
             return from_start
 
 
-def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
-        message = "the lab says `deep`, but no bodies overlapped deeply"
-        span = lab.place(("verify", "deep"))
-        fix = Fix("remove `deep`", "false", "true", safe=True)
-        yield diagnose("lab-shallow", span, message, help=fix)
-
-
 _SMALL = 0.1
 
 
@@ -187,7 +183,9 @@ def _make_diagnostic(lab: Lab, failure: TrialFailure) -> Diagnostic:
         case "nan" if failure.entry[0] == "expect":
             special_help = ""
         case "expect" if (expr := lab.fields.expect[int(failure.entry[1])].expr) is not None:
-            message = f"`{_shorten(expr)}` {message}"
+            line = " ".join(expr.split())
+            code = line if len(line) <= 60 else line[:59] + "…"
+            message = f"`{code}` {message}"
         case "goal" if failure.entry[-1] == "log":
             kind = "log"
         case "timeout" if message == "did not finish in time":
@@ -265,11 +263,6 @@ _SPELLINGS = {
 def _spellings(lab: Lab) -> dict[str, str]:
     """Return how a lab's author writes settings: in the JSON, or as keys of the fence."""
     return {name: f"`{pair[lab.kind == MJCF]}`" for name, pair in _SPELLINGS.items()}
-
-
-def _shorten(code: str) -> str:
-    line = " ".join(code.split())
-    return line if len(line) <= 60 else line[:59] + "…"
 
 
 _OPEN_OBJECTS = ("ctx", "value", "globalThis")

@@ -134,7 +134,20 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
     sim = node.get("sim")
     match decoding.structs.get(node):
         case MultipleChoice() | Predict() as fields:
-            yield from _check_choices(node, fields)
+            yield from _check_distinct(node, "options", "two options are the same: `{}`")
+            count = len(fields.options)
+            spans = [item.span for item in node.items("answer")] or [node.place("answer")]
+            answers = list(zip(fields.answers, spans, strict=True))
+            for number, span in answers:
+                if not 0 <= number < count:
+                    message = f"there is no option {number}: they are numbered 0 to {count - 1}"
+                    yield diagnose("quiz-answer", span, message)
+            yield from check_unique(answers, "quiz-answer", "the option {} is named twice")
+            if fields.feedback is not None and len(fields.feedback) != count:
+                texts = "1 text" if len(fields.feedback) == 1 else f"{len(fields.feedback)} texts"
+                message = f"`feedback` has {texts} for {count} options"
+                help = 'an option without feedback has `""`'
+                yield diagnose("field-value", node.place("feedback"), message, help=help)
         case Numeric() as fields:
             if fields.answer == 0 and fields.tol is None:
                 message = (
@@ -151,23 +164,6 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
         from coursebuild.features.lab.relations import check_lab
 
         yield from check_lab(sim, decoding.structs)
-
-
-def _check_choices(node: ObjectNode, fields: MultipleChoice | Predict) -> Iterator[Diagnostic]:
-    yield from _check_distinct(node, "options", "two options are the same: `{}`")
-    count = len(fields.options)
-    spans = [item.span for item in node.items("answer")] or [node.place("answer")]
-    answers = list(zip(fields.answers, spans, strict=True))
-    for number, span in answers:
-        if not 0 <= number < count:
-            message = f"there is no option {number}: they are numbered 0 to {count - 1}"
-            yield diagnose("quiz-answer", span, message)
-    yield from check_unique(answers, "quiz-answer", "the option {} is named twice")
-    if fields.feedback is not None and len(fields.feedback) != count:
-        texts = "1 text" if len(fields.feedback) == 1 else f"{len(fields.feedback)} texts"
-        message = f"`feedback` has {texts} for {count} options"
-        help = 'an option without feedback has `""`'
-        yield diagnose("field-value", node.place("feedback"), message, help=help)
 
 
 def _check_distinct(node: ObjectNode, name: str, message: str) -> Iterator[Diagnostic]:

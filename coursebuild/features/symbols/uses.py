@@ -126,7 +126,11 @@ def _symbol(element: Element, *, is_declared: bool = False) -> str | None:
     if bare.tag == "mi":
         return _letter(bare.text or "", bare.get("mathvariant") == "normal", is_declared)
     if bare.tag in _ACCENT_ELEMENTS:
-        return _accented_symbol(bare, is_declared=is_declared)
+        letter, sign = _symbol(bare[0], is_declared=is_declared), _unwrap(bare[1])
+        accent = sign.text or ""
+        if letter is None or sign.tag != "mo" or not accent or not set(accent) <= _ACCENTS:
+            return None
+        return f"<{bare.tag}>{letter}<mo>{escape(accent)}</mo></{bare.tag}>"
     if bare.tag not in _SCRIPTS:
         return None
     base = _symbol(bare[0], is_declared=is_declared)
@@ -146,23 +150,12 @@ def _symbol(element: Element, *, is_declared: bool = False) -> str | None:
 def _letter(text: str, is_upright: bool, is_declared: bool) -> str | None:
     if not any(map(str.isalpha, text)) or (text in _NO_SYMBOLS and not is_declared):
         return None
-    if not is_declared and _is_latin(text) and (is_upright or (text.isascii() and len(text) > 1)):
+    is_latin = all(unicodedata.name(char, "").startswith("LATIN") for char in text)
+    is_word = is_upright or (text.isascii() and len(text) > 1)
+    if not is_declared and is_word and (text.isascii() or is_latin):
         return None
     variant = ' mathvariant="normal"' if is_upright else ""
     return f"<mi{variant}>{escape(text)}</mi>"
-
-
-def _is_latin(text: str) -> bool:
-    return text.isascii() or all(unicodedata.name(char, "").startswith("LATIN") for char in text)
-
-
-def _accented_symbol(element: Element, *, is_declared: bool) -> str | None:
-    """Return a symbol with an accent."""
-    base, mark = _symbol(element[0], is_declared=is_declared), _unwrap(element[1])
-    text = mark.text or ""
-    if base is None or mark.tag != "mo" or not set(text) or not set(text) <= _ACCENTS:
-        return None
-    return f"<{element.tag}>{base}<mo>{escape(text)}</mo></{element.tag}>"
 
 
 def _index(element: Element) -> str | None:
