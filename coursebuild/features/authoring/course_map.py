@@ -312,16 +312,13 @@ def doubtful_places(
             for match in _RANGE.finditer(source.text)
             if id_order(match[1]) <= id_order(lesson.id) <= id_order(match[2])
         ]
-    return [*places, *_outdated_globs(course, lesson, new)]
-
-
-def _outdated_globs(course: Course, lesson: Lesson, new: str) -> Iterator[Span]:
-    """Yield the patterns of the map that match the lesson's old path, and not the new one."""
+    # Patterns that match the lesson's old path, and not the new one
     new_path = replace(lesson, id=new).path
     for path in _silenced_paths(_map(course)):
         fits = [fnmatchcase(name, path.value) for name in (lesson.path, new_path)]
         if path.value != lesson.path and fits == [True, False]:
-            yield path.span
+            places.append(path.span)
+    return places
 
 
 def _silenced_paths(root: ObjectNode) -> Iterator[StringNode]:

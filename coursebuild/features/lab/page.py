@@ -330,10 +330,15 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     words, view = writer.words, page_view(writer.page, lab)
     parts = [f"**{words('lab.label')}: {escape_marks(view.title)}**"]
     if view.recorded is not None:
-        parts += _write_recording(writer, view.recorded)
+        parts.append(picture(view.recorded.alt, writer.locate(view.recorded.picture)))
+        if readouts := view.recorded.record.readouts:
+            rows = [(escape_line(label), escape_line(value)) for label, value in readouts]
+            parts += [
+                f"{escape_marks(view.recorded.at)}:",
+                table((words("lab.readouts"), ""), rows),
+            ]
     if lab.goal:
         parts.append(f"**{words('lab.goal')}:** {writer.inlines(lab.goal)}")
-    words = writer.words
     text = f"{escape_marks(view.subject)}."
     if view.model is not None:
         name = link(escape_marks(view.model), writer.locate(view.model_href))
@@ -355,15 +360,6 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     parts.append("\n".join(displays))
     parts += [writer.blocks(lab.note), link(words("exports.run_lab"), writer.live)]
     return "\n\n".join(filter(None, parts))
-
-
-def _write_recording(writer: MarkdownWriter, recorded: RecordedView) -> Iterator[str]:
-    """Write the picture, and the readouts at the end."""
-    yield picture(recorded.alt, writer.locate(recorded.picture))
-    if readouts := recorded.record.readouts:
-        yield f"{escape_marks(recorded.at)}:"
-        rows = [(escape_line(label), escape_line(value)) for label, value in readouts]
-        yield table((writer.words("lab.readouts"), ""), rows)
 
 
 def _list_displays(writer: MarkdownWriter, view: LabView) -> Iterator[tuple[str, tuple[str, ...]]]:

@@ -22,7 +22,7 @@ from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.lab.compile import LabCode, pieces
 from coursebuild.features.lab.javascript import dotted_names, parse, text_of, walk
 from coursebuild.features.lab.model import MJCF, Entry, Lab
-from coursebuild.features.lab.reply import Parity, TrialFailure, TrialReply
+from coursebuild.features.lab.reply import TrialFailure, TrialReply
 from coursebuild.features.lab.schema import Button
 
 _EXPLANATIONS = {
@@ -128,8 +128,19 @@ def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
         span = lab.place(("verify", "deep"))
         fix = Fix("remove `deep`", "false", "true", safe=True)
         yield diagnose("lab-shallow", span, message, help=fix)
-    if trial.main is not None and trial.main["parity"] is not None:
-        yield from _check_parity(lab, trial.main["parity"])
+    parity = None if trial.main is None else trial.main["parity"]
+    if parity is not None and not parity.is_within_tolerance(lab.verify.rtol):
+        time = (parity.first or 0) * parity.timestep
+        tolerance = parity.tolerance(lab.verify.rtol)
+        yield diagnose(
+            "lab-parity",
+            lab.place(("verify", "rtol")),
+            f"the browser's engine and native MuJoCo differ from step {parity.first} on "
+            f"(t = {time:.6g} s), by up to {parity.relative:.1e} of the state, where {tolerance:g} "
+            "is allowed",
+            help="a controller that changes `model` while it runs cannot be repeated natively; "
+            f"where the motion is chaotic say how far it may part: {_spellings(lab)['parity']}",
+        )
 
 
 def remark_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
@@ -233,23 +244,6 @@ def _check_reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
                 "back"
             )
     yield diagnose("lab-reset", lab.place(entry), message, help=help)
-
-
-def _check_parity(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
-    """Report a difference between the engines that is larger than allowed."""
-    if parity.is_within_tolerance(lab.verify.rtol):
-        return
-    time = (parity.first or 0) * parity.timestep
-    tolerance = parity.tolerance(lab.verify.rtol)
-    yield diagnose(
-        "lab-parity",
-        lab.place(("verify", "rtol")),
-        f"the browser's engine and native MuJoCo differ from step {parity.first} on "
-        f"(t = {time:.6g} s), by up to {parity.relative:.1e} of the state, where {tolerance:g} is "
-        "allowed",
-        help="a controller that changes `model` while it runs cannot be repeated natively; where "
-        f"the motion is chaotic say how far it may part: {_spellings(lab)['parity']}",
-    )
 
 
 _SPELLINGS = {

@@ -74,7 +74,11 @@ def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | No
     if not isinstance(node, ObjectNode):
         return Parsed(None, sort_diagnostics(diagnostics))
     nodes = node.objects("questions")
-    diagnostics += _check_ids(nodes)
+    ids = [node.get("id") for node in nodes]
+    places = [(id.value, id.span) for id in ids if isinstance(id, StringNode)]
+    help = "a learner's answer is kept under it; give each question its own, or none"
+    message = "the question id `{}` is used twice in this quiz"
+    diagnostics += check_unique(places, "question-id-repeated", message, help=help)
     keys = _keys(nodes, decoding)
     questions: list[AnyQuestion] = []
     for question_node in nodes:
@@ -120,14 +124,6 @@ def _keys(nodes: tuple[ObjectNode, ...], decoding: Decoding[QuizFile]) -> dict[O
 
 
 # ---------------------------------------------------------------------------------------- checks
-
-
-def _check_ids(nodes: tuple[ObjectNode, ...]) -> Iterator[Diagnostic]:
-    ids = [node.get("id") for node in nodes]
-    places = [(id.value, id.span) for id in ids if isinstance(id, StringNode)]
-    help = "a learner's answer is kept under it; give each question its own, or none"
-    message = "the question id `{}` is used twice in this quiz"
-    yield from check_unique(places, "question-id-repeated", message, help=help)
 
 
 def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnostic]:

@@ -316,16 +316,6 @@ def used_symbols(library: Library) -> Iterator[tuple[Lesson, SymbolUse]]:
                 yield owner, use
 
 
-def _course_symbols(library: Library) -> list[CourseSymbol]:
-    rows: dict[str, CourseSymbol] = {}
-    for owner, use in used_symbols(library):
-        row = rows.setdefault(use.symbol, CourseSymbol(use))
-        row.owners.append(owner)
-        if use.meaning:
-            row.meanings.setdefault((use.meaning, use.unit), []).append(owner)
-    return sorted(rows.values(), key=lambda row: sort_key(row.first.symbol))
-
-
 class MeaningView(Struct, frozen=True):
     """What a symbol stands for; `places` are the lessons that say so, if others differ."""
 
@@ -349,25 +339,31 @@ class SymbolView(Struct, frozen=True):
 def symbols_values(library: Library) -> dict[str, object]:
     """Return the values for the template of the index."""
     place = urls.Place("symbols/index.html")
-    rows = [_symbol_view(library, place, row) for row in _course_symbols(library)]
+    symbols: dict[str, CourseSymbol] = {}
+    for owner, use in used_symbols(library):
+        row = symbols.setdefault(use.symbol, CourseSymbol(use))
+        row.owners.append(owner)
+        if use.meaning:
+            row.meanings.setdefault((use.meaning, use.unit), []).append(owner)
+    rows: list[SymbolView] = []
+    for row in sorted(symbols.values(), key=lambda row: sort_key(row.first.symbol)):
+        anchor, section = row.first.section
+        names = (name_outside(library, row.owners[0], target) for target in row.first.targets)
+        is_ambiguous = len(row.meanings) > 1
+        rows.append(
+            SymbolView(
+                Markup(f"<math>{row.first.symbol}</math>"),
+                tuple(
+                    MeaningView(text, unit, owner_links(place, owners) if is_ambiguous else None)
+                    for (text, unit), owners in row.meanings.items()
+                ),
+                owner_link(place, row.owners[0], anchor),
+                fill_in(section, names),
+                owner_links(place, row.owners[1:]),
+            )
+        )
     return {
         "declared": tuple(row for row in rows if row.meanings),
         "undeclared": tuple(row for row in rows if not row.meanings),
         "glossary": added_page(library, place, "glossary"),
     }
-
-
-def _symbol_view(library: Library, place: urls.Place, row: CourseSymbol) -> SymbolView:
-    anchor, section = row.first.section
-    names = (name_outside(library, row.owners[0], target) for target in row.first.targets)
-    is_ambiguous = len(row.meanings) > 1
-    return SymbolView(
-        Markup(f"<math>{row.first.symbol}</math>"),
-        tuple(
-            MeaningView(text, unit, owner_links(place, owners) if is_ambiguous else None)
-            for (text, unit), owners in row.meanings.items()
-        ),
-        owner_link(place, row.owners[0], anchor),
-        fill_in(section, names),
-        owner_links(place, row.owners[1:]),
-    )
