@@ -177,12 +177,10 @@ class _Fixer:
         return bool(harmless)
 
     def _may_edit(self, edit: Edit) -> bool:
-        """Whether the file of an edit may be changed."""
         path = edit.span.path
         return (not self.names or path in self.paths) and may_edit(self.options.root, path)
 
     def _texts_with(self, fixes: Iterable[Diagnostic]) -> dict[str, str]:
-        """The texts with these fixes."""
         edits: dict[Source, list[Edit]] = {}
         for edit in (edit for diagnostic in fixes for edit in diagnostic.edits):
             edits.setdefault(edit.span.source, []).append(edit)

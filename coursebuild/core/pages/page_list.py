@@ -307,7 +307,6 @@ def _added_parts(
 
 
 def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
-    """The facts about a compiled model, as pairs of label and value."""
     words = library.words
     unnamed = words("model.unnamed")
     rows = (

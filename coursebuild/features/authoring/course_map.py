@@ -76,7 +76,6 @@ def with_page(course: Course, id: str, title: str, path: str) -> str:
 
 
 def _table(kind: str, **fields: str) -> list[str]:
-    """Return the lines of a table."""
     return [f"[[{kind}]]", *(f"{name} = {toml_string(value)}" for name, value in fields.items())]
 
 

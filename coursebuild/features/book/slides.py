@@ -112,7 +112,6 @@ def _address(context: ExportContext, own_path: str, path: str, anchor: str) -> s
 
 
 def _elements(content: Iterable[HtmlContent]) -> Iterator[HtmlElement]:
-    """All elements of a tree."""
     for child in content:
         if isinstance(child, HtmlElement):
             yield child

@@ -170,7 +170,6 @@ def _outputs_section(before: Mapping[str, ScriptState], now: Mapping[str, Script
 
 
 def _describe_script_change(before: ScriptState, now: ScriptState) -> str:
-    """Describe how a script and its recorded outputs differ."""
     parts = ["code edited"] if before.code != now.code else []
     for old, new in zip_longest(before.outputs, now.outputs):
         if old is None or new is None:

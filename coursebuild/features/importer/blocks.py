@@ -260,7 +260,6 @@ def _convert_directive(name: str, argument: str, text: str, context: LessonConte
 
 @functools.cache
 def _highlighted_languages() -> frozenset[str]:
-    """The names of the languages that can be highlighted."""
     from pygments.lexers import get_all_lexers
 
     return frozenset(alias for _, aliases, _, _ in get_all_lexers() for alias in aliases)

@@ -229,7 +229,6 @@ def _values(words: Strings, control: Control) -> str:
 
 
 def _plot(words: Strings, plot: Plot) -> tuple[str, tuple[str, ...]]:
-    """Describe a plot: its axes, and the names of its lines."""
     title = words(
         "lab.plot",
         ylabel=plot.ylabel or words("lab.value"),

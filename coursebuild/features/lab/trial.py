@@ -302,7 +302,6 @@ class _LabTrial(Struct, frozen=True):
     def _fail(
         self, module: LabModule, diagnostics: list[Diagnostic]
     ) -> tuple[TrialResult, list[Diagnostic]]:
-        """Make the result of a lab that could not be tried."""
         line = TrialLine(module.name, self.lab.fields.title, self.trial.owner, "failed")
         return TrialResult(self.lab.span, line, LabOutput(module.code, module.config)), diagnostics
 

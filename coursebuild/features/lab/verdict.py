@@ -309,7 +309,6 @@ def _references(code: Excerpt) -> Iterator[NameReference]:
 
 
 def _declarations(node: Node) -> Iterator[Node]:
-    """Yield the names that a node declares."""
     if node.type in ("formal_parameters", "array_pattern", "object_pattern"):
         yield from node.named_children
     for field in ("name", "parameter", "left"):

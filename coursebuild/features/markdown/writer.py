@@ -366,7 +366,6 @@ def _text(node: model.Text, room: _Room) -> str:
 
 
 def _escape_pipes(text: str, room: _Room) -> str:
-    """Escape the pipes of a text in a cell of a table."""
     return _PIPE.sub(r"\\|", text) if room == "cell" else text
 
 

@@ -108,7 +108,6 @@ class EngineTable(Struct, frozen=True, dict=True):
 
     @functools.cached_property
     def names(self) -> EngineNames:
-        """The names."""
         return _decode(self.data)
 
 

@@ -105,7 +105,6 @@ def _unwrap(element: Element) -> Element:
 
 
 def _collect(element: Element, symbols: dict[str, None]) -> None:
-    """Add the symbols of an element."""
     symbol = _symbol(element) if element.tag in _SYMBOLS else None
     if symbol is None:
         for child in element:

@@ -164,12 +164,10 @@ class Claims(Struct, frozen=True):
 
     @property
     def proven(self) -> int:
-        """The number of proven claims."""
         return self.bound + self.computed + self.given
 
     @property
     def all(self) -> int:
-        """The number of claims."""
         return self.proven + len(self.unsourced) + len(self.open)
 
     @property
