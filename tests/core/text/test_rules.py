@@ -51,10 +51,10 @@ def catalogue_page() -> str:
     head = f"""\
 # Rules
 
-Each diagnostic names its rule, as in `error[output-drift]`; `coursebuild explain output-drift`
-prints its entry. There are {errors} errors and {len(RULES) - errors} warnings. An error
-keeps the site from being published. A warning can be [silenced](course-map.md#silence), an error
-cannot. `--fix` and `--unsafe` are options of [`coursebuild check`](commands.md#fix).
+There are {errors} errors, which keep the site from being published, and {len(RULES) - errors} warnings, which can be
+[silenced](course-map.md#silence). `coursebuild explain output-drift` prints an entry. An example leaves
+out where the mistake is. [`--fix`](commands.md#fix) is named where `coursebuild check` can mend a mistake;
+elsewhere {", or ".join(_common_reasons())}.
 
 {textwrap.fill(contents, 120, break_on_hyphens=False)}
 """
@@ -64,24 +64,46 @@ cannot. `--fix` and `--unsafe` are options of [`coursebuild check`](commands.md#
     )
 
 
+def _common_reasons() -> list[str]:
+    """Those that the head of the page tells once."""
+    counts = Counter(rule.no_fix for rule in RULES.values() if rule.no_fix)
+    return [reason for reason, count in counts.most_common() if count > 5]
+
+
 def _entry(rule: Rule) -> str:
     """A section with the first message of the rule's first case."""
     case, *_ = CASES[rule.name]
-    outputs = [case.expected for case in CASES[rule.name]]
-    options = [o for o in ("--fix", "--fix --unsafe") if f"\n{o} writes" in "".join(outputs)]
-    cure = " or ".join(f"`{option}`" for option in options) + " can mend it."
-    if rule.no_fix:
-        cure = f"No fix: {rule.no_fix}."
-    if command_of(case) != "check":
-        cure += f" Reported by `coursebuild {command_of(case)}`."
     blocks = case.expected.rstrip("\n").split("\n\n")
     message = next(block for block in blocks if block.startswith(f"{rule.severity}[{rule.name}]"))
     message = re.sub(r"\n  --> .*(\n +\|$)?", "", message, count=1, flags=re.MULTILINE)
+    message = re.sub(r"^( *(\d+|LINE)? \| |    = )", "    ", message, flags=re.MULTILINE)
     marks = "`" * max(3, 1 + max(map(len, re.findall("`+", message)), default=2))
-    return (
-        f"\n### {rule.name}\n\n{rule.severity.capitalize()}. {rule.summary} {cure}\n\n"
-        f"{marks}\n{message}\n{marks}\n"
-    )
+
+    sentences = []
+    if _words(rule.summary) - _words(message):  # or else the message says as much
+        sentences.append(rule.summary)
+    outputs = "".join(case.expected for case in CASES[rule.name])
+    options = [o for o in ("--fix", "--fix --unsafe") if f"\n{o} writes" in outputs]
+    if options:
+        sentences.append(" or ".join(f"`{option}`" for option in options) + " can mend it.")
+    elif rule.no_fix not in _common_reasons():
+        sentences.append(f"No fix: {rule.no_fix}.")
+    if command_of(case) != "check":
+        sentences.append(f"Reported by `coursebuild {command_of(case)}`.")
+    text = f"{' '.join(sentences)}\n\n" if sentences else ""
+    return f"\n### {rule.name}\n\n{text}{marks}\n{message}\n{marks}\n"
+
+
+def _words(text: str) -> set[str]:
+    """The words that carry the meaning of a text, without endings."""
+    words = set(re.findall("[a-z0-9]+", text.lower())) - _SMALL_WORDS
+    return {re.sub("(ing|ed|es|s|e)$", "", word) for word in words}
+
+
+_SMALL_WORDS = set(
+    """a an the is are of in or and not no as on by to it that this has have was be been its there at
+    what than with for from one can cannot may""".split()
+)
 
 
 installed_features()  # they add their own rules
