@@ -127,12 +127,9 @@ def markdown(report: Report) -> str:
         lines += [f"**{lessons} lessons**", "", *sizes_table(report, lessons), ""]
     if report.scripts:
         lines += [*scripts_table(report), ""]
-    lines += ["| tool | version | formulas typeset | configuration |", "| --- | --- | --- | --- |"]
+    lines += ["| tool | formulas by the | configuration |", "| --- | --- | --- |"]
     for tool in report.tools:
-        typesetter = {"build": "in the build", "reader": "by the reader's browser"}.get(
-            tool["math"], ""
-        )
-        lines.append(f"| {tool['title']} | {tool['version']} | {typesetter} | {tool['how']} |")
+        lines.append(f"| {tool['title']} {tool['version']} | {tool['math']} | {tool['how']} |")
     if report.absent:
         lines += ["", f"Not installed, and so not measured: {', '.join(report.absent)}."]
     if report.failed:
@@ -159,7 +156,7 @@ def cell(figure: Figure | None, base: Figure | None) -> str:
     text = significant(figure.median)
     if base is None or figure.tool == BASE:
         return text
-    return f"{text} ({significant(figure.median / base.median, 2)} ×)"
+    return f"{text} ({significant(figure.median / base.median, 2)}×)"
 
 
 def significant(value: float, digits: int = 3) -> str:

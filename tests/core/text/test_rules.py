@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import difflib
 import re
-import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -24,7 +23,6 @@ from msgspec.structs import replace
 
 from coursebuild.core.registry import installed_features
 from coursebuild.core.scripts.edit import apply_edits
-from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.rules import GROUPS, RULES, Rule
 from coursebuild.core.text.source import Source
@@ -47,16 +45,14 @@ def catalogue_page() -> str:
     errors = sum(rule.severity == "error" for rule in RULES.values())
     names = {name for group in GROUPS.values() for name in group}
     groups = {**GROUPS, _OTHER_GROUP: [name for name in RULES if name not in names]}
-    contents = " · ".join(f"[{title}](#{slug(title)})" for title in groups)
+    reasons = ", or ".join(_common_reasons())
     head = f"""\
 # Rules
 
-There are {errors} errors, which keep the site from being published, and {len(RULES) - errors} warnings, which can be
-[silenced](course-map.md#silence). `coursebuild explain output-drift` prints an entry. An example leaves
-out where the mistake is. [`--fix`](commands.md#fix) is named where `coursebuild check` can mend a mistake;
-elsewhere {", or ".join(_common_reasons())}.
-
-{textwrap.fill(contents, 120, break_on_hyphens=False)}
+There are {errors} errors, which keep the site from being published, and {len(RULES) - errors}
+warnings, which can be [silenced](course-map.md#silence). `coursebuild explain output-drift` prints
+an entry. An example leaves out where the mistake is. [`--fix`](commands.md#fix) is named where
+`coursebuild check` can mend a mistake; elsewhere {reasons}.
 """
     return head + "".join(
         f"\n## {title}\n" + "".join(_entry(RULES[name]) for name in group)
@@ -101,8 +97,8 @@ def _words(text: str) -> set[str]:
 
 
 _SMALL_WORDS = set(
-    """a an the is are of in or and not no as on by to it that this has have was be been its there at
-    what than with for from one can cannot may""".split()
+    """a an the is are of in or and not no as on by to it that this has have was be been its there
+    at what than with for from one can cannot may""".split()
 )
 
 
