@@ -168,8 +168,8 @@ def _command(text: str, name: str) -> str:
     parts = []
     if rows:
         parts.append(_table("argument | meaning", rows))
-    if parser.epilog:
-        examples = parser.epilog.partition("\n")[2].rstrip("\n")
+    examples = (parser.epilog or "").partition("\n")[2].rstrip("\n")
+    if re.search(r"[|>]", examples):  # what a table of arguments cannot say; `help` shows all
         lines = "\n".join(line[2:] for line in examples.splitlines())
         parts.append(f"```console\n{lines}\n```")
     return "\n\n".join(parts)
