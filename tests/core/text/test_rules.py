@@ -51,7 +51,7 @@ def catalogue_page() -> str:
 
 There are {errors} errors, which keep the site from being published, and {len(RULES) - errors}
 warnings, which can be [silenced](course-map.md#silence). `coursebuild explain output-drift` prints
-an entry. An example leaves out where the mistake is. [`--fix`](commands.md#fix) is named where
+an entry. An example leaves out the place and notes. [`--fix`](commands.md#fix) is named where
 `coursebuild check` can mend a mistake; elsewhere {reasons}.
 """
     return head + "".join(
@@ -72,6 +72,7 @@ def _entry(rule: Rule) -> str:
     blocks = case.expected.rstrip("\n").split("\n\n")
     message = next(block for block in blocks if block.startswith(f"{rule.severity}[{rule.name}]"))
     message = re.sub(r"\n  --> .*(\n +\|$)?", "", message, count=1, flags=re.MULTILINE)
+    message = re.sub(r"\n    = note: .*(\n {12}.*)*", "", message)
     message = re.sub(r"^( *(\d+|LINE)? \| |    = )", "    ", message, flags=re.MULTILINE)
     marks = "`" * max(3, 1 + max(map(len, re.findall("`+", message)), default=2))
 
@@ -81,7 +82,7 @@ def _entry(rule: Rule) -> str:
     outputs = "".join(case.expected for case in CASES[rule.name])
     options = [o for o in ("--fix", "--fix --unsafe") if f"\n{o} writes" in outputs]
     if options:
-        sentences.append(" or ".join(f"`{option}`" for option in options) + " can mend it.")
+        sentences.append(" or ".join(f"`{option}`" for option in options) + " mends it.")
     elif rule.no_fix not in _common_reasons():
         sentences.append(f"No fix: {rule.no_fix}.")
     if command_of(case) != "check":
