@@ -51,8 +51,9 @@ def catalogue_page() -> str:
 
 There are {errors} errors, which keep the site from being published, and {len(RULES) - errors}
 warnings, which can be [silenced](course-map.md#silence). `coursebuild explain output-drift` prints
-an entry. An example leaves out the place and notes. [`--fix`](commands.md#fix) is named where
-`coursebuild check` can mend a mistake; elsewhere {reasons}.
+an entry. An example leaves out the place, notes, and a line that the message quotes.
+[`--fix`](commands.md#fix) is named where `coursebuild check` can mend a mistake; elsewhere
+{reasons}.
 """
     return head + "".join(
         f"\n## {title}\n" + "".join(_entry(RULES[name]) for name in group)
@@ -74,7 +75,12 @@ def _entry(rule: Rule) -> str:
     message = re.sub(r"\n  --> .*(\n +\|$)?", "", message, count=1, flags=re.MULTILINE)
     message = re.sub(r"\n    = note: .*(\n {12}.*)*", "", message)
     message = re.sub(r"^( *(\d+|LINE)? \| |    = )", "    ", message, flags=re.MULTILINE)
-    marks = "`" * max(3, 1 + max(map(len, re.findall("`+", message)), default=2))
+    first, *lines = message.splitlines()
+    if len(lines) > 1 and (mark := re.fullmatch(r" +(\^+)", lines[1])):
+        text = lines[0][slice(*mark.span(1))].strip("`\"' ")
+        if f"`{text}`" in first or (len(text) > 2 and text in first):
+            del lines[:2]  # the message quotes what is marked
+    message = "\n".join(f"    {line}" for line in (first, *lines))
 
     sentences = []
     if _words(rule.summary) - _words(message):  # or else the message says as much
@@ -88,7 +94,7 @@ def _entry(rule: Rule) -> str:
     if command_of(case) != "check":
         sentences.append(f"Reported by `coursebuild {command_of(case)}`.")
     text = f"{' '.join(sentences)}\n\n" if sentences else ""
-    return f"\n### {rule.name}\n\n{text}{marks}\n{message}\n{marks}\n"
+    return f"\n### {rule.name}\n\n{text}{message}\n"
 
 
 def _words(text: str) -> set[str]:
