@@ -56,7 +56,7 @@ def _fields(
         is_here = other_name in definitions
         base = definitions if is_here else json.loads(json_schema("lab"))["$defs"]
         other_fields = base[other_name]["properties"]
-    rows: list[tuple[str, str, str]] = []
+    rows: list[tuple[str, str]] = []
     long_lists: dict[str, str] = {}
     for field, field_schema in structure["properties"].items():
         if (field in other_fields) != (relation == "within") or (other_fields and field == "kind"):
@@ -68,8 +68,11 @@ def _fields(
             value = value.replace(words, f"list as in `{first_field}`")
         if value.count('"') > 10:
             long_lists[value] = field
-        rows.append((f"`{field}`{required}", value, meaning))
-    return _table("field | value | meaning", rows)
+        if value == "text" or value in meaning:  # pages say once that a value is a text
+            value = ""
+        meaning = f"{meaning} ({value})" if meaning and value else meaning or value
+        rows.append((f"`{field}`{required}", meaning))
+    return _table("field | meaning", rows)
 
 
 def _describe(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
