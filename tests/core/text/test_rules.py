@@ -83,7 +83,7 @@ def _entry(rule: Rule) -> str:
     message = "\n".join(f"    {line}" for line in (first, *lines))
 
     sentences = []
-    if _words(rule.summary) - _words(message):  # or else the message says as much
+    if len(_words(rule.summary) - _words(message)) > 1:  # or else the message says as much
         sentences.append(rule.summary)
     outputs = "".join(case.expected for case in CASES[rule.name])
     options = [o for o in ("--fix", "--fix --unsafe") if f"\n{o} writes" in outputs]
