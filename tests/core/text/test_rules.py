@@ -45,26 +45,19 @@ def catalogue_page() -> str:
     errors = sum(rule.severity == "error" for rule in RULES.values())
     names = {name for group in GROUPS.values() for name in group}
     groups = {**GROUPS, _OTHER_GROUP: [name for name in RULES if name not in names]}
-    reasons = ", or ".join(_common_reasons())
     head = f"""\
 # Rules
 
 There are {errors} errors, which keep the site from being published, and {len(RULES) - errors}
 warnings, which can be [silenced](course-map.md#silence). `coursebuild explain output-drift` prints
 an entry. An example leaves out the place, notes, and a line that the message quotes.
-[`--fix`](commands.md#fix) is named where `coursebuild check` can mend a mistake; elsewhere
-{reasons}.
+[`--fix`](commands.md#fix) is named where `coursebuild check` can mend a mistake; of other rules,
+`coursebuild explain RULE --format json` says why it cannot.
 """
     return head + "".join(
         f"\n## {title}\n" + "".join(_entry(RULES[name]) for name in group)
         for title, group in groups.items()
     )
-
-
-def _common_reasons() -> list[str]:
-    """Those that the head of the page tells once."""
-    counts = Counter(rule.no_fix for rule in RULES.values() if rule.no_fix)
-    return [reason for reason, count in counts.most_common() if count > 5]
 
 
 def _entry(rule: Rule) -> str:
@@ -89,8 +82,6 @@ def _entry(rule: Rule) -> str:
     options = [o for o in ("--fix", "--fix --unsafe") if f"\n{o} writes" in outputs]
     if options:
         sentences.append(" or ".join(f"`{option}`" for option in options) + " mends it.")
-    elif rule.no_fix not in _common_reasons():
-        sentences.append(f"No fix: {rule.no_fix}.")
     if command_of(case) != "check":
         sentences.append(f"Reported by `coursebuild {command_of(case)}`.")
     text = f"{' '.join(sentences)}\n\n" if sentences else ""
