@@ -50,7 +50,7 @@ def catalogue_page() -> str:
 
 There are {errors} errors, which keep the site from being published, and {len(RULES) - errors}
 warnings, which can be [silenced](course-map.md#silence). `coursebuild explain output-drift` prints
-an entry. An example leaves out the place, notes, and a line that the message quotes.
+an entry: an example of its message and help, and what the rule means if the message says less.
 [`--fix`](commands.md#fix) is named where `coursebuild check` can mend a mistake; of other rules,
 `coursebuild explain RULE --format json` says why it cannot.
 """
@@ -65,15 +65,9 @@ def _entry(rule: Rule) -> str:
     case, *_ = CASES[rule.name]
     blocks = case.expected.rstrip("\n").split("\n\n")
     message = next(block for block in blocks if block.startswith(f"{rule.severity}[{rule.name}]"))
-    message = re.sub(r"\n  --> .*(\n +\|$)?", "", message, count=1, flags=re.MULTILINE)
-    message = re.sub(r"\n    = note: .*(\n {12}.*)*", "", message)
-    message = re.sub(r"^( *(\d+|LINE)? \| |    = )", "    ", message, flags=re.MULTILINE)
     first, *lines = message.splitlines()
-    if len(lines) > 1 and (mark := re.fullmatch(r" +(\^+)", lines[1])):
-        text = lines[0][slice(*mark.span(1))].strip("`\"' ")
-        if f"`{text}`" in first or (len(text) > 2 and text in first):
-            del lines[:2]  # the message quotes what is marked
-    message = "\n".join(f"    {line}" for line in (first, *lines))
+    helps = [line.replace("=", "", 1).strip() for line in lines if line.startswith("    = help: ")]
+    message = "\n".join([f"    {first}", *(f"        {help}" for help in helps)])
 
     sentences = []
     if len(_words(rule.summary) - _words(message)) > 1:  # or else the message says as much
