@@ -154,10 +154,12 @@ def _row(action: argparse.Action) -> tuple[str, str]:
 
 
 def _options(text: str) -> str:
-    rows = (
-        (name, ", ".join(f"`{command}`" for command in commands), meaning)
-        for (name, meaning), commands in _shared().items()
-    )
+    rows = []
+    last_names: list[str] = []
+    for (argument, meaning), names in _shared().items():
+        commands = ", ".join(f"`{command}`" for command in names)
+        rows.append((argument, "the same" if names == last_names else commands, meaning))
+        last_names = names
     return _table("argument | of | meaning", rows)
 
 
