@@ -154,7 +154,7 @@ def _row(action: argparse.Action) -> tuple[str, str]:
 
 
 def _options(text: str) -> str:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     last_names: list[str] = []
     for (argument, meaning), names in _shared().items():
         commands = ", ".join(f"`{command}`" for command in names)
