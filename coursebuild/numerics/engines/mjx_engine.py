@@ -6,6 +6,7 @@ Its implementation in JAX, `impl="jax"`; that in Warp is an engine of its own.
 from __future__ import annotations
 
 import importlib
+import os
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,23 @@ from coursebuild.numerics.engines.engine_trial import Engine, Variant
 from coursebuild.numerics.problem import Array
 
 
+def _load_jax() -> Any:
+    """JAX, whose pool on the processor gets more threads than there are cores.
+
+    On two cores, its two threads come to wait for each other: 4,096 worlds of a model with contacts
+    stopped for ever within some hundred steps (jaxlib 0.10.2), and ran through with eight threads.
+    """
+    os.environ.setdefault("NPROC", str(max(8, 2 * (os.cpu_count() or 1))))
+    return importlib.import_module("jax")
+
+
 class BatchedWorlds:
     """A batch that one compiled function advances."""
 
     def __init__(self, model: Any, data: Any, velocities: Array, variant: Variant) -> None:
+        jax = _load_jax()
         from mujoco import mjx
 
-        jax: Any = importlib.import_module("jax")
         jax.config.update("jax_enable_x64", variant.bits == 64)
         self._device = jax.devices(variant.device)[0]
         count = len(velocities)
@@ -46,14 +57,13 @@ class BatchedWorlds:
 
     def advance(self, steps: int) -> None:
         """Make so many steps in every world, and wait for them."""
-        jax: Any = importlib.import_module("jax")
+        jax = _load_jax()
         with jax.default_device(self._device):
             self._batch = jax.block_until_ready(self._advance(self._model, self._batch, steps))
 
     def command(self, control: tuple[float, ...]) -> None:
         """Give this command to all worlds."""
-        import jax
-
+        jax = _load_jax()
         before = self._batch.ctrl
         table = np.broadcast_to(np.asarray(control, before.dtype), before.shape)
         self._batch = self._batch.replace(ctrl=jax.device_put(table, self._device))
@@ -72,8 +82,7 @@ class BatchedWorlds:
 
 def variants(_: int) -> list[Variant]:
     """The processor, and the accelerator that JAX prefers, each in 32 and in 64 bits."""
-    import jax
-
+    jax = _load_jax()
     devices = {device.platform: device for device in (*jax.devices("cpu")[:1], *jax.devices()[:1])}
     return [
         Variant(platform, "" if platform == "cpu" else device.device_kind, bits)
