@@ -31,7 +31,8 @@ def regenerate(text: str) -> str:
 
     def part(match: re.Match[str]) -> str:
         name, *words = match[2].split()
-        return f"{match[1]}\n{_MAKERS[name](text, *words)}\n\n{match[3]}"
+        made = _MAKERS[name](text, *words)
+        return f"{match[1]}\n{made}\n\n{match[3]}" if made else match[1] + match[3]
 
     return _PART.sub(part, text)
 
