@@ -174,17 +174,12 @@ def repeat_findings(
             notes.append(Note(f"it ended otherwise: {ends}"))
         if diff := text_diff(before.stdout, now.stdout):
             notes.append(Note("its output:\n" + diff))
-        diagnostics.append(
-            diagnose(
-                "script-unrepeatable",
-                by_path[now.path].script.span.first_line(),
-                f"`{now.path}` behaves differently than before, though nothing that "
-                "it is known to depend on has changed",
-                help="make it do the same each time (a fixed seed, no clock, files that it opens "
-                "itself), or put `volatile` on its output",
-                notes=notes,
-            )
-        )
+        message = f"`{now.path}` behaves differently than before, though nothing that it is known "
+        message += "to depend on has changed"
+        help = "make it do the same each time (a fixed seed, no clock, files that it opens itself)"
+        help += ", or put `volatile` on its output"
+        place = by_path[now.path].script.span.first_line()
+        diagnostics.append(diagnose("script-unrepeatable", place, message, help=help, notes=notes))
     return tuple(diagnostics)
 
 

@@ -104,10 +104,7 @@ def without_indentation(span: Span) -> Span:
 
 
 def failure_diagnostic(
-    extraction: Extraction,
-    run: ScriptRun,
-    scripts: Scripts,
-    find_module: FindModule = lambda _: "",
+    extraction: Extraction, run: ScriptRun, scripts: Scripts, find_module: FindModule = lambda _: ""
 ) -> Diagnostic | None:
     """What is wrong with a run; `None` where it ended well or the script was not run.
 
@@ -176,12 +173,9 @@ def _failure_wording(extraction: Extraction, run: ScriptRun) -> tuple[str, str, 
 
 def silence_diagnostic(recording: Recording, path: str) -> Diagnostic:
     """An output is recorded, and the script printed no line."""
-    return diagnose(
-        "script-silent",
-        recording.caption_span,
-        f"an output is recorded here, but `{path}` printed nothing",
-        help="print what is recorded, or remove the recorded output",
-    )
+    message = f"an output is recorded here, but `{path}` printed nothing"
+    help = "print what is recorded, or remove the recorded output"
+    return diagnose("script-silent", recording.caption_span, message, help=help)
 
 
 def _parses(extraction: Extraction) -> bool:

@@ -107,10 +107,7 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
 
 
 def _build_course(
-    source: Source,
-    root: ObjectNode,
-    fields: CourseFile,
-    levels: tuple[Level, ...],
+    source: Source, root: ObjectNode, fields: CourseFile, levels: tuple[Level, ...]
 ) -> Course:
     settings, verify = fields.course, fields.verify or VerifyTable()
     table, gate = root.object("course"), root.object("verify")

@@ -35,19 +35,13 @@ COMMON = tuple(
     """.split()
 )
 """Units that are valid without asking Pint; others are proposed from among these."""
-_NAMES = {
-    **{"meter": "m", "metre": "m", "second": "s", "sec": "s", "gram": "g", "kilogram": "kg"},
-    **{"joule": "J", "watt": "W", "pascal": "Pa", "radian": "rad", "degree": "°", "hertz": "Hz"},
-    **{
-        "newton": "N",
-        "minute": "min",
-        "hour": "h",
-        "kelvin": "K",
-        "volt": "V",
-        "ampere": "A",
-        "percent": "%",
-    },
-}
+_NAMES = dict(
+    name.split("=")
+    for name in """
+    meter=m metre=m second=s sec=s gram=g kilogram=kg joule=J watt=W pascal=Pa radian=rad degree=°
+    hertz=Hz newton=N minute=min hour=h kelvin=K volt=V ampere=A percent=%
+    """.split()
+)
 _PRODUCT_UNITS = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
 """Units that are often written without the space between them."""
 
