@@ -307,11 +307,17 @@ def _end_states(run: ScriptRun) -> dict[int, list[tuple[float, list[float]]]]:
 
 def noise_warnings(sensitivity: Sensitivity) -> Iterator[Diagnostic]:
     """A warning where the verification compares what moved states change."""
-    warnings = [
-        (doubt.span, _describe_doubt(doubt))
-        for doubt in sensitivity.doubts
-        if doubt.compared and (doubt.repeat < _AS_MOVED or doubt.digits > _EXACT_DIGITS)
-    ]
+    warnings: list[tuple[Span, str]] = []
+    for doubt in sensitivity.doubts:
+        if not doubt.compared or (doubt.repeat >= _AS_MOVED and doubt.digits <= _EXACT_DIGITS):
+            continue
+        text = "no digit repeats"
+        if doubt.repeat:
+            text = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
+            number = _only_number(doubt.printed)
+            instead = "" if number is None else _round_to(number, doubt.repeat)
+            text += f", print {instead}" if instead else ""
+        warnings.append((doubt.span, f"{text}: printed from {doubt.least} to {doubt.most}"))
     for flip in (flip for flip in sensitivity.flips if flip.compared):
         text = f"printed as {quote(flip.other, _WIDTH)} too"
         if not flip.other.strip():
@@ -349,13 +355,3 @@ def describe_growth(sensitivity: Sensitivity) -> str:
     if size is None or not math.isfinite(size):
         return "its states part without bounds"
     return f"states end {size:.0e} times as far apart as they began"
-
-
-def _describe_doubt(doubt: Doubt) -> str:
-    values = f"printed from {doubt.least} to {doubt.most}"
-    if not doubt.repeat:
-        return f"no digit repeats: {values}"
-    repeat = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
-    number = _only_number(doubt.printed)
-    instead = "" if number is None else _round_to(number, doubt.repeat)
-    return f"{repeat}{f', print {instead}' if instead else ''}: {values}"

@@ -85,7 +85,13 @@ class _Token(Struct, frozen=True):
 
 def varying_times(first: Side, second: Side, comparison: Comparison) -> str:
     """The pattern that makes the outputs of two runs the same; empty if there is no good one."""
-    tokens = _pair_tokens(first.lines, second.lines)
+    tokens: list[_Token] = []
+    if len(first.lines) != len(second.lines):
+        return ""
+    for number, lines in enumerate(zip(first.lines, second.lines, strict=True)):
+        if len({" ".join(_TOKEN.sub("0", line).split()) for line in lines}) > 1:
+            return ""  # they differ in more than their numbers
+        tokens += (_Token(number, m) for m in zip(*map(_TOKEN.finditer, lines), strict=True))
     varying = [token for token in tokens if token.varies]
     excluded = comparison.mode is Mode.VOLATILE or comparison.ellipsis
     if excluded or not varying or not all(token.is_time(first.lines) for token in varying):
@@ -111,18 +117,6 @@ def varying_times(first: Side, second: Side, comparison: Comparison) -> str:
     filters = replace(comparison, volatile=pattern).filters
     first, second = (Side.of(side.raw, filters) for side in (first, second))
     return pattern if same_lines(first, second, comparison) else ""
-
-
-def _pair_tokens(first: Sequence[str], second: Sequence[str]) -> list[_Token]:
-    """The tokens of two outputs that are alike but for these; none where they are not."""
-    tokens: list[_Token] = []
-    for number, lines in enumerate(zip(first, second, strict=False)):
-        skeletons = {" ".join(_TOKEN.sub("0", line).split()) for line in lines}
-        if len(first) != len(second) or len(skeletons) > 1:
-            return []
-        pairs = zip(*map(_TOKEN.finditer, lines), strict=True)
-        tokens += (_Token(number, pair) for pair in pairs)
-    return tokens
 
 
 def _covers(pattern: str, token: _Token) -> bool:
