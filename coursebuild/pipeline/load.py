@@ -182,7 +182,6 @@ class _Loader:
     # --- texts
 
     def _drop_long_texts(self, limit: int) -> None:
-        """Leave out the files that are too long."""
         models = {model.source: model for model in self.files.models}
         self.files = replace(
             self.files,
@@ -234,7 +233,6 @@ class _Loader:
         self.diagnostics += (conflict for conflict in conflicts if conflict is not None)
 
     def _load_theme(self, theme: Theme) -> Theme:
-        """Return the theme with its files."""
         if theme == Theme() and not (self.root / TEMPLATES).is_dir():
             return theme
         from coursebuild.pipeline.theme_files import load_theme
