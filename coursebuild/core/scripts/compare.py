@@ -42,11 +42,16 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
-from coursebuild.core.scripts.diff import find_differences, number_change, quote, text_diff
+from coursebuild.core.scripts.diff import (
+    find_differences,
+    number_change,
+    quote,
+    text_diff,
+    varying_times,
+)
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.tables import compare_table
-from coursebuild.core.scripts.varying import varying_times
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
