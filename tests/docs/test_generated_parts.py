@@ -31,8 +31,8 @@ def regenerate(text: str) -> str:
 
     def part(match: re.Match[str]) -> str:
         name, *words = match[2].split()
-        made = _MAKERS[name](text, *words)
-        return f"{match[1]}\n{made}\n\n{match[3]}" if made else match[1] + match[3]
+        body = _MAKERS[name](text, *words)
+        return f"{match[1]}\n{body}\n\n{match[3]}" if body else match[1] + match[3]
 
     return _PART.sub(part, text)
 
