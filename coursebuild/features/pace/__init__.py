@@ -82,7 +82,9 @@ def check(course: model.Course, documents: Iterable[model.Document]) -> Iterator
     by_path = {document.source.path: document for document in documents}
     for lesson in course.lessons:
         if lesson.path in by_path:
-            efforts = _efforts_of(by_path[lesson.path])
+            document = by_path[lesson.path]
+            summary = (document.summaries or {}).get("pace")
+            efforts = summary if isinstance(summary, Efforts) else count_efforts(document)
             main = f"the main path of lesson {lesson.id} takes"
             further = f"the further sections of lesson {lesson.id} take"
             for field, part, map_minutes, effort in (
@@ -98,11 +100,6 @@ def check(course: model.Course, documents: Iterable[model.Document]) -> Iterator
                 if field == "minutes" and estimate > (map_minutes or estimate):
                     help += ", or mark sections that only some need with `{.further}`"
                 yield diagnose("lesson-minutes", lesson.span, message, help=help)
-
-
-def _efforts_of(document: model.Document) -> Efforts:
-    summary = (document.summaries or {}).get("pace")
-    return summary if isinstance(summary, Efforts) else count_efforts(document)
 
 
 FEATURE = Feature(
