@@ -55,24 +55,22 @@ def _count_effort(blocks: list[model.Block]) -> Effort:
     words = sum(len(model.plain_text(model.block_inlines(block)).split()) for block in blocks)
     feature_blocks = [block for block in blocks if isinstance(block, model.FeatureBlock)]
     tasks = sum(kind_of_block(block).tasks(block) for block in feature_blocks)
-    return Effort(_round_to(words, 50), _round_to(sum(map(_count_lines, blocks)), 5), tasks)
+    lines = 0
+    for block in blocks:
+        match block:
+            case model.Script() | model.PlainCode() | model.CodeBlock() | model.Mjcf():
+                lines += len(block.code.text.splitlines())
+            case model.Recording(body=body):
+                lines += len(body.rows if isinstance(body, model.Table) else body.text.splitlines())
+            case model.MathBlock():
+                lines += 1
+            case _:
+                pass
+    return Effort(_round_to(words, 50), _round_to(lines, 5), tasks)
 
 
 def _round_to(number: float, unit: int) -> int:
     return unit * round(number / unit)
-
-
-def _count_lines(block: model.Block) -> int:
-    match block:
-        case model.Script() | model.PlainCode() | model.CodeBlock() | model.Mjcf():
-            return len(block.code.text.splitlines())
-        case model.Recording():
-            body = block.body
-            return len(body.rows if isinstance(body, model.Table) else body.text.splitlines())
-        case model.MathBlock():
-            return 1
-        case _:
-            return 0
 
 
 def check(course: model.Course, documents: Iterable[model.Document]) -> Iterator[Diagnostic]:
