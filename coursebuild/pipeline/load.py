@@ -41,7 +41,6 @@ from coursebuild.core.pages.materials import words_for
 from coursebuild.core.registry import read_references
 from coursebuild.core.run.script_environment import course_environment, engine_version
 from coursebuild.core.scripts.edit import check_source_parts, shown_files
-from coursebuild.core.text.conflicts import find_conflict
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source, Span
 
@@ -212,6 +211,8 @@ class _Loader:
 
     def find_conflicts(self, course: Course | None) -> None:
         """Report merge conflicts in all texts but lessons and pages, which their parser reports."""
+        from coursebuild.core.syntax.document import find_conflict
+
         sources = [*self.files.declarations, *(model.source for model in self.files.models)]
         sources += [] if self.files.map is None else [self.files.map]
         paths = {*self.files.files}
