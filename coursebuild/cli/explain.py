@@ -10,7 +10,6 @@ import argparse
 import re
 import sys
 import time
-from collections.abc import Iterator
 from typing import Literal
 
 from msgspec import Struct
@@ -340,36 +339,35 @@ class _Explainer:
 
     def _documents_using(self, path: str) -> tuple[str, ...]:
         return tuple(
-            document.source.path
-            for document in self.course.documents
-            if any(True for _ in _uses(document, path))
+            document.source.path for document in self.course.documents if _uses(document, path)
         )
 
 
-def _uses(document: Document, path: str) -> Iterator[object]:
-    """The parts of a document that show a file, link to it, or quote its output."""
+def _uses(document: Document, path: str) -> bool:
+    """Whether a document shows a file, links to it, or quotes its output."""
     for block in document_blocks(document):
         if isinstance(block, FeatureBlock):
             mentioned = block.mentioned_models()
             models = {f"models/{model}.xml" for model in (*block.models(), *mentioned)}
             if path in models.union(map(BENCH.path, mentioned), map(ENGINES.path, mentioned)):
-                yield block
+                return True
         for inline in walk_inlines(block_inlines(block)):
             match inline:
-                case Image(url=url) if local_file(url, document.source.path) == path:
-                    yield inline
-                case Link(target=UrlTarget(url=url)) if (
-                    "://" not in url and local_file(url, document.source.path) == path
-                ):
-                    yield inline
-                case Link(target=ModelTarget(name=name)) if f"models/{name}.xml" == path:
-                    yield inline
-                case Link(target=ExampleTarget(path=example)) if example == path:
-                    yield inline
-                case NumberBinding(script=script) if script == path:
-                    yield inline
+                case Link(target=UrlTarget(url=url)) if "://" in url:
+                    shown_path = None
+                case Image(url=url) | Link(target=UrlTarget(url=url)):
+                    shown_path = local_file(url, document.source.path)
+                case Link(target=ModelTarget(name=name)):
+                    shown_path = f"models/{name}.xml"
+                case Link(target=ExampleTarget(path=example)):
+                    shown_path = example
+                case NumberBinding(script=script):
+                    shown_path = script
                 case _:
-                    pass
+                    shown_path = None
+            if shown_path == path:
+                return True
+    return False
 
 
 def _describe_run(

@@ -111,8 +111,11 @@ class Progress:
     def _tick(self) -> None:
         while True:
             with self._lock:
-                room = _columns(self.stream) - 1
-                self._write(_ERASE + clip(self._line(time.monotonic()), room))
+                try:
+                    columns = os.get_terminal_size(self.stream.fileno()).columns or 80
+                except (OSError, ValueError):
+                    columns = 80
+                self._write(_ERASE + clip(self._line(time.monotonic()), columns - 1))
             if self._stop.wait(_INTERVAL):
                 return
 
@@ -142,11 +145,3 @@ class Progress:
             self.stream.flush()
         except (OSError, ValueError):  # nobody reads any more; the work goes on
             self._has_readers = False
-
-
-def _columns(stream: TextIO) -> int:
-    """The width of a terminal; 80 where it is not known."""
-    try:
-        return os.get_terminal_size(stream.fileno()).columns or 80
-    except (OSError, ValueError):
-        return 80

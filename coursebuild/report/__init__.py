@@ -9,7 +9,6 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from coursebuild.core.model.results import TrialLine
-from coursebuild.core.scripts.sensitivity import Sensitivity
 from coursebuild.core.text.characters import clean_xml
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.rules import RULES, rule_address
@@ -45,7 +44,13 @@ def to_json(report: Report) -> str:
     }
     if report.sensitivity is not None:
         value["sensitivity"] = [
-            _sensitivity_value(sensitivity) for sensitivity in report.sensitivity
+            {
+                **plain(s, standing="status"),  # an amplification without bounds is `null`
+                "doubts": [{"file": row.span.path, **plain(row)} for row in s.doubts],
+                "flips": [{"file": row.span.path, **plain(row)} for row in s.flips],
+                "chaotic": s.chaotic,
+            }
+            for s in report.sensitivity
         ]
     return json_text(value)
 
@@ -53,14 +58,6 @@ def to_json(report: Report) -> str:
 def _line_value(line: ScriptLine | TrialLine) -> dict[str, Any]:
     value: dict[str, Any] = plain(line, unexported="no_python_export")
     return value | {"seconds": round(line.seconds, 3)}
-
-
-def _sensitivity_value(s: Sensitivity) -> dict[str, Any]:
-    """The sensitivity of a script; an amplification without bounds is `null`."""
-    value: dict[str, Any] = plain(s, standing="status")
-    for name, rows in (("doubts", s.doubts), ("flips", s.flips)):
-        value[name] = [{"file": row.span.path, **plain(row)} for row in rows]
-    return {**value, "chaotic": s.chaotic}
 
 
 # --- JUnit

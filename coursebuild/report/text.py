@@ -302,20 +302,14 @@ def _sensitivity_lines(s: Sensitivity, style: Style) -> list[str]:
     colour = GREEN if verdict == "all" else YELLOW
     parts = [f"of {plural(s.numbers, 'number')} {repeat} repeat in full"]
     parts.append(s.unhalved or f"{converged} are converged in full")
-    if s.amplification is not None:
-        parts.append(
-            f"states end {_format_factor(s.amplification)} times as far apart as they began"
-        )
+    if (size := s.amplification) is not None:
+        factor = f"{size:.0e}" if size >= 1e3 else f"{size:.2g}"
+        factor = factor if math.isfinite(size) else "without bounds, many"
+        parts.append(f"states end {factor} times as far apart as they began")
     head = f"{style.paint(f'{verdict:<9}', colour)} {s.path}  {', '.join(parts)}"
     rows: list[Doubt | Flip] = [*s.doubts, *s.flips]
     rows.sort(key=lambda row: (row.span.path, row.span.start))
     return [head, *(f"  {_row_text(row)}" for row in rows)]
-
-
-def _format_factor(size: float) -> str:
-    if not math.isfinite(size):
-        return "without bounds, many"
-    return f"{size:.0e}" if size >= 1e3 else f"{size:.2g}"
 
 
 def _row_text(row: Doubt | Flip) -> str:
@@ -332,14 +326,12 @@ def _row_text(row: Doubt | Flip) -> str:
             text += f"  ({'; '.join(measured_values)})"
             is_allowed = row.repeat < row.digits and not row.compared
         case Flip():
-            text, is_allowed = _flip_text(row), not row.compared
+            is_allowed = not row.compared
+            printed, second = (" ".join(text.split()) for text in (row.printed, row.other))
+            place = f"in place of `{printed}`" if printed else "here as well"
+            text = f"`{second}` is printed {place}"
+            if not second:
+                text = f"`{printed}` is not always printed"
         case _:
             assert_never(row)
     return f"{location(row.span)}  {text}" + ("  (allowed for)" if is_allowed else "")
-
-
-def _flip_text(row: Flip) -> str:
-    printed, second = (" ".join(text.split()) for text in (row.printed, row.other))
-    if not second:
-        return f"`{printed}` is not always printed"
-    return f"`{second}` is printed {f'in place of `{printed}`' if printed else 'here as well'}"

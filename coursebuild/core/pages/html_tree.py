@@ -150,21 +150,17 @@ def _xml(content: Iterable[HtmlContent]) -> Iterator[str]:
             if child.name in _NAMESPACES:
                 yield f' xmlns="{_NAMESPACES[child.name]}"'
             for key, value in child.attributes.items():
-                yield _xml_attribute(key, value)
+                space, _, local = key.rpartition(":")
+                has_name = space in ("", "xml", "xlink") and _XML_NAME.fullmatch(local)
+                if has_name and key != "xmlns":
+                    namespace = f' xmlns:xlink="{_XLINK}"' if space == "xlink" else ""
+                    yield f'{namespace} {key}="{_xml_text(value).replace(chr(34), "&quot;")}"'
             if child.name in VOID:
                 yield "/>"
             else:
                 yield ">"
                 yield from _xml(child.children)
                 yield f"</{child.name}>"
-
-
-def _xml_attribute(name: str, value: str) -> str:
-    space, _, local = name.rpartition(":")
-    if space not in ("", "xml", "xlink") or not _XML_NAME.fullmatch(local) or name == "xmlns":
-        return ""
-    namespace = f' xmlns:xlink="{_XLINK}"' if space == "xlink" else ""
-    return f'{namespace} {name}="{_xml_text(value).replace(chr(34), "&quot;")}"'
 
 
 def _xml_text(text: str) -> str:

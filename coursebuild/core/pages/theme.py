@@ -37,7 +37,10 @@ def course_face(use: str, name: str, data: bytes) -> tuple[Face, bytes] | str:
             measure = measure_font(font)
             characters = unicode_range("".join(map(chr, sorted(font.getBestCmap()))))
             italic = bool(font["OS/2"].fsSelection & 1 or font["post"].italicAngle)
-            weight = _weights(font)
+            weight = font["OS/2"].usWeightClass, font["OS/2"].usWeightClass
+            for axis in font["fvar"].axes if "fvar" in font else ():
+                if axis.axisTag == "wght":
+                    weight = round(axis.minValue), round(axis.maxValue)
             font.flavor = None
             whole = io.BytesIO()
             font.save(whole)
@@ -46,14 +49,6 @@ def course_face(use: str, name: str, data: bytes) -> tuple[Face, bytes] | str:
     subset, style = "latin" if measure else "other", "italic" if italic else "normal"
     face = Face(COURSE[use], subset, name, style, weight, characters, characters, measure)
     return face, whole.getvalue()
-
-
-def _weights(font: TTFont) -> tuple[int, int]:
-    for axis in font["fvar"].axes if "fvar" in font else ():
-        if axis.axisTag == "wght":
-            return round(axis.minValue), round(axis.maxValue)
-    weight = font["OS/2"].usWeightClass
-    return weight, weight
 
 
 def measure_font(font: TTFont) -> tuple[float, float, float, float] | None:

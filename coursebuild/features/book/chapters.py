@@ -116,18 +116,15 @@ def _rewrite_attribute(
     if name == "src" and element.name == "img":
         return value
     if name in _ADDRESSES:
-        # A picture inside a drawing is not part of the lesson.
-        return None if element.name == "image" else _rewrite_address(value, rules)
+        if element.name == "image":  # inside a drawing, and not part of the lesson
+            return None
+        if value.startswith("#"):
+            return f"#{urls.quote_anchor(rules.id(unquote(value[1:])))}" if len(value) > 1 else "#"
+        path, anchor = rules.place.target(value)
+        return value if path is None else rules.address(path, anchor) or None
     if "url(#" in value:
         return _IN_SVG.sub(lambda match: f"url(#{rules.id(match[1])})", value)
     return value
-
-
-def _rewrite_address(url: str, rules: RewriteRules) -> str | None:
-    if url.startswith("#"):
-        return f"#{urls.quote_anchor(rules.id(unquote(url[1:])))}" if len(url) > 1 else "#"
-    path, anchor = rules.place.target(url)
-    return url if path is None else rules.address(path, anchor) or None
 
 
 PICTURES = {

@@ -296,20 +296,17 @@ def _weights(site: Path) -> dict[str, int]:
     """Return the bytes of each page with the files that its HTML loads, and of all files."""
     files = [path for path in site.rglob("*") if path.is_file()]
     sizes = {path.relative_to(site).as_posix(): path.stat().st_size for path in files}
-    pages = {path: {path, *_find_assets(site, path)} for path in sizes if path.endswith(".html")}
-    weights = {path: sum(sizes.get(name, 0) for name in names) for path, names in pages.items()}
+    weights: dict[str, int] = {}
+    for page in (path for path in sizes if path.endswith(".html")):
+        html = (site / page).read_text(encoding="utf-8", errors="replace")
+        addresses = {
+            attributes.get("src") or attributes.get("href") or ""
+            for name, attributes in elements_with(html, ("src", "href"))
+            if name in ("script", "img") or attributes.get("rel") == "stylesheet"
+        }
+        paths = {page, *(Place(page).target(address)[0] for address in addresses)}
+        weights[page] = sum(sizes.get(path, 0) for path in paths if path is not None)
     return {**weights, _WHOLE: sum(sizes.values())}
-
-
-def _find_assets(site: Path, page: str) -> set[str]:
-    html = (site / page).read_text(encoding="utf-8", errors="replace")
-    addresses = {
-        attributes.get("src") or attributes.get("href") or ""
-        for name, attributes in elements_with(html, ("src", "href"))
-        if name in ("script", "img") or attributes.get("rel") == "stylesheet"
-    }
-    targets = (Place(page).target(address)[0] for address in addresses)
-    return {path for path in targets if path is not None}
 
 
 EXAMPLES = """\

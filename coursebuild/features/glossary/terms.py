@@ -197,18 +197,13 @@ def _plain_text(inline: model.Inline) -> str:
 def _sentence_ends(text: str) -> Iterator[int]:
     for mark in _END.finditer(text):
         end = mark.end()
-        next_character = text[end : end + 1]
-        goes_on = next_character.islower() or _ends_with_abbreviation(text[: mark.start() + 1])
+        word = _LAST_WORD.search(text[: mark.start() + 1])
+        is_short = word is not None and (
+            word[0].lower() in _ABBREVIATIONS or (len(word[0]) == 2 and word[0][0].isalpha())
+        )
+        goes_on = text[end : end + 1].islower() or (is_short and mark[0][0] == ".")
         if mark[0][0] in "。！？" or not goes_on:
             yield end
-
-
-def _ends_with_abbreviation(text: str) -> bool:
-    """Whether the full stop at the end of a text is that of an abbreviation or an initial."""
-    word = _LAST_WORD.search(text)
-    if word is None or not text.endswith("."):
-        return False
-    return word[0].lower() in _ABBREVIATIONS or (len(word[0]) == 2 and word[0][0].isalpha())
 
 
 def _slice(
@@ -239,33 +234,28 @@ class TermEntry(Struct, frozen=True):
 def glossary_values(library: Library) -> dict[str, object]:
     """Return the values for the template: the entries, grouped by letters."""
     place = urls.Place("glossary/index.html")
-    entries = sorted(_term_entries(library, place), key=lambda entry: sort_key(entry.term.name))
-    groups = groupby(entries, key=lambda entry: initial(entry.term.name))
-    return {
-        "letters": tuple((letter, tuple(group)) for letter, group in groups),
-        "symbols": added_page(library, place, "symbols"),
-    }
-
-
-def _term_entries(library: Library, place: urls.Place) -> Iterator[TermEntry]:
-    """Yield an entry for each term of the course, for its first definition."""
     users: dict[str, list[Owner]] = {}
     for owner, document in library.course.owned_documents:
         targets = links(library.course, document)
         for id in {target.id for target in targets if isinstance(target, TermTarget)}:
             users.setdefault(id, []).append(owner)
-    ids: set[str] = set()
+    entries: dict[str, TermEntry] = {}  # of a term, for its first definition
     for owner, document_terms in library.summaries("glossary"):
         for term in document_terms.terms:
-            if term.id not in ids:
-                ids.add(term.id)
+            if term.id not in entries:
                 names = (name_outside(library, owner, target) for target in term.targets)
                 title = fill_in(term.title, names)
                 pieces = tuple(replace(p, html=fill_in(p.html, names)) for p in term.definition)
                 term = replace(term, title=title, definition=pieces, targets=())
                 term_users = [user for user in users.get(term.id, ()) if user is not owner]
                 link = owner_link(place, owner, f"term:{term.id}")
-                yield TermEntry(term, link, owner_links(place, term_users))
+                entries[term.id] = TermEntry(term, link, owner_links(place, term_users))
+    sorted_entries = sorted(entries.values(), key=lambda entry: sort_key(entry.term.name))
+    groups = groupby(sorted_entries, key=lambda entry: initial(entry.term.name))
+    return {
+        "letters": tuple((letter, tuple(group)) for letter, group in groups),
+        "symbols": added_page(library, place, "symbols"),
+    }
 
 
 def sort_key(name: str) -> tuple[object, ...]:

@@ -275,7 +275,13 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         raise UsageError(message, help="; ".join(left))
     texts = [] if files.is_single else [part for part in parts if isinstance(part, ImportedText)]
     pages = [text for text in texts if _base_name(text.file) in _PAGES]
-    levels = _group_levels([part for part in parts if part not in pages], title)
+    # A level for each group, and one for each run of lessons outside groups
+    levels: list[ImportedLevel] = []
+    for kind, run in itertools.groupby((part for part in parts if part not in pages), type):
+        if kind is ImportedText:
+            levels.append(ImportedLevel(title=title or "Lessons", lessons=tuple(_flatten(run))))
+        else:
+            levels += (part for part in run if isinstance(part, ImportedLevel))
     return ImportedCourse(
         title=title or title_of_file(files.name), levels=tuple(levels), pages=tuple(pages)
     )
@@ -370,14 +376,3 @@ def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLeve
 
 def _base_name(path: str) -> str:
     return posixpath.basename(path).split(".")[0].lower()
-
-
-def _group_levels(
-    parts: Iterable[ImportedText | ImportedLevel], title: str
-) -> Iterator[ImportedLevel]:
-    """Yield a level for each group, and one for each run of lessons outside groups."""
-    for kind, run in itertools.groupby(parts, type):
-        if kind is ImportedText:
-            yield ImportedLevel(title=title or "Lessons", lessons=tuple(_flatten(run)))
-        else:
-            yield from (part for part in run if isinstance(part, ImportedLevel))

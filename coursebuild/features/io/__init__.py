@@ -80,12 +80,13 @@ def parse_io(fence: Fence, texts: TextParser) -> Parsed[Io]:
         diagnostics.append(diagnose("io-order", parts[label].span, message, help=help))
     contents: dict[str, tuple[Inline, ...]] = {}
     for label in LABELS:
-        text = _join_lines(parts[label].lines) if label in parts else None
-        if text is None:
+        lines = parts[label].lines if label in parts else []
+        trimmed_lines = [trim(line) for line in lines if line.text.strip()]
+        if not trimmed_lines:
             all_parts = (unlabelled, *parts.values())
             diagnostics.append(_diagnose_missing(label, parts, all_parts, fence))
         else:
-            inlines = texts.inlines(text)
+            inlines = texts.inlines(Excerpt.join(trimmed_lines, "\n"))
             contents[label] = inlines.value
             diagnostics += inlines.diagnostics
     io = Io(fence.span, *(contents.get(label, ()) for label in LABELS))
@@ -122,12 +123,6 @@ def _diagnose_missing(
             fix = Fix(f"write `{label}:`", edits=(Edit(place, label),), safe=is_safe)
     message = f"the io block has no line `{label}:`"
     return diagnose("io-missing", fence.head, message, help=fix, notes=notes)
-
-
-def _join_lines(lines: list[Excerpt]) -> Excerpt | None:
-    """Join the lines of a part without indentation and empty lines; `None` if none is left."""
-    texts = [trim(line) for line in lines if line.text.strip()]
-    return Excerpt.join(texts, "\n") if texts else None
 
 
 if TYPE_CHECKING:

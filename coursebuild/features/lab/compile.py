@@ -26,7 +26,6 @@ from coursebuild.features.lab.schema import (
     Control,
     LogEntry,
     Overlays,
-    Plot,
     Select,
     SimLab,
 )
@@ -101,12 +100,18 @@ def compile_lab(lab: Lab, name: str) -> LabModule:
     code = "".join(f"export const {member} = {text};\n" for member, text in members)
     literal = "{" + ", ".join(f"{member}: {text}" for member, text in members) + "}"
     fields = lab.fields
+    overlays = fields.overlays
+    switches = Overlays.__struct_fields__ if isinstance(overlays, Overlays) else ()
     config = {"id": name} | {field: getattr(fields, field) for field in _FIELDS}
     config |= {
-        "overlays": _overlays(fields),
+        "overlays": [o for o in switches if getattr(overlays, o)] if switches else overlays,
         "controls": [control_data(control) for control in fields.controls],
         "readouts": [{"label": r.label, "digits": r.digits} for r in fields.readouts],
-        "plots": [_plot_data(plot) for plot in fields.plots],
+        "plots": [
+            {name: getattr(plot, name) for name in _PLOT}
+            | {"traces": [{"label": trace.label, "dash": trace.dash} for trace in plot.traces]}
+            for plot in fields.plots
+        ],
         "expect": [
             {"after": c.steps, "t": c.t, "min": c.min, "max": c.max, "diverges": c.diverges}
             for c in fields.expect
@@ -172,14 +177,6 @@ def _log_data(fields: SimLab, log: tuple[LogEntry, ...]) -> Iterator[tuple[float
             yield from ((entry.t, numbers[label], value) for label, value in entry.do.items())
 
 
-def _overlays(fields: SimLab) -> list[str]:
-    """Return the overlays that start on."""
-    overlays = fields.overlays
-    if isinstance(overlays, Overlays):
-        return [name for name in Overlays.__struct_fields__ if getattr(overlays, name)]
-    return list(overlays)
-
-
 _CONTROL = {
     "type": None, "label": None, "unit": "", "min": None, "max": None, "step": None,
     "value": None, "digits": None, "options": (), "param": None, "init": False, "reset": False,
@@ -194,8 +191,3 @@ def control_data(control: Control) -> dict[str, Any]:
     if isinstance(control, Select):
         fields["value"] = control.start
     return {name: fields.get(name, default) for name, default in _CONTROL.items()}
-
-
-def _plot_data(plot: Plot) -> dict[str, Any]:
-    traces = [{"label": trace.label, "dash": trace.dash} for trace in plot.traces]
-    return {name: getattr(plot, name) for name in _PLOT} | {"traces": traces}

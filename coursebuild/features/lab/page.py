@@ -352,20 +352,14 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     if view.controls:
         rows = [(escape_line(label), escape_line(values)) for label, values in view.controls]
         parts.append(table((words("lab.control"), words("lab.range")), rows))
-    displays = (
-        f"- {escape_marks(name)}: {escape_marks(', '.join(labels))}"
-        for name, labels in _list_displays(writer, view)
+    texts = writer.page.renderer.words
+    displays = list(view.plots)
+    if view.readouts and view.recorded is None:
+        displays.insert(0, (texts("lab.readouts"), view.readouts))
+    if view.overlays:
+        displays.append((texts("lab.overlays"), view.overlays))
+    parts.append(
+        "\n".join(f"- {escape_marks(n)}: {escape_marks(', '.join(p))}" for n, p in displays)
     )
-    parts.append("\n".join(displays))
     parts += [writer.blocks(lab.note), link(words("exports.run_lab"), writer.live)]
     return "\n\n".join(filter(None, parts))
-
-
-def _list_displays(writer: MarkdownWriter, view: LabView) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield what the lab shows while it runs: its name, and its parts."""
-    texts = writer.page.renderer.words
-    if view.readouts and view.recorded is None:
-        yield texts("lab.readouts"), view.readouts
-    yield from view.plots
-    if view.overlays:
-        yield texts("lab.overlays"), view.overlays

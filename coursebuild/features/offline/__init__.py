@@ -119,18 +119,17 @@ def listing(shell: frozenset[str], files: Iterable[FileFacts]) -> bytes:
     for file in files:
         group = _group(shell, file)
         if group is not None:
-            groups[group][file.path] = "" if _has_hashed_name(file) else file.digest[:_DIGITS]
+            hash_in_name = file.path.rpartition(".")[0].rpartition(".")[2]
+            is_hashed = file.path.startswith("assets/") and hash_in_name == file.digest[:8]
+            groups[group][file.path] = "" if is_hashed else file.digest[:_DIGITS]
             sizes[group] += file.size
     parts = [f'"format": {_FORMAT}']
     for name, digests in groups.items():
-        parts.append(f'"{name}": {{\n"bytes": {sizes[name]},\n"files": {_lines(digests)}\n}}')
+        # A line for each file, as `json` writes them with an indent of 0, but faster
+        text = json.dumps(digests, ensure_ascii=False, separators=(",\n", ": "))
+        text = f"{{\n{text[1:-1]}\n}}" if digests else "{}"
+        parts.append(f'"{name}": {{\n"bytes": {sizes[name]},\n"files": {text}\n}}')
     return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8", "surrogatepass")
-
-
-def _lines(files: dict[str, str]) -> str:
-    """Write a line for each file, as `json` does with an indent of 0, but faster."""
-    text = json.dumps(files, ensure_ascii=False, separators=(",\n", ": "))
-    return f"{{\n{text[1:-1]}\n}}" if files else "{}"
 
 
 def _group(shell: frozenset[str], file: FileFacts) -> str | None:
@@ -144,12 +143,6 @@ def _group(shell: frozenset[str], file: FileFacts) -> str | None:
         return "rest" if is_lab_data else "text"
     is_text = path.endswith(_TEXT) or path == _SEARCH_INDEX
     return "text" if is_text and file.size <= _LARGE else "rest"
-
-
-def _has_hashed_name(file: FileFacts) -> bool:
-    """Whether the name contains the content's hash."""
-    digits = file.path.rpartition(".")[0].rpartition(".")[2]
-    return file.path.startswith("assets/") and digits == file.digest[:8]
 
 
 FEATURE = Feature(

@@ -55,24 +55,22 @@ def _count_effort(blocks: list[model.Block]) -> Effort:
     words = sum(len(model.plain_text(model.block_inlines(block)).split()) for block in blocks)
     feature_blocks = [block for block in blocks if isinstance(block, model.FeatureBlock)]
     tasks = sum(kind_of_block(block).tasks(block) for block in feature_blocks)
-    return Effort(_round_to(words, 50), _round_to(sum(map(_count_lines, blocks)), 5), tasks)
+    lines = 0
+    for block in blocks:
+        match block:
+            case model.Script() | model.PlainCode() | model.CodeBlock() | model.Mjcf():
+                lines += len(block.code.text.splitlines())
+            case model.Recording(body=body):
+                lines += len(body.rows if isinstance(body, model.Table) else body.text.splitlines())
+            case model.MathBlock():
+                lines += 1
+            case _:
+                pass
+    return Effort(_round_to(words, 50), _round_to(lines, 5), tasks)
 
 
 def _round_to(number: float, unit: int) -> int:
     return unit * round(number / unit)
-
-
-def _count_lines(block: model.Block) -> int:
-    match block:
-        case model.Script() | model.PlainCode() | model.CodeBlock() | model.Mjcf():
-            return len(block.code.text.splitlines())
-        case model.Recording():
-            body = block.body
-            return len(body.rows if isinstance(body, model.Table) else body.text.splitlines())
-        case model.MathBlock():
-            return 1
-        case _:
-            return 0
 
 
 def check(course: model.Course, documents: Iterable[model.Document]) -> Iterator[Diagnostic]:
@@ -82,7 +80,9 @@ def check(course: model.Course, documents: Iterable[model.Document]) -> Iterator
     by_path = {document.source.path: document for document in documents}
     for lesson in course.lessons:
         if lesson.path in by_path:
-            efforts = _efforts_of(by_path[lesson.path])
+            document = by_path[lesson.path]
+            summary = (document.summaries or {}).get("pace")
+            efforts = summary if isinstance(summary, Efforts) else count_efforts(document)
             main = f"the main path of lesson {lesson.id} takes"
             further = f"the further sections of lesson {lesson.id} take"
             for field, part, map_minutes, effort in (
@@ -98,11 +98,6 @@ def check(course: model.Course, documents: Iterable[model.Document]) -> Iterator
                 if field == "minutes" and estimate > (map_minutes or estimate):
                     help += ", or mark sections that only some need with `{.further}`"
                 yield diagnose("lesson-minutes", lesson.span, message, help=help)
-
-
-def _efforts_of(document: model.Document) -> Efforts:
-    summary = (document.summaries or {}).get("pace")
-    return summary if isinstance(summary, Efforts) else count_efforts(document)
 
 
 FEATURE = Feature(

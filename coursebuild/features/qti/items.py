@@ -238,10 +238,16 @@ _STYLE_SHEET = f"""\
 def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
     """Yield the files, none if no question has an answer, and report what items cannot hold."""
     quizzes: list[QuizItems] = []
-    for quiz in _quizzes(context):
-        yield from quiz.losses
-        if quiz.items:
-            quizzes.append(quiz)
+    for owner in context.course.owners:
+        summary = owner.document
+        if not summary or not any(find_blocks(summary, Quiz)):
+            continue
+        page = context.page(summary)
+        for block in find_blocks(page.document, Quiz):
+            quiz = quiz_items(page, block, context.course)
+            yield from quiz.losses
+            if quiz.items:
+                quizzes.append(quiz)
             test = render_xml(_FOLDER / "test.jinja", quiz=quiz)
             yield OutputFile(f"tests/{quiz.identifier}.xml", test)
             for item in quiz.items:
@@ -261,13 +267,3 @@ def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
             encode=urls.encode,
         )
         yield OutputFile("imsmanifest.xml", manifest)
-
-
-def _quizzes(context: ExportContext) -> Iterator[QuizItems]:
-    """Write all quizzes, in the order of the course."""
-    for owner in context.course.owners:
-        summary = owner.document
-        if summary and any(find_blocks(summary, Quiz)):
-            page = context.page(summary)
-            for quiz in find_blocks(page.document, Quiz):
-                yield quiz_items(page, quiz, context.course)

@@ -111,11 +111,25 @@ class Quiz(FeatureBlock, frozen=True):
 
     def child_blocks(self) -> tuple[Block, ...]:
         """The texts of its questions."""
-        return tuple(block for question in self.questions for block in _blocks(question))
+        blocks: list[Block] = []
+        for question in self.questions:
+            blocks += (*question.text, *question.explain, *(b for h in question.hints for b in h))
+            if isinstance(question, ChoiceQuestion):
+                blocks += [block for option in question.options for block in option.feedback]
+                blocks += [question.sim] if question.sim is not None else []
+            if isinstance(question, OpenQuestion):
+                blocks += question.reference
+        return tuple(blocks)
 
     def child_inlines(self) -> tuple[Inline, ...]:
         """Options, and items to be put in order."""
-        return tuple(inline for question in self.questions for inline in _inlines(question))
+        inlines: list[Inline] = []
+        for question in self.questions:
+            if isinstance(question, ChoiceQuestion):
+                inlines += [inline for option in question.options for inline in option.text]
+            if isinstance(question, OrderQuestion):
+                inlines += [inline for item in question.items for inline in item]
+        return tuple(inlines)
 
     def summary(self) -> Quiz:
         """The quiz with the questions whose answer a script gives, without their texts."""
@@ -141,21 +155,3 @@ class Quiz(FeatureBlock, frozen=True):
     def output_questions(self) -> Iterator[OutputQuestion]:
         """The questions whose answer a script gives."""
         return (question for question in self.questions if isinstance(question, OutputQuestion))
-
-
-def _blocks(question: AnyQuestion) -> tuple[Block, ...]:
-    blocks = [*question.text, *question.explain, *(b for hint in question.hints for b in hint)]
-    if isinstance(question, ChoiceQuestion):
-        blocks += [block for option in question.options for block in option.feedback]
-        blocks += [question.sim] if question.sim is not None else []
-    if isinstance(question, OpenQuestion):
-        blocks += question.reference
-    return tuple(blocks)
-
-
-def _inlines(question: AnyQuestion) -> tuple[Inline, ...]:
-    if isinstance(question, ChoiceQuestion):
-        return tuple(inline for option in question.options for inline in option.text)
-    if isinstance(question, OrderQuestion):
-        return tuple(inline for item in question.items for inline in item)
-    return ()

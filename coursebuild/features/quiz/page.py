@@ -188,24 +188,18 @@ if TYPE_CHECKING:
 
 def quiz_markdown(writer: MarkdownWriter, block: Quiz) -> str:
     """Write a quiz as a list of its questions, each with its answer."""
-    questions = (
-        hang(f"{number}. ", _question(writer, question))
-        for number, question in enumerate(block.questions, 1)
-    )
     has_heading = is_heading(writer.page.document, block.title)
-    title = "" if has_heading else f"**{escape_marks(block.title)}**"
-    return "\n\n".join(filter(None, (title, *questions)))
-
-
-def _question(writer: MarkdownWriter, question: AnyQuestion) -> str:
-    parts = [f"*{escape_marks(question.label)}*"] if question.label else []
-    parts.append(writer.blocks(question.text))
-    parts += _task(writer, question)
-    for number, hint in enumerate(question.hints, 1):
-        parts.append(writer.folded(writer.words("quiz.hint", n=number), writer.blocks(hint)))
-    answer = "\n\n".join(filter(None, _answer(writer, question)))
-    parts.append(writer.folded(writer.words("quiz.answer"), answer))
-    return "\n\n".join(filter(None, parts))
+    texts = [] if has_heading else [f"**{escape_marks(block.title)}**"]
+    for number, question in enumerate(block.questions, 1):
+        parts = [f"*{escape_marks(question.label)}*"] if question.label else []
+        parts.append(writer.blocks(question.text))
+        parts += _task(writer, question)
+        for n, hint in enumerate(question.hints, 1):
+            parts.append(writer.folded(writer.words("quiz.hint", n=n), writer.blocks(hint)))
+        answer = "\n\n".join(filter(None, _answer(writer, question)))
+        parts.append(writer.folded(writer.words("quiz.answer"), answer))
+        texts.append(hang(f"{number}. ", "\n\n".join(filter(None, parts))))
+    return "\n\n".join(filter(None, texts))
 
 
 def _task(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:

@@ -7,18 +7,19 @@
 """
 
 from coursebuild.core.features import Feature, PageKind, PagePart
-from coursebuild.core.pages.library import Library
 from coursebuild.features.search.index import search_files
 from coursebuild.features.search.page import note_page
 
-
-def _values(library: Library) -> dict[str, object]:
-    return {"action": "index.html"}
-
-
+_PAGE = PageKind(
+    name="search",
+    values=lambda library: {"action": "index.html"},
+    order=10,
+    indexed=False,
+    form=True,
+)
 FEATURE = Feature(
     name="search",
-    pages=(PageKind(name="search", values=_values, order=10, indexed=False, form=True),),
+    pages=(_PAGE,),
     parts=(PagePart(mark="", bundled="search.js", late=True),),
     note=note_page,
     files=search_files,

@@ -204,18 +204,14 @@ def join_slices(slices: Iterable[bytes]) -> str:
         for line in part.decode().split("\n") if part else ():
             term, _, pages = line.partition(" ")
             pages_by_term[term] += [first + page for page in bytes.fromhex(pages)]
-    lines = [_shard_line(term, sorted(pages)) for term, pages in sorted(pages_by_term.items())]
+    lines = []
+    for term, pages_of_term in sorted(pages_by_term.items()):
+        digits, previous = "", 0
+        for page in sorted(pages_of_term):
+            digits += _encode(page - previous)
+            previous = page & ~15
+        lines.append(f"{term} {digits}" if digits else term)
     return "\n".join(lines)
-
-
-def _shard_line(term: str, pages: list[int]) -> str:
-    if not pages:
-        return term
-    parts, previous = [f"{term} "], 0
-    for page in pages:
-        parts.append(_encode(page - previous))
-        previous = page & ~15
-    return "".join(parts)
 
 
 @functools.lru_cache(maxsize=1 << 14)

@@ -72,7 +72,16 @@ def terms_of(text: str) -> list[str]:
     """Return the terms of a text, in order, with repeats."""
     if not text.isascii():
         text = _FOREIGN.sub(_without_marks, text)
-    return [term for token in _TOKEN.findall(_GENITIVE.sub("", text)) for term in _expand(token)]
+    terms: list[str] = []
+    for token in _TOKEN.findall(_GENITIVE.sub("", text)):
+        name = token.strip("_")
+        if token in _SYMBOLS:
+            terms += _SYMBOLS[token]
+        elif _NUMBER.match(name):
+            terms += [name.lower()] if len(name) <= _MAX_NUMBER_LENGTH else []
+        elif 0 < len(name) <= MAX_LENGTH:
+            terms += dict.fromkeys(_split_name(name) if name.isascii() else _split_mixed(name))
+    return terms
 
 
 def shelf_of(term: str) -> str:
@@ -105,18 +114,6 @@ def _without_marks(run: re.Match[str]) -> str:
     """Return characters that are not ASCII in their compatible form, without marks."""
     text = unicodedata.normalize("NFKD", run[0])
     return "".join(c for c in text if unicodedata.category(c)[0] != "M")
-
-
-def _expand(token: str) -> tuple[str, ...]:
-    """Return the terms of a word, a name, a number or a symbol, each once."""
-    if token in _SYMBOLS:
-        return _SYMBOLS[token]
-    token = token.strip("_")
-    if len(token) > MAX_LENGTH or not token:
-        return ()
-    if _NUMBER.match(token):
-        return (token.lower(),) if len(token) <= _MAX_NUMBER_LENGTH else ()
-    return tuple(dict.fromkeys(_split_name(token) if token.isascii() else _split_mixed(token)))
 
 
 def _split_name(token: str) -> Iterator[str]:

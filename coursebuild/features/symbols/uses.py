@@ -203,19 +203,15 @@ def sort_key(symbol: str) -> tuple[object, ...]:
     """Sort Latin letters before Greek and others; plain letters before other shapes and marks."""
     root = _parse(symbol)
     text = "" if root is None else "".join(root.itertext())
-    letter = _base_letter(root) if root is not None else ""
+    while root is not None and len(root):
+        root = root[0]
+    letter = "" if root is None else root.text or ""
     plain = unicodedata.normalize("NFKC", letter)
     name = unicodedata.name(plain[:1] or " ", "")
     script = next((n for n, part in enumerate(("LATIN", "GREEK")) if part in name), 2)
     if script == 2 and plain in "ℓℏ":
         script = 0
     return (script, plain.casefold(), plain, letter, len(symbol), text, symbol)
-
-
-def _base_letter(element: Element) -> str:
-    while len(element):
-        element = element[0]
-    return element.text or ""
 
 
 _Formula: TypeAlias = model.Math | model.MathBlock

@@ -340,7 +340,9 @@ class _Counter:
                 continue
             for side in statement.sides:
                 if _is_claim(side, tex.text):
-                    place = tex.span(*_strip_range(tex.text, side.start, side.end))
+                    part = tex.text[side.start : side.end]
+                    start, end = side.end - len(part.lstrip()), side.start + len(part.rstrip())
+                    place = tex.span(start, end)
                     self.add("" if source is None else _given_kind(source), (), place)
 
 
@@ -374,8 +376,3 @@ def _is_claim(side: FormulaSide, tex: str) -> bool:
     powers = any(part.kind == "^" and part.parts[0].text == "10" for part in parts)
     large = any(int(number) > _COUNTS for number in numbers)
     return bool(side.is_numeric and numbers and (units or powers or large))
-
-
-def _strip_range(text: str, start: int, end: int) -> tuple[int, int]:
-    part = text[start:end]
-    return start + len(part) - len(part.lstrip()), start + len(part.rstrip())

@@ -182,16 +182,11 @@ def _new_feature(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     path = f"features/{name}.py"
     templates = {path: "feature.txt", f"tests/test_{name}.py": "test.txt"}
     new_map = with_feature(course, path)
-    return [
-        FileChange(course.map.path, course.map.text.encode(), new_map.encode()),
-        *(FileChange(p, None, _render_code(file, arguments)) for p, file in templates.items()),
-    ]
-
-
-def _render_code(file: str, arguments: argparse.Namespace) -> bytes:
-    """Render a template of `feature/` for a feature of this name."""
-    template = (_FEATURE / file).read_text(encoding="utf-8")
+    changes = [FileChange(course.map.path, course.map.text.encode(), new_map.encode())]
     jinja = Environment(trim_blocks=True, keep_trailing_newline=True)
-    text = jinja.from_string(template).render(script=arguments.script)
-    name = arguments.name
-    return text.replace("example", name).replace("Example", name.capitalize()).encode()
+    for path, file in templates.items():
+        template = jinja.from_string((_FEATURE / file).read_text(encoding="utf-8"))
+        text = template.render(script=arguments.script)
+        text = text.replace("example", name).replace("Example", name.capitalize())
+        changes.append(FileChange(path, None, text.encode()))
+    return changes
