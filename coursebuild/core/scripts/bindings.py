@@ -55,7 +55,7 @@ from coursebuild.core.scripts.bound_numbers import (
 )
 from coursebuild.core.scripts.lines import canonicalize
 from coursebuild.core.scripts.numbers import Number, difference
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean, nearest
 from coursebuild.core.text.source import Span
 
 _SILENT_OUTCOMES = (
@@ -180,6 +180,11 @@ def check_bindings(
             if finding.rule == "binding-mismatch" and script is not None:
                 help = f"if `{script.path}` prints it, record its output above the number"
                 finding = replace(finding, help=help, edits=())
+            elif binding.script is not None and binding.script not in outputs.scripts:
+                likely = nearest(binding.script, outputs.scripts)
+                places = (s.span for s in document_scripts(document) if s.path == likely)
+                notes = (Note(f"`{likely}` is here", place.first_line()) for place in places)
+                finding = replace(finding, notes=(*finding.notes, *notes))
             diagnostics.append(finding)
         elif finding:
             evidence[key] = tuple(line.text for line in finding)

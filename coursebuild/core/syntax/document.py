@@ -77,9 +77,10 @@ def parse_document(
     """
     state = ParsingState(callouts, lesson, words)
     base = _remove_front_matter(read_markdown(source), state)
-    title = None if lesson else title_line(source)
+    title = None if lesson else title_line(source, base.span().start)
     if title is not None:
-        base = base.slice(len(base.text.partition("\n")[0]))
+        below = base.text.lstrip().partition("\n")[2]
+        base = base.slice(len(base.text) - len(below))
     reader = TextReader(base, state, state.references, nested=False)
     blocks = reader.read()
     anchor = "" if title is None else slug(title.text)

@@ -167,7 +167,8 @@ def _check_choices(node: ObjectNode, fields: MultipleChoice | Predict) -> Iterat
         texts = "1 text" if len(fields.feedback) == 1 else f"{len(fields.feedback)} texts"
         message = f"`feedback` has {texts} for {count} options"
         help = 'an option without feedback has `""`'
-        yield diagnose("field-value", node.place("feedback"), message, help=help)
+        place = (node.get("feedback") or node).span
+        yield diagnose("field-value", place, message, help=help)
 
 
 def _check_distinct(node: ObjectNode, name: str, message: str) -> Iterator[Diagnostic]:
