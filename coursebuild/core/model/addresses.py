@@ -102,8 +102,10 @@ def document_anchors(document: Document) -> Iterator[tuple[str, AnchorOwner, Spa
     source = document.source
     if document.title_anchor:
         yield document.title_anchor, source, source.span(0, 0)
-    # A summary does not say where formulas and tables stand.
-    yield from ((item.id, item, source.span(0, 0)) for item in document.numbered_items)
+    for item in document.numbered_items:  # a summary does not say where formulas and tables stand
+        label = re.search(rf"\{{#{re.escape(item.id)}(?![\w-])", source.text)
+        at = 0 if label is None else label.start()
+        yield item.id, item, source.span(at, at)
     if document.summaries is None:
         for displayed in filter(lambda formula: formula.id, display_formulas(document)):
             yield displayed.id, displayed, source.span(displayed.start, displayed.start)

@@ -16,7 +16,7 @@ from msgspec import Meta, Struct
 from coursebuild.core.model.inlines import ForbiddenHtml, Inline, Label, MediaAddress
 from coursebuild.core.text.source import Excerpt, Source, Span
 
-_TITLE = re.compile(r"\ufeff?# +(.*\S)")
+_TITLE = re.compile(r"\ufeff?(?:[ \t\r]*\n)*# +(.*\S)")
 
 
 class Labelled(Struct, frozen=True, kw_only=True):
@@ -396,9 +396,9 @@ class NumberedItem(Struct, frozen=True):
         return self.id.partition(":")[0]
 
 
-def title_line(source: Source) -> Span | None:
-    """The title that a page's text opens with, as a heading of level 1."""
-    match = _TITLE.match(source.text)
+def title_line(source: Source, start: int = 0) -> Span | None:
+    """The title that a page's text opens with at an offset, as a heading of level 1."""
+    match = _TITLE.match(source.text, start)
     return source.span(*match.span(1)) if match is not None else None
 
 

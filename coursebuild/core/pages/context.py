@@ -25,6 +25,7 @@ from coursebuild.core.model import (
     CodeSpan,
     Course,
     Document,
+    HtmlBlock,
     Label,
     Lesson,
     NumberedItem,
@@ -34,6 +35,7 @@ from coursebuild.core.model import (
     UrlTarget,
     child_blocks,
     document_blocks,
+    is_comment,
     sibling_groups,
 )
 from coursebuild.core.model.results import SiteFile
@@ -68,6 +70,8 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
                     continue
                 following: list[Recording] = []
                 for sibling in siblings[number + 1 :]:
+                    if isinstance(sibling, HtmlBlock) and is_comment(sibling):
+                        continue  # readers do not see it
                     if not isinstance(sibling, Recording) or sibling.script != block.path:
                         break
                     following.append(sibling)

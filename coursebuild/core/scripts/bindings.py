@@ -54,7 +54,7 @@ from coursebuild.core.scripts.bound_numbers import (
 )
 from coursebuild.core.scripts.lines import canonicalize
 from coursebuild.core.scripts.numbers import Number, difference
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean, nearest
 
 _SILENT_OUTCOMES = (
     Outcome.FAILED,
@@ -181,6 +181,11 @@ def check_bindings(
             if finding.rule == "binding-mismatch" and scripts and key not in evidence:
                 help = f"if `{scripts[-1].path}` prints it, record its output above the number"
                 finding = replace(finding, help=help, edits=())
+            elif binding.script is not None and binding.script not in outputs.scripts:
+                likely = nearest(binding.script, outputs.scripts)
+                places = (s.span for s in document_scripts(document) if s.path == likely)
+                notes = (Note(f"`{likely}` is here", place.first_line()) for place in places)
+                finding = replace(finding, notes=(*finding.notes, *notes))
             diagnostics.append(finding)
         elif finding:
             evidence[key] = tuple(line.text for line in finding)

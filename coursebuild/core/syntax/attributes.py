@@ -289,16 +289,14 @@ def check_heading(
     if before == "---" and re.fullmatch(r"[a-z][\w-]*: .*\n-+", span.text.strip(), re.DOTALL):
         message, help = "front matter stands in the text, which would show it", "delete it"
         diagnostics.append(diagnose("front-matter", span.first_line(), message, help=help))
-    if lesson and level == 1:
+    if level == 1:
         help = "the title comes from the course map; begin with `## `"
         help = Fix(help, edits=_deepen(span, 1))
         if span.text.rstrip().endswith("\n======="):
             help = "a merge conflict may have left the line of `=` behind: delete it"
         message = "a lesson has no heading of level 1"
-        diagnostics.append(diagnose("heading-top", span, message, help=help))
-    elif level == 1 and previous is not None and previous > 1:
-        message = "a heading of level 1 stands below others"
-        help = Fix("begin it with `## `", edits=_deepen(span, 1), safe=True)
+        if not lesson:
+            message = "a page has no heading of level 1 but its title, at its top"
         diagnostics.append(diagnose("heading-top", span, message, help=help))
     if previous is not None and level > previous + 1:
         message = f"a heading of level {level} follows one of level {previous}"

@@ -43,7 +43,7 @@ _VALUES = ("timeout", "requires", "args", "writes", "record", "figure")
 _FLAGS = ("norun", "diverges", "deep")
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _DEVICE = re.compile(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
-_UNPORTABLE = re.compile(r'[\x00-\x1f\x7f<>:"|?*\ud800-\udfff]')
+_UNPORTABLE = re.compile(r'[\x00-\x1f\x7f<>:"|?*;&$!#%`{}\'\ud800-\udfff]')
 _UNUSABLE_NAMES = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"}) - set(
     "code test this".split()
 )
@@ -227,7 +227,7 @@ def path_mistake(path: str) -> str:
     if not path.endswith(".py") or not stem:
         return f"`{path}` does not end in `.py`" if stem else f"`{path}` has no name before `.py`"
     if _UNPORTABLE.search(path) or any(part[-1] in ". " or part[0] == " " for part in parts):
-        return f"`{path}` has a character that not every file system takes"
+        return f"`{path}` has a character that not every file system and shell takes"
     if any(len(part.encode()) > 255 for part in parts):
         return "a part of the path is longer than 255 bytes"
     if device := next((part for part in parts if _DEVICE.fullmatch(part)), None):

@@ -277,8 +277,16 @@ def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterat
         column, list_column = (
             part.start - source.line_start(part.line) for part in (before.span, block.span)
         )
-        if column == list_column + 1 and gap.text.count("\n") == 1:
+        last_line = source.line_text(block.span.line - 1)
+        blanks = len(last_line) - len(last_line.lstrip(" >"))
+        if gap.text.count("\n") != 1:
+            pass
+        elif column == list_column + 1:
             yield _diagnose_lost_mark(source, before.span.start, "-")
+        elif blanks > list_column + 1:  # the rest of an item
+            message = "the item that ends here may have lost its mark, or its first line"
+            help = "begin the item again, or remove the blanks before the line above the list"
+            yield diagnose("markup-unread", before.span, message, help=help)
 
 
 def check_numbers(spans: Sequence[Span]) -> Iterator[Diagnostic]:

@@ -83,9 +83,10 @@ def parse_document(
         help = Fix(help, edits=(Edit(base.span(0, front.end()), ""),))
         state.report(diagnose("front-matter", base.span(0, 3), message, help=help))
         base = base.slice(front.end())
-    title = None if lesson else title_line(source)
+    title = None if lesson else title_line(source, base.span().start)
     if title is not None:
-        base = base.slice(len(base.text.partition("\n")[0]))
+        below = base.text.lstrip().partition("\n")[2]
+        base = base.slice(len(base.text) - len(below))
     reader = TextReader(base, state, state.references, nested=False)
     blocks = reader.read()
     anchor = "" if title is None else slug(title.text)

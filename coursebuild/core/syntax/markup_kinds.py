@@ -197,7 +197,7 @@ BROKEN = {
         "a link is `[text](address)`, with no blank before the `(` and none in the address",
     ),
     "bracket": MarkupKind(
-        r"(?<![\\\w])\[(?=[^\W\d_]{2})(?![^\[\]]*\])|(?<=[^\W\d_])\[(?=(?-i:[a-z]))(?![^\[\]]*\])",
+        r"(?<![\\\w])\[(?=(?:[^\W\d_]?\s+)?[^\W\d_]{2})(?![^\[\]]*\])|(?<=[^\W\d_])\[(?=(?-i:[a-z]))(?![^\[\]]*\])",
         "no link begins here",
         "a link is `[text](address)`; write a backslash before a bracket that is meant to be seen",
     ),
@@ -248,7 +248,7 @@ BROKEN = {
         r"|\A1 (?=(?:[^\n]*\n)+?2\. )|^-(?=(?-i:[A-Z][a-z]))"
         r"|^[•‣◦▪●] ?(?=\w)|^-- (?=\0)"
         r"|(?:^[=_]|(?<=\n)0) (?=(?-i:[A-Z][a-z]))|^[.)] (?=(?-i:[A-Z][a-z]))"
-        r"|^[0=_] (?=(?-i:\0\0?[A-Z]))",
+        r"|^[0=_] (?=(?-i:\0\0?[A-Z]))|^[=_] (?=\0)",
         "no item of a list begins here",
         "an item is `- text` or `1. text`, with one blank after the mark",
     ),

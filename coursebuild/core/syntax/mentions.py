@@ -33,9 +33,17 @@ from coursebuild.core.model import (
     Text,
     UrlTarget,
 )
+from coursebuild.core.model.inlines import LABEL_KINDS
 from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.syntax.attributes import term_id
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, misspelt, nearest, propose
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Fix,
+    diagnose,
+    misspelt,
+    nearest,
+    propose,
+)
 from coursebuild.core.text.source import Excerpt, Span
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
@@ -79,6 +87,9 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
         help = "link to an address with `https:`, to a file, or by "
         help += "`lesson:`, `page:`, `model:`, `term:`"
         return diagnose("link-scheme", span, f"`{scheme}:` is not allowed in a page", help=help)
+    if scheme in LABEL_KINDS:
+        help = Fix(f"did you mean `#{url}`?", f"#{url}")
+        return diagnose("link-scheme", span, f"no link scheme `{match[1]}:`", help=help)
     likely = nearest(scheme, (*_COURSE_SCHEMES, "https", "mailto"), cutoff=0.75)
     if likely is None or scheme in _OTHER_SCHEMES:
         return None
@@ -102,7 +113,16 @@ _NUMBERED = re.compile(r"(?:[^\W\d_]+ )?(\d+(?:\.\d+)+)")
 
 
 def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> Diagnostic | None:
-    """The diagnostic of a text that is another lesson, or almost the name of a model or script."""
+    """The diagnostic of a text that is another lesson, or almost the name of a model or script.
+
+    A link without a text shows the name of what has a number.
+    """
+    if not children:
+        address = getattr(target, "url", None) or f"#{getattr(target, 'anchor', None) or ''}"
+        if address.partition("#")[2].partition(":")[0] in LABEL_KINDS:
+            return None
+        message, help = "this link has no text, so no reader sees it", "write one in the brackets"
+        return diagnose("link-text", span, message, help=help)
     match target, children:
         case LessonTarget(id=name), (Text(text=text),) if number := _NUMBERED.fullmatch(text):
             label, kind = number[1], "lesson"

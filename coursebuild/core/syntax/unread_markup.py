@@ -198,6 +198,8 @@ def _diagnose(
             return None
         case "latex" if markup.startswith("$") and markup[1] != "`":
             return None  # no code stands between the dollars
+        case "item" if markup == "=" and after.startswith(" $"):
+            return None  # an equation goes on
         case "role" if not after.startswith("`"):
             return None
         case "callout":

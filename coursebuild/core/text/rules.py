@@ -143,7 +143,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "link-lesson": "A link or mention names a lesson that is not in the map.",
         "link-level": "A mention names a level that is not in the map.",
         "link-page": "A link names a page that is not in the map.",
-        "link-text": "The text of a link names another lesson or model than its target.",
+        "link-text": "A link has no text, or one that names another lesson or model.",
         "link-term": "A link names a term that no lesson defines.",
         "link-model": "A link names a model that is not in `models/`.",
         "link-example": "A link names a script that is in no lesson.",

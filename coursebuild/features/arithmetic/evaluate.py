@@ -109,6 +109,9 @@ def format_number(value: Any, digits: int = 10) -> str:
 
 _MAX_BITS = 4_000
 _MAX_DIGITS = 300
+_MAX_SERIES_BITS = 10_000
+_MAX_COUNT = 1_000
+"""The limit for factorials, and for the terms of the sums in a side."""
 
 
 class WrongDimensions(NotUnderstood):
@@ -170,8 +173,15 @@ def evaluate(
 
 
 class _Evaluator:
-    def __init__(self, arithmetic: Arithmetic, symbols: Mapping[str, PhysicalQuantity]) -> None:
+    def __init__(
+        self,
+        arithmetic: Arithmetic,
+        symbols: Mapping[str, PhysicalQuantity],
+        term_numbers: Iterator[int] | None = None,
+    ) -> None:
         self.arithmetic, self.symbols = arithmetic, symbols
+        self.term_numbers = term_numbers or iter(range(_MAX_COUNT))
+        """Those that are left."""
 
     def evaluate(self, expression: Expression) -> PhysicalQuantity:
         """Return the value of an expression."""
@@ -209,15 +219,71 @@ class _Evaluator:
                 return PhysicalQuantity(abs(inner.value), inner.dimension)
             case "derivative" | "integral":
                 return self._evaluate_calculus(expression)
+            case "sum" | "prod":
+                return self._evaluate_series(expression)
+            case "index":
+                if expression.text not in self.symbols:
+                    raise expression.not_understood("the dimension may differ from term to term")
+                return self.symbols[expression.text]
             case name:
-                (inner,) = map(self.evaluate, expression.parts)
-                if inner.dimension:
-                    words = describe_dimension(inner.dimension)
-                    reason = f"`\\{name}` is of {words}, and not of a number"
-                    raise WrongDimensions(reason, expression.start, expression.end)
+                inners = [*map(self.evaluate, expression.parts)]
+                for inner in inners:
+                    if inner.dimension:
+                        words = describe_dimension(inner.dimension)
+                        function = "a factorial" if name == "factorial" else f"`\\{name}`"
+                        reason = f"{function} is of {words}, and not of a number"
+                        raise WrongDimensions(reason, expression.start, expression.end)
+                values = [inner.value for inner in inners]
+                if name in ("factorial", "binom"):
+                    return PhysicalQuantity(self._count(expression, values))
                 function_name = _RECIPROCALS.get(name) or _LIBRARY_NAMES.get(name, name)
-                value = getattr(self.arithmetic.library, function_name)(inner.value)
+                value = getattr(self.arithmetic.library, function_name)(*values)
                 return PhysicalQuantity(1 / value if name in _RECIPROCALS else value)
+
+    def _count(self, expression: Expression, values: list[Any]) -> Any:
+        """Return the factorial of a number, or the binomial of two."""
+        if any(abs(value) > _MAX_COUNT for value in values):
+            raise OverflowError
+        if self.arithmetic.library is not math:  # mpmath knows those of all numbers
+            name = "factorial" if len(values) == 1 else "binomial"
+            return getattr(self.arithmetic.library, name)(*values)
+        if any(value < 0 or value != int(value) for value in values):
+            raise expression.not_understood("it is of whole numbers only")
+        function: Callable[..., int] = math.factorial if len(values) == 1 else math.comb
+        return Fraction(function(*map(int, values)))
+
+    def _evaluate_series(self, expression: Expression) -> PhysicalQuantity:
+        """Return a sum or a product of terms."""
+        term, index, *ends = expression.parts
+        first, last = (self.evaluate(end) for end in ends)
+        if any(
+            end.dimension or not math.isfinite(end.value) or end.value != int(end.value)
+            for end in (first, last)
+        ):
+            raise expression.not_understood("its limits are not two whole numbers")
+        is_sum = expression.kind == "sum"
+        total: PhysicalQuantity | None = None
+        for value in range(int(first.value), int(last.value) + 1):
+            if next(self.term_numbers, None) is None:
+                raise OverflowError
+            number = PhysicalQuantity(self.arithmetic.number(str(value)))
+            symbols = {**self.symbols, index.text: number}
+            quantity = _Evaluator(self.arithmetic, symbols, self.term_numbers).evaluate(term)
+            if total is None:
+                total = quantity
+            elif is_sum and total.dimension != quantity.dimension:
+                reason = "its terms have different dimensions"
+                raise WrongDimensions(reason, expression.start, expression.end)
+            elif is_sum:
+                total = PhysicalQuantity(total.value + quantity.value, total.dimension)
+            else:
+                dimension = multiply(total.dimension, quantity.dimension)
+                total = PhysicalQuantity(total.value * quantity.value, dimension)
+            if isinstance(total.value, Fraction) and (
+                max(map(abs, total.value.as_integer_ratio())).bit_length() > _MAX_SERIES_BITS
+            ):
+                raise OverflowError
+        return total or PhysicalQuantity(self.arithmetic.number("0" if is_sum else "1"))
 
     def _evaluate_symbol(self, expression: Expression) -> PhysicalQuantity:
         quantity = self.symbols.get(expression.text)
@@ -272,7 +338,8 @@ class _Evaluator:
 
         def function(value: Any) -> Any:
             quantity = PhysicalQuantity(value, point.dimension)
-            inner = _Evaluator(self.arithmetic, {**self.symbols, variable.text: quantity})
+            symbols = {**self.symbols, variable.text: quantity}
+            inner = _Evaluator(self.arithmetic, symbols, self.term_numbers)
             result = inner.evaluate(body)
             dimension[:] = [result.dimension]
             return result.value

@@ -32,8 +32,9 @@ class Expression(Struct, frozen=True):
     """An operation on expressions, or a number, symbol or unit.
 
     `kind` is `number`, `symbol`, `unit`, one of `+ - * / ^`, `abs`, `derivative` (parts: function,
-    variable), `integral` (parts: function, variable, and the limits if there are any), or the name
-    of a function, as `sin`.
+    variable), `integral` (parts: function, variable, and the limits if there are any), `sum` or
+    `prod` (parts: term, index, first, last), `index`, `factorial`, `binom`, or the name of a
+    function, as `sin`.
     """
 
     kind: str
@@ -93,9 +94,7 @@ _REASONS = {
     r"\lVert": "it is a norm",
     r"\begin": "it is an array",
     r"\log": "the base of `\\log` is not said",
-}
-_REASONS |= {
-    rf"\{name}": "something is left out" for name in "dots ldots cdots dotsc dotsb".split()
+    **dict.fromkeys(r"\dots \ldots \cdots \dotsc \dotsb".split(), "something is left out"),
 }
 
 
@@ -121,6 +120,8 @@ class _Reader:
         self.count = 0
         self.peeked: tuple[int, str] = (-1, "")
         """The offset of the last token that `peek` returned, and the token."""
+        self.indices: frozenset[str] = frozenset()
+        """The indices of the sums and products of which a term is read."""
 
     # --- tokens
 
@@ -151,10 +152,8 @@ class _Reader:
     def not_understood(self, reason: str = "") -> NotUnderstood:
         """Return the exception that says that the next token is not understood."""
         sign = self.peek()
-        if not reason:
-            reason = _REASONS.get(
-                sign, f"`{sign}` is not known" if sign else "something is missing"
-            )
+        unknown = f"`{sign}` is not known" if sign else "something is missing"
+        reason = reason or _REASONS.get(sign, unknown)
         return NotUnderstood(reason, self.at, min(self.end, self.at + max(1, len(sign))))
 
     def group(self) -> Expression:
@@ -212,8 +211,9 @@ class _Reader:
                 factor = self.power()
                 if minus:
                     factor = Expression("-", start, self.at, (factor,))
-                begins_with_digit = self.tex[start].isdigit() or self.tex[start] == "."
-                if not sign and (begins_with_digit or _is_mixed(product, factor)):
+                is_run = self.tex[start].isdigit() or self.tex[start] == "."
+                is_run &= SPACE.sub("", self.tex[product.start : start])[-1:] != "!"
+                if not sign and (is_run or _is_mixed(product, factor)):
                     raise factor.not_understood("two numbers stand side by side")
                 is_spaced = self.tex[:start].rstrip().endswith(r"\,")
                 if not (sign or is_spaced) and product.kind == "symbol" and self.tex[start] in "([":
@@ -248,14 +248,17 @@ class _Reader:
         if text in ("d", "e"):
             self.at = start
             return None
-        exponent = ""
-        if self.take("^"):
-            exponent = "^" + self.raw()
-        return Expression("unit", start, self.at, text=unit_text(text) + exponent)
+        exponent = "^" + self.raw() if self.take("^") else ""
+        text = re.sub(r"\\[,;: ]|\\cdot|~|·", "*", text)  # `kg*m^2` for `kg\,m^2`
+        text = text.replace(r"\mu", "µ").replace(r"\Omega", "Ω").replace(r"\%", "%")
+        text = re.sub(r"\^\{(-?\d+)\}", r"^\1", text).strip("*")
+        return Expression("unit", start, self.at, text=text + exponent)
 
     def power(self) -> Expression:
-        """Parse a base with its exponents."""
+        """Parse a base with its factorial and its exponents."""
         power = self.base()
+        if self.take("!"):
+            power = Expression("factorial", power.start, self.at, (power,))
         while self.take("^"):
             if self.match(_DEGREES):
                 self.raw()
@@ -306,6 +309,10 @@ class _Reader:
             if self.take("_", "^"):
                 self.raw()
             return inner
+        if sign in (r"\binom", r"\tbinom", r"\dbinom"):
+            return Expression("binom", start, self.at, (self.group(), self.group()))
+        if sign in (r"\sum", r"\prod"):
+            return self.series(sign[1:], start)
         if sign == r"\int":
             return self.integral(start)
         if sign.lstrip("\\") in _FUNCTIONS and sign != sign.lstrip("\\"):
@@ -315,7 +322,7 @@ class _Reader:
             self.at = upright.end()
             self.raw()
             return Expression("symbol", start, self.at, text=r"\mathrm{e}")
-        return self.symbol(start)
+        return self.symbol()
 
     def bracket(self, end: str) -> Expression:
         """Parse the rest of a bracket, up to its end."""
@@ -324,9 +331,9 @@ class _Reader:
             raise self.not_understood()
         return inner
 
-    def symbol(self, start: int) -> Expression:
+    def symbol(self) -> Expression:
         """Parse a letter with its accent and its subscript."""
-        sign = self.peek()
+        sign, start = self.peek(), self.at
         name = sign.lstrip("\\")
         self.at += len(sign)
         if name in _ACCENTS and sign != name:
@@ -344,6 +351,10 @@ class _Reader:
             self.at = upright.end() if upright else self.at
             index = self.raw()
             text += f"_{{{_UPRIGHT.sub('', index).strip('{}') if upright is None else index}}}"
+            if self.indices & {*TOKEN.findall(index)}:
+                raise NotUnderstood("it may differ from term to term", start, self.at)
+        if text in self.indices:
+            return Expression("index", start, self.at, text=text)
         while self.take("'"):
             text += "'"
         if text == "e" and self.peek() == "^":
@@ -354,9 +365,7 @@ class _Reader:
         """Parse a fraction or a derivative."""
         numerator_start = self.at
         has_brace = self.take("{")
-        if self.match(_DIFFERENTIAL):
-            if not has_brace:
-                raise self.not_understood()
+        if has_brace and self.match(_DIFFERENTIAL):
             return self.derivative(start)
         self.at = numerator_start
         return Expression("/", start, self.at, (self.group(), self.group()))
@@ -368,8 +377,7 @@ class _Reader:
         if not (self.take("}") and self.take("{") and (denominator := self.match(_DIFFERENTIAL))):
             raise self.not_understood("only first derivatives are understood")
         self.at = denominator.end()
-        self.peek()
-        symbol = self.symbol(self.at)
+        symbol = self.symbol()
         if not self.take("}"):
             raise self.not_understood("only first derivatives are understood")
         parts = (self.product() if function is None else function, symbol)
@@ -387,18 +395,35 @@ class _Reader:
         if differential is None or len(limits) == 1:
             raise self.not_understood("the integral has no differential, or no limits")
         self.at = differential.end()
-        self.peek()
-        symbol = self.symbol(self.at)
+        symbol = self.symbol()
         ends = (limits["_"], limits["^"]) if limits else ()
         return Expression("integral", start, self.at, (integrand, symbol, *ends))
 
+    def series(self, name: str, start: int) -> Expression:
+        """Parse a sum or a product of a product's terms, from one whole number to another."""
+        limits: dict[str, Expression] = {}
+        index = None
+        while sign := self.take("_", "^"):
+            if sign == "^" or not self.take("{"):
+                limits[sign] = self.group()
+                continue
+            symbol = self.symbol()
+            index = Expression("index", symbol.start, symbol.end, text=symbol.text)
+            if not self.take("="):
+                raise self.not_understood("it is not over whole numbers in a row")
+            limits[sign] = self.bracket("}")
+        if index is None or len(limits) < 2:
+            raise NotUnderstood(f"`\\{name}` has no limits", start, self.at)
+        outer, self.indices = self.indices, self.indices | {index.text}
+        term = self.product()
+        self.indices = outer
+        return Expression(name, start, self.at, (term, index, limits["_"], limits["^"]))
+
     def function(self, name: str, start: int) -> Expression:
         """Parse a function of a bracket, or of the factors that follow."""
-        exponent = None
-        if self.take("^"):
-            exponent = self.group()
-            if exponent.kind != "number":
-                raise exponent.not_understood("an inverse or a power can be meant")
+        exponent = self.group() if self.take("^") else None
+        if exponent is not None and exponent.kind != "number":
+            raise exponent.not_understood("an inverse or a power can be meant")
         is_bracket = self.peek() in _BRACKETS
         argument = self.power()
         while not is_bracket and self.begins_factor() and self.peek()[1:] not in _FUNCTIONS:
@@ -420,13 +445,6 @@ def _is_mixed(left: Expression, right: Expression) -> bool:
 
 def _refuse_application(factor: Expression) -> None:
     """Raise where a symbol before a bracket can be a function of its content."""
-    factor = factor.parts[0] if factor.kind == "^" else factor
+    factor = factor.parts[0] if factor.kind in ("^", "factorial") else factor
     if factor.kind in ("symbol", "number", "/", "*"):
         raise factor.not_understood("it may be a product or a function of this")
-
-
-def unit_text(tex: str) -> str:
-    r"""Return a unit as text: `kg*m^2` for `kg\,m^2`."""
-    text = re.sub(r"\\[,;: ]|\\cdot|~|·", "*", tex)
-    text = text.replace(r"\mu", "µ").replace(r"\Omega", "Ω").replace(r"\%", "%")
-    return re.sub(r"\^\{(-?\d+)\}", r"^\1", text).strip("*")

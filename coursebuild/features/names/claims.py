@@ -67,15 +67,25 @@ _CODE_WORD = re.compile(
 _CODE = (
     model.Script | model.PlainCode | model.CodeBlock | model.Mjcf | model.FeatureBlock
 ) | model.Recording
-_PLAIN = re.compile(r"(?<![\w.\\/-])[A-Za-z]\w+[^\W_](?:\.(?:md|py|toml|xml)\b)?(?![\w./\\-])")
+_PLAIN = re.compile(
+    r"(?<![\w.\\/-])(?<!\A[,;])[A-Za-z]\w+[^\W_]"
+    r"(?:\.(?:md|py|toml|xml)\b)?(?![\w./\\-])"
+)
 """A word of inline code that is no part of a path."""
 _TOKEN = re.compile(
     r"(?<!\S)(?=\S*[A-Za-z_]{4})(?!\w+(?!\S))\S{6,}(?!\S)"
     r"|(?<!\S)\w*[\\<;,'\[\]]\w{3,}(?!\S)"
 )
 """What stands between blanks, with a word of some length and more than that."""
-_TAIL = re.compile(r"[A-Za-z0-9]+(?!\w)")
-"""Letters or digits directly after code."""
+_TAIL = re.compile(r"(?<!\s`)[A-Za-z0-9]+(?![\w{}=`])")
+"""Letters or digits directly after code that are no broken attribute."""
+ENDINGS = {
+    "en": "s es d ed ing er ers th st nd rd".split(),
+    "de": "s es n en e em er t te ten m r".split(),
+    "es": "s es n".split(),
+    "fr": "s es e".split(),
+}
+"""What may stand directly behind code, as in "two `geom`s"; other languages have more long ones."""
 _MOST_PLAIN = 3
 """How many uses of a plain word are kept of a document: what is used again is no slip."""
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}

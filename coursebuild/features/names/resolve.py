@@ -75,10 +75,8 @@ class Resolver:
     def __init__(self, course: Course, engine: EngineNames | None = None) -> None:
         self.course = course
         table = course.references.get("names")
-        self.engine = engine
+        self.engine = table.names if not engine and isinstance(table, EngineTable) else engine
         self._names_by_page: dict[int, frozenset[str]] = {}
-        if engine is None and isinstance(table, EngineTable):
-            self.engine = table.names
 
     @functools.cached_property
     def words(self) -> frozenset[str]:
@@ -87,8 +85,7 @@ class Resolver:
         for model in self.course.models:
             words |= claims.words_of(model.source.text)
         for names in course_names(self.course):
-            words |= names.words
-            words |= names.definitions.keys()
+            words |= names.words | names.definitions.keys()
         for package in self.course.packages:
             words.add(package.path)
         return frozenset(words)
@@ -156,12 +153,10 @@ class Resolver:
         if engine is not None and name in engine.words:
             return KnownName()
         if engine is not None and ENGINE_WORD.fullmatch(name):
-            version = engine.version
             engine_words = {*engine.functions, *engine.constants, *engine.enums, *engine.enum_of}
             engine_words |= {*engine.classes}
-            return Unknown(
-                f"MuJoCo {version} has no `{name}`", did_you_mean(name, engine_words), name
-            )
+            message = f"MuJoCo {engine.version} has no `{name}`"
+            return Unknown(message, did_you_mean(name, engine_words), name)
         if name in self.words or name in known_keys():
             return KnownName()
         is_vague = claim.kind == "call" or name.isupper()  # prose, or an environment variable
@@ -204,10 +199,16 @@ class Resolver:
         """A name of which a backtick stands before the last letters, as in "`Eule`r"."""
         name, tail = torn.split(" ")
         whole, words = name + tail, self.plain_words.keys() | names.words
-        if whole not in words or (name in words and tail in ("s", "es", "d", "ed", "ing")):
+        language = self.course.language.partition("-")[0]
+        is_ending = tail in claims.ENDINGS.get(language, claims.ENDINGS["en"])
+        if whole in words and not (is_ending and name in words):
+            message = f"`{name}` and the letters after its backtick are the name `{whole}`"
+            return Unknown(message, f"did you mean `{whole}`?", name)
+        is_vague = len(name) < 2 or (len(tail) > 1 and language != "en")
+        if is_ending or is_vague or language not in claims.ENDINGS:
             return None
-        message = f"`{name}` and the letters after its backtick are the name `{whole}`"
-        return Unknown(message, f"did you mean `{whole}`?", name)
+        message = f"`{tail}` stands directly behind a backtick, and is no ending of a word"
+        return Unknown(message, "move the backtick, or write a blank between them", name)
 
     def _plain(self, name: str, names: CodeNames) -> Answer:
         lengths, is_constant = self.plain_words, name.isupper()
@@ -260,19 +261,19 @@ class Resolver:
         if self.uses[name] > 1:
             return None
         message = f"nothing that the course knows is called `{name}`"
-        sign = re.fullmatch(r"([\w.]*)([\\<]|(?<=.)[;,'\[\]])([\w.]*\w)", name)
+        sign = re.fullmatch(r"([\w.]*)([\\<;,]|(?<=.)['\[\]])([\w.]*\w)", name)
         if sign is not None:
             head, tail = sign[1], sign[3]  # the sign took the place of a letter, or came beside one
             lengths = {len(name), len(name) - 1} if head else {len(name)}
-            candidates = {*self._page_names(names), *self.file_names, *self.long_words}
-            likely = {c for c in candidates if c.startswith(head) and c.endswith(tail)}
-            if (
-                candidate := min((c for c in likely if len(c) in lengths), default=None)
-            ) is not None:
-                return Unknown(message, f"did you mean `{candidate}`?", name)
+            candidates = self._page_names(names) | self.file_names | self.long_words
+            likely = (c for c in candidates if c.startswith(head) and c.endswith(tail))
+            if fitting := sorted(c for c in likely if len(c) in lengths):
+                return Unknown(message, f"did you mean `{fitting[0]}`?", name)
         words = [word.span() for word in re.finditer("[A-Za-z_]{4,}", name)]
         for candidate in slips_of(name):
-            if self.uses[candidate] > 1 or candidate in self.files or candidate in self.file_names:
+            is_word = len(candidate) > 5 and candidate in self.plain_words
+            is_file = candidate in self.files or candidate in self.file_names
+            if is_word or is_file or self.uses[candidate] > 1:
                 pairs = enumerate(zip(name, candidate, strict=False))
                 at = next((n for n, (a, b) in pairs if a != b), len(name))
                 if any(start - 1 <= at <= end + 1 for start, end in words):

@@ -20,11 +20,20 @@ from coursebuild.core.model import (
     ThematicBreak,
     document_scripts,
     find_blocks,
+    plain_text,
 )
 from coursebuild.core.model.results import Mathml, Outcome, ScriptRun
 from coursebuild.core.syntax.json_text import parse_json
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
-from coursebuild.core.text.source import Excerpt
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Fix,
+    Note,
+    Parsed,
+    diagnose,
+    did_you_mean,
+    is_one_edit,
+)
+from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.quiz.model import ChoiceQuestion, Quiz
 
@@ -63,20 +72,33 @@ def _check_predictions(quiz: Quiz, document: Document) -> Iterator[Diagnostic]:
     at = next((at for at, block in enumerate(document.blocks) if block is quiz), None)
     rest = () if at is None else document.blocks[at + 1 :]
     ends = (i for i, block in enumerate(rest) if isinstance(block, Heading | ThematicBreak))
-    blocks = rest[: next(ends, None)]
+    end = next(ends, len(rest))
+    blocks = rest[:end]
+    stops = [Note("what can be hidden ends here", b.span.first_line()) for b in rest[end:][:1]]
     labs = [block for block in blocks if isinstance(block, Lab)]
+    above = [b for b in document.blocks[: at or 0] if isinstance(b, Heading)][-1:]
+    for title in (plain_text(heading.children) for heading in above):
+        if quiz.title and quiz.title != title and is_one_edit(quiz.title, title):
+            start = quiz.span.start + max(quiz.span.text.find(quiz.title), 0)
+            place = quiz.span.source.span(start, start + len(quiz.title))
+            message = f"the title `{quiz.title}` is almost that of the heading above"
+            fix = Fix(f"did you mean `{title}`?", title)
+            yield diagnose("field-value", place, message, help=fix)
     for question in quiz.questions:
         if not isinstance(question, ChoiceQuestion):
             continue
         if question.gate and blocks in ((), tuple(labs[:1])):
             message = "nothing follows that could be hidden"
             help = "what answers the question stands below the quiz, before the next heading"
-            yield diagnose("quiz-gate", question.gate_span, message, help=help)
+            yield diagnose("quiz-gate", question.gate_span, message, help=help, notes=stops)
         if question.run is not None:
-            yield from _check_run(question.run, labs, blocks)
+            later = next((block.span for block in rest if isinstance(block, Lab)), None)
+            yield from _check_run(question.run, labs, blocks, later)
 
 
-def _check_run(run: Excerpt, labs: list[Lab], blocks: tuple[Block, ...]) -> Iterator[Diagnostic]:
+def _check_run(
+    run: Excerpt, labs: list[Lab], blocks: tuple[Block, ...], later: Span | None
+) -> Iterator[Diagnostic]:
     if labs:
         from coursebuild.features.lab.relations import check_steps
 
@@ -86,7 +108,8 @@ def _check_run(run: Excerpt, labs: list[Lab], blocks: tuple[Block, ...]) -> Iter
     elif not any(isinstance(block, CodeBlock) and block.language == "lab" for block in blocks):
         message = "no lab follows that could be run"
         help = "the lab stands below the quiz, before the next heading"
-        yield diagnose("quiz-gate", run.span(), message, help=help)
+        notes = [Note("the next lab is here", later.first_line())] if later is not None else []
+        yield diagnose("quiz-gate", run.span(), message, help=help, notes=notes)
 
 
 def _check_scripts(quiz: Quiz, scripts: Mapping[str, bool]) -> Iterator[Diagnostic]:

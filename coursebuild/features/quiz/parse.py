@@ -143,7 +143,8 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
                 texts = "1 text" if len(fields.feedback) == 1 else f"{len(fields.feedback)} texts"
                 message = f"`feedback` has {texts} for {count} options"
                 help = 'an option without feedback has `""`'
-                yield diagnose("field-value", node.place("feedback"), message, help=help)
+                place = (node.get("feedback") or node).span
+                yield diagnose("field-value", place, message, help=help)
         case Numeric() as fields:
             if fields.answer == 0 and fields.tol is None:
                 message = (

@@ -205,7 +205,7 @@ def receipt(html: str) -> str:
 
 
 def test_a_script_and_its_output_are_one_object_in_callouts_and_lists_too(make: Make) -> None:
-    lines = (SCRIPT + OUTPUT).strip().split("\n")
+    lines = f"{SCRIPT}\n<!-- a comment -->\n{OUTPUT}".strip().split("\n")
     for first, indent in (("> ", "> "), ("- ", "  ")):
         html = make(first + f"\n{indent}".join(lines)).html()
         assert html.count("<figure") == 1

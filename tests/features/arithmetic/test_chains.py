@@ -28,6 +28,10 @@ I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168
 -2^2 = -4
 \sqrt[3]{8} = 2
 \lvert -3\rvert = 3 < \pi < 4
+\frac{6!}{2!\,4!} = \binom{6}{2} = \tbinom62 = 15, \quad -3!^2 = -36, \quad 0! = 1
+\sum_{k=1}^{4} k^2 + 1 = 31, \quad \sum\limits_{i=1}^3\sum_{j=1}^i i\,j = 25
+\sum_{n=0}^{10} \frac{1}{n!} \approx 2.7182818, \quad \prod_{i=1}^{5} i = 5!
+\sum_{i=1}^{3} 2^i\ \mathrm{m} = 14\ \mathrm m, \quad \sum_{i=3}^{2} i = 0
 """
 SILENT = r"""
 e = 1
@@ -35,10 +39,14 @@ x \in [0, 1]
 \ddot\theta = -\frac g\ell \sin\theta
 \delta(0) = 0
 \exp\tfrac12\boldsymbol\Omega = 1
+\sum_i m_i = 3
+\sum_{i=1}^{3} m_i = 3
+\sum_{i=1}^\infty i^{-2} = \tfrac16\pi^2
 """
 TOKENS = (
     r"0 1 2.5 , . + - * / ^ _ { } ( ) [ ] | = < & \\ \frac \sqrt \sin \pi \cdot \mathrm{kg} \int"
     r" \ell g m v \dot x t T \approx \omega_0 \mathrm{d}"
+    r" ! \binom \sum_{m=1}^ \prod^2_"
 ).split()
 
 
@@ -74,6 +82,23 @@ def test_any_text_can_be_checked(tex: str) -> None:
         assert 0 <= comparison.start <= comparison.end <= len(tex)
 
 
+def test_what_is_too_large_or_no_whole_number_is_not_understood() -> None:
+    large, whole = "the numbers become too large", "it is of whole numbers only"
+    reasons = {
+        r"\sum_{i=1}^{5000} i = 1": large,
+        r"\sum_{i=1}^{800}\sum_{j=1}^{800} i = 1": large,
+        r"\prod_{i=1}^{900} 7^{999} = 1": large,
+        "1000000! = 1": large,
+        "2.5! = 3": whole,
+        "(-2)! = 2": whole,
+        r"\sum_{i=1}^{\pi} i = 3": "its limits are not two whole numbers",
+        "3!! = 3": "`!` is not known",
+    }
+    for tex, reason in reasons.items():
+        (comparison,) = check_arithmetic(tex)
+        assert (comparison.kind, comparison.message) == ("unread", reason)
+
+
 def test_deep_nesting_is_not_understood() -> None:
     for tex in ("(" * 2400 + "1" + ")" * 2400, r"\sqrt" * 900 + "1", "1 + " * 1200 + "1"):
         (comparison,) = check_arithmetic(tex + " = 1")
@@ -87,6 +112,8 @@ IDENTITIES = r"""
 \int_0^x \cos x\,\mathrm dx = \sin x = \sqrt{1 - \cos^2 x}
 \int x\,\mathrm e^{x}\,\mathrm dx = (x - 1)\,e^x
 \int_0^\infty e^{-x^2}\,\mathrm dx = \tfrac12\sqrt\pi
+\sum_{k=0}^{3} \binom{3}{k}\,x^k = (1 + x)^3
+x! = x\,(x - 1)!
 """
 
 
