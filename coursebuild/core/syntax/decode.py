@@ -210,10 +210,14 @@ class _Decoder:
         return _INVALID if _INVALID in values else tuple(values)
 
     def decode_map(self, node: ObjectNode, type: inspect.DictType) -> object:
-        values = {
-            key: self.decode_value(member.value, type.value_type, key)
-            for key, member in node.members.items()
-        }
+        values = {}
+        for key, member in node.members.items():
+            if isinstance(type.key_type, inspect.LiteralType) and key not in type.key_type.values:
+                message = f"unknown field {format_name(key)}"
+                help = did_you_mean(key, map(str, type.key_type.values))
+                self.report("field-unknown", member.key.span, message, help)
+                continue
+            values[key] = self.decode_value(member.value, type.value_type, key)
         return _INVALID if _INVALID in values.values() else values
 
     # ---------------------------------------------------------------------------------- structs
