@@ -2,8 +2,7 @@
 
 Entry points: `time_jobs(jobs, baseline, clock)`; `costs(model, scene, settings, …)`, of settings of
 a scene; `scenario_job(model, scenarios, timestep)`, a model's whole scenarios as a job;
-`mark_luck(rows, …)`, rows that know whether their errors are luck; `front(rows)`, whether they are
-on the front; `verdict(rows, …)`.
+`mark_luck(rows, …)`, rows that know whether their errors are luck; `verdict(rows, …)`.
 
 1. A job is a scenario from its beginning to its end, so that each setting is timed on its own
    states; what takes little time is repeated.
@@ -39,7 +38,14 @@ from coursebuild.numerics.pilot import apply, with_setting
 from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, RowVerdict, WorkPrecisionRow
-from coursebuild.numerics.reports.shown_errors import seconds_text, setting_text
+from coursebuild.numerics.reports.shown_errors import (
+    ERROR_SLACK,
+    Rows,
+    compared_error,
+    front_point,
+    seconds_text,
+    setting_text,
+)
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.simulation import STATE, full_state, initial_data, silent
 
@@ -197,65 +203,8 @@ def scenario_job(
     return job
 
 
-COST_SLACK, ERROR_SLACK = 0.03, 0.05
-"""Relative: costs repeat to a few per cent only."""
 _WORTH_SAYING = 0.1
 """An advantage that is smaller in both respects is none on another day."""
-Rows: TypeAlias = Sequence[WorkPrecisionRow]
-
-
-class FrontPoint(Struct, frozen=True):
-    """The place of a setting in the plot."""
-
-    cost: Interval
-    error: float
-
-    def beats(self, rival: FrontPoint) -> bool:
-        """Whether this is clearly better in one respect, and no worse in the other."""
-        is_more_accurate = self.error * (1 + ERROR_SLACK) < rival.error
-        is_no_worse = self.error <= rival.error * (1 + ERROR_SLACK)
-        return (self.is_cheaper(rival) and is_no_worse) or (
-            is_more_accurate and not rival.is_cheaper(self)
-        )
-
-    def is_cheaper(self, rival: FrontPoint) -> bool:
-        """Whether this costs less, beyond what timing can tell."""
-        is_separate = self.cost.high < rival.cost.low
-        return is_separate and self.cost.value * (1 + COST_SLACK) < rival.cost.value
-
-
-def _error(row: WorkPrecisionRow) -> float | None:
-    """The error by which settings are compared; `None` where the row has none."""
-    return row.seen if row.figure is None else row.figure[0]
-
-
-def _place(row: WorkPrecisionRow) -> FrontPoint | None:
-    """The cost and error of a setting; `None` where it was lost, or not timed."""
-    error = _error(row)
-    return None if row.cost is None or error is None else FrontPoint(row.cost, error)
-
-
-def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
-    """Rows that say whether they are on the front, and otherwise which row dominates them.
-
-    A lucky row is on no front, and dominates none.
-    """
-    places = {n: place for n, row in enumerate(rows) if (place := _place(row)) is not None}
-    better = {
-        n: [m for m, rival in places.items() if not rows[m].lucky and rival.beats(own_place)]
-        for n, own_place in places.items()
-    }
-
-    def worth(n: int) -> tuple[float, int]:
-        return places[n].cost.value * places[n].error, n
-
-    placed_rows = []
-    for n, row in enumerate(rows):
-        rivals = better.get(n, [])
-        best = min([m for m in rivals if not better[m]] or rivals, key=worth, default=None)
-        on_front = n in better and not rivals and not row.lucky
-        placed_rows.append(replace(row, front=on_front, dominated_by=best))
-    return tuple(placed_rows)
 
 
 def mark_luck(
@@ -273,13 +222,13 @@ def mark_luck(
     own_setting = next(row.setting for row in rows if row.own)
     marked_rows = []
     for row in rows:
-        setting, place = row.setting, _error(row)
+        setting, place = row.setting, compared_error(row)
         limit = limits.get(setting.integrator, math.inf)
         luck, is_usual = "", setting.solver_settings == own_setting.solver_settings
         if place is not None and is_usual and setting.timestep > limit * (1 + 1e-9):
             luck = f"it is beyond its largest stable timestep, {seconds_text(limit, 3)}"
         for rival in rows:
-            work, error = _more_work(rival.setting, setting), _error(rival)
+            work, error = _more_work(rival.setting, setting), compared_error(rival)
             if luck or not work or place is None or error is None:
                 continue
             if error > max(place * (1 + ERROR_SLACK), least):
@@ -302,6 +251,7 @@ def verdict(
     noticeable: Sequence[bool | None],
     least: float = 0.0,
     holds: Callable[[MeasuredSetting], bool] = lambda _: True,
+    horizon_error: str = "0.1",
 ) -> RowVerdict:
     """The verdict on the scene's own setting.
 
@@ -310,15 +260,17 @@ def verdict(
         noticeable: whether a learner sees the error of a row; `None` where that is not known.
         least: errors that are no larger are not resolved.
         holds: whether the advantage of another setting holds from starts nearby too.
+        horizon_error: the error at which predictions of a chaotic scene end, in words.
     """
     own_index = next(number for number, row in enumerate(rows) if row.own)
     row, is_noticeable = rows[own_index], noticeable[own_index]
     if row.reasons:
         return _verdict_of_lost(rows, row)
     error = None if is_noticeable is None else row.seen
-    own_place, remark = _place(row), _describe_error(error)
+    own_place, remark = front_point(row), _describe_error(error)
     if row.parted is not None:
-        return RowVerdict(False, None, None, None, is_noticeable, _verdict_of_chaos(rows, row))
+        text = _verdict_of_chaos(rows, row, horizon_error)
+        return RowVerdict(False, None, None, None, is_noticeable, text)
     if own_place is None:
         text = "nothing was timed, so no setting can be called better"
         return RowVerdict(False, None, None, None, is_noticeable, text + remark)
@@ -335,7 +287,7 @@ def verdict(
         text = "no other setting is cheaper without being less accurate"
         return RowVerdict(True, None, None, None, is_noticeable, text + remark)
     better = rows[row.dominated_by]
-    better_place = _place(better)
+    better_place = front_point(better)
     assert better_place is not None
     ratios = (
         better_place.cost.value / own_place.cost.value,
@@ -353,9 +305,9 @@ def verdict(
     return RowVerdict(False, row.dominated_by, *ratios, is_noticeable, text + remark)
 
 
-def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow) -> str:
+def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
     """The verdict on a chaotic scene: how long each setting stays near the exact motion."""
-    text = f"the motion is chaotic: it parts from the exact one at {row.parted:.3g} s"
+    text = f"the motion is chaotic: it is {error} from the exact one at {row.parted:.3g} s"
     parted = [(r.parted, n) for n, r in enumerate(rows) if r.parted is not None]
     whole = [r for r in rows if r.status == "ok" and r.parted is None and r.seen is not None]
     if whole:
@@ -381,7 +333,7 @@ def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow) -> RowVerdict:
     """The verdict on a scene that does not run under its own setting: what does."""
     text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
     text += "; ".join(row.reasons)
-    candidates = [(p, n) for n, r in enumerate(rows) if r.front and (p := _place(r))]
+    candidates = [(p, n) for n, r in enumerate(rows) if r.front and (p := front_point(r))]
     if not candidates:
         return RowVerdict(False, None, None, None, None, text)
     better = min(candidates, key=lambda c: (c[0].error, c[0].cost.value, c[1]))[1]

@@ -52,7 +52,7 @@ from coursebuild.numerics.measure import (
     momentum_drift,
     visible_error,
 )
-from coursebuild.numerics.pilot import CONES, Pilot, position_distances
+from coursebuild.numerics.pilot import CONES, Pilot, horizon_errors, position_distances
 from coursebuild.numerics.problem import ROUNDING, Integrator, Setup, Sizes
 from coursebuild.numerics.reports.scene_report import FLOORS
 from coursebuild.numerics.scene import ExactMotion, SceneError
@@ -70,9 +70,9 @@ EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
 """Accelerations that a reference may take."""
 FINER, QUICK_FINER = 16, 8
 """How many times shorter the steps of a `self` reference are than the shortest measured."""
-PARTING_DISTANCE = 0.01
-"""The difference from which on two runs of the engine are no reference: rad, or relative to the
-extent."""
+PARTING_DISTANCE, _PARTING_SHARE = 0.01, 0.1
+"""The difference from which on motions have nothing in common, rad or relative to the extent; the
+same of two runs of the engine that are to be a reference, relative to the error to be told."""
 FOREIGN = 1e-3
 """The difference from which on a closed form is that of another scene, in the same units."""
 PRECISION, _VOTES = 1e-8, 100.0
@@ -303,9 +303,8 @@ def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         if not np.isfinite(run.states.qpos).all():
             raise SceneError(f"it diverges even at {step:g} s a step")
         runs.append(run.states)
-    parted = np.flatnonzero(
-        position_distances(model, runs[0].qpos, runs[1].qpos) > PARTING_DISTANCE
-    )
+    gaps = position_distances(model, runs[0].qpos, runs[1].qpos, horizon_errors(model, pilot.scene))
+    parted = np.flatnonzero(gaps > _PARTING_SHARE)
     good = max(1, int(parted[0])) if parted.size else len(runs[0].times)
     states, second_states = (motion.head(good) for motion in runs)
     source = f"the engine itself: implicitfast at {1e6 * step:.6g} µs, Newton's solver"

@@ -255,6 +255,13 @@ def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
     return np.array(values)
 
 
+def quantity_errors(model: Any, scene: Scene, states: EngineStates, exact: EngineStates) -> Array:
+    """How far the declared quantity is from that of the exact states at every sample: (n,)."""
+    gaps = quantity_values(model, scene, states) - quantity_values(model, scene, exact)
+    distances: Array = np.linalg.norm(gaps, axis=1)
+    return distances
+
+
 Pair: TypeAlias = tuple[int, int]
 """Two geoms, by number."""
 Sticks: TypeAlias = tuple[frozenset[Pair], ...]

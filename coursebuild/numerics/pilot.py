@@ -5,9 +5,9 @@ Entry points: `run_pilot(model, scene)`; `settings(model, pilot)`, which are mea
 
 1. Every step is observed: a contact, a limit that is reached or dry friction makes accelerations
    jump, so that errors follow no power of the timestep and no smooth integration applies.
-2. Eight twins begin 1e-10 away, in four directions, to both sides. Where the first of them is a
-   tenth away, errors of trajectories mean nothing any more: that is the horizon. The growth until
-   there gives about the largest Lyapunov exponent.
+2. Eight twins begin 1e-10 away, in four directions, to both sides. Where the first of them is off
+   by what the scenario states, or a tenth, errors of trajectories mean nothing any more: that is
+   the horizon. The growth until there gives about the largest Lyapunov exponent.
 3. The largest positions, and the largest energy where nothing drives the motion, else velocity,
    give the bounds, with room for coarse timesteps.
 4. A setting is what can be chosen without changing the scene: every integrator at every timestep;
@@ -42,8 +42,8 @@ NUDGE = 1e-10
 """How far a twin's beginning is off: rad, or relative to the model's extent; velocities per s."""
 _DIRECTIONS = 4
 """How many directions beginnings are nudged in, each to both sides."""
-PARTING_DISTANCE = 0.1
-"""The distance at which two motions have nothing in common any more: rad, or relative to the
+_PARTING_DISTANCE = 0.1
+"""The error at which predictions end where the scenario states none: rad, or relative to the
 model's extent."""
 _REST_SPEED = 0.01
 """A body is at rest below this part of the speed of a fall through the model's extent."""
@@ -93,7 +93,8 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
     step, scenario = min(scene.timesteps), scene.scenario
     variant = with_integrator(model, integrator_of(model), step)
     variant.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-    data, twins = initial_data(scenario, variant), _twins(variant, scenario)
+    data, errors = initial_data(scenario, variant), horizon_errors(variant, scene)
+    twins, sizes = _twins(variant, scenario, errors)
     look = _Observer(variant)
     peaks = Peaks()
     times, steps_per_sample = scenario.times, scenario.steps(step)
@@ -109,10 +110,12 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
         if not peaks.finite:
             raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
         for twin, gap in zip(twins, gaps, strict=True):
-            if index == 0 or gap[index - 1] < PARTING_DISTANCE:
+            if index == 0 or gap[index - 1] < 1:
                 advance(variant, twin, steps_per_sample)
-                gap[index] = position_distance(variant, data.qpos, twin.qpos)
-    horizons, rates = zip(*(_horizon(times, gap) for gap in gaps), strict=True)
+                gap[index] = position_distance(variant, data.qpos, twin.qpos, errors)
+    horizons, rates = zip(
+        *(_horizon(times, *twin) for twin in zip(gaps, sizes, strict=True)), strict=True
+    )
     growth_rates = [rate for rate in rates if rate is not None]
     return Pilot(
         scene=scene,
@@ -126,32 +129,55 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
     )
 
 
-def position_distance(model: Any, first: Array, second: Array) -> float:
+def position_distance(model: Any, first: Array, second: Array, units: Array | None = None) -> float:
     """The distance of two positions (nq,), at the joint where they differ most.
 
-    In rad for hinges and attitudes, relative to the model's extent for slides and free places.
+    `units`: what counts as 1 in each degree of freedom (nv,), else `scales`.
     """
     difference = np.zeros(int(model.nv))
     mujoco.mj_differentiatePos(model, difference, 1.0, first, second)
-    return float(np.max(np.abs(difference / scales(model)), initial=0.0))
+    sizes = np.abs(difference / (scales(model) if units is None else units))
+    return float(np.max(sizes, initial=0.0))
 
 
-def position_distances(model: Any, first: Array, second: Array) -> Array:
+def position_distances(
+    model: Any, first: Array, second: Array, units: Array | None = None
+) -> Array:
     """The distances of two motions (n, nq) at each time: (n,)."""
     pairs = zip(first, second, strict=True)
-    return np.array([position_distance(model, a, b) for a, b in pairs])
+    return np.array([position_distance(model, a, b, units) for a, b in pairs])
 
 
-def scales(model: Any) -> Array:
-    """The unit of a difference in each degree of freedom: 1 rad, or the model's extent, m."""
-    units = np.ones(int(model.nv))
-    extent = max(float(model.stat.extent), mujoco.mjMINVAL)
+def scales(model: Any, angle: float = 1.0, length: float | None = None) -> Array:
+    """The size of a difference in each degree of freedom: rad, or m.
+
+    `angle`: of hinges and attitudes; `length`: of slides and places, else the model's extent.
+    """
+    sizes = np.full(int(model.nv), angle)
+    if length is None:
+        length = max(float(model.stat.extent), mujoco.mjMINVAL)
     for kind, dof in zip(model.jnt_type, model.jnt_dofadr, strict=True):
         if kind == mujoco.mjtJoint.mjJNT_FREE:
-            units[dof : dof + 3] = extent
+            sizes[dof : dof + 3] = length
         elif kind == mujoco.mjtJoint.mjJNT_SLIDE:
-            units[dof] = extent
-    return units
+            sizes[dof] = length
+    return sizes
+
+
+def horizon_error(model: Any, scene: Scene) -> dict[str, float]:
+    """The errors at which predictions of a scene end, by unit: those that it states, or a tenth."""
+    if scene.declaration.horizon_error:
+        return {str(unit): error for unit, error in scene.declaration.horizon_error.items()}
+    tenth = _PARTING_DISTANCE * scales(model)
+    is_length = scales(model, 0.0, 1.0) > 0
+    parts = {"rad": tenth[~is_length], "m": tenth[is_length]}
+    return {unit: float(errors[0]) for unit, errors in parts.items() if errors.size}
+
+
+def horizon_errors(model: Any, scene: Scene) -> Array:
+    """The same for each degree of freedom (nv,); infinite where none is stated of its unit."""
+    errors = horizon_error(model, scene)
+    return scales(model, errors.get("rad", math.inf), errors.get("m", math.inf))
 
 
 class _Observer:
@@ -199,15 +225,19 @@ def _limited_activations(model: Any) -> tuple[Any, Array]:
     return np.array([number for number, _ in activations], dtype=np.intp), limits
 
 
-def _twins(model: Any, scenario: Scenario) -> list[Any]:
-    """Copies of the beginning, nudged in positions and velocities, always in the same ways."""
-    twins = []
+def _twins(model: Any, scenario: Scenario, units: Array) -> tuple[list[Any], list[float]]:
+    """Copies of the beginning, nudged in positions and velocities, always in the same ways.
+
+    Also how far each is off, in `units`.
+    """
+    twins, distances = [], []
     for position, velocity in nudges(model, 2 * _DIRECTIONS, NUDGE):
         twin = initial_data(scenario, model)
         mujoco.mj_integratePos(model, twin.qpos, position, 1.0)
         twin.qvel[:] += velocity
         twins.append(twin)
-    return twins
+        distances.append(float(np.max(np.abs(position / units), initial=0.0)))
+    return twins, distances
 
 
 def nudges(model: Any, count: int, size: float) -> Array:
@@ -218,12 +248,12 @@ def nudges(model: Any, count: int, size: float) -> Array:
     return np.concatenate([directions, -directions])
 
 
-def _horizon(times: Array, gaps: Array) -> tuple[float, float | None]:
-    parted = np.flatnonzero(gaps >= PARTING_DISTANCE)
+def _horizon(times: Array, gaps: Array, nudge: float) -> tuple[float, float | None]:
+    parted = np.flatnonzero(gaps >= 1)
     if not parted.size:
         return float(times[-1]), None
     end = int(parted[0])
-    growth = math.log(float(gaps[end]) / NUDGE) / float(times[end])
+    growth = math.log(float(gaps[end]) / nudge) / float(times[end])
     return float(times[max(0, end - 1)]), growth
 
 

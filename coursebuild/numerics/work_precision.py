@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -24,14 +25,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from coursebuild.numerics.costs import (
-    Clock,
-    FrontPoint,
-    costs,
-    front,
-    mark_luck,
-    verdict,
-)
+from coursebuild.numerics.costs import Clock, costs, mark_luck, verdict
 from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.known_motion import (
     Cone,
@@ -48,13 +42,14 @@ from coursebuild.numerics.measure import (
     mean_energy,
     measure_slip,
     momentum_drift,
+    quantity_errors,
     quantity_name,
-    quantity_values,
     visible_error,
 )
-from coursebuild.numerics.pilot import PARTING_DISTANCE as CHAOS_DISTANCE
 from coursebuild.numerics.pilot import (
     Pilot,
+    horizon_error,
+    horizon_errors,
     nudges,
     own_setting,
     position_distances,
@@ -62,7 +57,7 @@ from coursebuild.numerics.pilot import (
     settings,
     with_setting,
 )
-from coursebuild.numerics.problem import STANDARD, Integrator, Sizes
+from coursebuild.numerics.problem import STANDARD, Sizes
 from coursebuild.numerics.reports.scene_report import (
     FLOORS,
     MeasuredSetting,
@@ -70,8 +65,16 @@ from coursebuild.numerics.reports.scene_report import (
     ScenarioReport,
     StableRow,
     WorkPrecisionRow,
+    step_evaluations,
 )
-from coursebuild.numerics.reports.shown_errors import is_idle, setting_text, solving_parts
+from coursebuild.numerics.reports.shown_errors import (
+    FrontPoint,
+    front,
+    horizon_error_text,
+    is_idle,
+    setting_text,
+    solving_parts,
+)
 from coursebuild.numerics.scene import Scene, thickness
 from coursebuild.numerics.simulation import (
     EngineStates,
@@ -156,9 +159,9 @@ def measure_scenario(
     limits = {row.integrator: row.largest for row in largest if row.largest is not None}
     least = basis.least_figure if quantity_name(model, scene) else basis.least_seen
     rows = front(mark_luck(measured_rows, limits, least))
-    judgement = verdict(
-        rows, noticeable, least, lambda setting: _holds(basis, rows, setting, quick)
-    )
+    error = horizon_error(model, scene)
+    holds = partial(_holds, basis, rows, quick)
+    judgement = verdict(rows, noticeable, least, holds, horizon_error_text(error))
     return ScenarioReport(
         name=scene.name,
         title=scene.title,
@@ -184,6 +187,7 @@ def measure_scenario(
         least_seen=basis.least_seen,
         least_figure=basis.least_figure,
         cost_of=cost_of,
+        horizon_error=error,
     )
 
 
@@ -226,12 +230,11 @@ def _least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[floa
     least_seen = FLOORS * visible_error(model, scene, states, second_states)
     if not quantity_name(model, scene):
         return least_seen, 0.0
-    gaps = quantity_values(model, scene, states) - quantity_values(model, scene, second_states)
-    return least_seen, FLOORS * float(np.linalg.norm(gaps, axis=1).max())
+    return least_seen, FLOORS * float(quantity_errors(model, scene, states, second_states).max())
 
 
 def _holds(
-    basis: Basis, rows: Sequence[WorkPrecisionRow], better: MeasuredSetting, quick: bool
+    basis: Basis, rows: Sequence[WorkPrecisionRow], quick: bool, better: MeasuredSetting
 ) -> bool:
     """Whether another setting is better than the scene's own from starts nearby too."""
     model, pilot = basis.model, basis.pilot
@@ -257,9 +260,7 @@ def _holds(
             states = run.states.head(len(exact.times))
             error = visible_error(model, scene, states, exact)
             if quantity_name(model, scene):
-                gaps = quantity_values(model, near.scene, states)
-                gaps -= quantity_values(model, near.scene, exact)
-                error = float(np.linalg.norm(gaps, axis=1).max())
+                error = float(quantity_errors(model, near.scene, states, exact).max())
             least = basis.least_figure if quantity_name(model, scene) else basis.least_seen
             points.append(FrontPoint(row.cost, max(error, least)))
         if not points[0].beats(points[1]):
@@ -295,6 +296,9 @@ def _notes(
         notes.append(
             f"errors count until {reference.horizon:.6g} s: the motion is not known beyond"
         )
+    if pilot.scene.declaration.horizon_error and pilot.lyapunov is None:
+        error = horizon_error_text(horizon_error(model, pilot.scene))
+        notes.append(f"no run that begins 1e-10 away comes to be off by {error}: it is not chaotic")
     if drivers := driving_force(model, pilot.scene.scenario):
         notes.append(f"energy is not judged: {drivers}")
     states = np.abs(np.hstack([reference.states.qpos, reference.states.qvel, reference.states.act]))
@@ -374,7 +378,7 @@ def _measure_setting(
         "model_error": cone.model_error,
         "refsafe": pilot.constrained and refsafe_active(variant),
         "steps": steps,
-        "evaluations": steps * (4 if setting.integrator == Integrator.RK4.value else 1),
+        "evaluations": steps * step_evaluations(setting.integrator),
         "lucky": "",
         "own": setting == basis.baseline,
         **dict.fromkeys(("front", "same"), False),
@@ -421,28 +425,22 @@ def _with_errors(
         noticeable = True
     creep = None if cone.sticks is None else measure_slip(model, scene, states, cone.sticks)
     if basis.pilot.lyapunov is not None:
-        gaps = position_distances(model, states.qpos, reference.states.qpos)
-        far = np.flatnonzero(gaps >= CHAOS_DISTANCE)
+        unit = horizon_errors(model, scene)
+        gaps = position_distances(model, states.qpos, reference.states.qpos, unit)
+        far = np.flatnonzero(gaps >= 1)
         if far.size:
             # How far apart they are later depends on the last digit of the start.
             return replace(row, parted=float(states.times[far[0]]), slip=creep), noticeable
+    figure = None
+    if quantity_name(model, scene):
+        distances = quantity_errors(model, scene, states, reference.states)
+        sizes = np.maximum([distances.max(), distances[-1]], basis.least_figure)
+        figure = float(sizes[0]), float(sizes[1])
     row = replace(
         row,
         **asdict(run_errors),
-        figure=_quantity_error(basis, states, reference),
+        figure=figure,
         seen=max(visible, floor) + cone.visible_model_error,
         slip=creep,
     )
     return row, noticeable
-
-
-def _quantity_error(
-    basis: Basis, states: EngineStates, reference: KnownMotion
-) -> tuple[float, float] | None:
-    """The error of the quantity that the scenario declares, at its largest and at the end."""
-    model, scene = basis.model, basis.pilot.scene
-    if not quantity_name(model, scene):
-        return None
-    exact, floor = quantity_values(model, scene, reference.states), basis.least_figure
-    distances = np.linalg.norm(quantity_values(model, scene, states) - exact, axis=1)
-    return max(float(distances.max()), floor), max(float(distances[-1]), floor)

@@ -125,7 +125,7 @@ def _hash_file(file: Path) -> bytes:
         return b"unreadable"
 
 
-_LATER = ("room", "stable_for", "search", "limits", "expected", "precision")
+_LATER = ("room", "stable_for", "search", "limits", "expected", "precision", "horizon_error")
 _PLAIN = asdict(ScenarioTable("plain"))
 
 

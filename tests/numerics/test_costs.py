@@ -10,16 +10,15 @@ import pytest
 
 from coursebuild.numerics.costs import (
     MIN_ROUNDS,
-    FrontPoint,
     Job,
     costs,
-    front,
     mark_luck,
     time_jobs,
     verdict,
 )
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, WorkPrecisionRow
+from coursebuild.numerics.reports.shown_errors import FrontPoint, front
 from coursebuild.numerics.scene import scenes
 from support.bench_reports import diverged_row, row
 from support.surveys import NO_DECLARATIONS
@@ -298,7 +297,7 @@ def test_chaotic_scene_is_judged_by_how_long_runs_last() -> None:
         row("Euler", 0.002, cost=1.0, seen=None, own=True, parted=2.4),
         row("RK4", 0.002, cost=4.0, seen=None, parted=12.4),
     )
-    text = verdict(rows, [True, True]).text
+    text = verdict(rows, [True, True], horizon_error="2 mm").text
     assert text == (
-        "the motion is chaotic: it parts from the exact one at 2.4 s, under RK4 at 2 ms at 12.4 s"
+        "the motion is chaotic: it is 2 mm from the exact one at 2.4 s, under RK4 at 2 ms at 12.4 s"
     )

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.drawing.scales import text_width
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.report_plots import plot_svg, work_precision
+from coursebuild.numerics.reports.report_plots import plot_svgs, work_precision
 from coursebuild.numerics.reports.scene_report import ScenarioReport
 from coursebuild.numerics.reports.shown_errors import main_quantity, quantities
 from support.bench_reports import diverged_row, row, scenario, swing
@@ -21,9 +21,9 @@ from support.bench_reports import diverged_row, row, scenario, swing
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")
 
 
-def parse_plot(report: ScenarioReport, **options: Any) -> ElementTree.Element:
-    """The plot: well-formed, everything inside of it, and no two texts over each other."""
-    svg = plot_svg(report, name="p", **options)
+def parse_plot(report: ScenarioReport, number: int = 0, **options: Any) -> ElementTree.Element:
+    """A plot: well-formed, everything inside of it, and no two texts over each other."""
+    svg = plot_svgs(report, name="p", **options)[number]
     root = ElementTree.fromstring(svg)
     _, _, width, height = (float(x) for x in root.attrib["viewBox"].split())
     boxes = []
@@ -63,8 +63,8 @@ def test_every_row_is_a_mark_that_says_what_it_is(narrow: bool) -> None:
     tooltips = titles(root)
     assert len(tooltips) == len(report.rows)
     assert (
-        "RK4 at 20 ms · error 0.00307 · cost 0.39 ± 1 % · 50 steps · on the Pareto front"
-        in tooltips
+        "RK4 at 20 ms · error 0.00307 · cost 0.39 ± 1 % · 50 steps · 200 evaluations · "
+        "on the Pareto front" in tooltips
     )
     assert (
         "Euler at 2 ms · error 0.0048 · cost 1 ± 1 % · 500 steps · the scene’s own setting · "
@@ -154,13 +154,51 @@ def test_other_solvers_are_small_marks_without_a_line() -> None:
     assert ["CG" in (title.text or "") for path in small for title in path.iter("title")] == [True]
 
 
-def test_steps_stand_in_for_times_that_are_not_there() -> None:
-    rows = [row("Euler", h, cost=None) for h in (0.01, 0.001)]
-    assert "steps" in texts(parse_plot(scenario(rows)))
+def test_evaluations_stand_in_for_times_that_are_not_there() -> None:
+    """Also where they were not recorded: a step of RK4 has four."""
+    rows = [row("Euler", 0.01, cost=None), row("RK4", 0.01, cost=None)]
+    assert "evaluations of the forward dynamics" in texts(parse_plot(scenario(rows)))
+    (chart,) = work_precision(scenario(rows))
+    assert [p.x.value for line in chart.lines for p in line.points] == [100, 400]
     rows = [row("Euler", 0.002, cost=1.0), row("Euler", 0.001, cost=None), row("RK4", 0.01, cost=3)]
-    chart = work_precision(scenario(rows))
-    assert chart is not None
+    chart, *_ = work_precision(scenario(rows))
     assert [p.x.value for line in chart.lines for p in line.points] == [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_work_that_is_the_same_on_every_machine_has_plots_of_its_own(narrow: bool) -> None:
+    """There the front is another one: RK4 is cheap here for what it evaluates."""
+    solver = {"solver": "Newton", "iterations": 100, "cone": "pyramidal"}
+    rows = [
+        row("Euler", 0.002, evaluations=500, seen=4.0, own=True, front=True, **solver),
+        row("Euler", 0.001, evaluations=1000, seen=2.0, front=True, **solver),
+        row("RK4", 0.01, evaluations=400, seen=0.02, cost=9.0, front=False, **solver),
+        row("RK4", 0.005, evaluations=800, seen=0.01, cost=18.0, front=True, **solver),
+    ]
+    rows[2] = replace(rows[2], dominated_by=3)
+    counts = [1500.0, 2000.0, None, 4000.0]
+    pairs = zip(rows, counts, strict=True)
+    report = scenario([replace(r, iterations=n) for r, n in pairs], least_seen=0.005)
+    names = ["evaluations of the forward dynamics", "iterations of the solver"]
+    for number, name in enumerate(names, start=1):
+        root = parse_plot(report, number, narrow=narrow)
+        assert name in texts(root)
+        assert "under 0.005: not resolved by the reference" in texts(root)
+        assert root.findtext("title", "").endswith(f" against {name}")
+    points = {
+        point.title.split(" · ")[0]: (point.x.value, point.full)
+        for line in work_precision(report)[1].lines
+        for point in line.points
+    }
+    like = "Newton, 100 iterations, pyramidal cone"
+    assert points == {
+        f"Euler at 2 ms, {like}": (500, False),
+        f"Euler at 1 ms, {like}": (1000, False),
+        f"RK4 at 10 ms, {like}": (400, True),
+        f"RK4 at 5 ms, {like}": (800, True),
+    }
+    assert [len(line.points) for line in work_precision(report)[2].lines] == [2, 1]
+    assert len(work_precision(swing())) == 2, "no solver runs"
 
 
 def test_which_error_is_shown() -> None:
@@ -195,5 +233,5 @@ def test_any_report_is_drawn(rows: Any, floor: float, narrow: bool) -> None:
         row(name, h, position=(e, e), velocity=None, cost=cost, status=status, own=n == 0)
         for n, (name, h, e, cost, status) in enumerate(rows)
     ]
-    svg = plot_svg(scenario(report_rows, floor=floor), name="p", narrow=narrow)
-    assert svg == "" or len(titles(ElementTree.fromstring(svg))) == len(report_rows)
+    for svg in plot_svgs(scenario(report_rows, floor=floor), name="p", narrow=narrow):
+        assert len(titles(ElementTree.fromstring(svg))) == len(report_rows)

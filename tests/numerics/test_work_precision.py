@@ -170,22 +170,22 @@ DOUBLE_PENDULUM = """\
 """
 
 
-def test_chaos_has_a_horizon_and_then_statistics() -> None:
-    (report,) = measure(
-        mujoco.MjModel.from_xml_string(DOUBLE_PENDULUM),
-        '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 9\nsample = 0.04\n',
-        quick=True,
-    )
+@pytest.mark.parametrize(("line", "error"), [("", 0.1), ("horizon_error = { rad = 1e-3 }\n", 1e-3)])
+def test_chaos_has_a_horizon_and_then_statistics(line: str, error: float) -> None:
+    toml = '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 9\nsample = 0.04\n'
+    (report,) = measure(mujoco.MjModel.from_xml_string(DOUBLE_PENDULUM), toml + line, quick=True)
     assert report.lyapunov is not None and report.horizons is not None
     assert report.reference == "ode", "beyond the horizon nothing is compared with the engine"
     first, last = report.horizons
     assert report.horizon == first < last <= 9, "eight nudges part at different times"
-    growth = math.log(0.1 / 1e-10)  # from the nudge to where nothing is in common
+    assert report.horizon_error == {"rad": error}
+    growth = math.log(error / 1e-10)  # from the nudge to where predictions end
     assert first / 1.5 < growth / report.lyapunov < 1.5 * last
     assert any("errors count until" in note for note in report.notes)
     own_row = next(line for line in report.rows if line.own)
     assert own_row.mean_energy is not None
     assert own_row.energy_drift is not None
+    assert f"it is {error:g} rad from the exact one at" in report.verdict.text
 
 
 TWO_POINTS = """\
@@ -201,17 +201,22 @@ TWO_POINTS = """\
 
 
 @pytest.mark.slow
-def test_chaotic_settings_have_the_horizons_that_extended_precision_gives() -> None:
-    """In 34 digits the angles are 0.1 apart at 2.4 s under Euler, and at 13.4 s under RK4."""
+@pytest.mark.parametrize(("error", "euler", "rk4"), [(0.1, 2.42, 13.56), (0.01, 1.78, 12.4)])
+def test_chaotic_settings_have_the_horizons_that_extended_precision_gives(
+    error: float, euler: float, rk4: float
+) -> None:
+    """When the angles are so far from Lagrange's equations with 40 digits, by MuJoCo alone, s."""
     toml = '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 16\nsample = 0.02\n'
-    toml += "timesteps = [0.0005]\n"
+    toml += f"timesteps = [0.0005]\nhorizon_error = {{ rad = {error} }}\n"
     (report,) = measure(mujoco.MjModel.from_xml_string(TWO_POINTS), toml, quick=True)
     horizons = {row.setting.integrator: row.parted for row in report.rows}
-    for name in ("Euler", "implicit", "implicitfast", "discrete"):
-        assert horizons[name] == pytest.approx(2.4, abs=0.05)
-    assert horizons["RK4"] == pytest.approx(13.4, abs=0.3)
+    assert horizons["Euler"] == pytest.approx(euler, abs=0.005)
+    for name in ("implicit", "implicitfast", "discrete"):
+        assert horizons[name] == pytest.approx(euler, abs=0.05)
+    assert horizons["RK4"] == pytest.approx(rk4, abs=0.3)
     assert all(row.seen is None and row.position is None for row in report.rows)
-    assert "it parts from the exact one at 2.42 s, under RK4 at 500 µs at 13" in report.verdict.text
+    text = f"it is {error:g} rad from the exact one at {euler:g} s, under RK4 at 500 µs at "
+    assert text in report.verdict.text
 
 
 BLOCK = """\

@@ -138,7 +138,7 @@ def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built_course: Folde
     assert 'id="measured"' in cup, "so that links to it hold"
     whole, tables, alone = course.figures()
     assert '<a href="../models/box.html#measured-swing">box</a>: A pendulum swings' in whole
-    assert whole.count("<svg>") == 2 and '<details class="more-figures">' in whole
+    assert whole.count("<svg>") == 4 and '<details class="more-figures">' in whole
     assert "RK4 at 20 ms costs 0.39 times as much" in whole
     assert "coursebuild bench" not in whole and "NumPy 2.3.0" in whole
     assert "#measured-awkward" in tables and "<svg>" not in tables and "<details" not in tables
@@ -146,7 +146,7 @@ def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built_course: Folde
     assert 'aria-label="Settings: A pendulum swings"' in alone
     pairs = re.findall(r'aria-labelledby="(_bench[^"]*)"', lesson)
     names = {name for pair in pairs for name in pair.split()}
-    assert len(names) == 4 and all(lesson.count(f'id="{name}"') == 1 for name in names)
+    assert len(names) == 8 and all(lesson.count(f'id="{name}"') == 1 for name in names)
     anchors = re.findall(r'id="(measured[^"]*)"', page)
     assert anchors == ["measured", "measured-swing", "measured-awkward"]
     assert "1.2" in page.split('id="used"')[1], "the lesson uses the model"
@@ -164,7 +164,7 @@ def test_report_is_in_markdown_notebook_ebook_and_search(course: Course) -> None
     assert course.folder.main("export", "epub").status == 0
     with zipfile.ZipFile(course.folder.root / "course.epub") as book:
         texts = [book.read(n).decode() for n in book.namelist() if n.endswith(".xhtml")]
-    assert sum(text.count('class="work-precision"') for text in texts) == 1
+    assert sum(text.count('class="work-precision"') for text in texts) == 2
     assert not any("plot-wide" in text for text in texts)
 
 

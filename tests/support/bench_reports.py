@@ -184,6 +184,7 @@ def awkward() -> ScenarioReport:
         horizon=2.5,
         lyapunov=3.21,
         horizons=(2.5, 3.75),
+        horizon_error={"rad": 0.05, "m": 0.002},
         hold=0.02,
         figure="site:tip (m)",
         reference="self",

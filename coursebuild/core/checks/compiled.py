@@ -319,9 +319,33 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
                 message = f"the model has no {measure.kind} `{measure.name}`"
                 help = did_you_mean(measure.name, [name for name in model_names if name])
                 yield diagnose(_RULE, scenario.place("measure"), message, help=help)
+        yield from _check_horizon_error(scenario, facts.sizes)
         yield from _check_timestep(scenario, facts)
     for sweep in declarations.sweeps:
         yield from _check_sweep(sweep, declarations.scenarios, facts)
+
+
+_LEAST_ERROR = 1e-8
+"""Of a difference of coordinates: whether a motion is chaotic is seen by differences of 1e-10."""
+
+
+def _check_horizon_error(
+    scenario: DeclaredScenario, sizes: Mapping[str, float]
+) -> Iterator[Diagnostic]:
+    place = scenario.place("horizon_error")
+    kinds = {"rad": "hinge, ball or free joint", "m": "slide or free joint"}
+    for unit, error in scenario.horizon_error.items():
+        if unit not in sizes:
+            message = f"no coordinate of the model is in {unit}: it has no {kinds[unit]}"
+            help = f"state an error in {next(iter(sizes))}" if sizes else "leave it out"
+            yield diagnose(_RULE, place, message, help=help)
+        elif not _LEAST_ERROR * sizes[unit] <= error <= sizes[unit]:
+            least, most = f"{_LEAST_ERROR * sizes[unit]:.3g}", f"{sizes[unit]:.3g} {unit}"
+            message = (
+                f"an error of {error:g} {unit} is too {'small' if error < sizes[unit] else 'large'}"
+            )
+            help = f"state one from {least} to {most}"
+            yield diagnose(_RULE, place, message, help=help)
 
 
 def _check_timestep(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:

@@ -290,6 +290,9 @@ class ModelFacts(Struct, frozen=True):
     includes: tuple[str, ...] = ()
     """Files that the model includes, relative to the project root; absolute if outside."""
     sensors: tuple[str, ...] = ()
+    sizes: Mapping[str, float] = {}
+    """The size of a large difference, by the units of its coordinates: 1 rad for hinges and
+    attitudes, the model's extent for slides and places, m."""
 
 
 class TrialLine(Struct, frozen=True):

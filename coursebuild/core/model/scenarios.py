@@ -144,6 +144,14 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
             "largest kinetic energy, added to the energy; of velocity, if something drives it"
         ),
     ] = 10.0
+    horizon_error: Annotated[
+        dict[Literal["rad", "m"], fields.Positive],
+        Meta(
+            description="the error at which predictions of a chaotic motion end, in rad for hinges "
+            "and attitudes, in m for slides and places, as in `{ rad = 0.05, m = 0.002 }`; else "
+            "0.1 rad, or a tenth of the model's extent"
+        ),
+    ] = {}
     stable_for: Annotated[
         fields.Positive | None,
         Meta(description="seconds over which a timestep has to be stable; else the duration"),

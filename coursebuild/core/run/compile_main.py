@@ -20,6 +20,8 @@ from typing import Any
 
 _INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 """In the order of mjtIntegrator, by their names in MJCF."""
+_FREE, _BALL, _SLIDE, _HINGE = range(4)
+"""As in mjtJoint."""
 
 
 def main() -> None:
@@ -61,6 +63,7 @@ def _facts(model: Any) -> dict[str, Any]:
         blob: bytes = model.names
         return [blob[a : blob.index(b"\0", a)].decode("utf-8", "replace") for a in addresses]
 
+    joints = set(model.jnt_type.tolist())
     return {
         "bodies": model.nbody - 1,
         "geoms": model.ngeom,
@@ -75,6 +78,8 @@ def _facts(model: Any) -> dict[str, Any]:
         "sites": names(model.name_siteadr),
         "sensors": names(model.name_sensoradr),
         "body_names": names(model.name_bodyadr[1:]),
+        "sizes": ({"rad": 1.0} if joints & {_FREE, _BALL, _HINGE} else {})
+        | ({"m": float(model.stat.extent)} if joints & {_FREE, _SLIDE} else {}),
     }
 
 

@@ -140,11 +140,7 @@ class _Decoder:
             case inspect.VarTupleType() | inspect.TupleType(), ArrayNode():
                 return self.decode_array(node, type, name)
             case inspect.DictType(), ObjectNode():
-                values = {
-                    key: self.decode_value(member.value, type.value_type, key)
-                    for key, member in node.members.items()
-                }
-                return _INVALID if _INVALID in values.values() else values
+                return self.decode_map(node, type)
             case inspect.StructType(), ObjectNode():
                 return self.decode_struct(node, type)
             case inspect.UnionType(), _:
@@ -218,6 +214,17 @@ class _Decoder:
             for i, (item, type) in enumerate(zip(node.items, types, strict=True))
         ]
         return _INVALID if _INVALID in values else tuple(values)
+
+    def decode_map(self, node: ObjectNode, type: inspect.DictType) -> object:
+        values = {}
+        for key, member in node.members.items():
+            if isinstance(type.key_type, inspect.LiteralType) and key not in type.key_type.values:
+                message = f"unknown field {format_name(key)}"
+                help = did_you_mean(key, map(str, type.key_type.values))
+                self.report("field-unknown", member.key.span, message, help)
+                continue
+            values[key] = self.decode_value(member.value, type.value_type, key)
+        return _INVALID if _INVALID in values.values() else values
 
     # ---------------------------------------------------------------------------------- structs
 

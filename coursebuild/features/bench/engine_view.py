@@ -133,7 +133,7 @@ def _notes(words: Strings, scenario: EngineScenario) -> Iterator[str]:
                 yield f"{row_name(row)}, {words('measured.worlds', n=cost.worlds)}: {cost.remark}."
 
 
-def engine_plots(name: str, scenario: EngineScenario) -> tuple[Markup, ...]:
+def engine_plots(name: str, scenario: EngineScenario) -> tuple[tuple[Markup, ...], ...]:
     """Draw the plot for wide and for narrow screens; `name` is unique on the page."""
     from coursebuild.numerics.reports.chart import NARROW_SIZE, WIDE_SIZE, chart_svg
     from coursebuild.numerics.reports.engine_report import engine_chart
@@ -142,4 +142,6 @@ def engine_plots(name: str, scenario: EngineScenario) -> tuple[Markup, ...]:
     if chart is None:
         return ()
     sizes = {"wide": WIDE_SIZE, "narrow": NARROW_SIZE}
-    return tuple(Markup(chart_svg(chart, f"{name}-{kind}", size)) for kind, size in sizes.items())
+    return (
+        tuple(Markup(chart_svg(chart, f"{name}-{kind}", size)) for kind, size in sizes.items()),
+    )

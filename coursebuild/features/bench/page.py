@@ -126,10 +126,10 @@ _ENGINES = "engines"
 
 
 def draw_bench(page: PageContext, block: Bench) -> Markup:
-    """Draw the report, with its plots for wide and for narrow screens."""
+    """Draw the report, with its plots, each for wide and for narrow screens."""
     view = _view(page, block)
-    drawings: tuple[Markup, ...] = ()
-    engine_drawings: tuple[Markup, ...] = ()
+    drawings: tuple[tuple[Markup, ...], ...] = ()
+    engine_drawings: tuple[tuple[Markup, ...], ...] = ()
     # The blocks of a page are numbered.
     places = [b.span.start for b in find_blocks(page.document, Bench)]
     number = places.index(block.span.start) + 1
@@ -152,9 +152,9 @@ def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     report = None if view.scenario is None else view.scenario.report
     if isinstance(report, ScenarioReport) and "plot" in block.shows:
         # The block says the verdict itself. The table of a sweep holds all that its plot shows.
-        plot = work_precision(replace(report, verdict=replace(report.verdict, text="")))
-        if plot is not None:
-            rest.insert(0, guard_lines(escape_marks(f"{plot.title}. {plot.text}")))
+        charts = work_precision(replace(report, verdict=replace(report.verdict, text="")))
+        texts = (f"{chart.title}. {chart.text}" for chart in charts)
+        rest = [*(guard_lines(escape_marks(text)) for text in texts), *rest]
     return "\n\n".join((head, *rest))
 
 

@@ -42,6 +42,7 @@ from coursebuild.numerics.reports.scene_report import (
 from coursebuild.numerics.reports.shown_errors import (
     FEWEST_STEPS,
     Quantity,
+    horizon_error_text,
     interval_text,
     is_cut_short,
     is_idle,
@@ -113,7 +114,9 @@ def _describe(words: Strings, report: ScenarioReport) -> list[str]:
         if report.lyapunov is not None and report.horizons is not None:
             first, last = map(seconds_text, report.horizons)
             rate = power(report.lyapunov)
-            sentences.append(phrase(words, "measured.chaotic", first=first, last=last, rate=rate))
+            error = horizon_error_text(report.horizon_error)
+            values = {"first": first, "last": last, "rate": rate, "error": error}
+            sentences.append(phrase(words, "measured.chaotic", **values))
     if report.hold:
         sentences.append(words("measured.hold", time=seconds_text(report.hold)))
     parts = [] if report.own_setting is None else solving_parts(report.own_setting)
@@ -146,11 +149,11 @@ def _settings_table(words: Strings, report: ScenarioReport) -> Grid:
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (speed, [factor(row.realtime) for row in rows]),
         (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
-        (evaluations, [f"{row.evaluations:,}" if row.evaluations else "" for row in rows]),
+        (evaluations, [f"{row.work:,}" for row in rows]),
         (iterations, ["" if r.iterations is None else f"{r.iterations:,.0f}" for r in rows]),
         *(error_column(quantity) for quantity in quantities(report) if quantity.is_resolved(rows)),
         (
-            words("measured.parted"),
+            words("measured.parted", error=horizon_error_text(report.horizon_error)),
             ["" if r.parted is None else seconds_text(r.parted, 3) for r in rows],
         ),
         (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
@@ -323,17 +326,19 @@ def _sweep_view(words: Strings, sweep: SweepReport, anchor: str) -> ScenarioView
     return ScenarioView(anchor, sweep.title, table, tuple(notes), sweep)
 
 
-def plots(name: str, report: ScenarioReport | SweepReport) -> tuple[Markup, ...]:
-    """Draw a plot for wide and for narrow screens; `name` is unique on the page."""
+def plots(name: str, report: ScenarioReport | SweepReport) -> tuple[tuple[Markup, ...], ...]:
+    """Draw the plots, each for wide and for narrow screens; `name` is unique on the page."""
     from coursebuild.numerics.reports.report_plots import (
-        plot_svg,  # late: few pages need it
+        plot_svgs,  # late: few pages need it
         sweep_svg,
     )
 
-    svgs = (
-        sweep_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")
-        if isinstance(report, SweepReport)
-        else plot_svg(report, name=f"{name}-{kind}", narrow=kind == "narrow")
-        for kind in ("wide", "narrow")
-    )
-    return tuple(Markup(svg) for svg in svgs if svg)
+    def draw(kind: str) -> tuple[str, ...]:
+        key, narrow = f"{name}-{kind}", kind == "narrow"
+        if isinstance(report, ScenarioReport):
+            return plot_svgs(report, name=key, narrow=narrow)
+        svg = sweep_svg(report, name=key, narrow=narrow)
+        return (svg,) if svg else ()
+
+    pairs = zip(draw("wide"), draw("narrow"), strict=True)
+    return tuple(tuple(map(Markup, pair)) for pair in pairs)

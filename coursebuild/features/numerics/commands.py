@@ -48,6 +48,7 @@ from coursebuild.features.numerics.page import case_view
 from coursebuild.numerics.reports.case_report import (
     CaseReport,
     ErrorLine,
+    case_quantities,
     course_cases,
     exact_file,
 )
@@ -57,7 +58,6 @@ from coursebuild.numerics.reports.records import (
     ReportFailure,
     case_departures,
 )
-from coursebuild.numerics.reports.report_plots import case_quantities
 from coursebuild.numerics.reports.scene_report import SceneReport
 from coursebuild.numerics.reports.shown_errors import seconds_text, status_text
 from coursebuild.pipeline.options import Options, UsageError

@@ -38,10 +38,11 @@ from coursebuild.features.bench.scenario_view import (
 from coursebuild.numerics.reports.case_report import (
     BoundaryLine,
     CaseReport,
+    case_quantities,
+    case_svgs,
     course_cases,
 )
 from coursebuild.numerics.reports.records import STABILITY
-from coursebuild.numerics.reports.report_plots import case_quantities, case_svg
 from coursebuild.numerics.reports.scene_report import FigureLine, SceneReport
 from coursebuild.numerics.reports.shown_errors import (
     INTEGRATORS,
@@ -75,6 +76,8 @@ class CaseView(Struct, frozen=True):
     sentences: tuple[str, ...]
     """What the plots say, and a note on the case."""
     plots: tuple[Markup, ...]
+    """The error against time and against evaluations."""
+    folded_plots: tuple[Markup, ...]
     grids: tuple[Grid, ...]
     notes: tuple[str, ...]
     page: str
@@ -165,14 +168,14 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
     grids = (boundaries, _figures(words, report), orders)
     quantities = case_quantities(report)
     name = urls.encode(report.name)
+    drawings = [case_svgs(report, q, f"{name}-{q.name}") for q in quantities]
     return CaseView(
         name,
         report.title,
         _matrix(words, report),
         tuple(_describe(words, report, quantities)),
-        tuple(
-            Markup(case_svg(report, quantity, f"{name}-{quantity.name}")) for quantity in quantities
-        ),
+        tuple(map(Markup, drawings[0] if drawings else ())),
+        tuple(Markup(svg) for svgs in drawings[1:] for svg in svgs),
         tuple(grid for grid in grids if grid is not None),
         tuple(_notes(words, report)),
         place.href(urls.model_page_path(model)) if model else "",

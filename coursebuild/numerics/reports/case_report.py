@@ -1,6 +1,7 @@
-"""The report on a hard case.
+"""The report on a hard case, and its plots.
 
-Entry points: `CaseReport`; `course_cases(report)`, the hard cases of a course's own: scenarios of
+Entry points: `CaseReport`; `case_quantities(report)`, the errors to draw, and `case_svgs(report,
+quantity, name)`; `course_cases(report)`, the hard cases of a course's own: scenarios of
 models whose exact motion stands in `exact_file`.
 """
 
@@ -13,7 +14,9 @@ from msgspec.structs import asdict
 
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Interval, Record
+from coursebuild.numerics.reports.chart import PAIR_SIZE, Chart, Line, Point, chart_svg
 from coursebuild.numerics.reports.scene_report import (
+    FLOORS,
     FigureLine,
     MeasuredRun,
     OrderRow,
@@ -21,6 +24,14 @@ from coursebuild.numerics.reports.scene_report import (
     SceneReport,
     StableRow,
     WorkPrecisionRow,
+    step_evaluations,
+)
+from coursebuild.numerics.reports.shown_errors import (
+    EVALUATION_LABEL,
+    INTEGRATORS,
+    Quantity,
+    seconds_text,
+    status_text,
 )
 
 
@@ -153,3 +164,71 @@ def _course_case(report: SceneReport, scenario: ScenarioReport) -> CaseReport:
 def _error_line(row: WorkPrecisionRow) -> ErrorLine:
     fields = {name: getattr(row, name) for name in MeasuredRun.__struct_fields__}
     return ErrorLine(integrator=row.setting.integrator, timestep=row.setting.timestep, **fields)
+
+
+def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:
+    """The first error that is resolved, and energy drift where energy is conserved."""
+    reference = report.reference
+    errors = (
+        Quantity("position", "error of position (m or rad)", FLOORS * reference.position),
+        Quantity("attitude", "error of attitude (rad)", FLOORS * reference.attitude),
+        Quantity("velocity", "error of velocity (m/s or rad/s)", FLOORS * reference.velocity),
+    )
+    drift = Quantity("energy_drift", "energy drift, relative")
+    runs = [line for line in report.errors if line.status == "ok"]
+    return (
+        *[quantity for quantity in errors if quantity.is_resolved(runs)][:1],
+        *[drift] * drift.is_resolved(runs),
+    )
+
+
+def case_svgs(report: CaseReport, quantity: Quantity, name: str) -> tuple[str, ...]:
+    """The plots of an error against processor time, where it was measured, and evaluations.
+
+    As `svg` elements; `name` is unique among the plots on the page.
+    """
+    svgs = (
+        _case_svg(report, quantity, work, f"{name}{suffix}")
+        for work, suffix in (("processor time", ""), (EVALUATION_LABEL, "-evaluations"))
+    )
+    return tuple(svg_text for svg_text in svgs if svg_text)
+
+
+def _case_svg(report: CaseReport, quantity: Quantity, work: str, name: str) -> str:
+    is_time = work == "processor time"
+
+    def amount(x: float, digits: int = 2) -> str:
+        return seconds_text(x, digits) if is_time else f"{x:.{digits}g}"
+
+    lines = []
+    for number, integrator in enumerate(INTEGRATORS):
+        points = []
+        for run in report.errors:
+            x = report.cost(run) if is_time else _evaluations(run)
+            if run.integrator != integrator or x is None:
+                continue
+            setting = f"{integrator} at {seconds_text(run.timestep)}"
+            if run.status != "ok":
+                points.append(Point(x, None, f"{setting}: {status_text(run.status)}"))
+            elif error := quantity.value_of(run):
+                points.append(Point(x, error, f"{setting}: {error:.3g}, {amount(x.value, 3)}"))
+        lines += [Line(integrator, number, tuple(points))] if points else []
+    texts = []
+    for line in lines:
+        if visible := line.visible_points:
+            ends = (f"{p.y:.2g} at {amount(p.x.value)}" for p in (visible[0], visible[-1]))
+            texts.append(f"{line.name}: {', '.join(ends)}.")
+    chart = Chart(
+        title=f"{report.title}: {quantity.label} against {work}",
+        text=" ".join(texts),
+        axes=(f"{work} for a simulated second{' (s)' * is_time}", quantity.label),
+        lines=tuple(lines),
+        least=quantity.least,
+    )
+    return chart_svg(chart, name, PAIR_SIZE)
+
+
+def _evaluations(run: ErrorLine) -> Interval:
+    """How often the forward dynamics are computed in a simulated second."""
+    count = step_evaluations(run.integrator) / run.timestep
+    return Interval(count, count, count)

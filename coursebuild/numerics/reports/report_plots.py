@@ -1,15 +1,15 @@
-"""The plots of reports as SVG: error against cost, of a scenario or a hard case, and sweeps.
+"""The plots of reports on models as SVG: error against work, of a scenario, and sweeps.
 
-Entry points: `plot_svg(report, …)`, of a scenario, from `work_precision(report)`; of a hard case
-`case_quantities(report)`, the errors to draw, and `case_svg(report, quantity, name)`;
+Entry points: `plot_svgs(report, …)`, of a scenario, from `work_precision(report)`;
 `sweep_svg(sweep, …)`.
 
 1. A line for each integrator goes from long timesteps to short ones, over those rows that have the
    scene's own solver, iterations and cone; the rows with others are small marks beside it.
 2. A mark is filled where the setting is on the Pareto front, and hollow where another one is
    better. A ring is around the scene's own setting. Bars are the intervals of the costs.
-3. The cost of a row that was not timed is estimated from the evaluations of the forward dynamics.
-   Where nothing at all was timed, these stand in for the cost.
+3. Beside the cost, which is time, work is counted as it is on every machine: in evaluations of the
+   forward dynamics, and in iterations of the solver. Each has a front of its own. The cost of a row
+   that was not timed is estimated from its evaluations.
 4. A sweep has a row for each value, and for each figure a scale beside it. A dot is a figure, a bar
    its interval; a line joins the values of one parameter, and a ring marks the model's own value. A
    scale is logarithmic where its figures differ by much.
@@ -21,9 +21,10 @@ import statistics
 from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 
+from msgspec.structs import replace
+
 from coursebuild.core.drawing.scales import Scale, log, shorten_to_width, text_width
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.case_report import CaseReport
 from coursebuild.numerics.reports.chart import (
     FINE,
     MARK,
@@ -51,7 +52,6 @@ from coursebuild.numerics.reports.chart import (
 )
 from coursebuild.numerics.reports.scene_report import (
     FIGURES,
-    FLOORS,
     ScenarioReport,
     SweepReport,
     SweepRow,
@@ -61,8 +61,11 @@ from coursebuild.numerics.reports.scene_report import (
     shown_figures,
 )
 from coursebuild.numerics.reports.shown_errors import (
+    EVALUATION_LABEL,
     INTEGRATORS,
     Quantity,
+    front,
+    horizon_error_text,
     interval_text,
     is_idle,
     main_quantity,
@@ -72,40 +75,72 @@ from coursebuild.numerics.reports.shown_errors import (
 )
 
 
-def plot_svg(report: ScenarioReport, *, name: str, narrow: bool = False) -> str:
-    """The plot as an `svg` element; empty where no row of the scenario has an error.
+def plot_svgs(report: ScenarioReport, *, name: str, narrow: bool = False) -> tuple[str, ...]:
+    """The plots of `work_precision` as `svg` elements.
 
     Args:
         report: of the scenario.
-        name: unique among the plots on the page, as ids are made from it.
+        name: unique on the page, as ids are made from it.
         narrow: for narrow screens: the text has the same size there.
     """
-    chart = work_precision(report)
-    return "" if chart is None else chart_svg(chart, name, NARROW_SIZE if narrow else WIDE_SIZE)
+    sizes = [WIDE_SIZE, PAIR_SIZE, PAIR_SIZE] if not narrow else [NARROW_SIZE] * 3
+    return tuple(
+        svg_text
+        for number, (chart, size) in enumerate(zip(work_precision(report), sizes, strict=False))
+        if (svg_text := chart_svg(chart, f"{name}-{number}" if number else name, size))
+    )
 
 
-def work_precision(report: ScenarioReport) -> Chart | None:
-    """The chart of error against cost; `None` where no row has an error."""
+_WORKS = {
+    "cost": "cost",
+    "evaluations": EVALUATION_LABEL,
+    "iterations": "iterations of the solver",
+}
+"""What a setting costs: time, and what is the same on every machine."""
+_AMOUNTS = {"cost": "at costs of {}", "evaluations": "with {}", "iterations": "with {}"}
+
+
+def work_precision(report: ScenarioReport) -> tuple[Chart, ...]:
+    """The charts of error against cost, evaluations, and where a solver runs, its iterations.
+
+    None where no row has an error.
+    """
     quantity = main_quantity(report)
     if quantity is None:
-        return None
-    timed = [row for row in report.rows if row.cost is not None and row.cost.value > 0]
-    is_counted = any(row.evaluations for row in report.rows)
-    work = "evaluations of the forward dynamics" if is_counted else "steps"
-    base = "the scene’s own setting"
-    if report.cost_of is not None:
-        base = setting_text(report.cost_of, report.own_setting)
-    integrators = {row.setting.integrator for row in report.rows}
+        return ()
+    return tuple(
+        _chart(report, quantity, work, works)
+        for work in _WORKS
+        if any(works := _find_works(report, work))
+    )
+
+
+def _chart(
+    report: ScenarioReport, quantity: Quantity, work: str, works: Sequence[Interval | None]
+) -> Chart:
+    if work != "cost":
+        pairs = list(zip(report.rows, works, strict=True))
+        places = front([replace(row, cost=x) for row, x in pairs])
+        rows = tuple(
+            replace(row, front=place.front, dominated_by=place.dominated_by)
+            for (row, _), place in zip(pairs, places, strict=True)
+        )
+        report = replace(report, rows=rows)
+    label = axis = _WORKS[work]
+    if work == "cost":
+        base = "the scene’s own setting"
+        if report.cost_of is not None:
+            base = setting_text(report.cost_of, report.own_setting)
+        axis = f"cost, relative to {base}"
     lines = tuple(
-        _line(report, quantity, timed, name) for name in INTEGRATORS if name in integrators
+        Line(name, INTEGRATORS.index(name), points)
+        for name in INTEGRATORS
+        if (points := tuple(_points(report, quantity, works, name)))
     )
     return Chart(
-        title=(
-            f"{report.title or report.name}: error of {quantity.label} "
-            f"against {'cost' if timed else work}"
-        ),
-        text=" ".join(_describe(report, quantity, lines)),
-        axes=(f"cost, relative to {base}" if timed else work, f"error: {quantity.label}"),
+        title=f"{report.title or report.name}: error of {quantity.label} against {label}",
+        text=" ".join(_describe(report, quantity, lines, work)),
+        axes=(axis, f"error: {quantity.label}"),
         lines=lines,
         least=quantity.least,
         unit_label="just visible" if quantity.name == "seen" else "",
@@ -113,48 +148,56 @@ def work_precision(report: ScenarioReport) -> Chart | None:
     )
 
 
-def _line(
+def _points(
     report: ScenarioReport,
     quantity: Quantity,
-    timed: Sequence[WorkPrecisionRow],
+    works: Sequence[Interval | None],
     name: str,
-) -> Line:
+) -> Iterator[Point]:
+    """The points of an integrator, from long timesteps to short ones."""
     baseline = report.own_setting
-    points = []
-    rows = [r for r in report.rows if r.setting.integrator == name and not is_idle(r)]
-    for row in sorted(rows, key=lambda row: -row.setting.timestep):
+    rows = [
+        (row, x)
+        for row, x in zip(report.rows, works, strict=True)
+        if row.setting.integrator == name and not is_idle(row)
+    ]
+    for row, x in sorted(rows, key=lambda pair: -pair[0].setting.timestep):
+        if x is None:
+            continue
         error = quantity.value_of(row) if row.status == "ok" else None
-        points.append(
-            Point(
-                _cost(row, timed),
-                error,
-                " · ".join(_point_title(report, row, error, timed=bool(timed))),
-                full=row.front,
-                small=baseline is not None
-                and row.setting.solver_settings != baseline.solver_settings,
-                ringed=row.own,
-            )
+        yield Point(
+            x,
+            error,
+            " · ".join(_point_title(report, row, error)),
+            full=row.front,
+            small=baseline is not None and row.setting.solver_settings != baseline.solver_settings,
+            ringed=row.own,
         )
-    return Line(name, INTEGRATORS.index(name), tuple(points))
+
+
+def _find_works(report: ScenarioReport, work: str) -> list[Interval | None]:
+    """What each row costs; nothing where that is not known of any."""
+    rows = report.rows
+    if work == "iterations":
+        return [Interval(n, n, n) if n else None for n in (row.iterations for row in rows)]
+    if work == "evaluations":
+        return [Interval(n, n, n) for n in (float(row.work) for row in rows)]
+    timed = [row for row in rows if row.cost is not None and row.cost.value > 0]
+    return [_cost(row, timed) for row in rows] if timed else []
 
 
 def _cost(row: WorkPrecisionRow, timed: Sequence[WorkPrecisionRow]) -> Interval:
-    """The cost of a row; estimated from its evaluations, or steps, where it was not timed."""
+    """The cost of a row; estimated from its evaluations where it was not timed."""
     if row in timed and row.cost is not None:
         return row.cost
     peers = [peer for peer in timed if peer.setting.integrator == row.setting.integrator] or timed
-    rates = [peer.cost.value / _work(peer) for peer in peers if peer.cost is not None]
-    value = _work(row) * (statistics.median(rates) if rates else 1.0)
+    rates = [peer.cost.value / peer.work for peer in peers if peer.cost is not None]
+    value = row.work * statistics.median(rates)
     return Interval(value, value, value)
-
-
-def _work(row: WorkPrecisionRow) -> int:
-    return max(row.evaluations or row.steps, 1)
 
 
 def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
     """The entries of the key, for the kinds of marks that occur."""
-    points = [point for line in lines for point in line.points]
     visible = [point for line in lines for point in line.visible_points]
     if any(point.full for point in visible):
         yield Entry("front", "on the Pareto front")
@@ -165,19 +208,36 @@ def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
     for row in report.rows:
         if row.own:
             yield Entry("own", f"the scene’s own: {setting_text(row.setting, row.setting)}")
-    if len(visible) < len(points):
-        yield Entry("lost", "run lost")
+    kinds = {"run lost": _lost(report), "past its horizon": _parted(report)}
+    if words := [text for text, names in kinds.items() if names]:
+        yield Entry("lost", ", or ".join(words))
 
 
-def _describe(report: ScenarioReport, quantity: Quantity, lines: Sequence[Line]) -> Iterator[str]:
+def _lost(report: ScenarioReport) -> list[str]:
+    """The integrators under which runs were lost."""
+    return list(dict.fromkeys(r.setting.integrator for r in report.rows if r.status != "ok"))
+
+
+def _parted(report: ScenarioReport) -> list[str]:
+    """Those under which runs are too far from a chaotic motion to have an error."""
+    return list(dict.fromkeys(r.setting.integrator for r in report.rows if r.parted is not None))
+
+
+def _describe(
+    report: ScenarioReport, quantity: Quantity, lines: Sequence[Line], work: str
+) -> Iterator[str]:
     for line in lines:
         if line.visible_points:
             errors = _range([point.y or 0.0 for point in line.visible_points], 2, "{1} to {0}")
             costs = _range([point.x.value for point in line.visible_points], 3, "{0} to {1}")
-            yield f"{line.name}: errors {errors} at costs of {costs}."
-    lost = [line.name for line in lines if len(line.visible_points) < len(line.points)]
-    if lost:
+            yield f"{line.name}: errors {errors} {_AMOUNTS[work].format(costs)}."
+    if work != "cost":
+        return  # the rest is said with the costs
+    if lost := _lost(report):
         yield f"Runs were lost under {', '.join(lost)}."
+    if parted := _parted(report):
+        error = horizon_error_text(report.horizon_error)
+        yield f"Runs are off by more than {error} under {', '.join(parted)}."
     for row in report.rows:
         if row.own:
             yield f"The scene’s own setting is {setting_text(row.setting)}."
@@ -194,20 +254,22 @@ def _range(values: Sequence[float], digits: int, words: str) -> str:
 
 
 def _point_title(
-    report: ScenarioReport, row: WorkPrecisionRow, error: float | None, *, timed: bool
+    report: ScenarioReport, row: WorkPrecisionRow, error: float | None
 ) -> Iterator[str]:
     yield setting_text(row.setting)
-    if error is None:
+    if row.parted is not None:
+        yield f"off by {horizon_error_text(report.horizon_error)} after {seconds_text(row.parted)}"
+    elif error is None:
         yield "; ".join((status_text(row.status), *row.reasons))
     else:
         yield f"error {error:.3g}"
     if row.cost is not None:
         yield f"cost {interval_text(row.cost)}"
-    elif timed:
+    elif any(row.cost is not None for row in report.rows):
         yield "not timed"
     yield f"{row.steps} steps"
-    if row.evaluations > row.steps:
-        yield f"{row.evaluations} evaluations"
+    if row.work > row.steps:
+        yield f"{row.work} evaluations"
     if row.iterations is not None:
         yield f"{row.iterations:.6g} iterations of the solver"
     if row.lucky:
@@ -219,61 +281,6 @@ def _point_title(
     elif row.dominated_by is not None and 0 <= row.dominated_by < len(report.rows):
         better = setting_text(report.rows[row.dominated_by].setting, row.setting)
         yield f"{better} is better"
-
-
-def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:
-    """The first error that is resolved, and energy drift where energy is conserved."""
-    reference = report.reference
-    errors = (
-        Quantity("position", "error of position (m or rad)", FLOORS * reference.position),
-        Quantity("attitude", "error of attitude (rad)", FLOORS * reference.attitude),
-        Quantity("velocity", "error of velocity (m/s or rad/s)", FLOORS * reference.velocity),
-    )
-    drift = Quantity("energy_drift", "energy drift, relative")
-    runs = [line for line in report.errors if line.status == "ok"]
-    return (
-        *[quantity for quantity in errors if quantity.is_resolved(runs)][:1],
-        *[drift] * drift.is_resolved(runs),
-    )
-
-
-def case_svg(report: CaseReport, quantity: Quantity, name: str) -> str:
-    """The plot as an `svg` element; empty where nothing was timed.
-
-    `name` is unique among the plots on the page.
-    """
-    lines = tuple(
-        Line(integrator, number, tuple(points))
-        for number, integrator in enumerate(INTEGRATORS)
-        if (points := [*_case_points(report, quantity, integrator)])
-    )
-    chart = Chart(
-        title=f"{report.title}: {quantity.label} against processor time",
-        text=" ".join(_case_range(line) for line in lines if line.visible_points),
-        axes=("processor time for a simulated second (s)", quantity.label),
-        lines=lines,
-        least=quantity.least,
-    )
-    return chart_svg(chart, name, PAIR_SIZE)
-
-
-def _case_points(report: CaseReport, quantity: Quantity, integrator: str) -> Iterator[Point]:
-    for run in report.errors:
-        cost = report.cost(run)
-        if run.integrator != integrator or cost is None:
-            continue
-        if run.status != "ok":
-            title = f"{integrator} at {seconds_text(run.timestep)}: {status_text(run.status)}"
-            yield Point(cost, None, title)
-        elif error := quantity.value_of(run):
-            yield Point(cost, error, f"{integrator}: {error:.3g} at {seconds_text(cost.value, 3)}")
-
-
-def _case_range(line: Line) -> str:
-    (x0, y0), *_, (x1, y1) = [
-        (p.x.value, p.y) for p in (*line.visible_points, line.visible_points[-1])
-    ]
-    return f"{line.name}: {y0:.2g} at {seconds_text(x0, 2)}, {y1:.2g} at {seconds_text(x1, 2)}."
 
 
 _SPREAD = 20.0

@@ -6,6 +6,8 @@ Entry points: `SceneReport`; of a sweep, where one parameter has other values, `
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from coursebuild.core.drawing.scales import tick_texts
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Interval, Record
@@ -179,8 +181,8 @@ class WorkPrecisionRow(MeasuredRun, frozen=True):
     """The largest displacement or turn of a body in a picture, where 1 is just visible. The front
     is that of cost and the figure, or where none is declared, of cost and this."""
     parted: float | None = None
-    """In a chaotic scenario, s: when it is a tenth (of a radian, or of the model's extent) from the
-    reference; its errors mean nothing later, and are not given."""
+    """In a chaotic scenario, s: when it is `horizon_error` from the reference; its errors mean
+    nothing later, and are not given."""
     mean_energy: float | None = None
     """Mean kinetic energy from the horizon to the end, relative to that of a run in small steps,
     less 1; `None` where nothing is beyond the horizon."""
@@ -198,6 +200,16 @@ class WorkPrecisionRow(MeasuredRun, frozen=True):
     def realtime(self) -> float | None:
         """Simulated time over processor time."""
         return 1 / self.seconds.value if self.seconds and self.seconds.value else None
+
+    @property
+    def work(self) -> int:
+        """`evaluations`, also where they were not recorded."""
+        return self.evaluations or max(self.steps, 1) * step_evaluations(self.setting.integrator)
+
+
+def step_evaluations(integrator: str) -> int:
+    """How often a step computes the forward dynamics."""
+    return 4 if integrator == "RK4" else 1
 
 
 class FittedOrder(Record, frozen=True):
@@ -349,6 +361,9 @@ class ScenarioReport(Record, frozen=True):
     """The same of the declared quantity, in its unit."""
     cost_of: MeasuredSetting | None = None
     """The setting that costs are relative to, where the scene's own was lost."""
+    horizon_error: Mapping[str, float] = {}
+    """The errors at which predictions end, by unit. Empty in older reports, where it is a tenth of
+    a radian or of the model's extent."""
 
     @property
     def own_setting(self) -> MeasuredSetting | None:

@@ -1,15 +1,17 @@
-"""Which errors of reports are shown, and the texts of settings, times and statuses.
+"""Which errors of reports are shown, which settings are worth their cost, and texts of both.
 
-Entry points: `quantities(report)`, `main_quantity`; `setting_text`, `seconds_text`, `status_text`;
-`limit_text` and `map_text`, of largest stable timesteps.
+Entry points: `quantities(report)`, `main_quantity`; `front(rows)`; `setting_text`, `seconds_text`,
+`status_text`; `limit_text` and `map_text`, of largest stable timesteps.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeAlias
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import (
@@ -23,6 +25,7 @@ from coursebuild.numerics.reports.scene_report import (
 
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
 """Integrators in the order in which they are shown, which also sets their colour and mark."""
+EVALUATION_LABEL = "evaluations of the forward dynamics"
 FEWEST_STEPS = 20
 """Steps of a scenario at the longest timestep that is tried for stability."""
 
@@ -72,6 +75,65 @@ def is_idle(row: WorkPrecisionRow) -> bool:
 
 _SAVING = 0.03
 """Times differ by less of themselves from one measurement to the next."""
+
+
+COST_SLACK, ERROR_SLACK = 0.03, 0.05
+"""Relative: costs repeat to a few per cent only."""
+Rows: TypeAlias = Sequence[WorkPrecisionRow]
+
+
+class FrontPoint(Struct, frozen=True):
+    """The place of a setting in the plot."""
+
+    cost: Interval
+    error: float
+
+    def beats(self, rival: FrontPoint) -> bool:
+        """Whether this is clearly better in one respect, and no worse in the other."""
+        is_more_accurate = self.error * (1 + ERROR_SLACK) < rival.error
+        is_no_worse = self.error <= rival.error * (1 + ERROR_SLACK)
+        return (self.is_cheaper(rival) and is_no_worse) or (
+            is_more_accurate and not rival.is_cheaper(self)
+        )
+
+    def is_cheaper(self, rival: FrontPoint) -> bool:
+        """Whether this costs less, beyond what timing can tell."""
+        is_separate = self.cost.high < rival.cost.low
+        return is_separate and self.cost.value * (1 + COST_SLACK) < rival.cost.value
+
+
+def compared_error(row: WorkPrecisionRow) -> float | None:
+    """The error by which settings are compared; `None` where the row has none."""
+    return row.seen if row.figure is None else row.figure[0]
+
+
+def front_point(row: WorkPrecisionRow) -> FrontPoint | None:
+    """The cost and error of a setting; `None` where it was lost, or not timed."""
+    error = compared_error(row)
+    return None if row.cost is None or error is None else FrontPoint(row.cost, error)
+
+
+def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
+    """Rows that say whether they are on the front, and otherwise which row dominates them.
+
+    A lucky row is on no front, and dominates none.
+    """
+    places = {n: place for n, row in enumerate(rows) if (place := front_point(row)) is not None}
+    better = {
+        n: [m for m, rival in places.items() if not rows[m].lucky and rival.beats(own_place)]
+        for n, own_place in places.items()
+    }
+
+    def worth(n: int) -> tuple[float, int]:
+        return places[n].cost.value * places[n].error, n
+
+    placed_rows = []
+    for n, row in enumerate(rows):
+        rivals = better.get(n, [])
+        best = min([m for m in rivals if not better[m]] or rivals, key=worth, default=None)
+        on_front = n in better and not rivals and not row.lucky
+        placed_rows.append(replace(row, front=on_front, dominated_by=best))
+    return tuple(placed_rows)
 
 
 def main_quantity(report: ScenarioReport) -> Quantity | None:
@@ -132,6 +194,11 @@ def seconds_text(value: float, digits: int = 6) -> str:
         if value >= size * 0.9999995:
             return f"{float(f'{value / size:.{digits}g}'):.{max(digits, 6)}g} {unit}"
     return f"{value:.{digits}g} s"
+
+
+def horizon_error_text(errors: Mapping[str, float]) -> str:
+    """The errors at which predictions end."""
+    return " / ".join(f"{error:.3g} {unit}" for unit, error in errors.items()) or "0.1"
 
 
 def interval_text(value: Interval) -> str:

@@ -99,6 +99,7 @@ def test_facts_of_the_text_that_was_read(root: Path) -> None:
                 sites=("tip", ""),
                 body_names=("ünder", ""),
                 includes=(),
+                sizes={"rad": 1.0, "m": 2.0},
             ),
         ),
     )

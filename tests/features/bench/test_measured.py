@@ -102,10 +102,10 @@ def test_a_scenario_has_its_plots_tables_and_figures_as_a_file(site: dict[str, s
         "from 1 ms RK4 80 ms – 90 ms 112 71 from 1 ms some are stable again, from 95 ms to 97 ms"
     ) in words
     assert "Reference by another integration (known to 1 × 10<sup>−12</sup>)" in words
-    assert page.count('class="work-precision"') == 4
+    assert page.count('class="work-precision"') == 8, "against time and evaluations, twice each"
     names = re.findall(r'aria-labelledby="(_plot[^"]*)"', page)
     ids = {name for pair in names for name in pair.split()}
-    assert len(ids) == 8 and all(page.count(f'id="{name}"') == 1 for name in ids)
+    assert len(ids) == 16 and all(page.count(f'id="{name}"') == 1 for name in ids)
     own_rows = re.findall(r'<tr class="own"><th scope="row">(.*?)</th>', page)
     assert own_rows[0] == "Euler at 2 ms"
     assert "Euler at 50 ms: diverged; the state is not finite." in words
@@ -216,7 +216,7 @@ def test_a_table_of_cases_without_a_row_is_not_shown(site: dict[str, str]) -> No
     assert not re.search(r"<tbody>\s*</tbody>", page)
 
 
-def test_errors_and_energy_are_drawn_against_processor_time(make: Make) -> None:
+def test_errors_and_energy_are_drawn_against_time_and_evaluations(make: Make) -> None:
     runs = [
         run(integrator=name, timestep=h, position=(h**power, h**power), energy_drift=-(h**2))
         for name, power in (("Euler", 1), ("RK4", 4))
@@ -226,10 +226,12 @@ def test_errors_and_energy_are_drawn_against_processor_time(make: Make) -> None:
     costs = tuple(StepCost(name, Interval(1e-6, 9e-7, 2e-6)) for name in ("Euler", "RK4"))
     site_reports = Reports(cases=(case("a", 4, errors=(lost, *runs), costs=costs),))
     page = pages(make, site_reports)["numerics/index.html"]
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 4
     assert "Euler: 0.1 at 10 µs, 0.025 at 40 µs. RK4: 0.0001 at 10 µs" in page
     assert "error of position (m or rad) against processor time" in page
     assert "energy drift, relative against processor time" in page
+    assert "error of position (m or rad) against evaluations of the forward dynamics" in page
+    assert "Euler: 0.1 at 10, 0.025 at 40. RK4: 0.0001 at 40" in page
     assert "<title>Euler at 200 ms: diverged</title>" in page
     assert "Only RK4 reaches an error of 10⁻³, at 10 µs for a simulated second." in page
 
