@@ -10,7 +10,8 @@ be measured.
 2. No error is given below ten times the floor, by which the reference itself may be off.
 3. An order is the slope where the error is over a hundred floors and under 0.1: nearer to the floor
    rounding is measured, beyond 0.1 the asymptotic law does not hold yet. It is given only where
-   those errors lie on a line, in a logarithmic plot.
+   those errors lie on a line, in a logarithmic plot. Where slopes still tend somewhere, the
+   interval holds that limit too.
 4. In the reference, two geoms stick to each other between two samples where a point in which they
    touch hardly moves along the surface, at both of them. A body that rolls sticks too.
 5. In another run the speed of that point along the surface, added up over the same time, is creep:
@@ -37,6 +38,8 @@ _LOWEST, _HIGHEST = 100.0, 0.1
 """An order is fitted to errors over so many floors, and under so much."""
 _FEWEST = 4
 """Errors that an order needs."""
+_BEYOND = 2.0
+"""How many times the last change of slopes their limit may be beyond the last slope."""
 _UNCERTAIN, _BENT = 0.25, 0.25
 """The widest half interval of an order, and the largest bend, with which it is given."""
 
@@ -106,8 +109,11 @@ def fit_order(
     freedom = len(x) - 2
     deviation = math.sqrt(float(np.sum((y - slope * x - shift) ** 2)) / freedom)
     error = deviation / math.sqrt(float(np.sum((x - x.mean()) ** 2)))
-    student = float(stdtrit(freedom, 0.975))  # an interval of 95 %
-    fit = FittedOrder(float(slope), student * error, float(np.ptp(slopes)))
+    uncertainty = float(stdtrit(freedom, 0.975)) * error  # an interval of 95 %
+    finest, finer, fine = slopes[:3].tolist()
+    if (finer - finest) * (fine - finer) > 0:  # not noise: they tend to a slope beyond the finest
+        uncertainty = max(uncertainty, abs(slope - finest) + _BEYOND * abs(finer - finest))
+    fit = FittedOrder(float(slope), uncertainty, float(np.ptp(slopes)))
     return fit if fit.uncertainty <= _UNCERTAIN and fit.bend <= _BENT else None
 
 

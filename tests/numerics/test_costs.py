@@ -20,6 +20,7 @@ from coursebuild.numerics.costs import (
 )
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, WorkPrecisionRow
+from coursebuild.numerics.reports.shown_errors import Quantity
 from coursebuild.numerics.scene import scenes
 from support.bench_reports import diverged_row, row
 from support.surveys import NO_DECLARATIONS
@@ -239,7 +240,7 @@ def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:
         row("Euler", 0.004 / 2**n, cost=2.0 ** (n - own_number), seen=error, own=n == own_number)
         for n, error in enumerate(errors)
     ]
-    return mark_luck(rows, {"Euler": 0.0025}, 1e-6)
+    return mark_luck(rows, {"Euler": 0.0025}, Quantity("seen", "", 1e-6))
 
 
 def test_errors_that_do_not_fall_or_belong_to_no_stable_run_are_luck() -> None:
@@ -263,7 +264,7 @@ def test_fewer_iterations_that_err_less_are_luck() -> None:
         row("Euler", 0.002, iterations=n, seen=error, cost=cost, own=n == 100, **solving)
         for n, error, cost in ((1, 1e-4, 0.8), (100, 1.4e-4, 1.0))
     )
-    few, many = front(mark_luck((few, many), {}, 0.0))
+    few, many = front(mark_luck((few, many), {}))
     assert few.lucky == "its error rises with more iterations" and not few.front and many.front
     judgement = verdict((few, many), [False, False])
     assert judgement.on_front and judgement.text.startswith("no other setting is cheaper")
@@ -280,7 +281,8 @@ def test_verdicts_claim_only_what_holds() -> None:
     assert text.startswith("no difference that holds: implicit at 2 ms takes 0.93 of the time")
     large = (small[0], row("RK4", 0.008, cost=0.5, seen=1e-6))
     assert verdict(front(large), [False] * 2).better == 1
-    assert "errs 1e+03 times less, or more: " in verdict(front(large), [False] * 2, 1e-6).text
+    text = verdict(front(large), [False] * 2, Quantity("seen", "", 1e-6)).text
+    assert "errs 1e+03 times less, or more: " in text
     judgement = verdict(
         front(large), [False] * 2, holds=lambda setting: setting.integrator != "RK4"
     )
