@@ -375,12 +375,12 @@ def run(
             pool.shutdown(cancel_futures=True)
 
 
-def table(outcomes: Sequence[Outcome]) -> list[str]:
-    """The counts by kind, and what they come to."""
+def table(outcomes: Sequence[Outcome], *, is_short: bool = False) -> list[str]:
+    """The counts by kind, and what they come to; or only of kinds of which some went unnoticed."""
     lines = [f"| kind of change | tried | {' | '.join(ENDS)} |", "| --- |" + " ---: |" * 8]
     for kind in [*KINDS, ""]:
         ends = Counter(o.end for o in outcomes if not kind or o.change.kind == kind)
-        if ends:
+        if ends and not (is_short and kind and not (ends["silent"] or ends["elsewhere"])):
             cells = (str(ends[end] or "") for end in ENDS)
             lines.append(f"| {kind or '**all**'} | {ends.total()} | {' | '.join(cells)} |")
     rest = [o for o in outcomes if o.change.kind not in ("numbers in prose", "inline code")]
@@ -395,6 +395,8 @@ def table(outcomes: Sequence[Outcome]) -> list[str]:
             "",
             f"Of {total} {title}, {silent:.1f} % were silent, {elsewhere:.1f} % elsewhere.",
         ]
+    if is_short:
+        return lines
     reasons = Counter(o.note for o in outcomes if o.end == "reason")
     lines += ["", "| reason | changes |", "| --- | ---: |"] if reasons else []
     return lines + [f"| {reason} | {count} |" for reason, count in reasons.most_common()]
@@ -440,7 +442,7 @@ def main() -> int:
     if arguments.docs:
         command = " ".join(sys.argv).replace(str(ROOT) + "/", "")
         head = f"`python {command}`, {date.today().isoformat()}:"
-        put_into(DOCS, "\n".join([head, "", *lines]))
+        put_into(DOCS, "\n".join([head, "", *table(outcomes, is_short=True)]))
     return 0
 
 

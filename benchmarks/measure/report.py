@@ -127,12 +127,6 @@ def markdown(report: Report) -> str:
         lines += [f"**{lessons} lessons**", "", *sizes_table(report, lessons), ""]
     if report.scripts:
         lines += [*scripts_table(report), ""]
-    lines += ["| tool | version | formulas typeset | configuration |", "| --- | --- | --- | --- |"]
-    for tool in report.tools:
-        typesetter = {"build": "in the build", "reader": "by the reader's browser"}.get(
-            tool["math"], ""
-        )
-        lines.append(f"| {tool['title']} | {tool['version']} | {typesetter} | {tool['how']} |")
     if report.absent:
         lines += ["", f"Not installed, and so not measured: {', '.join(report.absent)}."]
     if report.failed:
@@ -146,9 +140,13 @@ def sizes_table(report: Report, lessons: int) -> list[str]:
     rows = [row for row in ROWS if any(key[1] == row for key in figures)]
     heads = [row + (" (MB)" if row == PEAK_MEMORY else " (s)") for row in rows]
     lines = ["| | " + " | ".join(heads) + " |", "| --- |" + " --- |" * len(rows)]
+    names = {
+        tool["title"]: f"{tool['title']} {tool['version']}" + "*" * (tool["math"] == "reader")
+        for tool in report.tools
+    }
     for tool in dict.fromkeys(tool for tool, _ in figures):
         cells = [cell(figures.get((tool, row)), figures.get((BASE, row))) for row in rows]
-        lines.append(f"| {tool} | " + " | ".join(cells) + " |")
+        lines.append(f"| {names.get(tool, tool)} | " + " | ".join(cells) + " |")
     return lines
 
 
@@ -159,7 +157,7 @@ def cell(figure: Figure | None, base: Figure | None) -> str:
     text = significant(figure.median)
     if base is None or figure.tool == BASE:
         return text
-    return f"{text} ({significant(figure.median / base.median, 2)} ×)"
+    return f"{text} ({significant(figure.median / base.median, 2)}×)"
 
 
 def significant(value: float, digits: int = 3) -> str:

@@ -97,7 +97,13 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.unsafe and not arguments.fix:
         raise UsageError("--unsafe needs --fix")
     if arguments.fix:
-        return _fix(arguments)
+        from coursebuild.pipeline.fix import fix
+
+        if conflicts := _special_options(arguments):
+            raise UsageError(f"--fix cannot be combined with {conflicts[0]}")
+        options = options_of(arguments)
+        report = fix(options, tuple(arguments.lessons), unsafe=arguments.unsafe)
+        return print_report(report, arguments.format, options)
 
     def work(options: Options) -> Report:
         report = check(
@@ -123,17 +129,6 @@ def _special_options(arguments: argparse.Namespace) -> list[str]:
     """The options given by which it does anything but verify everything, once."""
     names = ("shard", "timings", "write_timings", "sensitivity", "truth")
     return [f"--{name.replace('_', '-')}" for name in names if getattr(arguments, name)]
-
-
-def _fix(arguments: argparse.Namespace) -> int:
-    """Mend what can be mended, and say what is left."""
-    from coursebuild.pipeline.fix import fix
-
-    if conflicts := _special_options(arguments):
-        raise UsageError(f"--fix cannot be combined with {conflicts[0]}")
-    options = options_of(arguments)
-    report = fix(options, tuple(arguments.lessons), unsafe=arguments.unsafe)
-    return print_report(report, arguments.format, options)
 
 
 def _compare_with_version(arguments: argparse.Namespace) -> int:

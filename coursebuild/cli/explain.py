@@ -97,7 +97,7 @@ class Explanation(Struct, frozen=True):
 def rule_text(rule: Rule, page: str) -> str:
     """What a rule means: its section of the page of rules, or else its summary."""
     section = re.search(rf"^### {rule.name}\n+(.*?)\s*(?=^##|\Z)", page, re.DOTALL | re.MULTILINE)
-    text = section[1] if section else f"{rule.severity.capitalize()}. {rule.summary}"
+    text = section[1] if section else rule.summary
     return f"{rule.name}\n\n{text}\n"
 
 

@@ -133,7 +133,39 @@ def hand_over(directory: str | None, words: list[str]) -> int | None:
     with connect(root) as connection:
         if connection is None:
             return None
-        return _run_there(connection, root or "", directory, words)
+        import resource
+
+        streams = (sys.stdin, sys.stdout, sys.stderr)
+        mask = os.umask(0o077)
+        os.umask(mask)
+        request = {
+            "ask": "command",
+            "root": os.path.realpath(root or ""),
+            "state": process_state(),
+            "directory": directory,
+            "words": words,
+            "environment": dict(os.environ),
+            "closed": [number for number, stream in enumerate(streams) if stream is None],
+            "umask": mask,
+            "limits": {number: resource.getrlimit(number)[0] for number in limits()},
+        }
+        try:
+            folder = os.open(".", os.O_RDONLY)
+        except OSError:  # it is gone, or may not be read
+            return None
+        try:
+            send(connection, request, [folder, 0, 1, 2])
+            answer = receive(connection)
+        except OSError:
+            answer = None
+        finally:
+            os.close(folder)
+        if answer is None or "refusal" in answer:
+            reason = "does not answer" if answer is None else answer["refusal"]
+            if not {"-q", "--quiet"} & {*words}:
+                say(0, f"the preview of this course {reason}; this command runs without it")
+            return None
+        return _wait(connection, int(answer["process"]))
 
 
 def ask_preview(root: str) -> dict[str, Any] | None:
@@ -165,44 +197,6 @@ def connect(root: str | None) -> Iterator[socket.socket | None]:
         except OSError:  # it was left by a process that was killed
             is_ours = False
         yield connection if is_ours else None
-
-
-def _run_there(
-    connection: socket.socket, root: str, directory: str | None, words: list[str]
-) -> int | None:
-    import resource
-
-    streams = (sys.stdin, sys.stdout, sys.stderr)
-    mask = os.umask(0o077)
-    os.umask(mask)
-    request = {
-        "ask": "command",
-        "root": os.path.realpath(root),
-        "state": process_state(),
-        "directory": directory,
-        "words": words,
-        "environment": dict(os.environ),
-        "closed": [number for number, stream in enumerate(streams) if stream is None],
-        "umask": mask,
-        "limits": {number: resource.getrlimit(number)[0] for number in limits()},
-    }
-    try:
-        folder = os.open(".", os.O_RDONLY)
-    except OSError:  # it is gone, or may not be read
-        return None
-    try:
-        send(connection, request, [folder, 0, 1, 2])
-        answer = receive(connection)
-    except OSError:
-        answer = None
-    finally:
-        os.close(folder)
-    if answer is None or "refusal" in answer:
-        reason = "does not answer" if answer is None else answer["refusal"]
-        if not {"-q", "--quiet"} & {*words}:
-            say(0, f"the preview of this course {reason}; this command runs without it")
-        return None
-    return _wait(connection, int(answer["process"]))
 
 
 def _wait(connection: socket.socket, process: int) -> int:

@@ -322,16 +322,15 @@ def _name_failures(offer: Any, feature: str = "", field: str = "") -> Any:
 
     @functools.wraps(offer)
     def call(*arguments: Any, **keywords: Any) -> Any:
+        def iterate(values: Iterator[Any]) -> Iterator[Any]:
+            with _named_failure(subject, arguments):
+                yield from values
+
         with _named_failure(subject, arguments):
             result = offer(*arguments, **keywords)
-        return _iterate(result, subject, arguments) if isgenerator(result) else result
+        return iterate(result) if isgenerator(result) else result
 
     return call
-
-
-def _iterate(values: Iterator[Any], subject: str, arguments: Iterable[object]) -> Iterator[Any]:
-    with _named_failure(subject, arguments):
-        yield from values
 
 
 @contextmanager

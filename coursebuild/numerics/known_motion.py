@@ -318,8 +318,8 @@ def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
     )
     good = max(1, int(parted[0])) if parted.size else len(runs[0].times)
     states, second_states = (motion.head(good) for motion in runs)
-    source = f"the engine itself: implicitfast at {step:g} s, Newton's solver"
-    second = f"the same under Euler at {2 * step:g} s"
+    source = f"the engine itself: implicitfast at {1e6 * step:.6g} µs, Newton's solver"
+    second = f"the same under Euler at {2e6 * step:.6g} µs"
     return _combine(model, "self", source, states, second, second_states)
 
 

@@ -98,24 +98,20 @@ def fix(options: Options, names: tuple[str, ...] = (), *, unsafe: bool = False) 
         options.root, changes, options.progress.say, keep=True
     )
     remarks = [changed_text("fixed", originals[c.path], changed[c.path]) for c in changes]
-    remarks.append(_sum_up(fixer.fixed, report, len(changes), can_undo=can_undo))
-    return replace(report, remarks=(*report.remarks, *remarks))
-
-
-def _sum_up(fixed: Sequence[Diagnostic], report: Report, files: int, *, can_undo: bool) -> str:
-    """Say how much was fixed, by rule, and what is left."""
+    # How much was fixed, by rule, and what is left
+    fixed, files = fixer.fixed, len(changes)
     rules = Counter(diagnostic.rule for diagnostic in fixed)
-    names = ", ".join(f"{rule} {n}" if n > 1 else rule for rule, n in sorted(rules.items()))
+    rule_names = ", ".join(f"{rule} {n}" if n > 1 else rule for rule, n in sorted(rules.items()))
     left = len(report.diagnostics)
     parts = [f"nothing fixed; {left} left"]
     if fixed:
-        parts = [f"fixed {plural(len(fixed), 'mistake')} in {plural(files, 'file')} ({names})"]
+        parts = [f"fixed {plural(len(fixed), 'mistake')} in {plural(files, 'file')} ({rule_names})"]
         parts.append(f"{left} left" if left else "nothing is left")
     if likely := sum(bool(d.edits) and not d.safe for d in report.diagnostics):
         parts.append(f"{likely} more with `--unsafe`, if they are what you meant")
     if fixed:
         parts.append("`coursebuild undo` takes it back" if can_undo else "it cannot be undone")
-    return "; ".join(parts)
+    return replace(report, remarks=(*report.remarks, *remarks, "; ".join(parts)))
 
 
 class _Fixer:
@@ -181,12 +177,10 @@ class _Fixer:
         return bool(harmless)
 
     def _may_edit(self, edit: Edit) -> bool:
-        """Whether the file of an edit may be changed."""
         path = edit.span.path
         return (not self.names or path in self.paths) and may_edit(self.options.root, path)
 
     def _texts_with(self, fixes: Iterable[Diagnostic]) -> dict[str, str]:
-        """The texts with these fixes."""
         edits: dict[Source, list[Edit]] = {}
         for edit in (edit for diagnostic in fixes for edit in diagnostic.edits):
             edits.setdefault(edit.span.source, []).append(edit)

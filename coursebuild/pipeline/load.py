@@ -41,7 +41,6 @@ from coursebuild.core.pages.materials import words_for
 from coursebuild.core.registry import read_references
 from coursebuild.core.run.script_environment import course_environment, engine_version
 from coursebuild.core.scripts.edit import check_source_parts, shown_files
-from coursebuild.core.text.conflicts import find_conflict
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
 from coursebuild.core.text.source import Source, Span
 
@@ -183,7 +182,6 @@ class _Loader:
     # --- texts
 
     def _drop_long_texts(self, limit: int) -> None:
-        """Leave out the files that are too long."""
         models = {model.source: model for model in self.files.models}
         self.files = replace(
             self.files,
@@ -213,6 +211,8 @@ class _Loader:
 
     def find_conflicts(self, course: Course | None) -> None:
         """Report merge conflicts in all texts but lessons and pages, which their parser reports."""
+        from coursebuild.core.syntax.document import find_conflict
+
         sources = [*self.files.declarations, *(model.source for model in self.files.models)]
         sources += [] if self.files.map is None else [self.files.map]
         paths = {*self.files.files}
@@ -233,7 +233,6 @@ class _Loader:
         self.diagnostics += (conflict for conflict in conflicts if conflict is not None)
 
     def _load_theme(self, theme: Theme) -> Theme:
-        """Return the theme with its files."""
         if theme == Theme() and not (self.root / TEMPLATES).is_dir():
             return theme
         from coursebuild.pipeline.theme_files import load_theme

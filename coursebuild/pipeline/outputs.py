@@ -248,7 +248,13 @@ def extract(options: Options, *, adopt: bool = False) -> Report:
             if files_read:
                 parsed_course = load(options.root)
                 course = parsed_course.value or course
-                _write_as_extracted(options, course, files_read)
+                # A block holds no line ends of an editor's and no blank lines at the end: a file
+                # that does would count as edited for ever.
+                for extraction in extract_course(course).value:
+                    path, data = extraction.path, extraction.data
+                    old = files_read.get(path, data)
+                    if old != data and block_text(old) == extraction.text:
+                        write_atomic(options.root, path, data, expected=old, durable=False)
                 extracted_scripts = extract_scripts(course, options)
             remarks += [*adoptions, *_list_changes(extracted_scripts)]
         diagnostics = [*parsed_course.diagnostics, *extracted_scripts.diagnostics, *refusals]
@@ -294,17 +300,3 @@ def _adopt(
             write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
             remarks.append(changed_text("updated", source, new))
     return remarks, refusals, files_read
-
-
-def _write_as_extracted(options: Options, course: Course, files_read: Mapping[str, bytes]) -> None:
-    """Make each adopted file what its block extracts to now.
-
-    A block holds no line ends of an editor's and no blank lines at the end: without this the file
-    would count as edited for ever.
-    """
-    for extraction in extract_course(course).value:
-        data = files_read.get(extraction.path, extraction.data)
-        if data != extraction.data and block_text(data) == extraction.text:
-            write_atomic(
-                options.root, extraction.path, extraction.data, expected=data, durable=False
-            )

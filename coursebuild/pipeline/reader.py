@@ -216,7 +216,17 @@ class Reader:
         summaries = {text.key: self._find_summary(text) for text in texts}
         missing = [text for text in texts if summaries[text.key] is None]
         if len(missing) >= _MIN_PARALLEL:
-            _prepare_to_read(missing[0])
+            # What is imported here, worker processes share, and what is prepared at its first use.
+            for name in _HEAVY:
+                importlib.import_module(name)
+            from coursebuild.core.pages.listings import highlight_lines
+
+            document = missing[0].parse().value
+            highlight_lines("python", "x")
+            if document_formulas(document):
+                from coursebuild.core.run.v8 import start
+
+                start()
         answers = self._answer_all("reading lessons and pages", iter(missing))
         for text, (summary, worker) in zip(missing, answers, strict=True):
             assert isinstance(summary, DocumentSummary)
@@ -406,21 +416,6 @@ _HEAVY = (
     "coursebuild.core.pages.page_list",
     "coursebuild.core.syntax.document",
 )
-
-
-def _prepare_to_read(sample: SourceText) -> None:
-    """Import and make what reading and drawing need, so that worker processes share it."""
-    for name in _HEAVY:
-        importlib.import_module(name)
-    from coursebuild.core.pages.listings import highlight_lines
-
-    # Several modules prepare things at their first use.
-    document = sample.parse().value
-    highlight_lines("python", "x")
-    if document_formulas(document):
-        from coursebuild.core.run.v8 import start
-
-        start()
 
 
 def kept_formulas(store: Store, path: str) -> dict[Formula, str]:

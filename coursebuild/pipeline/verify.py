@@ -237,7 +237,6 @@ def _select(
     documents: Collection[str] | None,
     shard: Shard | None,
 ) -> tuple[Sequence[Extraction], tuple[tuple[Trials, Trial], ...]]:
-    """Select the scripts to run, and the trials."""
     extractions, trials = runnable, feature_trials(course)
     if documents is not None:
         quoted_scripts: set[str] = set()

@@ -65,7 +65,6 @@ class FolderWatcher:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether watching has ended."""
         return self._stop.is_set()
 
     def stop(self) -> None:

@@ -159,7 +159,18 @@ class _Handler(BaseHTTPRequestHandler):
             if len(head) > _MOST_LINES:
                 self.send_error(HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE)
                 return False
-        if not _is_clear([self.raw_requestline, *head]):
+        first, *rest, last = [self.raw_requestline, *head]
+        headers = [match.groups() for line in rest if (match := _HEADER_LINE.fullmatch(line))]
+        names = [name.lower() for name, _ in headers]
+        lengths = [value for name, value in headers if name.lower() == b"content-length"]
+        # Only a head that every reader takes for the same, with a body that is not long
+        if (
+            _REQUEST_LINE.fullmatch(first) is None
+            or (len(headers), last) != (len(rest), b"\r\n")
+            or max(map(names.count, _ONCE)) > 1
+            or b"transfer-encoding" in names
+            or not all(re.fullmatch(rb"[0-9]{1,9}", n) and int(n) <= _LARGEST for n in lengths)
+        ):
             self._send_message(HTTPStatus.BAD_REQUEST, "the request cannot be read")
             return False
         stream, self.rfile = self.rfile, BytesIO(b"".join(head))
@@ -303,21 +314,6 @@ class _Handler(BaseHTTPRequestHandler):
     def _send_event(self, event: str, data: str) -> None:
         self.wfile.write(f"event: {event}\ndata: {data}\n\n".encode("utf-8", "replace"))
         self.wfile.flush()
-
-
-def _is_clear(lines: list[bytes]) -> bool:
-    """Whether a head is one that every reader takes for the same, with a body that is not long."""
-    first, *rest, last = lines
-    headers = [match.groups() for line in rest if (match := _HEADER_LINE.fullmatch(line))]
-    names = [name.lower() for name, _ in headers]
-    lengths = [value for name, value in headers if name.lower() == b"content-length"]
-    return (
-        _REQUEST_LINE.fullmatch(first) is not None
-        and (len(headers), last) == (len(rest), b"\r\n")
-        and max(map(names.count, _ONCE)) <= 1
-        and b"transfer-encoding" not in names
-        and all(re.fullmatch(rb"[0-9]{1,9}", n) and int(n) <= _LARGEST for n in lengths)
-    )
 
 
 def _decode_texts(body: bytes) -> dict[str, str]:

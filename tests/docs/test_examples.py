@@ -1,4 +1,4 @@
-"""Every command and example of README, CONTRIBUTING and the manual is tried.
+"""Every command and example of README, CONTRIBUTING, the manual and `--help` is tried.
 
 A fence that `ELSEWHERE` knows is tried by the test that it names. All others are tried here: what a
 shell runs, in a course that has what they name; tables of the map and of models against their
@@ -123,9 +123,15 @@ def command_lines(fence: Fence) -> list[str]:
     return [re.split(r"  +| +#| [>|] ", line)[0].strip() for line in lines]
 
 
+HELP = [
+    line.strip()
+    for command in known_commands().values()
+    for line in (parser_of(command).epilog or "").splitlines()[1:]
+]
+"""The examples that end the help of commands."""
 COMMANDS = [
     line
-    for fence in FENCES
+    for fence in [*FENCES, Fence("help", 1, "console", (), "\n".join(HELP))]
     if fence.kind in ("sh", "console", "text")
     for line in dict.fromkeys(command_lines(fence))
 ]

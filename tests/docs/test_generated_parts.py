@@ -3,7 +3,6 @@
 `pytest tests/docs/test_generated_parts.py --rewrite-fixtures` updates them. Such a part stands
 between `<!-- generated: WORDS -->` and `<!-- end -->`. The words are those of `_MAKERS`:
 
-- `contents`: links to the page's sections;
 - `fields lab SimLab`: the fields of a structure in the schema `lab`; `beyond` or `within` and the
   name of another one, of this schema or of `lab`, leave out those that it has, or has not;
 - `commands`, and `command check`: all of them, and what one takes; `options`: those of several.
@@ -21,12 +20,10 @@ from typing import Any
 import pytest
 
 from coursebuild.cli.commands import known_commands, parser_of
-from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.syntax.schemas import json_schema
 from support.markdown_files import PAGES
 
 _PART = re.compile(r"(<!-- generated: ([^>\n]+) -->\n).*?(<!-- end -->)", re.DOTALL)
-_FENCE = re.compile(r"^(`{3,})[^`\n]*\n.*?^\1`*$", re.MULTILINE | re.DOTALL)
 
 
 def regenerate(text: str) -> str:
@@ -37,16 +34,6 @@ def regenerate(text: str) -> str:
         return f"{match[1]}\n{_MAKERS[name](text, *words)}\n\n{match[3]}"
 
     return _PART.sub(part, text)
-
-
-def headings(text: str, level: int) -> list[str]:
-    return re.findall(rf"^#{{{level}}} (.+)$", _FENCE.sub("", text), re.MULTILINE)
-
-
-def _contents(text: str) -> str:
-    """Shown on code hosts, which drop `hidden`: on the site, contents stand beside the text."""
-    links = "\n".join(f"- [{title}](#{slug(title)})" for title in headings(text, 2))
-    return f"<div hidden>\n\n{links}\n\n</div>"
 
 
 def _table(head: str, rows: Iterable[tuple[str, ...]]) -> str:
@@ -69,7 +56,7 @@ def _fields(
         is_here = other_name in definitions
         base = definitions if is_here else json.loads(json_schema("lab"))["$defs"]
         other_fields = base[other_name]["properties"]
-    rows: list[tuple[str, str, str]] = []
+    rows: list[tuple[str, str]] = []
     long_lists: dict[str, str] = {}
     for field, field_schema in structure["properties"].items():
         if (field in other_fields) != (relation == "within") or (other_fields and field == "kind"):
@@ -81,8 +68,11 @@ def _fields(
             value = value.replace(words, f"list as in `{first_field}`")
         if value.count('"') > 10:
             long_lists[value] = field
-        rows.append((f"`{field}`{required}", value, meaning))
-    return _table("field | value | meaning", rows)
+        if value == "text" or value in meaning:  # pages say once that a value is a text
+            value = ""
+        meaning = f"{meaning} ({value})" if meaning and value else meaning or value
+        rows.append((f"`{field}`{required}", meaning))
+    return _table("field | meaning", rows)
 
 
 def _describe(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
@@ -181,8 +171,8 @@ def _command(text: str, name: str) -> str:
     parts = []
     if rows:
         parts.append(_table("argument | meaning", rows))
-    if parser.epilog:
-        examples = parser.epilog.partition("\n")[2].rstrip("\n")
+    examples = (parser.epilog or "").partition("\n")[2].rstrip("\n")
+    if re.search(r"[|>]", examples):  # what a table of arguments cannot say; `help` shows all
         lines = "\n".join(line[2:] for line in examples.splitlines())
         parts.append(f"```console\n{lines}\n```")
     return "\n\n".join(parts)
@@ -197,7 +187,6 @@ def _kinds(action: Any) -> Iterator[list[tuple[str, str]]]:
 
 
 _MAKERS: dict[str, Callable[..., str]] = {
-    "contents": _contents,
     "fields": _fields,
     "commands": _commands,
     "command": _command,
@@ -205,8 +194,6 @@ _MAKERS: dict[str, Callable[..., str]] = {
 }
 
 
-LONG = 6
-"""With so many sections or more, a page begins with its contents."""
 TOLD_OTHERWISE = {"CourseFile", "ModelFile", "Overlays"}
 """Structs whose fields are the sections of a page, or the values of a field."""
 TEXTS = {path: path.read_text(encoding="utf-8") for path in PAGES}
@@ -237,13 +224,6 @@ def test_every_field_has_its_table() -> None:
 
 def test_every_command_has_its_section() -> None:
     assert generated("command ") == set(known_commands())
-
-
-def test_long_pages_begin_with_their_contents() -> None:
-    long = {path for path, text in TEXTS.items() if len(headings(text, 2)) >= LONG}
-    contents = re.compile("<!-- generated: (contents|commands) -->")
-    without_contents = {path for path in long if not contents.search(TEXTS[path])}
-    assert without_contents == set()
 
 
 def test_every_page_begins_with_its_title() -> None:

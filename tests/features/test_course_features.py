@@ -106,8 +106,8 @@ def test_broken_feature_is_reported_at_its_place_in_the_map(course: Folder) -> N
 
 
 @pytest.mark.site
-def test_the_example_of_the_docs_works(course: Folder) -> None:
-    course.write("features/shout.py", EXAMPLES[0])
+def test_a_feature_sees_its_document_and_the_course(course: Folder) -> None:
+    course.write("features/shout.py", fixture_text("scripts/task_feature.txt"))
     task = '\n```task name="A & B"\nDo **this**.\n```\n'
     course.write("content/lessons/1.1-one.md", f"## Hello\n{task}")
     result = course.main("build")
@@ -156,7 +156,7 @@ def defined_name(node: ast.stmt) -> str:
 
 @pytest.fixture
 def inventory(course: Folder) -> Folder:
-    course.write("features/inventory.py", EXAMPLES[1])
+    course.write("features/inventory.py", EXAMPLES[0])
     course.replace(MAP, '"features/shout.py"', '"features/shout.py", "features/inventory.py"')
     course.write("models/box.xml", "<mujoco><worldbody/></mujoco>\n")
     return course

@@ -102,13 +102,16 @@ def test_lock_stays_without_addresses_when_npm_writes_it(root: Path) -> None:
     assert "omit-lockfile-registry-resolved=true" in settings
 
 
-def test_the_table_of_dependencies_is_complete(root: Path, pyproject: dict) -> None:
+def test_what_each_package_is_for_is_said_once(root: Path, pyproject: dict) -> None:
     npm = manifest(root)
-    npm_packages = {*npm["dependencies"].items(), *npm["devDependencies"].items()}
-    for line in declared_requirements(pyproject):
-        name = Requirement(line).name
-        versions = re.sub(r"\[.*\]", "", line.partition(";")[0]).removeprefix(name)
-        npm_packages.add((name, versions or "locked"))
-    table = (root / "docs/explanation/dependencies.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| `([^`]+)` \| ([^ |]+) \|", table, flags=re.MULTILINE)
-    assert sorted(rows) == sorted(npm_packages)
+    names = {*npm["dependencies"], *npm["devDependencies"]}
+    names |= {Requirement(line).name for line in declared_requirements(pyproject)}
+    page = (root / "docs/explanation/dependencies.md").read_text(encoding="utf-8")
+    (packages,) = re.findall(r"^## Packages$(.*?)^## ", page, re.DOTALL | re.MULTILINE)
+    table, _, list_for_work = packages.partition("### Only for work on coursebuild")
+    places = re.findall(r"^\| `([^`]+)` \| ", table, re.MULTILINE)
+    places += re.findall(r"`([\w-]+)`\s\(", list_for_work)
+    text = (root / "pyproject.toml").read_text(encoding="utf-8")
+    (group,) = re.findall(r"^dev = \[$(.*?)^\]", text, re.DOTALL | re.MULTILINE)
+    places += re.findall(r'^    "([\w-]+).*", # ', group, re.MULTILINE)
+    assert sorted(places) == sorted(names)

@@ -66,26 +66,20 @@ def mjcf_texts(course: Course) -> tuple[MjcfText, ...]:
     texts: list[MjcfText] = []
     for document in course.documents:
         for block in document_blocks(document):
-            if isinstance(block, Mjcf):
-                texts.append(_wrap_fragment(block))
+            if isinstance(block, Mjcf) and block.fragment is not None:
+                # `fragment="worldbody/body"` names nested elements, from the outside.
+                path = ["mujoco"]
+                if block.fragment not in ("", "mujoco"):
+                    path += block.fragment.split("/")
+                opening = "".join(f"<{name}>" for name in path)
+                closing = "".join(f"</{name}>" for name in reversed(path))
+                text = f"{opening}\n{block.code.text}\n{closing}"
+                texts.append(MjcfText(block, block.code, text, 1))
+            elif isinstance(block, Mjcf):
+                texts.append(MjcfText(block, block.code, block.code.text, 0))
             elif isinstance(block, FeatureBlock) and (code := block.mjcf()) is not None:
                 texts.append(MjcfText(block, code, code.text, 0))
     return tuple(texts)
-
-
-def _wrap_fragment(block: Mjcf) -> MjcfText:
-    """The text of a block; a fragment is put into the elements that it names.
-
-    `fragment="worldbody/body"` names nested ones, from the outside.
-    """
-    if block.fragment is None:
-        return MjcfText(block, block.code, block.code.text, 0)
-    if block.fragment in ("", "mujoco"):
-        return MjcfText(block, block.code, f"<mujoco>\n{block.code.text}\n</mujoco>", 1)
-    path = block.fragment.split("/")
-    opening = "<mujoco>" + "".join(f"<{name}>" for name in path)
-    closing = "".join(f"</{name}>" for name in reversed(path)) + "</mujoco>"
-    return MjcfText(block, block.code, f"{opening}\n{block.code.text}\n{closing}", 1)
 
 
 def check_compiled(

@@ -121,23 +121,22 @@ def check_links(course: Course, document: Document, targets: LinkTargets) -> Ite
     recorded_spans = {figure.span for figure in recorded_figures(document)}
     for block in document_blocks(document):
         if isinstance(block, HtmlBlock):
-            yield from _check_html_rules(block, course)
-            yield from _check_html_links(block, document, targets)
+            yield from _check_html(block, course, document, targets)
         for inline in walk_inlines(block_inlines(block)):
             if isinstance(inline, Link):
                 target = resolve(inline.target, course, document.source.path)
                 yield from _check_link(inline, target, document, targets)
             elif isinstance(inline, Image) and inline.url_span not in recorded_spans:
-                yield from _check_media(
-                    "the image ", inline.url, inline.url_span, document, targets
-                )
+                place, subject = inline.url_span, "the image "
+                yield from _check_media(subject, inline.url, place, document, targets)
             elif isinstance(inline, RawInline):
-                yield from _check_html_rules(inline, course)
-                yield from _check_html_links(inline, document, targets)
+                yield from _check_html(inline, course, document, targets)
 
 
-def _check_html_rules(html: HtmlBlock | RawInline, course: Course) -> Iterator[Diagnostic]:
-    """Report raw HTML that the course does not allow."""
+def _check_html(
+    html: HtmlBlock | RawInline, course: Course, document: Document, targets: LinkTargets
+) -> Iterator[Diagnostic]:
+    """Check raw HTML: what the course allows, links to this page, and the files that it shows."""
     if course.html == "none" and not (is_comment(html) or html.html.startswith("</")):
         message, help = "the course allows no raw HTML", "write it in Markdown"
         yield diagnose("html-forbidden", html.span, message, help=help)
@@ -145,12 +144,6 @@ def _check_html_rules(html: HtmlBlock | RawInline, course: Course) -> Iterator[D
         help = 'if you trust everyone who writes the course, set `html = "trusted"` in its map'
         for part in html.forbidden:
             yield diagnose("html-forbidden", part.span, part.message, help=help)
-
-
-def _check_html_links(
-    html: HtmlBlock | RawInline, document: Document, targets: LinkTargets
-) -> Iterator[Diagnostic]:
-    """Check links of raw HTML to anchors of its own page, and the files that it shows."""
     span = html.span
     for link in _HTML_ANCHOR.finditer(span.text):
         place = Span(span.source, span.start + link.start(1), span.start + link.end(1))
@@ -168,7 +161,25 @@ def _check_link(
     if isinstance(target, UrlTarget):
         yield from _check_url(span, target.url, document, targets)
         return
-    rule, name, names, missing = _look_up(target, targets)
+    lacks = "is not in the course map"
+    names: Collection[str]
+    match target:
+        case LessonTarget(id=name):
+            rule, names, missing = "link-lesson", targets.lessons, f"lesson {name} {lacks}"
+        case LevelTarget(id=name):
+            rule, names, missing = "link-level", targets.levels, f"level {name} {lacks}"
+        case PageTarget(id=name):
+            rule, names, missing = "link-page", targets.pages, f"no page `{name}` in the course map"
+        case ModelTarget(name=name):
+            rule, names, missing = "link-model", targets.models, f"no model `{name}` in models/"
+        case ExampleTarget(path=name):
+            missing = f"no lesson has a script `{name}`"
+            rule, names = "link-example", targets.scripts
+        case TermTarget(id=name):
+            missing = f"no lesson defines the term `{name}`"
+            rule, names = "link-term", targets.terms
+        case _:
+            assert_never(target)
     if name not in names:
         if isinstance(target, LessonTarget) and target.id in targets.levels:
             help = f"{target.id} is a level: {_link_help('level', target.id)}"
@@ -183,20 +194,17 @@ def _check_link(
         if target.anchor:
             # The ids that `templates/model.html` writes. Only scenarios that `models/NAME.toml`
             # declares have one, as others are unknown before they are measured.
-            source = targets.models[target.name].source
-            ids = {
-                *model_anchors(targets.scenarios.get(target.name, ())),
-                listing_anchor(source.path),
-            }
+            source, scenarios = targets.models[name].source, targets.scenarios.get(name, ())
+            ids = {*model_anchors(scenarios), listing_anchor(source.path)}
             listings = {source.path: source.text.rstrip()}
-            page_name = f"the page of the model `{target.name}`"
+            page_name = f"the page of the model `{name}`"
             yield from _check_anchor(span, target.anchor, page_name, ids, listings)
     elif isinstance(target, LessonTarget):
-        lesson = targets.lessons[target.id]
-        yield from _check_document_anchor(span, target.anchor, lesson, f"lesson {target.id}")
+        lesson = targets.lessons[name]
+        yield from _check_document_anchor(span, target.anchor, lesson, f"lesson {name}")
     elif isinstance(target, PageTarget):
-        page = targets.pages[target.id]
-        yield from _check_document_anchor(span, target.anchor, page, f"page `{target.id}`")
+        page = targets.pages[name]
+        yield from _check_document_anchor(span, target.anchor, page, f"page `{name}`")
 
 
 def _link_help(kind: str, id: str) -> str:
@@ -234,26 +242,6 @@ def _suggest_lesson(target: _NamedTarget, targets: LinkTargets) -> str:
     ids_of_level = [id for id in targets.lessons if level and id.rpartition(".")[0] == level]
     names = ", ".join(f"`{id}`" for id in ids_of_level)
     return f"level {level} has {names}" if names else ""
-
-
-def _look_up(target: _NamedTarget, targets: LinkTargets) -> tuple[str, str, Collection[str], str]:
-    """The rule of a link, the name of its target, all names of this kind, and the message."""
-    lacks = "is not in the course map"
-    match target:
-        case LessonTarget(id=id):
-            return "link-lesson", id, targets.lessons, f"lesson {id} {lacks}"
-        case LevelTarget(id=id):
-            return "link-level", id, targets.levels, f"level {id} {lacks}"
-        case PageTarget(id=id):
-            return "link-page", id, targets.pages, f"no page `{id}` in the course map"
-        case ModelTarget(name=name):
-            return "link-model", name, targets.models, f"no model `{name}` in models/"
-        case ExampleTarget(path=path):
-            return "link-example", path, targets.scripts, f"no lesson has a script `{path}`"
-        case TermTarget(id=id):
-            return "link-term", id, targets.terms, f"no lesson defines the term `{id}`"
-        case _:
-            assert_never(target)
 
 
 def _check_document_anchor(
@@ -315,18 +303,20 @@ def _check_url(
             return
         yield from _check_document_anchor(span, parts.fragment, document, "this page")
         return
-    path = local_file(url, document.source.path)
-    if path not in targets.files:
-        yield diagnose(
-            "link-file",
-            span,
-            f"no file `{path}`",
-            help=_suggest_file(path, url, document.source.path, targets),
-        )
+    yield from _check_file(url, span, document, targets)
 
 
 _ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
 """The fragment by which a site of a single page names a lesson, as in `#/lesson/4.2`."""
+
+
+def _check_file(
+    url: str, span: Span, document: Document, targets: LinkTargets
+) -> Iterator[Diagnostic]:
+    path = local_file(url, document.source.path)
+    if path not in targets.files:
+        help = _suggest_file(path, url, document.source.path, targets)
+        yield diagnose("link-file", span, f"no file `{path}`", help=help)
 
 
 def _suggest_file(path: str, url: str, source_path: str, targets: LinkTargets) -> str:
@@ -359,15 +349,8 @@ def _check_media(
         message = f"{subject}`{url}` is not a file of the course"
         help = "put the file into content/ and name it relative to the lesson"
         yield diagnose("image-remote", span, message, help=help)
-        return
-    path = local_file(url, document.source.path)
-    if path not in targets.files:
-        yield diagnose(
-            "link-file",
-            span,
-            f"no file `{path}`",
-            help=_suggest_file(path, url, document.source.path, targets),
-        )
+    else:
+        yield from _check_file(url, span, document, targets)
 
 
 def urlsplit_or_none(url: str) -> SplitResult | None:

@@ -201,10 +201,14 @@ def _place_points(
         sides = weights if number >= _PASSES - _BOTH_SIDES else weights[:1] if down else weights[1:]
         for level in range(len(rows)) if down else reversed(range(len(rows))):
             row, places = rows[level], steps[level]
-            offsets = [
-                _weighted_mean(x, point, sides) - place
-                for point, place in zip(row, places, strict=True)
-            ]
+            offsets = []
+            for point, place in zip(row, places, strict=True):
+                pairs = [pair for side in sides for pair in side.get(point, ())]
+                best = x[point]  # without neighbours it stays where it is
+                if pairs:
+                    best = sum(weight * x[neighbour] for neighbour, weight in pairs)
+                    best /= sum(weight for _, weight in pairs)
+                offsets.append(best - place)
             fitted = zip(row, places, _isotonic_regression(offsets), strict=True)
             x |= {point: place + offset for point, place, offset in fitted}
     return x
@@ -221,20 +225,6 @@ def _weigh_neighbours(
         ]
         for point, points in neighbours.items()
     }
-
-
-def _weighted_mean(
-    x: Mapping[_Point, float],
-    point: _Point,
-    sides: Sequence[Mapping[_Point, list[tuple[_Point, float]]]],
-) -> float:
-    """The best place of a point: the mean of its neighbours, or where it is without any."""
-    pairs = [pair for side in sides for pair in side.get(point, ())]
-    if not pairs:
-        return x[point]
-    return sum(weight * x[neighbour] for neighbour, weight in pairs) / sum(
-        weight for _, weight in pairs
-    )
 
 
 def _isotonic_regression(values: Sequence[float]) -> list[float]:

@@ -282,60 +282,53 @@ def _attribute_fault(tag: str, name: str, value: str) -> str:
 def _css_fault(css: str, *, is_sheet: bool = False) -> str:
     """The part of declarations or a style sheet that must not be there, in words; else empty."""
     try:
-        _judge_css(css, is_sheet)
+        blocks = [is_sheet]
+        """Whether each open block, the innermost last, holds rules; else it holds declarations."""
+        part: list[str] = []
+        """What was read of a declaration, or of what stands before a block."""
+        brackets = 0
+        for kind, token in _css_tokens(css):
+            if kind == "mark" and token in "([":
+                brackets += 1
+            elif kind == "mark" and token in ")]":
+                brackets -= 1
+            if kind == "function":
+                brackets += 1
+                if token == "url(":
+                    raise _RefusedError("a `url()` that leads elsewhere")
+                if token[:-1] not in _FUNCTIONS:
+                    raise _RefusedError(f"`{_short(token)})`")
+            elif (kind == "at" and (part or not blocks[-1] or _plain(token) not in _AT_RULES)) or (
+                kind == "font" and (blocks[-1] or part[:1] != ["src"])
+            ):
+                raise _RefusedError(f"`{_short(token)}`")
+            is_end = kind == "mark" and token in "{};"
+            if is_end and not brackets:
+                if token == "{" and blocks[-1]:
+                    blocks.append(_AT_RULES.get(_plain(part[0]) if part else "", False))
+                elif token == "{" or (token == ";" and blocks[-1]):
+                    raise _RefusedError(f"`{token}` after `{_short(' '.join(part))}`")
+                elif token == "}" and (len(blocks) == 1 or (blocks.pop() and part)):
+                    raise _RefusedError("an unpaired `}`")
+                part = []
+                continue
+            if brackets < 0 or is_end:
+                raise _RefusedError(f"an unpaired `{token}`")
+            part.append(token)
+            if not blocks[-1]:
+                if len(part) == 1:
+                    is_known = _plain(part[0]) in _PROPERTIES or part[0].startswith(
+                        ("--", "-inkscape-")
+                    )
+                    if kind != "name" or not is_known:
+                        raise _RefusedError(f"the property `{_short(part[0])}`")
+                elif (part[-1] == ":" and kind == "mark") != (len(part) == 2):
+                    raise _RefusedError(f"`{_short(''.join(part))}`")
+        if brackets or len(blocks) > 1 or (part and blocks[-1]):
+            raise _RefusedError("an unpaired bracket")
     except _RefusedError as error:
         return str(error)
     return ""
-
-
-def _judge_css(css: str, is_sheet: bool) -> None:
-    blocks = [is_sheet]
-    """Whether each open block, the innermost last, holds rules; else it holds declarations."""
-    part: list[str] = []
-    """What was read of a declaration, or of what stands before a block."""
-    brackets = 0
-    for kind, token in _css_tokens(css):
-        if kind == "mark" and token in "([":
-            brackets += 1
-        elif kind == "mark" and token in ")]":
-            brackets -= 1
-        if kind == "function":
-            brackets += 1
-            if token == "url(":
-                raise _RefusedError("a `url()` that leads elsewhere")
-            if token[:-1] not in _FUNCTIONS:
-                raise _RefusedError(f"`{_short(token)})`")
-        elif (kind == "at" and (part or not blocks[-1] or _plain(token) not in _AT_RULES)) or (
-            kind == "font" and (blocks[-1] or part[:1] != ["src"])
-        ):
-            raise _RefusedError(f"`{_short(token)}`")
-        is_end = kind == "mark" and token in "{};"
-        if is_end and not brackets:
-            if token == "{" and blocks[-1]:
-                blocks.append(_AT_RULES.get(_plain(part[0]) if part else "", False))
-            elif token == "{" or (token == ";" and blocks[-1]):
-                raise _RefusedError(f"`{token}` after `{_short(' '.join(part))}`")
-            elif token == "}" and (len(blocks) == 1 or (blocks.pop() and part)):
-                raise _RefusedError("an unpaired `}`")
-            part = []
-            continue
-        if brackets < 0 or is_end:
-            raise _RefusedError(f"an unpaired `{token}`")
-        part.append(token)
-        if not blocks[-1]:
-            _judge_declaration(part, kind)
-    if brackets or len(blocks) > 1 or (part and blocks[-1]):
-        raise _RefusedError("an unpaired bracket")
-
-
-def _judge_declaration(part: list[str], kind: str) -> None:
-    """Judge a declaration up to its last token."""
-    if len(part) == 1:
-        is_known = _plain(part[0]) in _PROPERTIES or part[0].startswith(("--", "-inkscape-"))
-        if kind != "name" or not is_known:
-            raise _RefusedError(f"the property `{_short(part[0])}`")
-    elif (part[-1] == ":" and kind == "mark") != (len(part) == 2):
-        raise _RefusedError(f"`{_short(''.join(part))}`")
 
 
 def _css_tokens(css: str) -> Iterator[tuple[str, str]]:

@@ -210,18 +210,14 @@ def _serve(
                 try:
                     reply = pickle.dumps((True, work(task)))
                 except BaseException as error:
-                    reply = pickle.dumps((False, _sendable(error)))
+                    error.add_note(f"in a worker:\n{traceback.format_exc()}")
+                    try:
+                        reply = pickle.dumps((False, error))
+                        pickle.loads(reply)
+                    except Exception:
+                        like = RuntimeError(f"{type(error).__name__}: {error}")
+                        reply = pickle.dumps((False, like))
                 connection.send_bytes(reply)
         status = 0
     finally:
         os._exit(status)
-
-
-def _sendable(error: BaseException) -> BaseException:
-    """The exception, or one like it, in a form that can be pickled."""
-    error.add_note(f"in a worker:\n{traceback.format_exc()}")
-    try:
-        pickle.loads(pickle.dumps(error))
-    except Exception:
-        return RuntimeError(f"{type(error).__name__}: {error}")
-    return error

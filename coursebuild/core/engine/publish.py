@@ -27,7 +27,7 @@ import re
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
@@ -105,33 +105,34 @@ def publish(
             site = new_site(Manifest.read(root, place), files, file_list)
             if site.is_there():
                 return ()
-            return _replace(root, place, site, jobs, stage)
+            slot = _sibling(place, "new")
+            try:
+                open_slot(root, slot)
+                entries, paths = site.fill(slot, jobs, stage)
+                if not holds(slot, entries):
+                    message = f"another process is changing what is being written to {place}"
+                    raise EffectError(message)
+                _swap(slot, place)
+            finally:
+                _recover(place)
+                put_away(root, slot)
+            Manifest(place, entries).write(root)
+            return tuple(sorted(paths))
     except OSError as error:
         raise EffectError(f"the site cannot be written to {out}: {reason(error)}") from None
 
 
-def _replace(
-    root: Path,
-    place: Path,
-    site: NewSite,
-    jobs: int,
-    stage: Callable[[], AbstractContextManager[None]],
-) -> tuple[str, ...]:
-    """Fill the slot with the site and swap the two; return the paths that were written."""
-    slot = _sibling(place, "new")
-    try:
-        open_slot(root, slot)
-        entries, paths = site.fill(slot, jobs, stage)
-        if not holds(slot, entries):
-            raise EffectError(f"another process is changing what is being written to {place}")
-        # The permissions of the site's folder: those it has already, else the usual ones.
-        slot.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o755)
-        _swap(slot, place)
-    finally:
-        _recover(place)
-        put_away(root, slot)
-    Manifest(place, entries).write(root)
-    return tuple(sorted(paths))
+def _swap(slot: Path, place: Path) -> None:
+    """Move the new site to the place, with the permissions of the old one, which goes the way."""
+    slot.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o755)
+    if not os.path.lexists(place):
+        slot.rename(place)
+    elif not exchange(slot, place):
+        old = _sibling(place, "old")
+        remove(old)
+        place.rename(old)
+        slot.rename(place)
+        old.rename(slot)
 
 
 # --- the place
@@ -171,18 +172,6 @@ def _check_place(root: Path, out: Path, place: Path) -> None:
             f"{out} holds files that coursebuild did not put there: {', '.join(foreign[:3])}{rest}",
             help="move them away, or publish to another folder",
         )
-
-
-def _swap(slot: Path, place: Path) -> None:
-    """Move the new site to the place, and the old one to the slot."""
-    if not os.path.lexists(place):
-        slot.rename(place)
-    elif not exchange(slot, place):
-        old = _sibling(place, "old")
-        remove(old)
-        place.rename(old)
-        slot.rename(place)
-        old.rename(slot)
 
 
 def exchange(a: Path, b: Path) -> bool:
@@ -274,7 +263,15 @@ class NewSite(Struct, frozen=True):
                 entries[path] = entry
         new_paths = [path for path in self.keys if path not in entries]
         new_files = [self.files[path] for path in new_paths if path in self.files]
-        entries |= self._write_all(slot, new_files, jobs, stage)
+
+        def share(start: int) -> list[ManifestEntry]:
+            return [self._write(slot, file) for file in new_files[start : start + _TASK_SIZE]]
+
+        can_share = jobs > 1 and len(new_files) >= _MIN_FOR_COPIES and can_fork()
+        with Workers(share, min(jobs, _MAX_COPIES) if can_share else 0) as workers, stage():
+            parts = workers.map((None, start) for start in range(0, len(new_files), _TASK_SIZE))
+            new_entries = (entry for part, _ in parts for entry in part)
+            entries |= {f.path: entry for f, entry in zip(new_files, new_entries, strict=True)}
         if self.file_list is not None and self.file_list.path not in entries:
             facts = [FileFacts(path, e.digest, e.size) for path, e in sorted(entries.items())]
             path = self.file_list.path
@@ -294,24 +291,6 @@ class NewSite(Struct, frozen=True):
             return True
         Path(target).unlink()
         return False
-
-    def _write_all(
-        self,
-        slot: Path,
-        files: Sequence[SiteFile],
-        jobs: int,
-        stage: Callable[[], AbstractContextManager[None]],
-    ) -> dict[str, ManifestEntry]:
-        """Make files and write them, whose folders are there already; return their entries."""
-
-        def share(start: int) -> list[ManifestEntry]:
-            return [self._write(slot, file) for file in files[start : start + _TASK_SIZE]]
-
-        can_share = jobs > 1 and len(files) >= _MIN_FOR_COPIES and can_fork()
-        with Workers(share, min(jobs, _MAX_COPIES) if can_share else 0) as workers, stage():
-            parts = workers.map((None, start) for start in range(0, len(files), _TASK_SIZE))
-            entries = (entry for part, _ in parts for entry in part)
-            return {file.path: entry for file, entry in zip(files, entries, strict=True)}
 
     def _write(self, slot: Path, file: SiteFile) -> ManifestEntry:
         target = f"{slot}/{file.path}"

@@ -216,20 +216,17 @@ class Store:
     def close(self) -> None:
         """Wait until the shared place has all new results, and keep the store within its limit."""
         self.flush()
-        if self._bytes_written:
-            with contextlib.suppress(OSError):
-                self._prune_if_due()
-            self._bytes_written = 0
-
-    def _prune_if_due(self) -> None:
-        """Prune if that was not done lately, or if much was written since."""
-        marker = self.folder / "pruned"
-        with contextlib.suppress(FileNotFoundError):
-            age = time.time() - marker.stat().st_mtime
-            if 0.0 <= age < _PRUNE_INTERVAL and self._bytes_written * _PRUNE_SHARE < self.size:
-                return
-        marker.touch()
-        prune(self.folder, self.size)
+        if not self._bytes_written:
+            return
+        marker, age = self.folder / "pruned", _PRUNE_INTERVAL
+        with contextlib.suppress(OSError):
+            with contextlib.suppress(FileNotFoundError):
+                age = time.time() - marker.stat().st_mtime
+            is_full = self._bytes_written * _PRUNE_SHARE >= self.size
+            if is_full or not 0.0 <= age < _PRUNE_INTERVAL:
+                marker.touch()
+                prune(self.folder, self.size)
+        self._bytes_written = 0
 
     def _say(self, line: str) -> None:
         """Send a message, unless it was sent before."""

@@ -12,18 +12,12 @@ MAP = "content/course.toml"
 """The file that makes a folder a course."""
 FOLDERS = ("content", "features", "models", "mjcourse", "theme")
 """The folders that a course's author writes, and the library that a course may have."""
-DECISIVE = (
-    "MUJOCO_GL",
-    "MUJOCO_EGL_DEVICE_ID",
-    "PYOPENGL_PLATFORM",
-    "LD_LIBRARY_PATH",
-    "DYLD_LIBRARY_PATH",
-    "DYLD_FALLBACK_LIBRARY_PATH",
-    "CUDA_HOME",
-    "CUDA_PATH",
-    "CUDA_VISIBLE_DEVICES",
-    "NVIDIA_VISIBLE_DEVICES",
-    "NVIDIA_DRIVER_CAPABILITIES",
+DECISIVE = tuple(
+    """
+    MUJOCO_GL MUJOCO_EGL_DEVICE_ID PYOPENGL_PLATFORM LD_LIBRARY_PATH DYLD_LIBRARY_PATH
+    DYLD_FALLBACK_LIBRARY_PATH CUDA_HOME CUDA_PATH CUDA_VISIBLE_DEVICES NVIDIA_VISIBLE_DEVICES
+    NVIDIA_DRIVER_CAPABILITIES
+    """.split()
 )
 """Environment variables that decide how scripts draw or compute something."""
 

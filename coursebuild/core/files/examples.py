@@ -137,7 +137,14 @@ class _Update:
         if self.written or self.removed:
             _save_manifest(self.root, before)
         for path in list(self.written):
-            self._write(path)
+            new, old = self.scripts[path], self.current[path]
+            try:
+                write_atomic(self.root, path, new, expected=old, durable=False)
+            except FileChangedError:  # somebody saved it since, maybe another run of the tool
+                now = self._look(path)[1]
+                if now != new:
+                    self.written.remove(path)
+                    self._block(path, Obstacle.EDITED, now)
         for path in list(self.removed):
             self._remove(path)
         _save_manifest(self.root, self.manifest)
@@ -185,17 +192,6 @@ class _Update:
         except (FileNotFoundError, NotADirectoryError):
             return None, None
 
-    def _write(self, path: str) -> None:
-        try:
-            write_atomic(
-                self.root, path, self.scripts[path], expected=self.current[path], durable=False
-            )
-        except FileChangedError:  # somebody saved it since `_look`, maybe another run of the tool
-            now = self._look(path)[1]
-            if now != self.scripts[path]:
-                self.written.remove(path)
-                self._block(path, Obstacle.EDITED, now)
-
     def _remove(self, path: str) -> None:
         full = self.root / path
         if full.read_bytes() != self.current[path]:
@@ -212,20 +208,13 @@ class _Update:
             self.manifest[path] = self.known_hashes[path]
         else:
             self.manifest.pop(path, None)
-        text = _decode(current or b"")
+        text, new = _decode(current or b""), self.scripts.get(path)
         diff = ""
         if current is not None:
-            diff = unified_diff(
-                _decode(self.scripts.get(path, b"")),
-                text,
-                f"{path} (in the lesson)",
-                f"{path} (on the disk)",
-            )
-        known_hashes = self.known_hashes.get(path, ())
-        new = self.scripts.get(path)
-        diverged = (
-            obstacle is Obstacle.EDITED and new is not None and _hash(new) not in known_hashes
-        )
+            names = f"{path} (in the lesson)", f"{path} (on the disk)"
+            diff = unified_diff(_decode(new or b""), text, *names)
+        is_new = new is not None and _hash(new) not in self.known_hashes.get(path, ())
+        diverged = obstacle is Obstacle.EDITED and is_new
         self.blocked.append(BlockedFile(path, obstacle, text, diff, diverged))
 
 

@@ -203,8 +203,11 @@ def temporary_folder() -> Iterator[str]:
         _remove_abandoned(tempfile.gettempdir())
         while True:
             folder = tempfile.mkdtemp(prefix=_PREFIX)
-            if (fd := _lock(folder)) is not None:
-                break
+            with contextlib.suppress(FileNotFoundError):  # taken for abandoned, and removed
+                fd = os.open(folder, _OPEN_FOLDER)
+                if try_lock(fd) is not False and Path(folder).exists():
+                    break
+                os.close(fd)
     except OSError as error:
         raise EffectError(f"there is no place for temporary files: {reason(error)}") from None
     try:
@@ -212,18 +215,6 @@ def temporary_folder() -> Iterator[str]:
     finally:
         remove_folder(folder)
         os.close(fd)
-
-
-def _lock(folder: str) -> int | None:
-    """Lock a new folder; `None` if another process has taken it for abandoned."""
-    try:
-        fd = os.open(folder, _OPEN_FOLDER)
-    except FileNotFoundError:
-        return None
-    if try_lock(fd) is not False and Path(folder).exists():
-        return fd
-    os.close(fd)
-    return None
 
 
 @functools.cache
@@ -235,20 +226,15 @@ def _remove_abandoned(place: str) -> None:
         if is_shared or status.st_uid not in (0, me):
             return  # others can move this user's folders
         for entry in entries:
-            if _NAME.fullmatch(entry.name):
-                with contextlib.suppress(OSError):
-                    _remove_if_abandoned(entry.path, me)
-
-
-def _remove_if_abandoned(folder: str, me: int) -> None:
-    fd = os.open(folder, _OPEN_FOLDER)
-    try:
-        status = os.fstat(fd)
-        is_ours = status.st_uid == me and stat.S_IMODE(status.st_mode) == stat.S_IRWXU
-        if is_ours and try_lock(fd):
-            remove_folder(folder)
-    finally:
-        os.close(fd)
+            with contextlib.suppress(OSError), contextlib.ExitStack() as resources:
+                if not _NAME.fullmatch(entry.name):
+                    continue
+                fd = os.open(entry.path, _OPEN_FOLDER)
+                resources.callback(os.close, fd)
+                status = os.fstat(fd)
+                is_ours = status.st_uid == me and stat.S_IMODE(status.st_mode) == stat.S_IRWXU
+                if is_ours and try_lock(fd):
+                    remove_folder(entry.path)
 
 
 def remove_folder(folder: str) -> None:

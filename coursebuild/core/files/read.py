@@ -118,8 +118,18 @@ def _read_inside(root: Path, path: str) -> bytes:
         raise EffectError("a path holds a null character")
     if not Path(os.path.realpath(root / path)).is_relative_to(root):
         raise OutsideProjectError(f"{path} {_OUTSIDE_REASON}")
-    try:
-        return _read_regular(root / path)
+    try:  # without waiting, even for a pipe
+        fd = os.open(root / path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+        try:
+            status = os.fstat(fd)
+            if not stat.S_ISREG(status.st_mode):
+                raise OSError("it is not a regular file")
+            parts = [os.read(fd, status.st_size + 1)]
+            while parts[-1]:
+                parts.append(os.read(fd, 1 << 20))
+            return b"".join(parts)
+        finally:
+            os.close(fd)
     except OSError as error:
         raise EffectError(f"{path} cannot be read: {reason(error)}") from None
 
@@ -151,14 +161,9 @@ class _Reader:
     def map(self) -> Source | None:
         """Read the course map; a missing one is a diagnostic."""
         if not (self.root / MAP).is_symlink() and not (self.root / MAP).exists():
-            self.diagnostics.append(
-                diagnose(
-                    "map-missing",
-                    Source(MAP, "").span(),
-                    f"there is no {MAP}",
-                    help="the map names every level, lesson and page; start with `[course]`",
-                )
-            )
+            help = "the map names every level, lesson and page; start with `[course]`"
+            message, place = f"there is no {MAP}", Source(MAP, "").span()
+            self.diagnostics.append(diagnose("map-missing", place, message, help=help))
             return None
         return next(iter(self.sources([MAP])), None)
 
@@ -248,14 +253,17 @@ class _Reader:
         source = Source(path, text)
         if position >= 0:
             at = len(data[:position].decode("utf-8"))
-            self.diagnostics.append(
-                diagnose(
-                    "file-encoding",
-                    source.span(at, at + 1),
-                    f"byte 0x{data[position]:02x} {problem}",
-                    help=f"save the file as UTF-8{_guess(data)}",
-                )
-            )
+            # Latin UTF-16 without a byte order mark: every other byte is zero.
+            least, most = sorted((data[:1024:2].count(0), data[1:1024:2].count(0)))
+            guess = "may be Latin-1 or Windows-1252"
+            if data.startswith(_UTF16) or (least == 0 and most > len(data[:1024]) // 4):
+                guess = "looks like UTF-16"
+            elif b"\0" in data:
+                guess = "looks like a binary file"
+            message = f"byte 0x{data[position]:02x} {problem}"
+            help = f"save the file as UTF-8; it {guess}"
+            place = source.span(at, at + 1)
+            self.diagnostics.append(diagnose("file-encoding", place, message, help=help))
         if is_text:
             return source
         self.unreadable.append(path)
@@ -268,32 +276,6 @@ class _Reader:
         self.diagnostics.append(diagnose("file-unreadable", span, f"{name} {problem}"))
 
 
-def _read_regular(path: Path) -> bytes:
-    """The bytes of a regular file; anything else is refused without waiting, even a pipe."""
-    fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
-    try:
-        status = os.fstat(fd)
-        if not stat.S_ISREG(status.st_mode):
-            raise OSError("it is not a regular file")
-        parts = [os.read(fd, status.st_size + 1)]
-        while parts[-1]:
-            parts.append(os.read(fd, 1 << 20))
-        return b"".join(parts)
-    finally:
-        os.close(fd)
-
-
 def _is_text(path: str) -> bool:
     """Whether a path is proper Unicode (Python keeps other bytes as lone surrogates)."""
     return path.isascii() or not any("\udc80" <= c <= "\udcff" for c in path)
-
-
-def _guess(data: bytes) -> str:
-    """The end of a sentence that guesses what the file is instead."""
-    # Latin UTF-16 without a byte order mark: every other byte is zero.
-    least, most = sorted((data[:1024:2].count(0), data[1:1024:2].count(0)))
-    if data.startswith(_UTF16) or (least == 0 and most > len(data[:1024]) // 4):
-        return "; it looks like UTF-16"
-    if b"\0" in data:
-        return "; it looks like a binary file"
-    return "; it may be Latin-1 or Windows-1252"

@@ -32,9 +32,8 @@ def assets_dir() -> Path:
     Raises:
         EffectError: this is a source tree where they have not been built.
     """
-    return _find_folder(
-        _PACKAGE / "assets", _TREE / "site" / "dist", "the browser's files are not built"
-    )
+    problem = "the browser's files are not built"
+    return _find_folder(_PACKAGE / "assets", _TREE / "site" / "dist", problem)
 
 
 def templates_dir() -> Path:
@@ -43,9 +42,8 @@ def templates_dir() -> Path:
     Raises:
         EffectError: the installation is broken.
     """
-    return _find_folder(
-        _PACKAGE / "templates", _TREE / "templates", "the page templates are missing"
-    )
+    problem = "the page templates are missing"
+    return _find_folder(_PACKAGE / "templates", _TREE / "templates", problem)
 
 
 def rules_page() -> str:
@@ -54,9 +52,8 @@ def rules_page() -> str:
     Raises:
         EffectError: the installation is broken.
     """
-    folder = _find_folder(
-        _PACKAGE / "docs", _TREE / "docs/reference", "the page of rules is missing"
-    )
+    problem = "the page of rules is missing"
+    folder = _find_folder(_PACKAGE / "docs", _TREE / "docs/reference", problem)
     return (folder / "rules.md").read_text(encoding="utf-8")
 
 
@@ -93,16 +90,16 @@ class Bundle(Mapping[str, bytes]):
         return tuple(path for path in _paths(self._folder) if Path(path).name != "stamp.json")
 
 
-def _paths(folder: Path) -> Iterator[str]:
+def _paths(folder: Path) -> list[str]:
     """The files below a folder by path relative to it, sorted."""
+
+    def fail(error: OSError) -> None:
+        raise error
+
     top = len(f"{folder}/")
-    walk = os.walk(folder, onerror=_raise)
+    walk = os.walk(folder, onerror=fail)
     paths = (f"{place}/{name}"[top:] for place, _, names in walk for name in names)
-    yield from sorted(paths, key=lambda path: path.split("/"))
-
-
-def _raise(error: OSError) -> None:
-    raise error
+    return sorted(paths, key=lambda path: path.split("/"))
 
 
 def template_texts() -> tuple[tuple[str, str], ...]:

@@ -132,18 +132,12 @@ def remove_leftovers(folders: Iterable[Path]) -> None:
     for folder in folders:
         with contextlib.suppress(OSError), os.scandir(folder) as entries:
             for entry in entries:
-                if entry.name.startswith(PREFIX) and entry.is_file(follow_symlinks=False):
-                    _remove_if_abandoned(Path(entry.path))
-
-
-def _remove_if_abandoned(path: Path) -> None:
-    with contextlib.suppress(OSError):
-        fd = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
-        try:
-            if is_abandoned(fd):
-                path.unlink()
-        finally:
-            os.close(fd)
+                with contextlib.suppress(OSError), contextlib.ExitStack() as resources:
+                    if entry.name.startswith(PREFIX) and entry.is_file(follow_symlinks=False):
+                        fd = os.open(entry.path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
+                        resources.callback(os.close, fd)
+                        if is_abandoned(fd):
+                            Path(entry.path).unlink()
 
 
 def _open_temporary(folder: Path) -> tuple[int, str]:

@@ -353,23 +353,15 @@ def display_formulas(document: Document) -> tuple[DisplayFormula, ...]:
         formulas: list[DisplayFormula] = []
         for formula, has_no_id in candidates:
             label, id_ = formula.label, ""
-            if not has_no_id:
-                tex = formula.tex.text
-                id_ = label.id if label is not None else _make_id(tex, used_ids, counts)
+            if label is not None and not has_no_id:
+                id_ = label.id
+            elif not has_no_id:
+                base = id_ = f"eq:{key_of(' '.join(formula.tex.text.split()))[:8]}"
+                while id_ in used_ids:  # a repeated formula gets a number
+                    counts[base] = max(2, counts[base] + 1)
+                    id_ = f"{base}-{counts[base]}"
                 used_ids.add(id_)
             formulas.append(DisplayFormula(formula.span.start, formula.tex.text, label, id_))
         return tuple(formulas)
 
     return computed_once(document, "display_formulas", find)
-
-
-def _make_id(tex: str, used_ids: set[str], counts: Counter[str]) -> str:
-    """Make the id of a formula without a label; a repeated formula gets a number.
-
-    `counts` has the last number given to each.
-    """
-    base = id = f"eq:{key_of(' '.join(tex.split()))[:8]}"
-    while id in used_ids:
-        counts[base] = max(2, counts[base] + 1)
-        id = f"{base}-{counts[base]}"
-    return id

@@ -150,7 +150,11 @@ def draw(
         values["article"] = article(page, document)
         values["title_anchor"] = document.title_anchor
         if head.kind == "page":
-            head = replace(head, description=_first_sentences(page, document))
+            first = next((b for b in document.blocks if isinstance(b, Paragraph)), None)
+            inlines = () if first is None else without_links(first.children, page.reference)
+            text = " ".join(plain_text(inlines).split())
+            text = text if len(text) <= 200 else text[:200].rsplit(" ", 1)[0] + " …"
+            head = replace(head, description=text)
     kind = page_kind(head.kind)
     if kind is not None and kind.draw is not None:
         values |= {"title": head.title, "content": kind.draw(renderer, values)}
@@ -169,11 +173,3 @@ def _draw_value(value: object, renderer: Renderer) -> object:
             return Markup("").join(html)
         case _:
             return value
-
-
-def _first_sentences(page: PageContext, document: Document) -> str:
-    """The first paragraph, cut at a word, for search engines."""
-    first = next((b for b in document.blocks if isinstance(b, Paragraph)), None)
-    inlines = () if first is None else without_links(first.children, page.reference)
-    text = " ".join(plain_text(inlines).split())
-    return text if len(text) <= 200 else text[:200].rsplit(" ", 1)[0] + " …"

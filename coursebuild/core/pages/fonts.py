@@ -111,7 +111,9 @@ def font_jobs(
         used_characters = letters & characters_in(face.characters)
         jobs.append(FontJob(face, data, "".join(sorted(used_characters))))
         course_characters.setdefault(face.family, set()).update(used_characters)
-    signs = _mathematical(MATHEMATICS.union(mathematics)) if mathematics else set[str]()
+    # Characters of formulas, with the italics that a browser replaces single letters by
+    signs = MATHEMATICS.union(mathematics) if mathematics else frozenset[str]()
+    signs |= {*map(italic_letter, signs)} - {""}
     assigned: dict[tuple[str, str], set[str]] = {}
     for face, data in faces:
         missing = letters - course_characters.get(_COURSE_FAMILIES.get(face.family, ""), set())
@@ -147,11 +149,6 @@ def unicode_range(characters: str) -> str:
         else:
             runs.append([code, code])
     return ", ".join(f"U+{a:X}" if a == b else f"U+{a:X}-{b:X}" for a, b in runs)
-
-
-def _mathematical(characters: frozenset[str]) -> set[str]:
-    """Characters of formulas, with the italics that a browser replaces single letters by."""
-    return {*characters, *map(italic_letter, characters)} - {""}
 
 
 def italic_letter(character: str) -> str:

@@ -64,7 +64,13 @@ def split_formula(mathml: str) -> str:
     if whole is None or _length(mathml) < LONG:
         return mathml
     inner = whole[1]
-    rows = _outer_rows(inner)
+    rows: list[str] = []
+    depth = start = 0
+    for match in _ROW.finditer(inner):
+        depth += -1 if match[1] else 1
+        if depth == 0:
+            rows.append(inner[start : match.end()])
+            start = match.end()
     if "".join(rows) != inner:
         return mathml
     if len(rows) == 1:
@@ -75,17 +81,6 @@ def split_formula(mathml: str) -> str:
 
 def _length(mathml: str) -> int:
     return len(unescape(_TAG.sub("", _ANNOTATION.sub("", mathml))))
-
-
-def _outer_rows(text: str) -> list[str]:
-    rows: list[str] = []
-    depth = start = 0
-    for match in _ROW.finditer(text):
-        depth += -1 if match[1] else 1
-        if depth == 0:
-            rows.append(text[start : match.end()])
-            start = match.end()
-    return rows
 
 
 def _pieces(row: str) -> list[str]:
@@ -143,19 +138,17 @@ def glue_formulas(html: str) -> str:
         before, closing = parts[at - 1][len(text) :], _CLOSING.match(parts[at + 1])
         after = closing[0] if closing else ""
         if before or after:
-            glued = _glue_formula(before, parts[at], after)
+            formula = parts[at]
+            first, last = formula.find("</math><math>"), formula.rfind("</math><math>")
+            if first < 0:
+                glued = _glued(before + formula + after)
+            else:
+                head, tail = first + len("</math>"), last + len("</math>")
+                start = _glued(before + formula[:head]) if before else formula[:head]
+                end = _glued(formula[tail:] + after) if after else formula[tail:]
+                glued = start + formula[head:tail] + end
             parts[at - 1 : at + 2] = text, glued, parts[at + 1][len(after) :]
     return "".join(parts)
-
-
-def _glue_formula(before: str, formula: str, after: str) -> str:
-    first, last = formula.find("</math><math>"), formula.rfind("</math><math>")
-    if first < 0:
-        return _glued(before + formula + after)
-    head, tail = first + len("</math>"), last + len("</math>")
-    start = _glued(before + formula[:head]) if before else formula[:head]
-    end = _glued(formula[tail:] + after) if after else formula[tail:]
-    return start + formula[head:tail] + end
 
 
 def _glued(html: str) -> str:

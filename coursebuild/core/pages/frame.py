@@ -244,7 +244,6 @@ def script_words(keys: Collection[str], parts: Iterable[str]) -> tuple[str, ...]
 
 
 def _links(place: urls.Place, pages: Iterable[tuple[str, str]]) -> tuple[NavLink, ...]:
-    """Links to pages, given by path and title."""
     return tuple(NavLink(place.href(path), title, path == place.path) for path, title in pages)
 
 

@@ -151,7 +151,6 @@ class _Box(Struct, frozen=True):
 
 
 def _edges(layout: Layout, look: _Look, unit: float) -> Iterator[str]:
-    """Lines from box to box, and arrowheads."""
     lines, heads = [], []
     for edge in layout.edges:
         xs = [_x(x, unit, look) for x in edge.xs]

@@ -47,7 +47,6 @@ class HtmlElement(Struct):
 
     @property
     def elements(self) -> Iterator[HtmlElement]:
-        """The elements directly in it."""
         return (child for child in self.children if isinstance(child, HtmlElement))
 
     @property

@@ -299,7 +299,6 @@ class HtmlWriter:
     # -- inlines
 
     def _inline(self, inline: model.Inline) -> str:
-        """One inline."""
         match inline:
             case model.Text():
                 return escape(inline.text)

@@ -59,7 +59,27 @@ class PageEntry(Struct, frozen=True):
         """The inputs of the page; summaries of documents are enough."""
         kind = page_kind(self.kind)
         if kind is None:
-            return _course_inputs(self, library)
+            match self.kind:
+                case "home":
+                    return home_inputs(library, self.document(library))
+                case "level":
+                    return level_inputs(library, library.levels[self.id])
+                case "lesson":
+                    entry_lesson = library.lessons[self.id]
+                    if entry_lesson.document is None:
+                        return stub_inputs(library, entry_lesson)
+                    return lesson_inputs(library, entry_lesson, entry_lesson.document)
+                case "models":
+                    return gallery_inputs(library)
+                case "model":
+                    model = next(model for model in library.course.models if model.name == self.id)
+                    return model_inputs(library, model)
+                case "page":
+                    page = library.pages[self.id]
+                    assert page.document is not None, "a page without a document is not in the list"
+                    return page_inputs(library, page, page.document)
+                case _:
+                    return not_found_inputs(library)
         key = f"{kind.name}.description"
         description = library.words(key) if library.words.has(key) else ""
         title, home = page_title(library, kind), urls.Place(kind.path).href(urls.HOME)
@@ -107,30 +127,6 @@ def page_list(library: Library) -> Iterator[PageEntry]:
         if page.document is not None and not page.is_home:
             yield PageEntry(urls.page_path(page), "page", page.id)
     yield PageEntry(urls.NOT_FOUND, "notfound")
-
-
-def _course_inputs(entry: PageEntry, library: Library) -> PageInputs:
-    match entry.kind:
-        case "home":
-            return home_inputs(library, entry.document(library))
-        case "level":
-            return level_inputs(library, library.levels[entry.id])
-        case "lesson":
-            entry_lesson = library.lessons[entry.id]
-            if entry_lesson.document is None:
-                return stub_inputs(library, entry_lesson)
-            return lesson_inputs(library, entry_lesson, entry_lesson.document)
-        case "models":
-            return gallery_inputs(library)
-        case "model":
-            model = next(model for model in library.course.models if model.name == entry.id)
-            return model_inputs(library, model)
-        case "page":
-            page = library.pages[entry.id]
-            assert page.document is not None, "a page without a document is not in the list"
-            return page_inputs(library, page, page.document)
-        case _:
-            return not_found_inputs(library)
 
 
 class NamedLink(Struct, frozen=True):
@@ -311,7 +307,6 @@ def _added_parts(
 
 
 def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
-    """The facts about a compiled model, as pairs of label and value."""
     words = library.words
     unnamed = words("model.unnamed")
     rows = (

@@ -226,7 +226,6 @@ def output_receipt(page: PageContext, block: Recording) -> Receipt:
 
 
 def _describe_comparison(words: Strings, comparison: Comparison) -> str:
-    """How an output was compared, in words."""
     match comparison.mode:
         case Mode.EXACT | Mode.VOLATILE:
             text = words("receipt.exact")

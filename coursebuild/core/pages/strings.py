@@ -105,21 +105,17 @@ def category(language: str, n: float) -> Category:
     n = abs(int(n))
     match language.replace("_", "-").split("-")[0].lower():
         case "ar":
-            return _arabic(n)
+            if n <= 2:
+                return CATEGORIES[n]
+            if 3 <= n % 100 <= 10:
+                return "few"
+            return "many" if n % 100 >= 11 else "other"
         case "fr" | "es" if n and n % 1_000_000 == 0:
             return "many"
         case "fr":
             return "one" if n <= 1 else "other"
         case _:
             return "one" if n == 1 else "other"
-
-
-def _arabic(n: int) -> Category:
-    if n <= 2:
-        return CATEGORIES[n]
-    if 3 <= n % 100 <= 10:
-        return "few"
-    return "many" if n % 100 >= 11 else "other"
 
 
 _FROM_THE_RIGHT = frozenset(

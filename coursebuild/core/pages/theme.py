@@ -49,7 +49,6 @@ def course_face(use: str, name: str, data: bytes) -> tuple[Face, bytes] | str:
 
 
 def _weights(font: TTFont) -> tuple[int, int]:
-    """The least and the greatest weight."""
     for axis in font["fvar"].axes if "fvar" in font else ():
         if axis.axisTag == "wght":
             return round(axis.minValue), round(axis.maxValue)

@@ -133,7 +133,11 @@ class Place(Struct, frozen=True):
             return self.root + encode("" if path == HOME else path) + fragment
         if path == self.path:
             return fragment or encode(posixpath.basename(path))
-        return encode(_relative(path, self.path)) + fragment
+        ends, starts = path.split("/"), self.path.split("/")[:-1]
+        shared = 0
+        while shared < min(len(ends) - 1, len(starts)) and ends[shared] == starts[shared]:
+            shared += 1
+        return encode("/".join([".."] * (len(starts) - shared) + ends[shared:])) + fragment
 
     def target(self, address: str) -> tuple[str | None, str]:
         """The site path and anchor of an address on the page; `None` if it leads elsewhere."""
@@ -156,12 +160,3 @@ def file_address(place: Place, path: str, url: str) -> str:
         return url
     site_path = file_path(local_file(url, path))
     return place.href(site_path) + url[len(url.split("#", 1)[0].split("?", 1)[0]) :]
-
-
-def _relative(path: str, start: str) -> str:
-    """A site path relative to the page at `start`."""
-    ends, starts = path.split("/"), start.split("/")[:-1]
-    shared = 0
-    while shared < min(len(ends) - 1, len(starts)) and ends[shared] == starts[shared]:
-        shared += 1
-    return "/".join([".."] * (len(starts) - shared) + ends[shared:])

@@ -34,21 +34,17 @@ def main() -> None:
     for line in sys.stdin:
         path, texts, seconds = json.loads(line)
         if path is None:
-            print(json.dumps(_vocabulary(mujoco)), file=replies, flush=True)
+            enums = (enum for name, enum in vars(mujoco).items() if name.startswith("mjt"))
+            members = [name for enum in enums for name in getattr(enum, "__members__", ())]
+            keywords = sorted({name.partition("_")[2] for name in members} - {""})
+            vocabulary = (mujoco.mj_printSchema(False, False), keywords)
+            print(json.dumps(vocabulary), file=replies, flush=True)
             continue
         start = time.process_time()
         signal.setitimer(signal.ITIMER_PROF, seconds)
         reply = _compile(mujoco, path, texts)
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         print(json.dumps((*reply, time.process_time() - start)), file=replies, flush=True)
-
-
-def _vocabulary(mujoco: Any) -> tuple[str, list[str]]:
-    """The schema as it is printed, and the keywords that have a number in MuJoCo."""
-    enums = (enum for name, enum in vars(mujoco).items() if name.startswith("mjt"))
-    members = [name for enum in enums for name in getattr(enum, "__members__", ())]
-    keywords = sorted({name.partition("_")[2] for name in members} - {""})
-    return mujoco.mj_printSchema(False, False), keywords
 
 
 def _compile(mujoco: Any, path: str, texts: dict[str, str]) -> tuple[str, dict[str, Any] | None]:

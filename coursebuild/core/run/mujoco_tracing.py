@@ -64,26 +64,24 @@ def wrap(mujoco: ModuleType) -> None:
     for owner, name, before in class_readers:
         if hasattr(owner, name):
             setattr(owner, name, staticmethod(wrap_function(getattr(owner, name), before)))
+
+    def spec_reader(position: int) -> CallHook:
+        """Notes the files of the specification that is the argument at `position`."""
+        return lambda args, keywords: ModelFiles(_note_read).scan_spec(
+            _get_argument(args, keywords, position, "child")
+        )
+
+    def note_library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        if tracer is not None:
+            tracer.note_library(_decode(_get_argument(args, keywords, 0, "path", "directory")))
+
     for name, position in (("compile", 0), ("recompile", 0), ("attach", 1)):
-        wrap_method(spec, name, _spec_reader(position))
+        wrap_method(spec, name, spec_reader(position))
     wrap_method(spec, "to_file", _writer(1))
-    wrap_functions(mujoco, ("mj_loadPluginLibrary", "mj_loadAllPluginLibraries"), _note_library)
+    wrap_functions(mujoco, ("mj_loadPluginLibrary", "mj_loadAllPluginLibraries"), note_library)
     wrap_functions(mujoco, ("mju_getXMLDependencies",), reader(ModelFiles.scan_path))
     for name, position in _WRITERS:
         wrap_functions(mujoco, (name,), _writer(position))
-
-
-def _spec_reader(position: int) -> CallHook:
-    """Notes the files of the specification that is the argument at `position`."""
-    return lambda args, keywords: ModelFiles(_note_read).scan_spec(
-        _get_argument(args, keywords, position, "child")
-    )
-
-
-def _note_library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-    path = _decode(_get_argument(args, keywords, 0, "path", "directory"))
-    if tracer is not None:
-        tracer.note_library(path)
 
 
 def _writer(position: int) -> CallHook:

@@ -162,7 +162,8 @@ class _Watch:
         worst = int(parts.argmax())
         if not parts[worst] > DEEP:
             return
-        names = [_describe_geom(model, int(geom)) for geom in pairs[worst]]
+        geoms = [(int(geom), model.geom(int(geom)).name) for geom in pairs[worst]]
+        names = [f"`{name}`" if name else f"geom {number}" for number, name in geoms]
         self._note_once(data, "contact", f"{-distance[worst]:.2g}\x1f{names[0]}\x1f{names[1]}")
 
     def _note_once(self, data: Any, kind: str, detail: str) -> None:
@@ -178,7 +179,12 @@ class _Watch:
         tracer = mujoco_tracing.tracer
         if tracer is None or self._notes > _MOST_NOTES:
             return
-        path, line = _find_script_line(tracer.root)
+        place = _innermost_place(sys._getframe(), tracer.root)
+        if place is None:  # a thread of MuJoCo's own: it is that of the only thread that has one
+            places = [_innermost_place(f, tracer.root) for f in sys._current_frames().values()]
+            known_places = [place for place in places if place is not None]
+            place = known_places[0] if len(known_places) == 1 else ("", 0)
+        path, line = place
         parts = (kind, detail, time, model, path, str(line))
         fields = (part.replace("\t", " ").replace("\0", "") for part in parts)
         tracer.note("d" + "\t".join(fields))
@@ -242,25 +248,8 @@ def _name(data: Any) -> str:
     return "" if name == _DEFAULT_MODEL_NAME else name
 
 
-def _describe_geom(model: Any, index: int) -> str:
-    name = model.geom(index).name
-    return f"`{name}`" if name else f"geom {index}"
-
-
-def _find_script_line(root: str) -> tuple[str, int]:
-    """The path in the project and the number of the innermost line of a script that is executed.
-
-    A thread of MuJoCo's own has none; then it is that of the only thread that has one.
-    """
-    place = _innermost_place(sys._getframe(2), root)
-    if place is not None:
-        return place
-    places = [_innermost_place(frame, root) for frame in sys._current_frames().values()]
-    known_places = [place for place in places if place is not None]
-    return known_places[0] if len(known_places) == 1 else ("", 0)
-
-
 def _innermost_place(frame: FrameType | None, root: str) -> tuple[str, int] | None:
+    """The path in the project and the number of the innermost line of a script, if it has one."""
     while frame is not None:
         path = frame.f_code.co_filename.removeprefix(root)
         if path.startswith("examples/"):

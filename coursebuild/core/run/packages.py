@@ -310,7 +310,20 @@ def _create_environment(prefix: Path, engine: str) -> None:
         if configured.is_file():
             shutil.copyfile(configured, new / "pip.conf")
         python = str(new / "bin" / "python")
-        _install_engine(python, _packages(new), engine)
+        command = _install_command(python)
+        requirements, installed = {f"{_ENGINE}=={engine}"}, set[str]()
+        while requirements:
+            status, output = _run([*command, *sorted(requirements)])
+            if status:
+                raise _install_error(engine, output)
+            installed |= requirements
+            needs = {  # MuJoCo requires packages of its own, as `mujoco-core==4.0.0`
+                need
+                for distribution in importlib.metadata.distributions(path=[str(_packages(new))])
+                for need in distribution.requires or ()
+                if need.startswith(f"{_ENGINE}-") and "extra ==" not in need
+            }
+            requirements = needs - installed
         lines = (f"import site; site.addsitedir({folder!r})\n" for folder in site_folders())
         (_packages(new) / "packages_of_here.pth").write_text("".join(lines))
         status, output = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
@@ -324,28 +337,6 @@ def _create_environment(prefix: Path, engine: str) -> None:
         new.rename(prefix)
     finally:
         shutil.rmtree(new, ignore_errors=True)
-
-
-def _install_engine(python: str, packages: Path, engine: str) -> None:
-    """Install MuJoCo, and the packages of its own that it requires, and theirs in turn."""
-    command = _install_command(python)
-    requirements, installed = {f"{_ENGINE}=={engine}"}, set[str]()
-    while requirements:
-        status, output = _run([*command, *sorted(requirements)])
-        if status:
-            raise _install_error(engine, output)
-        installed |= requirements
-        requirements = _mujoco_requirements(packages) - installed
-
-
-def _mujoco_requirements(packages: Path) -> set[str]:
-    """The packages of MuJoCo's own that it requires, as `mujoco-core==4.0.0`."""
-    needs = {
-        need
-        for installed in importlib.metadata.distributions(path=[str(packages)])
-        for need in installed.requires or ()
-    }
-    return {need for need in needs if need.startswith(f"{_ENGINE}-") and "extra ==" not in need}
 
 
 def _install_error(engine: str, output: str) -> EffectError:

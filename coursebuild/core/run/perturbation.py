@@ -38,21 +38,12 @@ SIZE = 1e-12
 """Relative; for a state of zeros absolute, in the unit of the coordinate (rad, m)."""
 _CORRECTION = 1e-9
 """Changes below this part of the largest number of a field only correct a rounding."""
-_COMPUTING_FUNCTIONS = (
-    "mj_step",
-    "mj_step1",
-    "mj_forward",
-    "mj_forwardSkip",
-    "mj_inverse",
-    "mj_inverseSkip",
-    "mj_fwdPosition",
-    "mj_fwdKinematics",
-    "mj_kinematics",
-    "mj_collision",
-    "mj_energyPos",
-    "mj_energyVel",
-    "mjd_transitionFD",
-    "mjd_inverseFD",
+_COMPUTING_FUNCTIONS = tuple(
+    """
+    mj_step mj_step1 mj_forward mj_forwardSkip mj_inverse mj_inverseSkip mj_fwdPosition
+    mj_fwdKinematics mj_kinematics mj_collision mj_energyPos mj_energyVel mjd_transitionFD
+    mjd_inverseFD
+    """.split()
 )
 """Functions before which an initial state is complete."""
 _INTEGRATING = ("mj_step2", "mj_Euler", "mj_implicit", "mj_RungeKutta")

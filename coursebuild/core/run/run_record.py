@@ -89,7 +89,13 @@ def record_of(
 def to_bytes(record: RunRecord, places: Iterable[tuple[str, str]]) -> bytes:
     """A record as JSON; `places` are this machine's folders by name, longer ones first."""
     run = record.stored_run
-    run = replace(run, seconds=round(run.seconds, 4), stderr=_replace_places(run.stderr, places))
+    text = run.stderr.replace(_MARK, "\ufffd")
+    for name, folder in places:
+        if folder == "/":
+            continue  # every path begins with it
+        pattern = rf"(?<![\w./-]){re.escape(folder.rstrip('/'))}(?=[/\"'\s:,;)\]]|$)"
+        text = re.sub(pattern, f"{_MARK}{name}{_MARK}", text)
+    run = replace(run, seconds=round(run.seconds, 4), stderr=text)
     # Names of files may hold bytes that are no text; JSON can hold those as escapes only.
     return json.dumps(
         msgspec.to_builtins(replace(record, stored_run=run)), ensure_ascii=True
@@ -106,16 +112,6 @@ def from_bytes(data: bytes) -> RunRecord:
         return msgspec.json.decode(data, type=RunRecord)
     except msgspec.DecodeError:  # perhaps for an escape that is half a letter
         return msgspec.convert(json.loads(data), RunRecord)
-
-
-def _replace_places(text: str, places: Iterable[tuple[str, str]]) -> str:
-    text = text.replace(_MARK, "\ufffd")
-    for name, folder in places:
-        if folder == "/":
-            continue  # every path begins with it
-        pattern = rf"(?<![\w./-]){re.escape(folder.rstrip('/'))}(?=[/\"'\s:,;)\]]|$)"
-        text = re.sub(pattern, f"{_MARK}{name}{_MARK}", text)
-    return text
 
 
 # --- from notes to a trace
@@ -148,6 +144,10 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
                 )
     files = {_resolve(path, top) for path in values_by_kind["r"]}
     inside = {path.removeprefix(f"{top}/") for path in files if path.startswith(f"{top}/")}
+    sought_names: dict[str, set[str]] = defaultdict(set)  # by the folder where they are not
+    for record in values_by_kind["v"]:
+        folder, _, names = record.partition("\t")
+        sought_names[_make_relative(folder, top)].update(names.split(","))
     return Trace(
         files=tuple(sorted(inside - {os.path.normpath(script)})),
         folders=tuple(
@@ -160,7 +160,9 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
         effects=tuple(effects),
         is_perturbed=bool(values_by_kind["p"]),
         states=tuple(values_by_kind["s"]),
-        sought=_join_sought(values_by_kind["v"], top),
+        sought=tuple(
+            f"{folder}/{{{','.join(sorted(n))}}}" for folder, n in sorted(sought_names.items())
+        ),
     )
 
 
@@ -179,14 +181,3 @@ def _resolve(path: str, top: str) -> str:
             resolved = os.path.realpath(path)
             path = resolved if resolved.startswith(f"{top}/") else path
     return path
-
-
-def _join_sought(records: Iterable[str], top: str) -> tuple[str, ...]:
-    """The modules that were looked for in vain, as `folder/{one,two}`."""
-    names_by_folder: dict[str, set[str]] = defaultdict(set)
-    for record in records:
-        folder, _, names = record.partition("\t")
-        names_by_folder[_make_relative(folder, top)].update(names.split(","))
-    return tuple(
-        f"{folder}/{{{','.join(sorted(n))}}}" for folder, n in sorted(names_by_folder.items())
-    )

@@ -240,27 +240,17 @@ def visible_places(root: str, library: str, interpreter: Interpreter | None) -> 
     sources[f"{library}/mjcourse"] = f"{ours}/mjcourse"
     if interpreter is None:
         sources |= {path: path for path in site_folders()}
-    prefixes = (
-        (sys.prefix, sys.base_prefix)
-        if interpreter is None
-        else (interpreter.prefix, interpreter.base)
-    )
+        prefixes = (sys.prefix, sys.base_prefix)
+    else:
+        prefixes = (interpreter.prefix, interpreter.base)
     for prefix in prefixes:
-        sources |= _interpreter_parts(prefix, root)
+        # A course can name any folder of the machine, also by a link: it must hold an interpreter.
+        real = os.path.realpath(prefix)
+        marks = (Path(real, "pyvenv.cfg"), *Path(real).glob("lib/python3*/os.py"))
+        if any(mark.exists() for mark in marks) and not f"{real}/".startswith(f"{root}/"):
+            places = {real} if f"{prefix}/".startswith(f"{root}/") else {real, prefix}
+            sources |= {f"{at}/{p}": f"{real}/{p}" for at in places for p in _PYTHON_PARTS}
     return sources
-
-
-def _interpreter_parts(prefix: str, root: str) -> dict[str, str]:
-    """The parts of a folder that holds an interpreter; nothing where it holds none.
-
-    A course can name any folder of the machine, also by a link.
-    """
-    real = os.path.realpath(prefix)
-    is_interpreter = Path(real, "pyvenv.cfg").exists() or any(Path(real).glob("lib/python3*/os.py"))
-    if not is_interpreter or f"{real}/".startswith(f"{root}/"):
-        return {}
-    prefixes = {real} if f"{prefix}/".startswith(f"{root}/") else {real, prefix}
-    return {f"{at}/{part}": f"{real}/{part}" for at in prefixes for part in _PYTHON_PARTS}
 
 
 def special_files(sources: Mapping[str, str], copies: Iterable[tuple[str, str]]) -> dict[str, str]:

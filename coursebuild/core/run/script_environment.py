@@ -31,14 +31,7 @@ from coursebuild.core.model import Course, NamedPath
 from coursebuild.core.model.results import Machine
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 
-_SAYS_NOTHING = (
-    "PATH",
-    "HOME",
-    "USER",
-    "LOGNAME",
-    "VIRTUAL_ENV",
-    "CONDA_PREFIX",
-)
+_SAYS_NOTHING = tuple("PATH HOME USER LOGNAME VIRTUAL_ENV CONDA_PREFIX".split())
 """Variables about the user and the places of programs, which do not change a result."""
 _FIXED = {
     "LC_ALL": "C.UTF-8",

@@ -26,11 +26,7 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import CodeType, ModuleType
 from typing import Any, TypedDict
 
-from coursebuild.core.run import (
-    mujoco_tracing,
-    mujoco_watching,
-    perturbation,
-)
+from coursebuild.core.run import mujoco_tracing, mujoco_watching, perturbation
 from coursebuild.core.run.tracing import Tracer
 
 _IMPORTS = {"numpy": ("numpy", "numpy.random"), "mujoco": ("numpy", "mujoco")}
@@ -86,27 +82,26 @@ class PreloadedPackages:
 
     def load(self, packages: Sequence[str]) -> None:
         """Import packages."""
-        for package in packages:
-            if package not in self._groups:
-                self._load(package)
-
-    def _load(self, package: str) -> None:
-        before = set(sys.modules)
-        try:
-            for name in _IMPORTS[package]:
-                importlib.import_module(name)
-        except ModuleNotFoundError as error:  # a script that asks for it says so
-            self.is_broken = self.is_broken or error.name != package
-        except BaseException:
-            self.is_broken = True
         excluded = sys.stdlib_module_names | {"coursebuild"}
-        names = [n for n in sys.modules if n not in before and n.partition(".")[0] not in excluded]
-        new_modules = {name: sys.modules[name] for name in names}
-        group = self._groups.get("numpy", {}) if package == "mujoco" else {}
-        self._groups[package] = group | new_modules
-        if package == "mujoco" and "mujoco" in sys.modules:
-            mujoco_tracing.wrap(sys.modules["mujoco"])
-            mujoco_watching.watch(sys.modules["mujoco"])
+        for package in packages:
+            if package in self._groups:
+                continue
+            before = set(sys.modules)
+            try:
+                for name in _IMPORTS[package]:
+                    importlib.import_module(name)
+            except ModuleNotFoundError as error:  # a script that asks for it says so
+                self.is_broken = self.is_broken or error.name != package
+            except BaseException:
+                self.is_broken = True
+            new = [
+                n for n in sys.modules if n not in before and n.partition(".")[0] not in excluded
+            ]
+            group = self._groups.get("numpy", {}) if package == "mujoco" else {}
+            self._groups[package] = group | {name: sys.modules[name] for name in new}
+            if package == "mujoco" and "mujoco" in sys.modules:
+                mujoco_tracing.wrap(sys.modules["mujoco"])
+                mujoco_watching.watch(sys.modules["mujoco"])
 
     def names(self) -> frozenset[str]:
         """The top-level modules already loaded, which Python seeks in no folder any more."""
@@ -238,21 +233,17 @@ class ScriptProcess:
         return compile(text, self.path, "exec", dont_inherit=True)
 
     def _tracer(self) -> Tracer:
-        installed, root, library = _installed_folders(), self.job["root"], self.job["library"]
+        folders = {os.path.dirname(os.__file__), *site.getsitepackages()}  # noqa: PTH120
+        folders.update(f for f in sys.path if f.endswith(("/site-packages", "/dist-packages")))
+        if site.ENABLE_USER_SITE:
+            folders.add(site.getusersitepackages())
+        installed = sorted({f for folder in folders for f in (folder, os.path.realpath(folder))})
+        root, library = self.job["root"], self.job["library"]
         if "PYTHONPATH" in self._environment and not f"{library}/".startswith(f"{root}/"):
             installed.append(f"{library}/mjcourse")  # unless the project itself holds it
         temporary, writable = self._environment["TMPDIR"], self.job["writes"]
         overflow = notes_folder(temporary)
         return Tracer(root, temporary, installed, overflow, self._shared, writable)
-
-
-def _installed_folders() -> list[str]:
-    """The folders of Python's own modules and of installed packages, with and without links."""
-    folders = {os.path.dirname(os.__file__), *site.getsitepackages()}  # noqa: PTH120
-    folders.update(f for f in sys.path if f.endswith(("/site-packages", "/dist-packages")))
-    if site.ENABLE_USER_SITE:
-        folders.add(site.getusersitepackages())
-    return sorted({f for folder in folders for f in (folder, os.path.realpath(folder))})
 
 
 def notes_folder(temporary: str) -> str:

@@ -21,7 +21,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Self, TypeAlias
@@ -47,7 +47,7 @@ from coursebuild.core.run.script_environment import (
     wanted_packages,
 )
 from coursebuild.core.run.script_process import Job
-from coursebuild.core.run.script_worker import ChildReport, Enclose, Worker
+from coursebuild.core.run.script_worker import Enclose, Worker
 from coursebuild.core.run.watching import STDERR_KEPT
 
 OnStart: TypeAlias = Callable[[str], object]
@@ -62,14 +62,6 @@ RunAll: TypeAlias = Callable[..., tuple[ScriptRun, ...]]
 
 class RunStoppedError(Exception):
     """The caller no longer wants the results; the scripts that ran were ended."""
-
-
-def _ignore(value: object) -> None:
-    pass
-
-
-def _allow(job: ScriptJob) -> ScriptRun | bool:
-    return True
 
 
 _PATIENCE = 0.1
@@ -118,11 +110,11 @@ class ScriptServer:
         jobs: Sequence[ScriptJob],
         *,
         parallel: int,
-        on_start: OnStart = _ignore,
-        on_finish: OnFinish = _ignore,
+        on_start: OnStart = lambda _: None,
+        on_finish: OnFinish = lambda _: None,
         interpreter: Interpreter | None = None,
         is_unwanted: Callable[[frozenset[str]], bool] | None = None,
-        claim: Claim = _allow,
+        claim: Claim = lambda _: True,
     ) -> tuple[ScriptRun, ...]:
         """Run scripts; only one run at a time.
 
@@ -162,9 +154,9 @@ class ScriptServer:
     def _run(
         self, work: _Work, parallel: int, is_unwanted: Callable[[frozenset[str]], bool] | None
     ) -> None:
+        jobs, log = work.jobs, work.root / _LOG
         busy: dict[int, Worker] = {}
         """By the descriptors of their reports."""
-        log = work.root / _LOG
         had_log = os.path.lexists(log)
         try:
             while True:
@@ -176,10 +168,20 @@ class ScriptServer:
                     break
                 patience = None if is_unwanted is None and not work.pending else _PATIENCE
                 for ready in wait(busy, patience if self._sandbox is None else _VIGILANCE):
-                    self._handle_report(busy[ready], busy, work)  # type: ignore[index]
-                for worker in busy.values():
-                    work.enforce_limits(worker)
-                if is_unwanted is not None and is_unwanted(work.running_paths(busy.values())):
+                    worker = busy[ready]  # type: ignore[index]
+                    is_alive = work.read_report(worker)
+                    if is_alive and worker.job is not None:
+                        continue
+                    del busy[worker.reports]
+                    if is_alive and self._sandbox is None:
+                        self._idle.append(worker)
+                    else:
+                        worker.close()
+                running_jobs = [(w, jobs[w.job]) for w in busy.values() if w.job is not None]
+                for worker, job in running_jobs:
+                    worker.enforce_limits(job.timeout, job.memory)
+                paths = frozenset(job.path for _, job in running_jobs)
+                if is_unwanted is not None and is_unwanted(paths):
                     raise RunStoppedError
         finally:
             for worker in busy.values():
@@ -189,16 +191,6 @@ class ScriptServer:
             if not had_log:
                 with contextlib.suppress(OSError):
                     log.unlink()
-
-    def _handle_report(self, worker: Worker, busy: dict[int, Worker], work: _Work) -> None:
-        is_alive = work.read_report(worker)
-        if is_alive and worker.job is not None:
-            return
-        del busy[worker.reports]
-        if is_alive and self._sandbox is None:
-            self._idle.append(worker)
-        else:
-            worker.close()
 
     def _get_worker(self, work: _Work) -> Worker:
         """A supervisor that waits for a job: an idle or a new one."""
@@ -286,12 +278,6 @@ class _Work:
             self.on_start(self.jobs[index].path)
         worker.give(index, self._message(self.jobs[index]))
 
-    def enforce_limits(self, worker: Worker) -> None:
-        """End a supervisor's sandbox if it exceeds a limit of its job."""
-        if worker.job is not None:
-            job = self.jobs[worker.job]
-            worker.enforce_limits(job.timeout, job.memory)
-
     def read_report(self, worker: Worker) -> bool:
         """Read from a supervisor and finish its job if the report is complete.
 
@@ -323,20 +309,36 @@ class _Work:
         report = worker.take_report()
         if report is None:
             return
-        run = _script_run(str(self.root), self.jobs[index], report)
+        job = self.jobs[index]
+        parts = (None if part is None else part.encode("latin-1") for part in report.parts)
+        out, err, trace, *figures = parts
+        if out is None or err is None:
+            raise ValueError("a report without output")
+        stdout = out.decode("utf-8", "backslashreplace")
+        outcome = Outcome(report.outcome)
+        if outcome is Outcome.OK and stdout.encode() != out:
+            outcome = Outcome.ENCODING
+        if len(err) == STDERR_KEPT:  # a letter may be cut in two
+            err = err[next((i for i in range(4) if err[i] & 0xC0 != 0x80), 0) :]
+        named_figures = zip(job.figures, figures, strict=False)
+        run = ScriptRun(
+            job.path,
+            outcome,
+            report.status,
+            stdout.replace("\r\n", "\n"),
+            err.decode("utf-8", "backslashreplace").replace("\r\n", "\n"),
+            report.seconds,
+            missing=report.missing,
+            trace=read_records(trace, str(self.root), job.path) if trace else None,
+            figures=tuple((name, data) for name, data in named_figures if data is not None),
+        )
         if self.sandbox is not None and run.trace is not None:
-            reason = run.trace.opaque or sandbox_difference(
-                self.jobs[index], run.trace, self.sources
-            )
+            reason = run.trace.opaque or sandbox_difference(job, run.trace, self.sources)
             run = replace(run, trace=replace(run.trace, opaque=reason))
         worker.job, worker.is_reused = None, False
         self._finish(index, run)
         if self.sandbox is None and (next_index := self.take_job()) is not None:
             self.give(worker, next_index)
-
-    def running_paths(self, busy: Iterable[Worker]) -> frozenset[str]:
-        """The paths of the scripts that these supervisors run."""
-        return frozenset(self.jobs[w.job].path for w in busy if w.job is not None)
 
     def _message(self, job: ScriptJob) -> bytes:
         request: Job = {
@@ -370,31 +372,6 @@ def _package_states(interpreter: Interpreter | None) -> tuple[object, ...]:
         with contextlib.suppress(OSError):
             states.append((folder, Path(folder).stat().st_mtime_ns))
     return tuple(states)
-
-
-def _script_run(root: str, job: ScriptJob, report: ChildReport) -> ScriptRun:
-    parts = (None if part is None else part.encode("latin-1") for part in report.parts)
-    out, err, trace, *figures = parts
-    if out is None or err is None:
-        raise ValueError("a report without output")
-    stdout = out.decode("utf-8", "backslashreplace")
-    outcome = Outcome(report.outcome)
-    if outcome is Outcome.OK and stdout.encode() != out:
-        outcome = Outcome.ENCODING
-    if len(err) == STDERR_KEPT:
-        err = err[next((i for i in range(4) if err[i] & 0xC0 != 0x80), 0) :]  # a letter cut in two
-    named_figures = zip(job.figures, figures, strict=False)
-    return ScriptRun(
-        job.path,
-        outcome,
-        report.status,
-        stdout.replace("\r\n", "\n"),
-        err.decode("utf-8", "backslashreplace").replace("\r\n", "\n"),
-        report.seconds,
-        missing=report.missing,
-        trace=read_records(trace, root, job.path) if trace else None,
-        figures=tuple((name, data) for name, data in named_figures if data is not None),
-    )
 
 
 def _lost_run(path: str, status: int, excess: tuple[Outcome, str] | None) -> ScriptRun:

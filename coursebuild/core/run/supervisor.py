@@ -51,12 +51,7 @@ from coursebuild.core.run.script_process import (
     figure_path,
     notes_folder,
 )
-from coursebuild.core.run.watching import (
-    STDERR_KEPT,
-    STDOUT_LIMIT,
-    RunningScript,
-    has_ended,
-)
+from coursebuild.core.run.watching import STDERR_KEPT, STDOUT_LIMIT, RunningScript, has_ended
 
 LENGTH = struct.Struct(">I")
 STARTED = LENGTH.pack(0)
@@ -149,14 +144,19 @@ class _Supervisor:
 
     def work(self) -> ScriptProcess | None:
         """Serve until the input closes; in the process of a script, return the script."""
-        while (message := _receive(self.jobs)) is not None:
+        while True:
+            with open(self.jobs, "rb", closefd=False) as pipe:  # no job follows before the report
+                header = pipe.read(LENGTH.size)
+                length = LENGTH.unpack(header)[0] if len(header) == LENGTH.size else -1
+                message = pipe.read(max(length, 0))
+            if len(message) != length:
+                return None
             job: Job = json.loads(message)
             self.scratch = job["scratch"]
             answer = self._serve(job)
             if isinstance(answer, ScriptProcess):
                 return answer
             _send(self.reports, answer)
-        return None
 
     def _serve(self, job: Job) -> bytes | ScriptProcess:
         """The report on a script; in the process of the script, the script itself."""
@@ -243,7 +243,11 @@ class _Supervisor:
 
     def _can_fork(self, job: Job) -> bool:
         """Whether this script cannot tell a copy of this process from a fresh interpreter."""
-        if not self.may_fork or self.preloaded.is_broken or _has_threads():
+        try:
+            threads = len(os.listdir("/proc/self/task"))  # noqa: PTH208 (here time counts)
+        except OSError:
+            return False
+        if not self.may_fork or self.preloaded.is_broken or threads > 1:
             return False
         return _sibling_names(job).isdisjoint(self.preloaded.names())
 
@@ -309,12 +313,6 @@ def _read_notes(shared: mmap.mmap | None, overflow: str) -> bytes:
                 if path.is_file():
                     parts.append(path.read_bytes())
     return b"\0".join(parts)
-
-
-def _has_threads() -> bool:
-    with contextlib.suppress(OSError):
-        return len(os.listdir("/proc/self/task")) > 1  # noqa: PTH208 (here time counts)
-    return True
 
 
 def missing_modules(names: Sequence[str], folders: Sequence[str], library: str) -> list[str]:
@@ -397,15 +395,6 @@ def _report(
     }
     data = json.dumps(report, ensure_ascii=False).encode()
     return LENGTH.pack(len(data)) + data
-
-
-def _receive(fd: int) -> bytes | None:
-    """The next message, `None` at the end; the tool sends no other before the report."""
-    with open(fd, "rb", closefd=False) as pipe:
-        header = pipe.read(LENGTH.size)
-        length = LENGTH.unpack(header)[0] if len(header) == LENGTH.size else -1
-        message = pipe.read(max(length, 0))
-    return message if len(message) == length else None
 
 
 def _send(fd: int, data: bytes) -> None:

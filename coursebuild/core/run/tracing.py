@@ -348,7 +348,7 @@ class Tracer:
             return None
         if not path.startswith("/"):
             path = f"{posix.getcwd()}/{path}"
-        full_path = _normalize(path)
+        full_path = "/" + normpath(path).lstrip("/")
         if full_path.startswith(self._ignored) or full_path == self.temporary[:-1]:
             return None
         if (
@@ -399,11 +399,6 @@ class Tracer:
                 posix.close(fd)
         finally:
             self._is_spilling = False
-
-
-def _normalize(path: str) -> str:
-    """An absolute path without `.`, `..` and repeated slashes."""
-    return "/" + normpath(path).lstrip("/")
 
 
 def _join_descriptor(folder: object, path: object) -> object:

@@ -292,7 +292,15 @@ class MathEngine:
                 scripts = (temml, Path(__file__).with_name("typeset.js"))
                 self._isolate = Isolate(*(path.read_text(encoding="utf-8") for path in scripts))
             replies = json.loads(self._isolate.call("typeset", request, seconds))
-            yield from (_result(f, reply) for f, reply in zip(formulas, replies, strict=True))
+            for formula, reply in zip(formulas, replies, strict=True):
+                if isinstance(reply, str):
+                    yield reply
+                    continue
+                position = reply["position"]
+                if position is not None:  # in UTF-16 units
+                    units = formula.tex.encode("utf-16-le", "surrogatepass")[: 2 * position]
+                    position = len(units.decode("utf-16-le", "ignore"))
+                yield MathError(readable(reply["message"]), position)
         except LimitError as error:
             self.close()
             if len(formulas) > 1:
@@ -300,16 +308,6 @@ class MathEngine:
                     yield from self._batch([formula])
             else:
                 yield MathError(f"the formula {error}", None)
-
-
-def _result(formula: Formula, reply: str | dict[str, Any]) -> str | MathError:
-    if isinstance(reply, str):
-        return reply
-    position = reply["position"]
-    if position is not None:  # in UTF-16 units
-        units = formula.tex.encode("utf-16-le", "surrogatepass")[: 2 * position]
-        position = len(units.decode("utf-16-le", "ignore"))
-    return MathError(readable(reply["message"]), position)
 
 
 _WORDING = (

@@ -190,7 +190,9 @@ def pair(
         rows, columns = range(i0, i1), range(j0, j1)
         if len(rows) * len(columns) <= _CELLS:
             pairs += _best_pairs(rows, columns, weight, is_free)
-        elif blocks := _equal_blocks(left[i0:i1], right[j0:j1]):
+            continue
+        matcher = difflib.SequenceMatcher(None, left[i0:i1], right[j0:j1])
+        if blocks := matcher.get_matching_blocks()[:-1]:
             for block in blocks:
                 i, j = rows[block.a], columns[block.b]
                 pairs += [(i + k, j + k) for k in range(block.size)]
@@ -228,8 +230,3 @@ def _best_pairs(rows: range, columns: range, weight: Weight, is_free: Sequence[b
         else:
             i += 1
     return pairs
-
-
-def _equal_blocks(left: Sequence[str], right: Sequence[str]) -> Sequence[difflib.Match]:
-    """Runs of items that are equal on both sides, in order; frequent items begin none."""
-    return difflib.SequenceMatcher(None, left, right).get_matching_blocks()[:-1]

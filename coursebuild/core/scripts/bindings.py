@@ -27,7 +27,7 @@ What a binding that does not hold is told (`_mismatch`):
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from decimal import Context, Decimal
 from typing import TypeAlias
 
@@ -38,7 +38,6 @@ from coursebuild.core.model import (
     Document,
     Mode,
     NumberBinding,
-    Script,
     Table,
     document_scripts,
     find_inlines,
@@ -56,7 +55,6 @@ from coursebuild.core.scripts.bound_numbers import (
 from coursebuild.core.scripts.lines import canonicalize
 from coursebuild.core.scripts.numbers import Number, difference
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
-from coursebuild.core.text.source import Span
 
 _SILENT_OUTCOMES = (
     Outcome.FAILED,
@@ -176,9 +174,15 @@ def check_bindings(
         key = outputs.key(binding)
         finding = _check(binding, outputs, evidence.get(key, ()))
         if isinstance(finding, Diagnostic):
-            script = None if key in evidence else _script_between(document, binding, outputs)
-            if finding.rule == "binding-mismatch" and script is not None:
-                help = f"if `{script.path}` prints it, record its output above the number"
+            verdicts = [] if binding.script is not None else outputs.of_binding(binding)
+            start = _end_of_body(verdicts[0]) if verdicts else binding.span.start
+            scripts = [  # between it and the output further up that it depends on
+                script
+                for script in document_scripts(document)
+                if start < script.span.start < binding.span.start
+            ]
+            if finding.rule == "binding-mismatch" and scripts and key not in evidence:
+                help = f"if `{scripts[-1].path}` prints it, record its output above the number"
                 finding = replace(finding, help=help, edits=())
             diagnostics.append(finding)
         elif finding:
@@ -230,16 +234,6 @@ def _check(
     return _mismatch(binding, path, lines, before)
 
 
-def _script_between(
-    document: Document, binding: NumberBinding, outputs: PrintedOutputs
-) -> Script | None:
-    """The last script between a binding and the output further up that the binding depends on."""
-    verdicts = [] if binding.script is not None else outputs.of_binding(binding)
-    start = _end_of_body(verdicts[0]) if verdicts else binding.span.start
-    scripts = [s for s in document_scripts(document) if start < s.span.start < binding.span.start]
-    return scripts[-1] if scripts else None
-
-
 def _holds(bound_text: BoundText, lines: Sequence[PrintedLine]) -> bool:
     if bound_text.numbers:
         return bound_text.is_in(lines)
@@ -274,23 +268,17 @@ def dependent_bindings(
     dependents: list[DependentBinding] = []
     for binding in (b for document in documents for b in document_bindings(document)):
         if any(_recording_key(candidate) == key for candidate in outputs.of_binding(binding)):
-            spans = [(span.start, span.end) for span in _dependence_spans(binding, lines)]
+            bound_text = BoundText.of(binding.text)
+            places = text_places(bound_text.before, lines)
+            if bound_text.numbers:
+                windows = filter(bound_text.shows, bound_text.windows(lines))
+                places = ((w.line, n.start, n.end) for w in windows for n in w.numbers)
+            located = (line.locate(a, b) for line, a, b in places if line.locate is not None)
+            spans = [(span.start, span.end) for span in located]
             overlap = (c for a, b in spans for c in changes if a < c.span.end and c.span.start < b)
             change = next(overlap, None)
             dependents += [] if change is None else [DependentBinding(binding, change)]
     return tuple(dependents)
-
-
-def _dependence_spans(binding: NumberBinding, lines: Sequence[PrintedLine]) -> Iterator[Span]:
-    """Where the numbers or the text of a binding stand in a recorded output."""
-    bound_text = BoundText.of(binding.text)
-    places = text_places(bound_text.before, lines)
-    if bound_text.numbers:
-        windows = filter(bound_text.shows, bound_text.windows(lines))
-        places = ((w.line, number.start, number.end) for w in windows for number in w.numbers)
-    for line, start, end in places:
-        if line.locate is not None:
-            yield line.locate(start, end)
 
 
 _QUOTIENT = Context(prec=34)

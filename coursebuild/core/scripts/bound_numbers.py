@@ -15,13 +15,7 @@ from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.scripts.lines import MappedText, Side, plain_text, replace_ranges
-from coursebuild.core.scripts.numbers import (
-    Number,
-    round_like,
-    scan,
-    scan_prose,
-    within_half_unit,
-)
+from coursebuild.core.scripts.numbers import Number, round_like, scan, scan_prose, within_half_unit
 from coursebuild.core.scripts.tables import RowCell, table_rows
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -151,7 +145,7 @@ class BoundText(Struct, frozen=True):
     def stray(self) -> str:
         """A sign beside the numbers that is neither a unit nor a word, as in `-9.81-`."""
         texts = (self.before.strip(), self.after.strip())
-        return next(filter(re.compile(r"[-+*/.,;:=_]+").fullmatch, texts), "")
+        return next(filter(_STRAY.fullmatch, texts), "")
 
     def _windows(self, lines: Iterable[PrintedLine]) -> Iterator[Window]:
         """All runs of as many printed numbers of one line."""

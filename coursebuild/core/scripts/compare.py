@@ -110,9 +110,19 @@ class _ChangeFinder(Struct, frozen=True):
                     for step in group:
                         yield from self._line(step)
                 case StepKind.MISSING:
-                    yield self._missing(list(group))
+                    missing = [step.recorded for step in group]
+                    start, _ = self.recorded.origin(missing[0], 0, 0)
+                    span = self._span(start, self._end_of(missing[-1]))
+                    text = "\n".join(self.recorded.lines[line] for line in missing)
+                    yield Change(DriftKind.MISSING, span, text, "")
                 case StepKind.EXTRA:
-                    yield self._extra(list(group))
+                    extra = list(group)
+                    text = "\n".join(self.printed.lines[step.printed] for step in extra)
+                    before, count = extra[0].recorded, len(self.recorded.lines)
+                    place = self._end_of(count - 1)
+                    if before < count:
+                        place = self.recorded.origin(before, 0, 0)[0]
+                    yield Change(DriftKind.EXTRA, self._span(place, place), "", text)
                 case _:
                     pass
 
@@ -130,18 +140,6 @@ class _ChangeFinder(Struct, frozen=True):
                 yield number_change(span, *texts, d.numbers)
             else:
                 yield Change(DriftKind.TEXT, span, *texts)
-
-    def _missing(self, steps: Sequence[Step]) -> Change:
-        start, _ = self.recorded.origin(steps[0].recorded, 0, 0)
-        text = "\n".join(self.recorded.lines[step.recorded] for step in steps)
-        span = self._span(start, self._end_of(steps[-1].recorded))
-        return Change(DriftKind.MISSING, span, text, "")
-
-    def _extra(self, steps: Sequence[Step]) -> Change:
-        text = "\n".join(self.printed.lines[step.printed] for step in steps)
-        before, lines = steps[0].recorded, len(self.recorded.lines)
-        place = self.recorded.origin(before, 0, 0)[0] if before < lines else self._end_of(lines - 1)
-        return Change(DriftKind.EXTRA, self._span(place, place), "", text)
 
     def _end_of(self, line: int) -> int:
         """Where a recorded line ends; 0 where none is recorded."""
@@ -166,11 +164,28 @@ def repeat_findings(
 ) -> tuple[Diagnostic, ...]:
     """A warning for each script; `differing_runs` are pairs of a remembered run and a new one."""
     by_path = {extraction.path: extraction for extraction in extractions}
-    return tuple(
-        _unrepeatable(by_path[now.path], before, now)
-        for before, now in differing_runs
-        if now.path in by_path and not _may_differ(course, before, now)
-    )
+    diagnostics: list[Diagnostic] = []
+    for before, now in differing_runs:
+        if now.path not in by_path or _may_differ(course, before, now):
+            continue
+        notes = []
+        if (before.outcome, before.status) != (now.outcome, now.status):
+            ends = f"before {_describe_end(before)}, now {_describe_end(now)}"
+            notes.append(Note(f"it ended otherwise: {ends}"))
+        if diff := text_diff(before.stdout, now.stdout):
+            notes.append(Note("its output:\n" + diff))
+        diagnostics.append(
+            diagnose(
+                "script-unrepeatable",
+                by_path[now.path].script.span.first_line(),
+                f"`{now.path}` behaves differently than before, though nothing that "
+                "it is known to depend on has changed",
+                help="make it do the same each time (a fixed seed, no clock, files that it opens "
+                "itself), or put `volatile` on its output",
+                notes=notes,
+            )
+        )
+    return tuple(diagnostics)
 
 
 def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
@@ -189,26 +204,6 @@ def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
     )
 
 
-def _unrepeatable(extraction: Extraction, before: ScriptRun, now: ScriptRun) -> Diagnostic:
-    notes = []
-    if (before.outcome, before.status) != (now.outcome, now.status):
-        notes.append(
-            Note(f"it ended otherwise: before {_describe_end(before)}, now {_describe_end(now)}")
-        )
-    diff = text_diff(before.stdout, now.stdout)
-    if diff:
-        notes.append(Note("its output:\n" + diff))
-    return diagnose(
-        "script-unrepeatable",
-        extraction.script.span.first_line(),
-        f"`{extraction.path}` behaves differently than before, though nothing that "
-        "it is known to depend on has changed",
-        help="make it do the same each time (a fixed seed, no clock, files that it opens itself), "
-        "or put `volatile` on its output",
-        notes=notes,
-    )
-
-
 def _describe_end(run: ScriptRun) -> str:
     return f"{run.outcome.value} ({run.status})" if run.status else run.outcome.value
 
@@ -222,16 +217,31 @@ def instability_diagnostic(
     """
     steps = align(first, second, LineMatcher(comparison))
     different_steps = [step for step in steps if step.kind in _DIFFERENT]
-    notes = [
-        Note(_describe_difference(step, first, second)) for step in different_steps[:_MAX_NOTES]
-    ]
+    notes = []
+    for step in different_steps[:_MAX_NOTES]:
+        if step.kind is StepKind.MISSING:
+            line = quote(first.lines[step.recorded], _WIDTH)
+            notes.append(Note(f"{line} was printed in the first run only"))
+        elif step.kind is StepKind.EXTRA:
+            line = quote(second.lines[step.printed], _WIDTH)
+            notes.append(Note(f"{line} was printed in the second run only"))
+        else:
+            number = second.raw_line(step.printed)
+            lines = (first.lines[step.recorded], second.lines[step.printed])
+            a, b = (quote(line, _WIDTH) for line in lines)
+            notes.append(Note(f"line {number}: {a} in one run, {b} in the next"))
     if (rest := len(different_steps) - _MAX_NOTES) > 0:
         notes.append(Note(f"and {rest} more {'line' if rest == 1 else 'lines'}"))
     help = _TABLE_HELP if isinstance(recording.body, Table) else _HELP
     if isinstance(recording.body, Excerpt) and (
         pattern := varying_times(first, second, comparison)
     ):
-        edit = _make_volatile(recording, pattern)
+        source, end = recording.body_span.source, recording.body_span.start - 1
+        start = source.line_starts[source.position(end)[0] - 1]
+        line = source.text[start:end].rstrip()
+        key = re.search(r'\svolatile="[^"]*"', line)
+        place = key.span() if key else (len(line), len(line))
+        edit = Edit(source.span(start + place[0], start + place[1]), f' volatile="{pattern}"')
         help = Fix(f'a time varies: say `volatile="{pattern}"` on the fence', edits=(edit,))
     return diagnose(
         "output-unstable",
@@ -242,16 +252,6 @@ def instability_diagnostic(
     )
 
 
-def _make_volatile(recording: Recording, pattern: str) -> Edit:
-    """The edit that says on a fence what varies, in the place of what it says so far."""
-    source, end = recording.body_span.source, recording.body_span.start - 1
-    start = source.line_starts[source.position(end)[0] - 1]
-    line = source.text[start:end].rstrip()
-    key = re.search(r'\svolatile="[^"]*"', line)
-    place = key.span() if key else (len(line), len(line))
-    return Edit(source.span(start + place[0], start + place[1]), f' volatile="{pattern}"')
-
-
 _REPEAT_HELP = "make the script print the same each time (a fixed seed, no clock)"
 _HELP = (
     f'{_REPEAT_HELP}, or say what varies by `volatile="…"` on the fence, or by `ellipsis` and `...`'
@@ -260,16 +260,6 @@ _TABLE_HELP = f"{_REPEAT_HELP}, or record the output in a `text` fence with `vol
 
 
 _DIFFERENT = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
-
-
-def _describe_difference(step: Step, first: Side, second: Side) -> str:
-    if step.kind is StepKind.MISSING:
-        return f"{quote(first.lines[step.recorded], _WIDTH)} was printed in the first run only"
-    if step.kind is StepKind.EXTRA:
-        return f"{quote(second.lines[step.printed], _WIDTH)} was printed in the second run only"
-    a, b = first.lines[step.recorded], second.lines[step.printed]
-    number = second.raw_line(step.printed)
-    return f"line {number}: {quote(a, _WIDTH)} in one run, {quote(b, _WIDTH)} in the next"
 
 
 Status: TypeAlias = Literal["same", "changed", "fails", "unclear", "drifted", "uncompared"]
@@ -303,25 +293,19 @@ def run_standings(
     verdicts: dict[str, list[Verdict]] = {}
     for verdict in verify(course, runs):
         verdicts.setdefault(verdict.recording.script or "", []).append(verdict)
-    return {
-        run.path: _compare_with_recordings(run, verdicts[run.path])
-        if run.path in verdicts
-        else _compare_with_current(course, current_runs[run.path], run)
-        for run in runs
-    }
-
-
-def _compare_with_recordings(run: ScriptRun, verdicts: Iterable[Verdict]) -> RunStanding:
-    compared = [verdict for verdict in verdicts if verdict.status != "volatile"]
-    return RunStanding(
-        run, bool(compared), tuple(c for verdict in compared for c in verdict.changes)
-    )
-
-
-def _compare_with_current(course: Course, current_run: ScriptRun, run: ScriptRun) -> RunStanding:
-    current, new = (Side.of(run.stdout, course.filters) for run in (current_run, run))
-    is_same = same_lines(current, new, course.comparison)
-    return RunStanding(run, True, diff="" if is_same else text_diff(current_run.stdout, run.stdout))
+    standings: dict[str, RunStanding] = {}
+    for run in runs:
+        if run.path in verdicts:
+            compared = [v for v in verdicts[run.path] if v.status != "volatile"]
+            changes = tuple(change for verdict in compared for change in verdict.changes)
+            standings[run.path] = RunStanding(run, bool(compared), changes)
+        else:
+            old, new = current_runs[run.path].stdout, run.stdout
+            current_side, new_side = (Side.of(text, course.filters) for text in (old, new))
+            is_same = same_lines(current_side, new_side, course.comparison)
+            diff = "" if is_same else text_diff(old, new)
+            standings[run.path] = RunStanding(run, True, diff=diff)
+    return standings
 
 
 def judge_comparability(standing: RunStanding) -> Judgement | None:

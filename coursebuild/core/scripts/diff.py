@@ -202,9 +202,11 @@ def diff_rows(verdict: Verdict, stdout: str) -> tuple[DiffRow, ...]:
     """
     body = verdict.recording.body
     if isinstance(body, Table):
-        return tuple(
-            row for change in verdict.changes for row in _cell_rows(change.recorded, change.printed)
-        )
+        cells: list[DiffRow] = []
+        for change in verdict.changes:
+            cells += [_row("-", text) for text in change.recorded.split("\n") if change.recorded]
+            cells += [_row("+", text) for text in change.printed.split("\n") if change.printed]
+        return tuple(cells)
     matcher, filters = LineMatcher(verdict.comparison), verdict.comparison.filters
     recorded, printed = Side.of(body.text, filters), Side.of(stdout, filters)
     steps = align(recorded, printed, matcher)
@@ -212,11 +214,6 @@ def diff_rows(verdict: Verdict, stdout: str) -> tuple[DiffRow, ...]:
     # Between two common lines, all removed lines come before all added ones.
     hunks = (list(group) for _, group in groupby(rows, key=lambda row: row[0] == " "))
     return tuple(row for hunk in hunks for row in sorted(hunk, key=lambda r: r[0], reverse=True))
-
-
-def _cell_rows(recorded: str, printed: str) -> Iterator[DiffRow]:
-    yield from (_row("-", text) for text in recorded.split("\n") if recorded)
-    yield from (_row("+", text) for text in printed.split("\n") if printed)
 
 
 def _step_rows(

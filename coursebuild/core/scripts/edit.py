@@ -54,8 +54,8 @@ from coursebuild.core.scripts.lines import (
     replace_ranges,
     same_number,
 )
-from coursebuild.core.scripts.numbers import Number, round_like
-from coursebuild.core.scripts.tables import RowCell, RowMatch, TableMatcher, table_rows
+from coursebuild.core.scripts.numbers import round_like
+from coursebuild.core.scripts.tables import RowCell, TableMatcher, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -100,27 +100,6 @@ def update_body(
     recorded, printed = (Side.of(text, filters) for text in (body.text, stdout))
     if same_lines(recorded, printed, comparison):
         return None
-    lines = _new_lines(body, recorded, printed, comparison)
-    if isinstance(lines, Diagnostic):
-        return lines
-    return _fence_edit(recording, lines)
-
-
-def refusal(span: Span, message: str, help_text: str, label: str = "") -> Diagnostic:
-    """An output that cannot be brought up to date."""
-    return diagnose("output-not-updatable", span, message, label=label, help=help_text)
-
-
-# ------------------------------------------------------------------------------------ new lines
-
-
-def _new_lines(
-    body: Excerpt,
-    recorded: Side,
-    printed: Side,
-    comparison: Comparison,
-) -> list[str] | Diagnostic:
-    """The lines to record; they match the run."""
     candidates: list[list[str]] = []
     if comparison.filters or comparison.ellipsis:
         updated_lines = _update_lines(body, recorded, printed, LineMatcher(comparison))
@@ -130,13 +109,21 @@ def _new_lines(
     if not comparison.ellipsis:
         candidates.append(list(Side.of(printed.raw).lines))
     for lines in candidates:
-        if same_lines(Side.of("\n".join(lines), comparison.filters), printed, comparison):
-            return lines
+        if same_lines(Side.of("\n".join(lines), filters), printed, comparison):
+            return _fence_edit(recording, lines)
     return refusal(
         body.span().first_line(),
         "no text was found that matches what the script prints",
         "bring it up to date by hand: a `...` or a filter is in the way",
     )
+
+
+def refusal(span: Span, message: str, help_text: str, label: str = "") -> Diagnostic:
+    """An output that cannot be brought up to date."""
+    return diagnose("output-not-updatable", span, message, label=label, help=help_text)
+
+
+# ------------------------------------------------------------------------------------ new lines
 
 
 def _update_lines(
@@ -293,59 +280,38 @@ def _update_table(table: Table, comparison: Comparison, stdout: str) -> Edit | D
     rows: list[tuple[RowCell, ...]] = []
     edits: list[Edit] = []
     for match in matches:
-        row = _update_row(match, comparison)
-        if isinstance(row, Diagnostic):
-            return row
-        cells, row_edits = row
-        rows.append(cells)
-        edits += row_edits
+        if match.line < 0:
+            span = match.row[0].cell.span.to(match.row[-1].cell.span)
+            return _refuse(span, "no line of this run has the cells of this row in order")
+        places: dict[int, list[tuple[int, int, str]]] = {id(cell): [] for cell in match.row}
+        for cell, old, new in match.pairs:
+            if same_number(old, new, comparison):
+                continue
+            span, text = cell.span(old), new.text
+            if span.text.replace(MINUS, "-") != old.text:
+                reason = "a number written with an entity or an escape cannot be replaced"
+                return _refuse(span, reason)
+            if comparison.mode is Mode.DIGITS and old.is_inexact and new.place < old.place:
+                text = round_like(old, new.value) or text
+            places[id(cell)].append((old.start, old.end, text))
+            edits.append(Edit(span, _with_signs_of(span.text, text)))
+        texts = ((cell, replace_ranges(cell.mapped.text, places[id(cell)])) for cell in match.row)
+        rows.append(tuple(replace(cell, canonical=canonicalize(text)) for cell, text in texts))
     if TableMatcher(rows, printed, comparison).find_matching_lines() is None:
         span = table.span if not edits else edits[0].span
         return _refuse(span, "the table cannot be made to match what the script prints")
-    return _join_edits(edits) if edits else None
-
-
-def _update_row(
-    match: RowMatch, comparison: Comparison
-) -> tuple[tuple[RowCell, ...], list[Edit]] | Diagnostic:
-    """A row with the numbers of its line, and the edits that make it so."""
-    if match.line < 0:
-        span = match.row[0].cell.span.to(match.row[-1].cell.span)
-        return _refuse(span, "no line of this run has the cells of this row in order")
-    edits: list[Edit] = []
-    places: dict[int, list[tuple[int, int, str]]] = {id(cell): [] for cell in match.row}
-    for cell, recorded, printed in match.pairs:
-        if same_number(recorded, printed, comparison):
-            continue
-        span = cell.span(recorded)
-        if span.text.replace(MINUS, "-") != recorded.text:
-            return _refuse(span, "a number written with an entity or an escape cannot be replaced")
-        new = _format_like(recorded, printed, comparison)
-        places[id(cell)].append((recorded.start, recorded.end, new))
-        edits.append(Edit(span, _with_signs_of(span.text, new)))
-    texts = ((cell, replace_ranges(cell.mapped.text, places[id(cell)])) for cell in match.row)
-    return tuple(replace(cell, canonical=canonicalize(text)) for cell, text in texts), edits
+    if not edits:
+        return None
+    whole = edits[0].span.to(edits[-1].span)
+    at = whole.start
+    ranges = ((edit.span.start - at, edit.span.end - at, edit.text) for edit in edits)
+    return Edit(whole, replace_ranges(whole.text, ranges))
 
 
 def _with_signs_of(old: str, new: str) -> str:
     """The new number with the minus signs of the old one: before it, and in its exponent."""
     parts = zip_longest(*(re.split("(?=[eE])", text) for text in (old, new)), fillvalue="")
     return "".join(part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
-
-
-def _format_like(recorded: Number, printed: Number, comparison: Comparison) -> str:
-    """A printed number as the table shows it."""
-    if comparison.mode is Mode.DIGITS and recorded.is_inexact and printed.place < recorded.place:
-        return round_like(recorded, printed.value) or printed.text
-    return printed.text
-
-
-def _join_edits(edits: Sequence[Edit]) -> Edit:
-    """One edit that does what several do, in order."""
-    whole = edits[0].span.to(edits[-1].span)
-    at = whole.start
-    places = ((edit.span.start - at, edit.span.end - at, edit.text) for edit in edits)
-    return Edit(whole, replace_ranges(whole.text, places))
 
 
 def _refuse(span: Span, message: str) -> Diagnostic:

@@ -97,17 +97,6 @@ def _find_innermost_line(stderr: str, scripts: Scripts) -> tuple[Extraction, Spa
     return next(filter(None, lines), None)
 
 
-def _name_lesson_lines(text: str, scripts: Scripts) -> str:
-    """The text with paths and lines of extracted files replaced by those of lessons."""
-
-    def translate(form: str, match: re.Match[str]) -> str:
-        line = _find_line(match, scripts)
-        return form.format(line[1].path, line[1].line) if line else match.group()
-
-    text = _FRAME.sub(partial(translate, 'File "{}", line {}'), text)
-    return _WARNING.sub(partial(translate, "{}:{}"), text)
-
-
 def without_indentation(span: Span) -> Span:
     """A line from its first letter on."""
     lead = len(span.text) - len(span.text.lstrip())
@@ -152,7 +141,7 @@ def failure_diagnostic(
             packages = [*extraction.packages, folder]
             line = f"packages = {msgspec.json.encode(packages).decode()}".replace(",", ", ")
             help = f"`{file}` is there: add `{line}` to `[course]` in the map"
-    notes = _stderr_notes(run.outcome, _name_lesson_lines(stderr, scripts))
+    notes = _stderr_notes(run.outcome, stderr, scripts)
     if source.path != extraction.path:
         notes.insert(0, Note(f"`{extraction.path}` was running", fence))
     return diagnose(rule, span, message, label=label, help=help, notes=notes)
@@ -219,9 +208,15 @@ def _last_message(stderr: str) -> str:
     return lines[-1] if lines else ""
 
 
-def _stderr_notes(outcome: Outcome, text: str) -> list[Note]:
-    """The end of the standard error."""
-    text = text.rstrip()
+def _stderr_notes(outcome: Outcome, text: str, scripts: Scripts) -> list[Note]:
+    """The end of the standard error, with lines of lessons in place of those of their scripts."""
+
+    def translate(form: str, match: re.Match[str]) -> str:
+        line = _find_line(match, scripts)
+        return form.format(line[1].path, line[1].line) if line else match.group()
+
+    text = _FRAME.sub(partial(translate, 'File "{}", line {}'), text)
+    text = _WARNING.sub(partial(translate, "{}:{}"), text).rstrip()
     text = _NOISE.sub("", text.removeprefix(_ABORTED) if outcome is Outcome.TIMEOUT else text)
     if not text.strip():
         return []

@@ -268,18 +268,15 @@ def _csv_difference(old_data: bytes, new_data: bytes) -> str:
     if [len(row) for row in old] != [len(row) for row in new]:
         return "the table has other rows or columns"
     columns = zip(itertools.zip_longest(*old), itertools.zip_longest(*new), strict=True)
-    different = sum(_count_unequal(*column) for column in columns)
+    different = 0
+    for old_cells, new_cells in columns:
+        pairs = [(_number(a), _number(b)) for a, b in zip(old_cells, new_cells, strict=True)]
+        largest = max((abs(a) for a, _ in pairs if math.isfinite(a)), default=0.0)
+        different += sum(
+            old_cell != new_cell and not abs(a - b) <= TOLERANCE * largest
+            for old_cell, new_cell, (a, b) in zip(old_cells, new_cells, pairs, strict=True)
+        )
     return f"{different} of its cells differ" if different else ""
-
-
-def _count_unequal(old: Sequence[str | None], new: Sequence[str | None]) -> int:
-    """How many cells of a column differ."""
-    numbers = [(_number(a), _number(b)) for a, b in zip(old, new, strict=True)]
-    largest = max((abs(number) for number, _ in numbers if math.isfinite(number)), default=0.0)
-    return sum(
-        old_cell != new_cell and not abs(a - b) <= TOLERANCE * largest
-        for old_cell, new_cell, (a, b) in zip(old, new, numbers, strict=True)
-    )
 
 
 def _number(cell: str | None) -> float:

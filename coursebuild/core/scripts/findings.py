@@ -133,9 +133,17 @@ def _find_unmarked(
             run = runs.get(script.path)
             if run is None or run.outcome is not Outcome.OK or not run.stdout.strip():
                 continue
-            if _share_alike(block, run.stdout, course) >= _ALIKE:
-                yield _unmarked_diagnostic(block, script.path, course.words.output[0])
-                break
+            if _share_alike(block, run.stdout, course) < _ALIKE:
+                continue
+            message = f"this resembles what `{script.path}` printed, and nothing compares the two"
+            help = "an output is of kind `output`; if it is none, write `text illustration`"
+            if isinstance(block, Table):
+                help = f"write a paragraph `{course.words.output[0]}:` above it; or bind its "
+                help += "numbers, or mark them as given"
+            elif (head := _FENCE_HEAD.match(block.span.text)) is not None:
+                help = Fix(help, f"{head[1]}output", head[0])
+            yield diagnose("output-unmarked", block.span.first_line(), message, help=help)
+            break
 
 
 def _share_alike(block: CodeBlock | Table, stdout: str, course: Course) -> float:
@@ -161,18 +169,6 @@ def _share_alike(block: CodeBlock | Table, stdout: str, course: Course) -> float
     lines = list(filter(_TELLING.search, whole.lines))
     matcher = LineMatcher(comparison)
     return count_alike(Side.of("\n".join(lines)), printed, matcher) / max(len(lines), 1)
-
-
-def _unmarked_diagnostic(block: CodeBlock | Table, path: str, word: str) -> Diagnostic:
-    message = f"this resembles what `{path}` printed, and nothing compares the two"
-    if isinstance(block, Table):
-        help = f"write a paragraph `{word}:` above it; or bind its numbers, or mark them as given"
-        return diagnose("output-unmarked", block.span.first_line(), message, help=help)
-    help = "an output is of kind `output`; if it is none, write `text illustration`"
-    head = _FENCE_HEAD.match(block.span.text)
-    if head is not None:
-        help = Fix(help, f"{head[1]}output", head[0])
-    return diagnose("output-unmarked", block.span.first_line(), message, help=help)
 
 
 _FENCE_HEAD = re.compile(r"(`{3,}|~{3,})[ \t]*[^\s`]*")
@@ -243,31 +239,24 @@ def drift_diagnostic(
             f"no output of `{recording.script}` is recorded yet",
             help=f"run {update}",
         )
-    first, *rest = sorted(verdict.changes, key=lambda change: change.span.start)
+    changes = verdict.changes
+    first, *rest = sorted(changes, key=lambda change: change.span.start)
     notes = [Note(_describe_difference(change), change.span) for change in rest[:_MAX_NOTES]]
     if len(rest) > _MAX_NOTES:
         rest_count = len(rest) - _MAX_NOTES
         noun = "difference" if rest_count == 1 else "differences"
         notes.append(Note(f"and {rest_count} more {noun}"))
     notes += (Note(_describe_dependence(d), d.binding.text_span) for d in dependents)
-    return diagnose(
-        "output-drift",
-        first.span,
-        f"recorded output differs from this run ({classes(verdict.changes)})",
-        label=_label(first),
-        help=_explain_slip(verdict.changes, first) or f"if the change is intended, run {update}",
-        notes=notes,
-    )
-
-
-def _explain_slip(changes: Sequence[Change], first: Change) -> str:
-    """How to mend a recorded output that was pasted or typed as no script prints it, if it was."""
-    if any("\x1b" in change.recorded and "\x1b" not in change.printed for change in changes):
-        return "what is recorded has the colour codes of a terminal: remove them"
+    help = f"if the change is intended, run {update}"
     fraction = re.match(r",(\d+)", first.span.source.text[first.span.end : first.span.end + 40])
-    if fraction and f"{first.recorded}.{fraction[1]}" == first.printed:
-        return f"Python prints a decimal point: write `{first.printed}`"
-    return ""
+    if any("\x1b" in change.recorded and "\x1b" not in change.printed for change in changes):
+        help = "what is recorded has the colour codes of a terminal: remove them"
+    elif fraction and f"{first.recorded}.{fraction[1]}" == first.printed:
+        help = f"Python prints a decimal point: write `{first.printed}`"
+    message = f"recorded output differs from this run ({classes(changes)})"
+    return diagnose(
+        "output-drift", first.span, message, label=_label(first), help=help, notes=notes
+    )
 
 
 def classes(changes: Sequence[Change]) -> str:
@@ -284,13 +273,14 @@ def _label(change: Change) -> str:
     match change.kind:
         case DriftKind.ROUNDING | DriftKind.NUMERIC:
             wording = closeness(change)
-            return f"this run printed {_number(change.printed)}{f' ({wording})' if wording else ''}"
+            suffix = f" ({wording})" if wording else ""
+            return f"this run printed {shorten(change.printed, _WIDTH)}{suffix}"
         case DriftKind.TEXT if not (change.recorded.strip() or change.printed.strip()):
             return "this run printed white space of another width here"
         case DriftKind.TEXT if not change.printed.strip():
             return "this run printed nothing here"
         case DriftKind.TEXT if _is_same_value(change):
-            number = _number(change.printed)
+            number = shorten(change.printed, _WIDTH)
             return f"this run printed {number} (the same value, written in another way)"
         case DriftKind.TEXT:
             return f"this run printed {quote(change.printed, _WIDTH)}"
@@ -337,12 +327,8 @@ def _describe_difference(change: Change) -> str:
     if change.kind is DriftKind.EXTRA or not change.recorded.strip():
         return _label(change)
     numeric = change.kind is not DriftKind.TEXT or _is_same_value(change)
-    recorded = _number(change.recorded) if numeric else quote(change.recorded, _WIDTH)
+    recorded = shorten(change.recorded, _WIDTH) if numeric else quote(change.recorded, _WIDTH)
     return f"recorded {recorded}; {_label(change)}"
-
-
-def _number(text: str) -> str:
-    return shorten(text, _WIDTH)
 
 
 def _describe_dependence(dependent: DependentBinding) -> str:

@@ -92,14 +92,6 @@ class Number(Struct, frozen=True):
         return self.is_finite and not self.is_integer
 
 
-def _number(start: int, text: str) -> Number:
-    value = Decimal(text.replace("\u2212", "-"))
-    exponent = value.as_tuple().exponent
-    place = exponent if isinstance(exponent, int) else 0
-    is_integer = value.is_finite() and not any(c in text for c in ".eE")
-    return Number(start, start + len(text), text, value, place, is_integer)
-
-
 def scan(text: str) -> tuple[Number, ...]:
     """The numbers of a text, in order."""
     return tuple(_scan(text))
@@ -109,7 +101,12 @@ def _scan(text: str) -> Iterator[Number]:
     for match in _TOKEN.finditer(text):
         kind = match.lastgroup
         if kind in ("number", "imaginary", "special") and match.end() - match.start() <= _LONGEST:
-            yield _number(match.start(), match.group())
+            digits = match.group()
+            value = Decimal(digits.replace("\u2212", "-"))
+            exponent = value.as_tuple().exponent
+            place = exponent if isinstance(exponent, int) else 0
+            is_integer = value.is_finite() and not any(c in digits for c in ".eE")
+            yield Number(*match.span(), digits, value, place, is_integer)
 
 
 def scan_prose(text: str) -> tuple[Number, ...]:

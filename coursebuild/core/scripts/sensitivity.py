@@ -33,13 +33,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Course, Mode, Recording
 from coursebuild.core.model.results import Change, Outcome, ScriptRun
-from coursebuild.core.model.sensitivity import (
-    PERTURBATION,
-    Doubt,
-    Flip,
-    Sensitivity,
-    Standing,
-)
+from coursebuild.core.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
 from coursebuild.core.scripts.bound_numbers import printed_lines
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import quote
@@ -287,7 +281,12 @@ def amplification(moved_runs: Sequence[ScriptRun]) -> float | None:
     for pair, (first, second) in enumerate(zip(ends[::2], ends[1::2], strict=True)):
         initial_gap = 2 * PERTURBATION * 0.5**pair
         for number in first.keys() & second.keys():
-            factors += _growth_factors(first[number], second[number], initial_gap)
+            pairs = zip(first[number], second[number], strict=True)
+            for (size, mine), (other_size, theirs) in pairs:
+                if mine and len(mine) == len(theirs):
+                    gap = max(abs(a - b) for a, b in zip(mine, theirs, strict=True))
+                    growth = gap / (max(size, other_size, *map(abs, mine)) or 1.0)
+                    factors.append(growth / initial_gap if math.isfinite(growth) else math.inf)
     return max(factors, default=None)
 
 
@@ -303,19 +302,6 @@ def _end_states(run: ScriptRun) -> dict[int, list[tuple[float, list[float]]]]:
     return end_states
 
 
-def _growth_factors(
-    first: list[tuple[float, list[float]]],
-    second: list[tuple[float, list[float]]],
-    initial_gap: float,
-) -> Iterator[float]:
-    for (size, mine), (other_size, theirs) in zip(first, second, strict=True):
-        if not mine or len(mine) != len(theirs):
-            continue
-        gap = max(abs(a - b) for a, b in zip(mine, theirs, strict=True))
-        largest = max(size, other_size, *map(abs, mine)) or 1.0
-        yield gap / largest / initial_gap if math.isfinite(gap / largest) else math.inf
-
-
 # --- warnings
 
 
@@ -326,7 +312,13 @@ def noise_warnings(sensitivity: Sensitivity) -> Iterator[Diagnostic]:
         for doubt in sensitivity.doubts
         if doubt.compared and (doubt.repeat < _AS_MOVED or doubt.digits > _EXACT_DIGITS)
     ]
-    warnings += [(flip.span, _describe_flip(flip)) for flip in sensitivity.flips if flip.compared]
+    for flip in (flip for flip in sensitivity.flips if flip.compared):
+        text = f"printed as {quote(flip.other, _WIDTH)} too"
+        if not flip.other.strip():
+            text = "not always printed"
+        elif not flip.printed.strip():
+            text = f"{quote(flip.other, _WIDTH)} is printed here as well"
+        warnings.append((flip.span, text))
     warnings.sort(key=lambda warning: (warning[0].path, warning[0].start))
     if not warnings:
         return
@@ -367,11 +359,3 @@ def _describe_doubt(doubt: Doubt) -> str:
     number = _only_number(doubt.printed)
     instead = "" if number is None else _round_to(number, doubt.repeat)
     return f"{repeat}{f', print {instead}' if instead else ''}: {values}"
-
-
-def _describe_flip(flip: Flip) -> str:
-    if not flip.other.strip():
-        return "not always printed"
-    if not flip.printed.strip():
-        return f"{quote(flip.other, _WIDTH)} is printed here as well"
-    return f"printed as {quote(flip.other, _WIDTH)} too"

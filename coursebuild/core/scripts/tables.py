@@ -89,28 +89,20 @@ def compare_table(
 ) -> Verdict:
     """The verdict on a recorded table."""
     rows, printed = table_rows(table, comparison.filters), Side.of(stdout, comparison.filters)
-    changes = tuple(
-        change
-        for match in TableMatcher(rows, printed, comparison).match()
-        for change in _row_changes(match, comparison)
-    )
-    return Verdict(recording, comparison, "drift" if changes else "verified", changes)
+    changes: list[Change] = []
+    for match in TableMatcher(rows, printed, comparison).match():
+        if match.line < 0:
+            first, last = match.row[0].cell.span, match.row[-1].cell.span
+            changes.append(Change(DriftKind.MISSING, first.to(last), _row_text(match.row), ""))
+        for cell, old, new in match.pairs:
+            if not same_number(old, new, comparison):
+                span = cell.span(old)
+                changes.append(number_change(span, span.text, new.text, (old, new)))
+    return Verdict(recording, comparison, "drift" if changes else "verified", tuple(changes))
 
 
 def _row_text(row: Sequence[RowCell]) -> str:
     return "  ".join(cell.mapped.text for cell in row)
-
-
-def _row_changes(match: RowMatch, comparison: model.Comparison) -> list[Change]:
-    if match.line < 0:
-        first, last = match.row[0].cell.span, match.row[-1].cell.span
-        return [Change(DriftKind.MISSING, first.to(last), _row_text(match.row), "")]
-    changes = []
-    for cell, recorded, printed in match.pairs:
-        if not same_number(recorded, printed, comparison):
-            span = cell.span(recorded)
-            changes.append(number_change(span, span.text, printed.text, (recorded, printed)))
-    return changes
 
 
 class TableMatcher:
@@ -126,7 +118,11 @@ class TableMatcher:
 
     def match(self) -> tuple[RowMatch, ...]:
         """The line of each row: with its numbers if possible, else with the rest of it."""
-        lines = self.find_matching_lines() or self._align_lines()
+        lines = self.find_matching_lines()
+        if lines is None:
+            lines = [-1] * len(self.rows)
+            for number, line in pair([_row_text(r) for r in self.rows], self.lines, self._weight):
+                lines[number] = line
         return tuple(self._match_row(row, line) for row, line in zip(self.rows, lines, strict=True))
 
     def find_matching_lines(self) -> list[int] | None:
@@ -140,13 +136,6 @@ class TableMatcher:
                 return None
             line_numbers.append(line)
             first_line = line + 1
-        return line_numbers
-
-    def _align_lines(self) -> list[int]:
-        """A line for each row that stands in one except for its numbers; -1 for other rows."""
-        line_numbers = [-1] * len(self.rows)
-        for row, line in pair([_row_text(r) for r in self.rows], self.lines, self._weight):
-            line_numbers[row] = line
         return line_numbers
 
     def _matches(self, row: Sequence[RowCell], line: int) -> bool:
@@ -220,21 +209,17 @@ def _nearest_places(
             before = [way for way in best if way[2] <= place]
             if before:
                 cost, places, _ = min(before, key=lambda way: way[0])
-                total = cost + _cost(cell.canonical, line, place, numbers_match)
+                # The numbers' relative errors, each at most 1
+                for recorded, printed in zip(
+                    cell.canonical.numbers, line.numbers_at(cell.canonical, place), strict=True
+                ):
+                    if not numbers_match(recorded, printed):
+                        error = relative_error(recorded.value, printed.value)
+                        cost += 0.01 + (1.0 if error is None else min(1.0, float(error)))
                 end = place + len(cell.canonical.skeleton)
-                extended.append((total, [*places, place], end))
+                extended.append((cost, [*places, place], end))
         best = extended
     return min(best, key=lambda way: way[0])[1]
-
-
-def _cost(cell: CanonicalText, line: CanonicalText, place: int, numbers_match: SameNumber) -> float:
-    """How far the numbers of a cell are from those of the line: relative errors, each at most 1."""
-    cost = 0.0
-    for recorded, printed in zip(cell.numbers, line.numbers_at(cell, place), strict=True):
-        if not numbers_match(recorded, printed):
-            error = relative_error(recorded.value, printed.value)
-            cost += 0.01 + (1.0 if error is None else min(1.0, float(error)))
-    return cost
 
 
 # --- cells
@@ -266,7 +251,15 @@ def _text_stretches(inlines: Iterable[model.Inline]) -> Iterator[tuple[str, Span
             case model.Text():
                 yield inline.text, inline.span
             case model.CodeSpan():
-                yield inline.text, _inside_backticks(inline)
+                # Between the backticks, without padding
+                markdown, text = inline.span.text, inline.text
+                edge = len(markdown) - len(markdown.lstrip("`"))
+                if len(markdown) - 2 * edge == len(text) + 2:
+                    edge += 1
+                yield (
+                    text,
+                    Span(inline.span.source, inline.span.start + edge, inline.span.end - edge),
+                )
             case model.NumberBinding():
                 yield inline.text, inline.text_span
             case model.Math():
@@ -279,13 +272,3 @@ def _text_stretches(inlines: Iterable[model.Inline]) -> Iterator[tuple[str, Span
                 yield (" " if inline.html.startswith("<br") else ""), inline.span
             case _:
                 pass
-
-
-def _inside_backticks(code: model.CodeSpan) -> Span:
-    """The place of a code span's text: what stands between the backticks, without padding."""
-    markdown = code.span.text
-    ticks = len(markdown) - len(markdown.lstrip("`"))
-    inner = markdown[ticks : len(markdown) - ticks]
-    padding = 1 if len(inner) == len(code.text) + 2 else 0
-    start = code.span.start + ticks + padding
-    return Span(code.span.source, start, code.span.end - ticks - padding)

@@ -71,18 +71,16 @@ class _Token(Struct, frozen=True):
         *before, last = re.split(r"(\S+\s*)", match.string[: match.start()])
         words = [word for word in before if word] + [last] * bool(last)
         is_bare = not (match["stamp"] or match["unit"] or after)
+        if match["stamp"]:
+            general = re.sub(r"\d+", "[0-9]+", _literal(match[0]))
+        else:
+            marks = {*"".join(m["number"] for m in self.matches)} - {*"0123456789"}
+            general = f"[0-9{''.join(sorted(marks - {'-'}))}{'-' * ('-' in marks)}]+"
+            units = sorted({_literal(m["unit"] or "") for m in self.matches})
+            general += units[0] if len(units) == 1 else f"(?:{'|'.join(units)})"
         for count in range(1 if is_bare else 0, len(words) + 1):
             context = "".join(words[len(words) - count :])
-            yield _literal(context) + self._general() + _literal(after)
-
-    def _general(self) -> str:
-        first, second = self.matches
-        if first["stamp"]:
-            return re.sub(r"\d+", "[0-9]+", _literal(first[0]))
-        marks = {*(first["number"] + second["number"])} - {*"0123456789"}
-        number = f"[0-9{''.join(sorted(marks - {'-'}))}{'-' * ('-' in marks)}]+"
-        units = sorted({_literal(m["unit"] or "") for m in self.matches})
-        return number + (units[0] if len(units) == 1 else f"(?:{'|'.join(units)})")
+            yield _literal(context) + general + _literal(after)
 
 
 def varying_times(first: Side, second: Side, comparison: Comparison) -> str:

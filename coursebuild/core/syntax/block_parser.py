@@ -104,9 +104,12 @@ def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) 
         return False
     line, start, is_closed = start_line, run.end(), False
     while True:
-        closing = _find_closing(state.src, start, state.eMarks[line])
-        if closing is not None:
-            rest = state.src[closing + 2 : state.eMarks[line]].strip(" \t")
+        end = state.eMarks[line]
+        closing = state.src.find("$$", start, end)
+        if closing >= 0:  # the first one that no backslash escapes
+            closing = _BLOCK_TEX.match(state.src, start, end).end()  # type: ignore[union-attr]  # it matches nothing too
+        if closing >= 0 and state.src.startswith("$$", closing, end):
+            rest = state.src[closing + 2 : end].strip(" \t")
             if rest and not _LABEL.fullmatch(rest):
                 return False
             is_closed = True
@@ -124,14 +127,6 @@ def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) 
     token.map = [start_line, line]
     token.info = "" if is_closed else "unclosed"
     return True
-
-
-def _find_closing(src: str, start: int, end: int) -> int | None:
-    """The offset of the first `$$` between two offsets that no backslash escapes."""
-    if src.find("$$", start, end) < 0:
-        return None
-    tex_end = _BLOCK_TEX.match(src, start, end).end()  # type: ignore[union-attr]  # it matches nothing too
-    return tex_end if src.startswith("$$", tex_end, end) else None
 
 
 MAX_NESTING = 60
@@ -211,6 +206,10 @@ def _deep_paragraph(state: StateBlock, start: int, end: int, silent: bool) -> bo
     return True
 
 
+_WITH_TEXT = frozenset("fence code_block html_block paragraph_open math_block".split())
+"""Types of tokens whose content is the text that the last rule cut out."""
+
+
 def _with_places(rule: BlockRule) -> BlockRule:
     """The rule, which also gives places to its tokens."""
 
@@ -220,41 +219,34 @@ def _with_places(rule: BlockRule) -> BlockRule:
         token_count = len(state.tokens)
         applies = rule(state, start, end, silent)
         if applies and len(state.tokens) > token_count:
-            _set_place(state, token_count, begin)
+            opening = state.tokens[token_count]
+            assert isinstance(opening, PositionedToken)
+            last = state.line - 1
+            first = opening.map[0] if opening.map else last
+            while last > first and state.isEmpty(last):
+                last -= 1
+            opening.start, opening.end = begin, state.eMarks[last]
+            if opening.type in _WITH_TEXT:
+                opening.text = state.text
+                opening.meta["closed"] = state.text_end < state.line  # by a line of its own
+            elif opening.type == "heading_open" and opening.markup[0] != "#":
+                opening.text = state.text
+            elif (
+                opening.type == "heading_open"
+            ):  # whose rule does not cut its content by `getLines`
+                at, length = state.skipCharsStr(begin, "#"), len(state.tokens[-2].content)
+                while length and state.src[at] in MD_TRIM_CHARS:
+                    at += 1
+                opening.text = state.base.slice(at, at + length)
+            elif opening.type == "table_open":
+                for token in state.tokens[token_count:]:
+                    if token.type == "tr_open" and isinstance(token, PositionedToken) and token.map:
+                        row = token.map[0]
+                        token.start = state.bMarks[row] + state.tShift[row]
+                        token.end = state.eMarks[row]
         return applies
 
     return run
-
-
-def _set_place(state: BlockState, first_token: int, begin: int) -> None:
-    """Give its place, which the state forgets soon, to the block that begins with `first_token`."""
-    opening = state.tokens[first_token]
-    assert isinstance(opening, PositionedToken)
-    last = state.line - 1
-    first = opening.map[0] if opening.map else last
-    while last > first and state.isEmpty(last):
-        last -= 1
-    opening.start, opening.end = begin, state.eMarks[last]
-    if opening.type in ("fence", "code_block", "html_block", "paragraph_open", "math_block"):
-        opening.text = state.text
-        opening.meta["closed"] = state.text_end < state.line  # by a line of its own
-    elif opening.type == "heading_open":
-        opening.text = _atx_text(state, begin) if opening.markup[0] == "#" else state.text
-    elif opening.type == "table_open":
-        for token in state.tokens[first_token:]:
-            if token.type == "tr_open" and isinstance(token, PositionedToken) and token.map:
-                row = token.map[0]
-                token.start = state.bMarks[row] + state.tShift[row]
-                token.end = state.eMarks[row]
-
-
-def _atx_text(state: BlockState, begin: int) -> Excerpt:
-    """The content of a `#` heading, which its rule does not cut by `getLines`."""
-    content = state.tokens[-2].content
-    at = state.skipCharsStr(begin, "#")
-    while content and state.src[at] in MD_TRIM_CHARS:
-        at += 1
-    return state.base.slice(at, at + len(content))
 
 
 def _build_parser() -> MarkdownIt:

@@ -16,14 +16,7 @@ import shlex
 import sys
 from collections.abc import Iterator
 
-from coursebuild.core.model import (
-    Block,
-    CodeBlock,
-    Mjcf,
-    PlainCode,
-    Script,
-    SourcePart,
-)
+from coursebuild.core.model import Block, CodeBlock, Mjcf, PlainCode, Script, SourcePart
 from coursebuild.core.model.blocks import FigureName
 from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import (
@@ -82,21 +75,19 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
     elif show is None and (fragment is None or has_file):
         diagnostics += check_syntax(fence.body, script=has_file)
     script = None if file is None else _build_script(fence, file, keys.value, diagnostics)
-    source = None if show is None or has_file else _read_source_part(fence, show, diagnostics)
+    source = None
+    if show is not None and not has_file:
+        path, _, part = (show.value or "").partition("#")
+        if _PATH.fullmatch(path) and not fence.nested:
+            source = SourcePart(path, part, show.value_span, fence.body_span, fence.prefix)
+        else:
+            message = f"`{path}` is not the path of a file of the project"
+            if fence.nested:
+                message = "a text of a quiz or lab cannot show a file"
+            help = "name it from the project's folder, as in `show=src/pkg/x.py#function`"
+            diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
     code = PlainCode(fence.span, fence.body, fragment is not None and file is None, source)
     return Parsed(script or code, tuple(diagnostics))
-
-
-def _read_source_part(fence: Fence, show: Word, diagnostics: list[Diagnostic]) -> SourcePart | None:
-    path, _, part = (show.value or "").partition("#")
-    if _PATH.fullmatch(path) and not fence.nested:
-        return SourcePart(path, part, show.value_span, fence.body_span, fence.prefix)
-    message = f"`{path}` is not the path of a file of the project"
-    if fence.nested:
-        message = "a text of a quiz or lab cannot show a file"
-    help = "name it from the project's folder, as in `show=src/pkg/x.py#function`"
-    diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
-    return None
 
 
 def _build_script(
@@ -111,6 +102,10 @@ def _build_script(
         if "is not below" in mistake and not fence.nested:
             help = Fix(help, f"examples/{path.rpartition('/')[2]}", path)
         diagnostics.append(diagnose("script-path", file.value_span, mistake, help=help))
+    text = fence.body.text.rstrip("\n")  # with exactly one line end at its end
+    code = Excerpt(fence.body.source, text + "\n", fence.body.pieces)
+    if len(text) < len(fence.body.text):
+        code = fence.body.slice(0, len(text) + 1)
     timeout = _read_timeout(keys.get("timeout"), diagnostics)
     requires = _read_modules(keys.get("requires"), diagnostics)
     args = _read_arguments(keys.get("args"), diagnostics)
@@ -129,7 +124,7 @@ def _build_script(
         fence.span,
         path,
         file.value_span,
-        _with_line_end(fence.body),
+        code,
         fence.prefix,
         timeout,
         requires,
@@ -142,14 +137,6 @@ def _build_script(
         once=record is not None,
         figures=figures,
     )
-
-
-def _with_line_end(body: Excerpt) -> Excerpt:
-    """The text with exactly one final line end."""
-    text = body.text.rstrip("\n")
-    if len(text) < len(body.text):
-        return body.slice(0, len(text) + 1)
-    return Excerpt(body.source, text + "\n", body.pieces)
 
 
 def _read_timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
@@ -289,7 +276,23 @@ def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
             check_stray_keys(fence, state)
             return fence.code()
         case "mjcf":
-            return _read_mjcf(fence, state)
+            parsed_keys = fence.keys(values=("fragment", "error"))
+            state.diagnostics += parsed_keys.diagnostics
+            keys, fragment = parsed_keys.value, parsed_keys.value.get("fragment")
+            if fragment is not None and not _ELEMENTS.fullmatch(fragment.value or ""):
+                message = f"`{fragment.value}` is not the name of an element"
+                help = 'name the element that it goes into, for example `fragment="worldbody"`'
+                state.report(diagnose("fence-key-value", fragment.value_span, message, help=help))
+                return fence.code()
+            if parsed_keys.diagnostics:
+                return fence.code()
+            return Mjcf(
+                fence.span,
+                fence.body,
+                keys.value("fragment"),
+                keys.value("error"),
+                keys.place("error"),
+            )
         case name if (kind := fence_kind(name)) is not None and fence.nested and not kind.nested:
             message = f"a text of a quiz or lab cannot hold a {name}"
             state.report(diagnose("fence-info", fence.head, message))
@@ -330,20 +333,3 @@ def _read_unclosed(fence: Fence, state: ParsingState) -> CodeBlock:
     if fence.kind == "python" or fence.inner is not None:
         state.script, state.has_invalid_script = None, True
     return fence.code()
-
-
-def _read_mjcf(fence: Fence, state: ParsingState) -> Mjcf | CodeBlock:
-    """An `mjcf` fence; with wrong keys it cannot be compiled, and is shown as code."""
-    parsed_keys = fence.keys(values=("fragment", "error"))
-    state.diagnostics += parsed_keys.diagnostics
-    keys, fragment = parsed_keys.value, parsed_keys.value.get("fragment")
-    if fragment is not None and not _ELEMENTS.fullmatch(fragment.value or ""):
-        message = f"`{fragment.value}` is not the name of an element"
-        help = 'name the element that it goes into, for example `fragment="worldbody"`'
-        state.report(diagnose("fence-key-value", fragment.value_span, message, help=help))
-        return fence.code()
-    if parsed_keys.diagnostics:
-        return fence.code()
-    return Mjcf(
-        fence.span, fence.body, keys.value("fragment"), keys.value("error"), keys.place("error")
-    )

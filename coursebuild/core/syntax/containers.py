@@ -165,27 +165,9 @@ def _read_cells(
     inlines: Callable[[Excerpt], tuple[Inline, ...]],
     report: Callable[[Diagnostic], None],
 ) -> tuple[Cell, ...]:
-    cells = _split_row(base, row.start, row.end)
-    if any(cell.text for cell in cells[columns:]):
-        message = f"this row has {len(cells)} cells and the header {columns}, so this is not shown"
-        help = "write `\\|` for a `|` that is part of a cell, and `\\vert` for one in a formula"
-        span = cells[columns].span().to(cells[-1].span())
-        report(diagnose("table-cells", span, message, help=help))
-    elif len(cells) < columns:
-        count = "1 cell" if len(cells) == 1 else f"{len(cells)} cells"
-        message = f"this row has {count} and the header {columns}"
-        help = "write `|` between cells, and `| |` for a cell with nothing in it"
-        report(diagnose("table-cells", base.span(row.start, row.end), message, help=help))
-    empty = Excerpt(base.source, "", ((0, base.offset(row.end)),))
-    cells = [*cells, *[empty] * columns][:columns]
-    return tuple([Cell(cell.span(), cell, inlines(cell)) for cell in cells])
-
-
-def _split_row(base: Excerpt, start: int, end: int) -> list[Excerpt]:
-    """The cells of the row between two offsets of `base`."""
-    line = base.text[start:end]
-    at = start + len(line) - len(line.lstrip(MD_TRIM_CHARS))
-    end = start + len(line.rstrip(MD_TRIM_CHARS))
+    line = base.text[row.start : row.end]
+    at = row.start + len(line) - len(line.lstrip(MD_TRIM_CHARS))
+    end = row.start + len(line.rstrip(MD_TRIM_CHARS))
     parts: list[list[Excerpt]] = [[]]
     for pipe in _PIPE.finditer(base.text, at, end):
         parts[-1].append(base.slice(at, pipe.start()))
@@ -200,7 +182,20 @@ def _split_row(base: Excerpt, start: int, end: int) -> list[Excerpt]:
         del cells[0]
     if cells and not cells[-1].text:
         del cells[-1]
-    return [trim(cell) for cell in cells]
+    cells = [trim(cell) for cell in cells]
+    if any(cell.text for cell in cells[columns:]):
+        message = f"this row has {len(cells)} cells and the header {columns}, so this is not shown"
+        help = "write `\\|` for a `|` that is part of a cell, and `\\vert` for one in a formula"
+        span = cells[columns].span().to(cells[-1].span())
+        report(diagnose("table-cells", span, message, help=help))
+    elif len(cells) < columns:
+        count = "1 cell" if len(cells) == 1 else f"{len(cells)} cells"
+        message = f"this row has {count} and the header {columns}"
+        help = "write `|` between cells, and `| |` for a cell with nothing in it"
+        report(diagnose("table-cells", base.span(row.start, row.end), message, help=help))
+    empty = Excerpt(base.source, "", ((0, base.offset(row.end)),))
+    cells = [*cells, *[empty] * columns][:columns]
+    return tuple([Cell(cell.span(), cell, inlines(cell)) for cell in cells])
 
 
 _EMPTY_QUOTED = re.compile(r"^[ >]*>[ \t]*$", re.MULTILINE)

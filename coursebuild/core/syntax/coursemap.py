@@ -271,20 +271,15 @@ def _check_prerequisites(lessons: list[Lesson], ids: Iterable[str]) -> Iterator[
                 help = did_you_mean(name, names)
                 yield diagnose("prerequisite-unknown", span, message, help=help)
     graph = {lesson.id: lesson_by_id[lesson.id].prerequisites for lesson in lessons}
-    while circle := _find_cycle(graph):
-        yield _diagnose_cycle([lesson_by_id[name] for name in circle])
+    while True:
+        try:
+            graphlib.TopologicalSorter(graph).prepare()
+            return
+        except graphlib.CycleError as error:
+            circle: list[str] = error.args[1][:0:-1]
+        first = circle.index(next(name for name in graph if name in circle))  # as in the map
+        yield _diagnose_cycle([lesson_by_id[name] for name in circle[first:] + circle[:first]])
         graph = {name: graph[name] for name in graph if name not in circle}
-
-
-def _find_cycle(graph: Mapping[str, tuple[str, ...]]) -> list[str]:
-    """Lessons that require each other in a circle, the first of the map first; empty if none do."""
-    try:
-        graphlib.TopologicalSorter(graph).prepare()
-    except graphlib.CycleError as error:
-        circle: list[str] = error.args[1][:0:-1]
-        first = circle.index(next(name for name in graph if name in circle))
-        return circle[first:] + circle[:first]
-    return []
 
 
 def _diagnose_cycle(circle: list[Lesson]) -> Diagnostic:

@@ -92,6 +92,17 @@ def parse_declarations(source: Source) -> Parsed[Declarations | None]:
     for node, scenario in zip(root.objects("scenario"), fields.scenario, strict=True):
         places = tuple((name, member.value.mark) for name, member in node.members.items())
         scenarios.append(DeclaredScenario(**asdict(scenario), span=node.mark, places=places))
+    sweeps = []
+    for node, sweep in zip(root.objects("sweep"), fields.sweep, strict=True):
+        members, variations = node.object("vary").members, []
+        for name, values in sweep.vary.items():
+            relative = isinstance(values, str)
+            if isinstance(values, str):
+                share = float(values.strip("± %")) / 100
+                values = (1 - share, 1 + share)
+            span = members[name].key.mark
+            variations.append(Variation(name, values, relative=relative, span=span))
+        sweeps.append(DeclaredSweep(**asdict(sweep), variations=tuple(variations)))
     keeps = zip(root.objects("keep"), fields.keep, strict=True)
     declarations = Declarations(
         model=source.path.removeprefix("models/").removesuffix(".toml"),
@@ -101,25 +112,9 @@ def parse_declarations(source: Source) -> Parsed[Declarations | None]:
             Keep(**asdict(table), finding_span=node.place("finding")) for node, table in keeps
         ),
         bench=fields.bench or BenchTable(),
-        sweeps=tuple(map(_build_sweep, root.objects("sweep"), fields.sweep)),
+        sweeps=tuple(sweeps),
     )
     return Parsed(declarations, ())
-
-
-# ---------------------------------------------------------------------------------------- values
-
-
-def _build_sweep(node: ObjectNode, table: SweepTable) -> DeclaredSweep:
-    members = node.object("vary").members
-    variations = []
-    for name, values in table.vary.items():
-        relative = isinstance(values, str)
-        if isinstance(values, str):
-            share = float(values.strip("± %")) / 100
-            values = (1 - share, 1 + share)
-        span = members[name].key.mark
-        variations.append(Variation(name, values, relative=relative, span=span))
-    return DeclaredSweep(**asdict(table), variations=tuple(variations))
 
 
 # ---------------------------------------------------------------------------------------- checks

@@ -132,13 +132,21 @@ class _Decoder:
             case inspect.StrType(), StringNode():
                 return self.decode_string(node, type, name, remarks)
             case inspect.LiteralType(), StringNode():
-                return self.decode_literal(node, type, name)
+                if node.value in type.values:
+                    return node.value
+                message = f"{format_name(name)} cannot be {format_value(node)}"
+                help = did_you_mean(node.value, map(str, type.values))
+                return self.report("field-value", node.mark, message, help)
             case inspect.IntType() | inspect.FloatType(), NumberNode():
                 return self.decode_number(node, type, name)
             case inspect.VarTupleType() | inspect.TupleType(), ArrayNode():
                 return self.decode_array(node, type, name)
             case inspect.DictType(), ObjectNode():
-                return self.decode_map(node, type)
+                values = {
+                    key: self.decode_value(member.value, type.value_type, key)
+                    for key, member in node.members.items()
+                }
+                return _INVALID if _INVALID in values.values() else values
             case inspect.StructType(), ObjectNode():
                 return self.decode_struct(node, type)
             case inspect.UnionType(), _:
@@ -170,18 +178,22 @@ class _Decoder:
             self.texts.append((node, remarks["text"]))
         return value
 
-    def decode_literal(self, node: StringNode, type: inspect.LiteralType, name: str) -> object:
-        if node.value in type.values:
-            return node.value
-        message = f"{format_name(name)} cannot be {format_value(node)}"
-        help = did_you_mean(node.value, map(str, type.values))
-        return self.report("field-value", node.mark, message, help)
-
     def decode_number(
         self, node: NumberNode, type: inspect.IntType | inspect.FloatType, name: str
     ) -> object:
-        value = node.value if isinstance(type, inspect.IntType) else _to_double(node.value)
-        problem = _check_double(node) or _check_bounds(value, node, type)
+        double, problem = _to_double(node.value), ""
+        value = node.value if isinstance(type, inspect.IntType) else double
+        if node.raw.strip("+-") in ("inf", "nan"):
+            problem = f"must be a finite number, not {node.raw}"
+        elif math.isinf(double):
+            problem = "is too large: numbers end at about 1.8e308"
+        elif double == 0 and re.search(r"[1-9]", re.split(r"[eE]", node.raw)[0]):
+            problem = "is too small: it becomes 0"
+        for attribute, words, holds in () if problem else _BOUNDS:
+            limit = getattr(type, attribute)
+            if limit is not None and not holds(value, limit):
+                problem = f"must be {words} {limit:g}, not {node.raw}"
+                break
         if problem:
             return self.report("field-value", node.mark, f"{format_name(name)} {problem}")
         return value
@@ -208,13 +220,6 @@ class _Decoder:
             for i, (item, type) in enumerate(zip(node.items, types, strict=True))
         ]
         return _INVALID if _INVALID in values else tuple(values)
-
-    def decode_map(self, node: ObjectNode, type: inspect.DictType) -> object:
-        values = {
-            key: self.decode_value(member.value, type.value_type, key)
-            for key, member in node.members.items()
-        }
-        return _INVALID if _INVALID in values.values() else values
 
     # ---------------------------------------------------------------------------------- structs
 
@@ -332,31 +337,11 @@ _BOUNDS = (
 )
 
 
-def _check_bounds(value: float, node: NumberNode, type: inspect.IntType | inspect.FloatType) -> str:
-    for attribute, words, holds in _BOUNDS:
-        limit = getattr(type, attribute)
-        if limit is not None and not holds(value, limit):
-            return f"must be {words} {limit:g}, not {node.raw}"
-    return ""
-
-
 def _to_double(value: float) -> float:
     try:
         return float(value)
     except OverflowError:
         return math.inf if value > 0 else -math.inf
-
-
-def _check_double(node: NumberNode) -> str:
-    """Why a number cannot be used in a calculation; empty if it can."""
-    value = _to_double(node.value)
-    if node.raw.strip("+-") in ("inf", "nan"):
-        return f"must be a finite number, not {node.raw}"
-    if math.isinf(value):
-        return "is too large: numbers end at about 1.8e308"
-    if value == 0 and re.search(r"[1-9]", re.split(r"[eE]", node.raw)[0]):
-        return "is too small: it becomes 0"
-    return ""
 
 
 def has_value(node: ObjectNode, name: str) -> bool:

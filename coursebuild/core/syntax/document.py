@@ -1,13 +1,13 @@
 """The entry point of this package: a Markdown file of a course becomes a `Document`.
 
-Entry point: `parse_document`. It never raises, whatever the text:
+Entry points: `parse_document`, which never raises, whatever the text; `find_conflict`, of any file.
 
 1. Line ends, NUL and a byte order mark are normalized; front matter is reported and left out.
 2. `tree` reads the blocks and, with `inline_tree`, their content; other modules read our fences.
 3. Footnotes are read last, in the order of their numbers.
 4. Terms and labels in wrong places are found in the whole document (`_check_placement`), and what
-   has the id of something else (`_check_ids`). Where a merge conflict was left, that is all there
-   is to say.
+   has the id of something else (`_check_ids`). Where a merge conflict was left (`find_conflict`),
+   that is all there is to say.
 """
 
 from __future__ import annotations
@@ -45,7 +45,6 @@ from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import ILLUSTRATION
 from coursebuild.core.syntax.spans import read_markdown
 from coursebuild.core.syntax.tree import TextReader
-from coursebuild.core.text.conflicts import find_conflict
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Edit,
@@ -55,7 +54,7 @@ from coursebuild.core.text.diagnostics import (
     diagnose,
     sort_diagnostics,
 )
-from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.core.text.source import Source, Span
 
 _YAML = re.compile(
     r"---[ \t]*\n(?:#[ \t].*\n)*"  # the first line, comments
@@ -76,7 +75,14 @@ def parse_document(
     read.
     """
     state = ParsingState(callouts, lesson, words)
-    base = _remove_front_matter(read_markdown(source), state)
+    base = read_markdown(source)
+    if (front := _YAML.match(base.text) or _TOML.match(base.text)) is not None:
+        message = f"a {'lesson' if lesson else 'page'} has no front matter"
+        help = "its title and everything else about it are in content/course.toml; "
+        help += "begin with the text"
+        help = Fix(help, edits=(Edit(base.span(0, front.end()), ""),))
+        state.report(diagnose("front-matter", base.span(0, 3), message, help=help))
+        base = base.slice(front.end())
     title = None if lesson else title_line(source)
     if title is not None:
         base = base.slice(len(base.text.partition("\n")[0]))
@@ -99,18 +105,6 @@ def parse_document(
         help = Fix("delete it; readers would see `\ufffd`", edits=edits, safe=True)
         state.report(diagnose("control-character", source.span(at, at + 1), message, help=help))
     return Parsed(document, sort_diagnostics(state.diagnostics))
-
-
-def _remove_front_matter(text: Excerpt, state: ParsingState) -> Excerpt:
-    match = _YAML.match(text.text) or _TOML.match(text.text)
-    if match is None:
-        return text
-    subject = "lesson" if state.lesson else "page"
-    message = f"a {subject} has no front matter"
-    help = "its title and everything else about it are in content/course.toml; begin with the text"
-    fix = Fix(help, edits=(Edit(text.span(0, match.end()), ""),))
-    state.report(diagnose("front-matter", text.span(0, 3), message, help=fix))
-    return text.slice(match.end())
 
 
 _TEXTS = frozenset(
@@ -213,3 +207,59 @@ def _is_reported(first: AnchorOwner, second: AnchorOwner) -> bool:
     return (isinstance(first, labelled_types) and isinstance(second, labelled_types)) or (
         isinstance(first, Script | Term) and type(first) is type(second)
     )
+
+
+# --- merge conflicts that git left in a file
+
+
+_CONFLICT_MARK = re.compile(r"^(?:<{7}|\|{7}|={7}|>{7})(?:[ \t][^\r\n]*)?(?=\r?$)", re.MULTILINE)
+_SHOWN_CONFLICT = re.compile(
+    r"^ {0,3}(`{3,}|~{3,})[ \t]*(?:diff|markdown)\b.*\n(?:.*\n)*? {0,3}\1[`~]*[ \t]*\r?$",
+    re.MULTILINE,
+)
+"""A block that shows a change, or how a lesson is written."""
+_CONFLICT_NOTES = {
+    "|": "the text that both versions changed begins here",
+    "=": "the other version begins here",
+    ">": "the conflict ends here",
+}
+
+
+def find_conflict(source: Source) -> Diagnostic | None:
+    """The diagnostic of the first merge conflict in a file, or of a mark that is left of one.
+
+    Git writes its marks at the start of a line, so a conflict can be shown on purpose: in a block
+    of kind `diff` or `markdown`, or indented in a list or a quotation.
+    """
+    text, is_markdown = source.text, source.path.endswith(".md")
+    if "<<<<<<<" not in text and ">>>>>>>" not in text:
+        return None  # a line of `=` alone may be anything
+    examples = [match.span() for match in _SHOWN_CONFLICT.finditer(text)] if is_markdown else []
+    marks = [
+        Span(source, *match.span())
+        for match in _CONFLICT_MARK.finditer(text)
+        if not any(start <= match.start() < end for start, end in examples)
+    ]
+    first = next((i for i, mark in enumerate(marks) if mark.text[0] in "<>"), None)
+    if first is None:
+        return None
+    conflict = [marks[first]]
+    for mark in marks[first + 1 :] if marks[first].text[0] == "<" else ():
+        if mark.text[0] == "<":
+            break
+        conflict.append(mark)
+        if mark.text[0] == ">":
+            break
+    message = "this line was left behind by a merge conflict"
+    if len(conflict) > 1:
+        lines = [str(mark.line) for mark in conflict]
+        message = "a merge conflict was left here: its marks are lines "
+        message += f"{', '.join(lines[:-1])} and {lines[-1]}"
+    more_count = sum(mark.text[0] == "<" for mark in marks[first + 1 :])
+    notes = [Note(_CONFLICT_NOTES[mark.text[0]], mark) for mark in conflict[1:]]
+    if more_count:
+        notes.append(Note(f"conflicts further down in this file: {more_count}"))
+    help = "keep one of the versions, or join them, and delete the marks"
+    if is_markdown:
+        help += "; to show a conflict to readers, put it into a block of kind `diff`"
+    return diagnose("merge-conflict", conflict[0], message, help=help, notes=notes)

@@ -242,7 +242,23 @@ class _InlineParser(ParserInline):
         for rule in self.rules.get(state.src[at], ()):
             if rule(state, silent):
                 if len(state.tokens) > token_count:
-                    _set_places(state, token_count, at)
+                    assert isinstance(state, InlineState)
+                    tokens, end = state.tokens, state.pos
+                    cursor = at
+                    for token in tokens[token_count:]:
+                        assert isinstance(token, PositionedToken)
+                        if token.end >= 0:
+                            continue
+                        if token.type in ("link_open", "term_open"):
+                            token.start, token.end = at, at + 1
+                        elif token.type != "text":
+                            token.end = end
+                        elif tokens[-1].markup == "autolink":
+                            token.start, token.end = at + 1, end - 1
+                        else:
+                            token.start, token.end = cursor, cursor + len(token.content)
+                            cursor = token.end
+                    state.text_start = end
                 return True
         return False
 
@@ -257,27 +273,6 @@ class _InlineParser(ParserInline):
                 rule(state)
         tokens.extend(state.tokens)
         return tokens
-
-
-def _set_places(state: StateInline, first_token: int, start: int) -> None:
-    """Give places to the tokens from the index `first_token` on, whose text begins at `start`."""
-    assert isinstance(state, InlineState)
-    tokens, end = state.tokens, state.pos
-    cursor = start
-    for token in tokens[first_token:]:
-        assert isinstance(token, PositionedToken)
-        if token.end >= 0:
-            continue
-        if token.type in ("link_open", "term_open"):
-            token.start, token.end = start, start + 1
-        elif token.type != "text":
-            token.end = end
-        elif tokens[-1].markup == "autolink":
-            token.start, token.end = start + 1, end - 1
-        else:
-            token.start, token.end = cursor, cursor + len(token.content)
-            cursor = token.end
-    state.text_start = end
 
 
 def _build_parser(rules: InlineRules, stop: re.Pattern[str]) -> MarkdownIt:

@@ -39,12 +39,7 @@ from coursebuild.core.model import (
     Term,
     plain_text,
 )
-from coursebuild.core.syntax.attributes import (
-    collapse_spaces,
-    read_meaning,
-    read_term,
-    term_id,
-)
+from coursebuild.core.syntax.attributes import collapse_spaces, read_meaning, read_term, term_id
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_code import check_inline_code
@@ -61,11 +56,7 @@ from coursebuild.core.syntax.mentions import (
 )
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken
-from coursebuild.core.syntax.unread_markup import (
-    check_unread_markup,
-    find_repetitions,
-    find_stars,
-)
+from coursebuild.core.syntax.unread_markup import check_unread_markup, find_repetitions, find_stars
 from coursebuild.core.text.diagnostics import Fix, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 

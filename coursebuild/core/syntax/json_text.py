@@ -105,9 +105,8 @@ class _Reader:
             self.report(self.offset, self.offset + 1, f"`{char}` closes nothing")
         elif char:
             line = self.text[self.offset :].split("\n", 1)[0]
-            self.report(
-                self.offset, self.offset + len(line), "text after the end of the JSON value"
-            )
+            end = self.offset + len(line)
+            self.report(self.offset, end, "text after the end of the JSON value")
         return value
 
     def peek(self) -> str:
@@ -117,9 +116,9 @@ class _Reader:
             char = self.text[at : at + 1]
             if comment := _COMMENT.match(self.text, at):
                 first_line = comment[0].split("\n", 1)[0]
-                self.report(
-                    at, at + len(first_line), "JSON has no comments", self.comment_fix(comment)
-                )
+                edit = Edit(self.body.span(*comment.span()), "")
+                help = Fix("remove it", edits=(edit,))
+                self.report(at, at + len(first_line), "JSON has no comments", help)
                 self.offset = comment.end()
             elif odd := odd_character(char):
                 help = Fix("replace it by a plain space, or remove it", " ", safe=True)
@@ -158,7 +157,11 @@ class _Reader:
                 message = f"`{shorten(key.value)}` is given twice"
                 notes = (Note("the first one is here", first.key.span),)
                 self.diagnostics.append(diagnose("field-repeated", key.span, message, notes=notes))
-            self.read_colon(key)
+            if self.peek() == "=":
+                self.report(self.offset, self.offset + 1, "`=` where JSON has `:`", write(":"))
+            elif self.peek() != ":":
+                self.fail_expecting(f"`:` after the key `{shorten(key.value)}`")
+            self.offset += 1
             members.setdefault(key.value, Member(key, self.read_value(depth + 1)))
             is_done = self.read_separator(start, "}")
         self.offset += 1
@@ -174,14 +177,6 @@ class _Reader:
             is_done = self.read_separator(start, "]")
         self.offset += 1
         return ArrayNode(self.body, start, self.offset, (start, start + 1), items)
-
-    def read_colon(self, key: StringNode) -> None:
-        char = self.peek()
-        if char == "=":
-            self.report(self.offset, self.offset + 1, "`=` where JSON has `:`", write(":"))
-        elif char != ":":
-            self.fail_expecting(f"`:` after the key `{shorten(key.value)}`")
-        self.offset += 1
 
     def read_separator(self, opening: int, closer: str) -> bool:
         """Read what follows a value, the comma included; whether it was the last value."""
@@ -254,7 +249,21 @@ class _Reader:
             char = json.loads(f'"{match[0]}"')
         if char and not _SURROGATE.match(char):
             return char
-        message, help = _escape_mistake(self.text, match, char)
+        escape, word = match[0], tex_word(self.text, match.start() + 1)
+        if char:
+            name = f"`{escape}`" if len(escape) > 1 else f"U+{ord(char):04X}"
+            message, help = f"{name} is half of a character", "write the character itself"
+        elif escape == "\t":
+            message, help = "a tab inside a string", Fix("write `\\t`, or a space", " ")
+        elif len(escape) == 1:
+            message = f"the control character U+{ord(escape):04X} inside a string"
+            help = Fix(f"write `\\u{ord(escape):04x}`, or remove it", "")
+        elif escape != "\\u":
+            message, help = f"`{escape}` is not an escape of JSON", _backslash_help(word)
+        else:
+            message = "`\\u` is not followed by four hexadecimal digits"
+            help = "write four hexadecimal digits after `\\u`"
+            help = _backslash_help(word) if len(word) > 1 else help
         self.report(match.start(), match.end(), message, help)
         return "\ufffd"
 
@@ -295,11 +304,6 @@ class _Reader:
         places = (at for match in matches for at in (match.start(), match.end() - 1))
         return tuple(Edit(self.body.span(at, at + 1), '"') for at in places)
 
-    def comment_fix(self, comment: re.Match[str]) -> Fix:
-        """The fix that removes a comment, and its line if that holds nothing else."""
-        edit = Edit(self.body.span(*comment.span()), "")
-        return Fix("remove it", edits=(edit,))
-
     def fail_unclosed(self, opening: int) -> NoReturn:
         end = len(self.text.rstrip())
         notes = (Note("the block ends here", self.body.span(max(end - 1, 0), end)),)
@@ -319,9 +323,8 @@ class _Reader:
         word = match[0] if match else text[at]
         notes: tuple[Note, ...] = ()
         if opening is not None and word in "]}:":
-            notes = (
-                Note(f"`{text[opening]}` is opened here", self.body.span(opening, opening + 1)),
-            )
+            place = self.body.span(opening, opening + 1)
+            notes = (Note(f"`{text[opening]}` is opened here", place),)
         name = "a string" if word == '"' else f"`{shorten(word)}`"
         help = self.help_with(word, noun)
         self.report(at, at + len(word), f"expected {noun}, found {name}", help, notes)
@@ -337,27 +340,6 @@ _QUOTED = re.compile(
     re.VERBOSE,
 )
 """A string, also one between the quotes of Python or of a word processor."""
-
-
-def _escape_mistake(text: str, match: re.Match[str], char: str) -> tuple[str, str]:
-    """What is wrong with an escape or a character inside a string, and how to mend it.
-
-    `char` is the half of a character that an escape stands for, if it does.
-    """
-    escape = match[0]
-    if char:
-        name = f"`{escape}`" if len(escape) > 1 else f"U+{ord(char):04X}"
-        return f"{name} is half of a character", "write the character itself"
-    if escape == "\t":
-        return "a tab inside a string", Fix("write `\\t`, or a space", " ")
-    if len(escape) == 1:
-        message = f"the control character U+{ord(escape):04X} inside a string"
-        return message, Fix(f"write `\\u{ord(escape):04x}`, or remove it", "")
-    word = tex_word(text, match.start() + 1)
-    if escape != "\\u":
-        return f"`{escape}` is not an escape of JSON", _backslash_help(word)
-    help = _backslash_help(word) if len(word) > 1 else "write four hexadecimal digits after `\\u`"
-    return "`\\u` is not followed by four hexadecimal digits", help
 
 
 def _backslash_help(command: str) -> str:

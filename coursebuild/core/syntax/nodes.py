@@ -299,28 +299,25 @@ def format_value(node: Node) -> str:
 
 def wrong_type_message(node: Node, name: str, type: inspect.Type, format: Format) -> str:
     """The message for a value of the wrong type."""
-    problem = f"must be {_describe_type(type)[0]}, not {_describe_value(node)}"
+    match node:
+        case ObjectNode():
+            value = "an object"
+        case ArrayNode():
+            value = "an array"
+        case StringNode():
+            value = "a string"
+        case NumberNode():
+            value = f"the number {shorten(node.raw)}"
+        case DateNode():
+            value = "a date or time"
+        case BoolNode() | NullNode() | ErrorNode():
+            value = f"`{shorten(node.raw)}`"
+        case _:
+            assert_never(node)
+    problem = f"must be {_describe_type(type)[0]}, not {value}"
     if format == TOML:
         problem = problem.replace("an object", "a table").replace("objects", "tables")
     return f"{format_name(name)} {problem}"
-
-
-def _describe_value(node: Node) -> str:
-    match node:
-        case ObjectNode():
-            return "an object"
-        case ArrayNode():
-            return "an array"
-        case StringNode():
-            return "a string"
-        case NumberNode():
-            return f"the number {shorten(node.raw)}"
-        case DateNode():
-            return "a date or time"
-        case BoolNode() | NullNode() | ErrorNode():
-            return f"`{shorten(node.raw)}`"
-        case _:
-            assert_never(node)
 
 
 def type_help(node: Node, type: inspect.Type) -> str:

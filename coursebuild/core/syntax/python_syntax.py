@@ -73,10 +73,8 @@ def check_syntax(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
     def lesson_line(match: re.Match[str]) -> str:
         return f"{match[1]} line {rows[int(match[2]) - 1].span().line}"
 
-    if isinstance(error, IndentationError) and (tab := _find_mixed_tab(rows)) is not None:
-        message = "this line is indented by a tab, and others by blanks"
-        fix = Fix("indent all lines by blanks", edits=_expand_tabs(rows), safe=True)
-        yield diagnose("python-syntax", tab, message, help=fix)
+    if isinstance(error, IndentationError) and (mixed := _diagnose_mixed_tab(rows)) is not None:
+        yield mixed
         return
     message, _, help = _LINE_REFERENCE.sub(lesson_line, error.msg).partition(". ")
     if row.text.lstrip().startswith(("%", "!")):
@@ -111,28 +109,32 @@ def _python_edits(row: Excerpt, message: str, place: Span) -> tuple[Edit, ...]:
     return ()
 
 
-def _find_mixed_tab(rows: Sequence[Excerpt]) -> Span | None:
-    """The first tab before code of which other lines are indented by blanks."""
-    indentations = [re.match(r"[ \t]*", row.text) for row in rows]
-    if not any(match and match[0].startswith(" ") for match in indentations):
-        return None
-    for row, match in zip(rows, indentations, strict=True):
-        if match and "\t" in match[0]:
-            at = match[0].index("\t")
-            return row.span(at, at + 1)
-    return None
+def _diagnose_mixed_tab(rows: Sequence[Excerpt]) -> Diagnostic | None:
+    """The diagnostic of the first tab before code of which other lines are indented by blanks.
 
-
-def _expand_tabs(rows: Sequence[Excerpt]) -> tuple[Edit, ...]:
-    """The edits that put blanks in the place of tabs before code, if it is read then."""
+    Its edits put blanks in the place of all such tabs, if the code is read then.
+    """
     leads = [row.text[: len(row.text) - len(row.text.lstrip())] for row in rows]
+    tab = next(
+        (
+            row.span(at := lead.index("\t"), at + 1)
+            for row, lead in zip(rows, leads, strict=True)
+            if "\t" in lead
+        ),
+        None,
+    )
+    if tab is None or not any(lead.startswith(" ") for lead in leads):
+        return None
     width = min((len(lead) for lead in leads if lead and "\t" not in lead), default=4)
     new_leads = [lead.replace("\t", " " * width) for lead in leads]
     lines = [new + row.text.lstrip() for new, row in zip(new_leads, rows, strict=True)]
-    if _compile_error("\n".join(lines)) is not None:
-        return ()
-    pairs = zip(rows, leads, new_leads, strict=True)
-    return tuple(Edit(row.span(0, len(a)), b) for row, a, b in pairs if a != b)
+    edits: tuple[Edit, ...] = ()
+    if _compile_error("\n".join(lines)) is None:
+        pairs = zip(rows, leads, new_leads, strict=True)
+        edits = tuple(Edit(row.span(0, len(a)), b) for row, a, b in pairs if a != b)
+    message = "this line is indented by a tab, and others by blanks"
+    fix = Fix("indent all lines by blanks", edits=edits, safe=True)
+    return diagnose("python-syntax", tab, message, help=fix)
 
 
 def _lower_first(sentence: str) -> str:

@@ -225,7 +225,17 @@ def _read_comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparis
     atol = _read_tolerance(keys.get("atol"), diagnostics)
     _check_contradictions(keys, diagnostics)
     ellipsis = keys.get("ellipsis") is not None
-    volatile = _read_pattern(keys.get("volatile"), diagnostics)
+    volatile, word = "", keys.get("volatile")
+    if word is not None and word.value_text is not None:
+        pattern = word.value_text.text
+        mistake = pattern_mistake(pattern) or pattern_mistake(volatile_pattern(pattern))
+        if mistake is not None or matches_empty_text(pattern):
+            message = "the pattern matches where there is nothing"
+            if mistake is not None:
+                message = f"the pattern does not compile: {mistake[0]}"
+            diagnostics.append(diagnose("fence-key-value", word.value_span, message))
+        else:
+            volatile = pattern
     if keys.get("volatile") and not volatile:
         return Comparison(Mode.VOLATILE)
     mode = Mode.DIGITS if keys.get("digits") else Mode.EXACT
@@ -259,21 +269,6 @@ def _read_tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal
     )
     diagnostics.append(diagnose("fence-key-value", word.value_span, message))
     return None
-
-
-def _read_pattern(word: Word | None, diagnostics: list[Diagnostic]) -> str:
-    """The regular expression of what differs from run to run; empty if there is none."""
-    if word is None or word.value_text is None:
-        return ""
-    pattern = word.value_text.text
-    mistake = pattern_mistake(pattern) or pattern_mistake(volatile_pattern(pattern))
-    if mistake is None and not matches_empty_text(pattern):
-        return pattern
-    message = "the pattern matches where there is nothing"
-    if mistake is not None:
-        message = f"the pattern does not compile: {mistake[0]}"
-    diagnostics.append(diagnose("fence-key-value", word.value_span, message))
-    return ""
 
 
 def _check_contradictions(keys: FenceKeys, diagnostics: list[Diagnostic]) -> None:

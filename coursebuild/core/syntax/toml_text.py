@@ -56,9 +56,10 @@ def parse_toml(text: Source | Excerpt, *, rule: str = "map-syntax") -> Parsed[Ob
     except RecursionError:
         diagnostic = diagnose(rule, body.span(0, 0), "tables, arrays or keys are nested too deeply")
     except ValueError as error:
-        diagnostic = _diagnose_repeated_key(body, str(error)) or diagnose_syntax(
-            body, str(error), rule
-        )
+        repeated_key = _diagnose_repeated_key(body, str(error))
+        start, end, message, help = _describe_mistake(body.text, str(error))
+        mistake = diagnose(rule, body.span(start, end), message, help=help)
+        diagnostic = repeated_key or mistake
     return Parsed(None, (diagnostic,))
 
 
@@ -248,12 +249,6 @@ def double_backslash(command: str) -> str:
     return Fix(help, "\\\\", "\\", safe=True)
 
 
-def diagnose_syntax(body: Excerpt, message: str, rule: str) -> Diagnostic:
-    """The diagnostic of a text that `tomllib` refuses with `message`."""
-    start, end, words, help = _describe_mistake(body.text, message)
-    return diagnose(rule, body.span(start, end), words, help=help)
-
-
 _Mistake = tuple[int, int, str, str]
 """Its start and end in the text, the message and the help."""
 
@@ -270,7 +265,12 @@ def _describe_mistake(text: str, message: str) -> _Mistake:
     opening = _innermost_opening(text, at)
     bracket = text[opening] if opening is not None else ""
     if opening is not None and bracket in "\"'":
-        return _unclosed_string(text, opening)
+        quote = text[opening]
+        if text.startswith(quote * 3, opening):
+            return opening, opening + 3, f"`{quote * 3}` is never closed", ""
+        end = opening + len(text[opening:].split("\n", 1)[0])
+        help = f"close it with `{quote}`; text of several lines stands between three quotes"
+        return opening, end, "the string is not closed on its line", help
     if re.match("Unescaped|Escaped|Invalid hex", words):
         start = text.rindex("\\", 0, at)
         help = double_backslash(tex_word(text, start + 1))
@@ -284,7 +284,13 @@ def _describe_mistake(text: str, message: str) -> _Mistake:
         return _wrong_value(text, at)
     if words.startswith(("Expected newline", "Unclosed")):
         closer = "]" if words == "Unclosed array" else "}" if bracket else ""
-        return _wrong_end_of_value(text, at, closer)
+        before = re.search(r"[\w.+:-]*\Z", text[:at])
+        if before and before[0] and not text[at].isspace() and text[at] not in ",#":
+            return _wrong_value(text, before.start())
+        noun, help = "the end of the line", "each `key = value` stands on a line of its own"
+        if closer:
+            noun, help = f"`,` or `{closer}`", "values in brackets have commas between them"
+        return _expected_instead(text, at, noun, help)
     help = Fix("TOML writes `key = value`", " =", safe=True) if char == ":" else ""
     help = _QUOTES_HELP if char in _CURLY_QUOTES else help
     if words.startswith("Invalid"):
@@ -305,15 +311,6 @@ def _innermost_opening(text: str, at: int) -> int | None:
         elif token[0] in ("]", "}") and openings:
             openings.pop()
     return openings[-1] if openings else None
-
-
-def _unclosed_string(text: str, start: int) -> _Mistake:
-    quote = text[start]
-    if text.startswith(quote * 3, start):
-        return start, start + 3, f"`{quote * 3}` is never closed", ""
-    end = start + len(text[start:].split("\n", 1)[0])
-    help = f"close it with `{quote}`; text of several lines stands between three quotes"
-    return start, end, "the string is not closed on its line", help
 
 
 def _wrong_value(text: str, start: int) -> _Mistake:
@@ -339,17 +336,6 @@ def _value_help(text: str) -> str:
         return ""
     new = None if "\\" in text or "#" in text else f'"{text}"'
     return Fix(f'text needs quotes: `"{shorten(text)}"`', new, safe=True)
-
-
-def _wrong_end_of_value(text: str, at: int, closer: str) -> _Mistake:
-    """Describe what wrongly follows a value, such as letters after digits."""
-    before = re.search(r"[\w.+:-]*\Z", text[:at])
-    if before and before[0] and not text[at].isspace() and text[at] not in ",#":
-        return _wrong_value(text, before.start())
-    noun, help = "the end of the line", "each `key = value` stands on a line of its own"
-    if closer:
-        noun, help = f"`,` or `{closer}`", "values in brackets have commas between them"
-    return _expected_instead(text, at, noun, help)
 
 
 def _expected_instead(text: str, at: int, noun: str, help: str) -> _Mistake:

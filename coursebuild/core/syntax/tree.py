@@ -19,17 +19,10 @@ from functools import partial
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.syntax.attributes import (
-    LABEL,
-    Attributes,
-    check_heading,
-    read_attributes,
-    split_label,
-)
+from coursebuild.core.syntax.attributes import LABEL, check_heading, read_attributes, split_label
 from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.code_blocks import read_block
 from coursebuild.core.syntax.containers import (
-    Head,
     check_item,
     check_neighbours,
     check_numbers,
@@ -89,7 +82,7 @@ class TextReader:
             elif token.type == "footnote_reference_open":
                 label, at = token.content, token.start + 2
                 label_span = self.base.span(at, at + len(label))
-                read = self._defer_reading(i + 1)
+                read = partial(self._read_footnote, i + 1)
                 self.state.notes.add(FootnoteText(label, label_span, self._span(token), read))
         deep_token = next((token for token in self.tokens if token.info == TOO_DEEP), None)
         if deep_token is not None:
@@ -97,14 +90,9 @@ class TextReader:
             place = self._span(deep_token).first_line()
             self.state.report(diagnose("nesting-deep", place, message))
 
-    def _defer_reading(self, at: int) -> Callable[[], tuple[model.Block, ...]]:
-        """Return a function that reads the footnote whose first token has the index `at`."""
-
-        def read() -> tuple[model.Block, ...]:
-            self.index = at
-            return self._read_blocks("footnote_reference_close")
-
-        return read
+    def _read_footnote(self, at: int) -> tuple[model.Block, ...]:
+        self.index = at
+        return self._read_blocks("footnote_reference_close")
 
     def read(self) -> tuple[model.Block, ...]:
         """The blocks of the text without its footnotes, which are read last."""
@@ -232,22 +220,12 @@ class TextReader:
         )
         if not self.nested:
             state.level = level
-        return model.Heading(
-            span,
-            level,
-            children,
-            *self._take_anchor(attributes.value, children),
-            attributes.value.classes,
-        )
-
-    def _take_anchor(
-        self, attributes: Attributes, children: tuple[model.Inline, ...]
-    ) -> tuple[str, bool]:
-        anchors = self.state.anchors
-        if attributes.id is not None:
-            anchors.take(attributes.id.text[1:], attributes.id.span())
-            return attributes.id.text[1:], True
-        return anchors.make(model.plain_text(children)), False
+        classes, id = attributes.value.classes, attributes.value.id
+        if id is None:
+            anchor = state.anchors.make(model.plain_text(children))
+            return model.Heading(span, level, children, anchor, False, classes)
+        state.anchors.take(id.text[1:], id.span())
+        return model.Heading(span, level, children, id.text[1:], True, classes)
 
     def _read_fence(self, token: PositionedToken) -> model.Block:
         fence = read_fence(token, self.base, nested=self.nested)
@@ -274,24 +252,20 @@ class TextReader:
             children = self.inlines(content, html=True)
             if self.nested or any(isinstance(child, model.Math) for child in children):
                 return model.HtmlFlow(content.span(), children)
-        else:
-            self._check_html_block(html)
+        else:  # check the tags, and the texts between them
+            texts: list[tuple[int, str]] = []
+            end, literals = 0, 0
+            for tag in tags(html.text):
+                self.balance.add(tag, html)
+                if not literals:
+                    texts.append((end, html.text[end : tag.start]))
+                if tag.name in LITERAL and not tag.is_complete:
+                    literals = max(0, literals + (-1 if tag.is_end_tag else 1))
+                end = tag.end
+            texts.append((end, html.text[end:]))
+            self.state.diagnostics += check_unread_markup(html, texts, html=True)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
         return model.HtmlBlock(self._span(token), text, find_media(html), find_forbidden(html))
-
-    def _check_html_block(self, html: Excerpt) -> None:
-        """Check the tags of a block of HTML, and the texts between them."""
-        texts: list[tuple[int, str]] = []
-        end, literals = 0, 0
-        for tag in tags(html.text):
-            self.balance.add(tag, html)
-            if not literals:
-                texts.append((end, html.text[end : tag.start]))
-            if tag.name in LITERAL and not tag.is_complete:
-                literals = max(0, literals + (-1 if tag.is_end_tag else 1))
-            end = tag.end
-        texts.append((end, html.text[end:]))
-        self.state.diagnostics += check_unread_markup(html, texts, html=True)
 
     def _read_thematic_break(self, token: PositionedToken) -> model.ThematicBreak:
         return model.ThematicBreak(self._span(token))
@@ -321,37 +295,32 @@ class TextReader:
             head = read_head(trim(first_token.text), self.state.callouts)
             if head is not None:
                 self.state.diagnostics += head.diagnostics
-                return self._read_callout(span, head.value)
+                kind, place, folded = head.value.kind, head.value.kind_span, head.value.folded
+                title, rest = self.inlines(head.value.title), head.value.rest
+                self.index += 3
+                blocks: tuple[model.Block, ...] = ()
+                if rest.text:
+                    blocks = (model.Paragraph(rest.span(), self.inlines(rest)),)
+                blocks += self._read_blocks("blockquote_close")
+                return model.Callout(span, kind, place, title, folded, blocks)
         return model.BlockQuote(span, self._read_blocks("blockquote_close"))
-
-    def _read_callout(self, span: Span, head: Head) -> model.Callout:
-        title = self.inlines(head.title)
-        self.index += 3
-        rest: tuple[model.Block, ...] = ()
-        if head.rest.text:
-            rest = (model.Paragraph(head.rest.span(), self.inlines(head.rest)),)
-        blocks = (*rest, *self._read_blocks("blockquote_close"))
-        return model.Callout(span, head.kind, head.kind_span, title, head.folded, blocks)
 
     def _read_list(self, token: PositionedToken) -> model.ListBlock:
         ordered = token.type == "ordered_list_open"
         items: list[model.ListItem] = []
         while (item := self.tokens[self.index]).type == "list_item_open":
             self.index += 1
-            items.append(self._read_item(item))
+            blocks = self._read_blocks("list_item_close")
+            marker = self.base.span(item.start, item.start + len(item.info) + 1)
+            span = marker.to(blocks[-1].span) if blocks else marker
+            self.state.diagnostics += check_item(span)
+            items.append(model.ListItem(span, blocks, item.meta.get("checked")))
         self.index += 1
         if ordered:
             self.state.diagnostics += check_numbers([item.span for item in items])
         return model.ListBlock(
             self._span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
         )
-
-    def _read_item(self, token: PositionedToken) -> model.ListItem:
-        blocks = self._read_blocks("list_item_close")
-        marker = self.base.span(token.start, token.start + len(token.info) + 1)
-        span = marker.to(blocks[-1].span) if blocks else marker
-        self.state.diagnostics += check_item(span)
-        return model.ListItem(span, blocks, token.meta.get("checked"))
 
     def _read_table(self, token: PositionedToken) -> model.Table:
         table, self.index = self._table_at(self.index - 1)
@@ -432,13 +401,14 @@ class NestedTextParser:
     def inlines(self, excerpt: Excerpt) -> Parsed[tuple[model.Inline, ...]]:
         """The inlines of a text that is one paragraph at most."""
         content = trim(normalize(excerpt))
-        return self._state.collect_diagnostics(lambda: self._read_inlines(content))
 
-    def _read_inlines(self, content: Excerpt) -> tuple[model.Inline, ...]:
-        balance = Balance(self._state.report)
-        inlines = read_inlines(content, self._state, self._references(), balance)
-        balance.finish()
-        return inlines
+        def read() -> tuple[model.Inline, ...]:
+            balance = Balance(self._state.report)
+            inlines = read_inlines(content, self._state, self._references(), balance)
+            balance.finish()
+            return inlines
+
+        return self._state.collect_diagnostics(read)
 
     def _references(self) -> References:
         """A copy of the document's link definitions, as those in a text hold in it only."""

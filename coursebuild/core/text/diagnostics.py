@@ -277,16 +277,14 @@ _IDS = re.compile(r"\d+|(?<![^\W_])[^\W\d_](?![^\W_])")
 """Numbers and single letters."""
 
 
-def propose(
-    name: str, likely: str, names: Iterable[str] = (), form: str = "did you mean `{}`?"
-) -> Fix:
+def propose(name: str, likely: str, names: Iterable[str] = ()) -> Fix:
     """The fix that writes the likely one of `names` for a name.
 
     It is safe where the name differs from that one by a letter or two, and from others by more.
     Names that differ in numbers or single letters are of different things: there the help has no
     edit.
     """
-    help = form.format(likely)
+    help = f"did you mean `{likely}`?"
     if _IDS.findall(name.lower()) != _IDS.findall(likely.lower()):
         return Fix(help)
     candidates = dict(_misspelt_names(name, {*names, likely}))

@@ -82,8 +82,7 @@ GROUPS: dict[str, dict[str, str]] = {
     },
     "Markdown": {
         "front-matter": "A lesson begins with front matter; coursebuild reads none.",
-        "heading-top": "A lesson has a heading of level 1, or a page has one that is not its title "
-        "in the map.",
+        "heading-top": "A lesson has a heading of level 1, or a page has one other than its title.",
         "nesting-deep": "Quotations, lists or footnotes are nested too deeply.",
         "heading-skip": "A heading skips a level.",
         "heading-empty": "A heading has no text.",
@@ -112,7 +111,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "fence-info": "The first line of a fence cannot be read.",
         "fence-key-unknown": "This kind of block has no such key.",
         "fence-key-repeated": "A fence has the same key twice.",
-        "fence-key-value": "The value of a key is not allowed.",
+        "fence-key-value": "A key of a fence has a value that it does not take.",
         "fence-kind-near": "The kind of a code block looks misspelt.",
         "fence-unread": "A code block holds JSON, and its kind is not a known one.",
     },
@@ -125,7 +124,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "term-attribute": "The attribute that defines a term cannot be read.",
         "term-place": "A term is defined outside a paragraph.",
         "term-repeated": "The course defines a term twice.",
-        "symbol-attribute": "The meaning of a symbol cannot be read.",
+        "symbol-attribute": "The braces that declare a symbol cannot be read.",
         "symbol-formula": "The formula declared as a symbol is not a single symbol.",
         "unit-unknown": "The unit of an answer or a symbol does not exist.",
         "symbol-repeated": "A text gives a symbol its meaning twice.",

@@ -85,7 +85,15 @@ def multiply(left: Dimension, right: Dimension, power: Fraction | int = 1) -> Di
 def find_unit(text: str) -> Unit | None:
     """The unit of a text such as `N m/rad`; `None` if neither we nor Pint know it."""
     plain = re.sub("[⁰¹²³⁴-⁹⁻]+", lambda m: "^" + m[0].translate(_SUPERSCRIPTS), text.strip())
-    return _parse_product(re.sub(r"\s*[ ·⋅*]\s*", "*", plain)) or _ask_pint(text)
+    unit = _parse_product(re.sub(r"\s*[ ·⋅*]\s*", "*", plain))
+    if unit is not None:
+        return unit
+    try:
+        base = _registry()(text.replace(" ", "*").replace("·", "*")).to_base_units()
+        powers = sorted((str(n)[1:-1], Fraction(p)) for n, p in base.dimensionality.items())
+        return Unit(Fraction(repr(float(base.magnitude))), tuple(powers))
+    except Exception:  # Pint does not document what its parser raises
+        return None
 
 
 def _parse_product(text: str) -> Unit | None:
@@ -112,15 +120,6 @@ def _find_known_unit(name: str) -> Unit | None:
         if rest in _DERIVED_UNITS and (unit := _parse_product(_DERIVED_UNITS[rest])):
             return Unit(unit.size * Fraction(10) ** power, unit.dimension)
     return None
-
-
-def _ask_pint(text: str) -> Unit | None:
-    try:
-        base = _registry()(text.replace(" ", "*").replace("·", "*")).to_base_units()
-        powers = sorted((str(n)[1:-1], Fraction(p)) for n, p in base.dimensionality.items())
-        return Unit(Fraction(repr(float(base.magnitude))), tuple(powers))
-    except Exception:  # Pint does not document what its parser raises
-        return None
 
 
 @functools.cache

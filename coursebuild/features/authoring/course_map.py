@@ -76,7 +76,6 @@ def with_page(course: Course, id: str, title: str, path: str) -> str:
 
 
 def _table(kind: str, **fields: str) -> list[str]:
-    """Return the lines of a table."""
     return [f"[[{kind}]]", *(f"{name} = {toml_string(value)}" for name, value in fields.items())]
 
 
@@ -118,7 +117,8 @@ def with_lesson_renamed(course: Course, old: Lesson, new: str, edits: Sequence[E
     _check_free(course, new)
     text = apply_edits(course.map.text, edits)
     new_course = parse_course_map(Source(course.map.path, text)).value
-    lesson = None if new_course is None else _find_lesson(new_course, new)
+    lessons = () if new_course is None else new_course.lessons
+    lesson = next((lesson for lesson in lessons if lesson.id == new), None)
     if new_course is None or lesson is None:
         return _require_valid(course, text, new)
     ids = [sibling.id for sibling in new_course.lessons if sibling.level == lesson.level]
@@ -216,10 +216,6 @@ def _require_valid(course: Course, text: str, id: str, kind: str = "lesson") -> 
     return text
 
 
-def _find_lesson(course: Course, id: str) -> Lesson | None:
-    return next((lesson for lesson in course.lessons if lesson.id == id), None)
-
-
 def _level_id(id: str) -> str:
     return id.partition(".")[0]
 
@@ -315,16 +311,13 @@ def doubtful_places(
             for match in _RANGE.finditer(source.text)
             if id_order(match[1]) <= id_order(lesson.id) <= id_order(match[2])
         ]
-    return [*places, *_outdated_globs(course, lesson, new)]
-
-
-def _outdated_globs(course: Course, lesson: Lesson, new: str) -> Iterator[Span]:
-    """Yield the patterns of the map that match the lesson's old path, and not the new one."""
+    # Patterns that match the lesson's old path, and not the new one
     new_path = replace(lesson, id=new).path
     for path in _silenced_paths(_map(course)):
         fits = [fnmatchcase(name, path.value) for name in (lesson.path, new_path)]
         if path.value != lesson.path and fits == [True, False]:
-            yield path.span
+            places.append(path.span)
+    return places
 
 
 def _silenced_paths(root: ObjectNode) -> Iterator[StringNode]:

@@ -329,10 +329,18 @@ def layout_json(node: Node, width: int, column: int = 0, indent: int = 0) -> str
     than their parent; those that begin on the line of the bracket are aligned after it.
     """
     line = to_one_line(node).text
-    parts = _child_nodes(node)
+    parts: list[Member] | list[Node] = node.items if isinstance(node, ArrayNode) else []
+    if isinstance(node, ObjectNode):
+        parts = list(node.members.values())
     if not parts or ("\n" not in node.raw and column + len(line) <= width):
         return line
-    breaks = _count_breaks(node, parts)
+    breaks = [1] * (len(parts) + 1)  # the line ends before each part and the closing bracket
+    if "\n" in node.raw:
+        places = [
+            (p.key.start, p.value.end) if isinstance(p, Member) else (p.start, p.end) for p in parts
+        ]
+        places = [(0, node.start + 1), *places, (node.end - 1, 0)]
+        breaks = [node.body.text.count("\n", a[1], b[0]) for a, b in pairwise(places)]
     inner = indent + 2 if breaks[0] else column + 1 if any(breaks) else indent
     text, at = line[0], column + 1
     for part, lines in zip(parts, breaks, strict=False):
@@ -348,20 +356,3 @@ def layout_json(node: Node, width: int, column: int = 0, indent: int = 0) -> str
     if breaks[-1]:
         text += "\n" + " " * (indent if breaks[0] else column)
     return text + line[-1]
-
-
-def _child_nodes(node: Node) -> list[Member] | list[Node]:
-    if isinstance(node, ObjectNode):
-        return list(node.members.values())
-    return node.items if isinstance(node, ArrayNode) else []
-
-
-def _count_breaks(node: Node, parts: list[Member] | list[Node]) -> list[int]:
-    """Count the line ends before each part and the closing bracket; 1 each for a single line."""
-    if "\n" not in node.raw:
-        return [1] * (len(parts) + 1)
-    places = [
-        (p.key.start, p.value.end) if isinstance(p, Member) else (p.start, p.end) for p in parts
-    ]
-    places = [(0, node.start + 1), *places, (node.end - 1, 0)]
-    return [node.body.text.count("\n", a[1], b[0]) for a, b in pairwise(places)]

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.pages.strings import Strings
-from coursebuild.features.bench.grids import Grid, bounded, grid, percent, phrase, power
+from coursebuild.features.bench.grids import Grid, bounded, factor, grid, percent, phrase, power
 from coursebuild.numerics.reports.engine_report import (
     BatchCost,
     EngineReport,
@@ -108,10 +108,10 @@ def _cost_text(row: EngineRow, worlds: int) -> str:
     cost = next((cost for cost in row.costs if cost.worlds == worlds), BatchCost(worlds))
     if cost.seconds is None or cost.ratio is None:
         return "–" if cost.remark else ""
-    ratio = f"{cost.ratio.value:.2g}"
+    ratio = factor(cost.ratio.value, 2)
     if cost.ratio.half_width > _UNCERTAIN:
-        ratio = f"{cost.ratio.low:.2g} – {cost.ratio.high:.2g}"
-    return f"{1e6 * cost.seconds.value:.3g} µs (×{ratio})"
+        ratio = f"{factor(cost.ratio.low, 2)} – {factor(cost.ratio.high, 2)}"
+    return Markup("{} <br>×{}").format(seconds_text(cost.seconds.value, 3), ratio)
 
 
 _UNCERTAIN = 0.1

@@ -142,11 +142,12 @@ def unbroken(number: Markup) -> Markup:
     return Markup('<span class="whole">{}</span>').format(number)
 
 
-def factor(value: float | None) -> str:
-    """Write how many times as fast as real time something runs."""
+def factor(value: float | None, digits: int = 3) -> str:
+    """Write in so many digits how many times as fast, or as slow, something is."""
     if value is None:
         return ""
-    return f"{value:,.0f}".replace(",", _THIN) if value >= 100 else f"{value:.3g}"
+    value = float(f"{value:.{digits}g}")
+    return f"{value:,.0f}".replace(",", _THIN) if value >= 100 else f"{value:g}"
 
 
 def size(count: int) -> str:

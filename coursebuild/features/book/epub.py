@@ -176,8 +176,13 @@ class _Epub:
     def _cover(self) -> bytes:
         """Draw the title of the course as a picture, with a bar in the accent colour."""
         title = " ".join(self._course.title.split())
+        widths = [
+            1.0 if unicodedata.east_asian_width(c) in "WF" else 0.7 if c.isupper() else 0.52
+            for c in title
+        ]
+        mean_width = sum(widths) / max(len(widths), 1) or 1.0  # in ems; an estimate without a font
         for size in _COVER_SIZES:
-            lines = textwrap.wrap(title, int(_COVER_WIDTH / size / _mean_width(title))) or [""]
+            lines = textwrap.wrap(title, int(_COVER_WIDTH / size / mean_width)) or [""]
             if len(lines) <= _COVER_LINES:
                 break
         accent, _ = accents(self._course.theme)
@@ -242,15 +247,6 @@ class _Epub:
 
 def _page_item(name: str, page: bytes, properties: str = "") -> EpubItem:
     return EpubItem(OutputFile(f"{_FOLDER}{name}", page), _XHTML, properties, linear=True)
-
-
-def _mean_width(title: str) -> float:
-    """Estimate the mean width of the title's characters, in ems, without a font."""
-    widths = [
-        1.0 if unicodedata.east_asian_width(c) in "WF" else 0.7 if c.isupper() else 0.52
-        for c in title
-    ]
-    return sum(widths) / max(len(widths), 1) or 1.0
 
 
 def xml_id(id: str) -> str:

@@ -61,19 +61,6 @@ def pdf_file(context: ExportContext) -> OutputFile:
     Raises:
         EffectError: there is no Chromium, or it does not print.
     """
-    program = _find_chromium()
-    html = page_file(context, page_numbers=True).data.decode()
-    with tempfile.TemporaryDirectory(prefix="coursebuild-pdf-") as folder:
-        first = _print(program, Path(folder), _with_numbers(html, {}))
-        data = _print(program, Path(folder), _with_numbers(html, _page_numbers(first)))
-    times = _TIMES.search(data, 0, 4096)
-    if times is not None:
-        note = f"{MARK})".encode().ljust(len(times[0]))
-        data = data[: times.start()] + note + data[times.end() :]
-    return OutputFile("course.pdf", data)
-
-
-def _find_chromium() -> str:
     choice = os.environ.get(_PATH, "")
     candidates = [choice] if choice else [*_NAMES, _MAC]
     program = next(filter(None, map(shutil.which, candidates)), None)
@@ -84,7 +71,15 @@ def _find_chromium() -> str:
             help=f"install Chromium or Chrome, or name one in the variable {_PATH}; or print the "
             "page of `coursebuild export page` in any browser",
         )
-    return program
+    html = page_file(context, page_numbers=True).data.decode()
+    with tempfile.TemporaryDirectory(prefix="coursebuild-pdf-") as folder:
+        first = _print(program, Path(folder), _with_numbers(html, {}))
+        data = _print(program, Path(folder), _with_numbers(html, _page_numbers(first)))
+    times = _TIMES.search(data, 0, 4096)
+    if times is not None:
+        note = f"{MARK})".encode().ljust(len(times[0]))
+        data = data[: times.start()] + note + data[times.end() :]
+    return OutputFile("course.pdf", data)
 
 
 def _print(program: str, folder: Path, html: str) -> bytes:
@@ -118,7 +113,9 @@ def _print(program: str, folder: Path, html: str) -> bytes:
             help="print the page of `coursebuild export page` in parts",
         ) from None
     finally:
-        _end(process)
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
     data = pdf.read_bytes() if pdf.is_file() else b""
     if not data.startswith(b"%PDF-"):
         lines = errors.decode(errors="replace").strip().splitlines()
@@ -129,13 +126,6 @@ def _print(program: str, folder: Path, html: str) -> bytes:
             "`coursebuild export page` elsewhere",
         )
     return data
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """End Chromium with its helpers, whatever has become of it."""
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
 
 
 def _with_numbers(html: str, numbers: Mapping[str, int]) -> str:

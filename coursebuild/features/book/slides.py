@@ -64,7 +64,7 @@ def slides_file(context: ExportContext) -> OutputFile:
     place = urls.Place(path)
     files: dict[str, bytes] = {}
     text = lesson_text(context, path)
-    for lab in _labs(text):
+    for lab in (element for element in _elements(text) if "data-config" in element.attributes):
         _embed_lab(context, place, lab, files)
     rules = RewriteRules(
         place,
@@ -112,15 +112,10 @@ def _address(context: ExportContext, own_path: str, path: str, anchor: str) -> s
 
 
 def _elements(content: Iterable[HtmlContent]) -> Iterator[HtmlElement]:
-    """All elements of a tree."""
     for child in content:
         if isinstance(child, HtmlElement):
             yield child
             yield from _elements(child.children)
-
-
-def _labs(content: Iterable[HtmlContent]) -> Iterator[HtmlElement]:
-    return (element for element in _elements(content) if "data-config" in element.attributes)
 
 
 def _embed_lab(

@@ -170,7 +170,6 @@ def _outputs_section(before: Mapping[str, ScriptState], now: Mapping[str, Script
 
 
 def _describe_script_change(before: ScriptState, now: ScriptState) -> str:
-    """Describe how a script and its recorded outputs differ."""
     parts = ["code edited"] if before.code != now.code else []
     for old, new in zip_longest(before.outputs, now.outputs):
         if old is None or new is None:
@@ -213,20 +212,15 @@ def _labs(course: Course) -> dict[tuple[str, str], LabState]:
         text = trial.block.span.text
         if trial.block.span.path.startswith("models/"):  # the trial of a model that no text shows
             continue
-        data = _parse_object(text.partition("\n")[2].rpartition("\n")[0])
+        try:
+            value = json.loads(text.partition("\n")[2].rpartition("\n")[0])
+        except ValueError:
+            value = None
+        data: dict[str, object] = value if isinstance(value, dict) else {}
         key = trial.owner, str(data.get("title") or trial.name)
         models = {name: texts.get(name, "") for name in trial.block.models()}
         labs[(trial.owner, trial.name) if key in labs else key] = LabState(text, data, models)
     return labs
-
-
-def _parse_object(text: str) -> dict[str, object]:
-    """Parse a JSON object; empty if the text is none."""
-    try:
-        value = json.loads(text)
-    except ValueError:
-        return {}
-    return value if isinstance(value, dict) else {}
 
 
 def _describe_lab_change(before: LabState, now: LabState) -> str:

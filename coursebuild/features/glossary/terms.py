@@ -272,7 +272,8 @@ def sort_key(name: str) -> tuple[object, ...]:
     """Sort digits and signs before Latin letters and others; marks and case count last."""
     plain = _without_accents(name)
     first = plain[:1]
-    return (first.isalpha() + (first.isalpha() and not _is_latin(first)), plain, name)
+    is_latin = first.isascii() or unicodedata.name(first, "").startswith("LATIN")
+    return (first.isalpha() + (first.isalpha() and not is_latin), plain, name)
 
 
 def initial(name: str) -> str:
@@ -286,7 +287,3 @@ def _without_accents(name: str) -> str:
     parts = unicodedata.normalize("NFKD", name.casefold())
     letters = "".join(char for char in parts if not unicodedata.combining(char))
     return letters.lstrip("$\\{[(\"'“‘ ")
-
-
-def _is_latin(char: str) -> bool:
-    return char.isascii() or unicodedata.name(char, "").startswith("LATIN")

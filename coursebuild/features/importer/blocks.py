@@ -105,7 +105,11 @@ def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: Lesso
     if not isinstance(last, ast.Expr) or text.rstrip().endswith(";"):
         return text
     if isinstance(last.value, ast.Call):
-        if _shows_itself(last.value):
+        root: ast.expr = last.value.func
+        while isinstance(root, ast.Attribute | ast.Call):
+            root = root.func if isinstance(root, ast.Call) else root.value
+        drawing_names = ("print", "plt", "ax", "axs", "axes", "fig", "display")
+        if isinstance(root, ast.Name) and root.id in drawing_names:
             return text
         if not cell.shows_value:
             name = ast.unparse(last.value.func)
@@ -115,15 +119,6 @@ def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: Lesso
     before = "\n".join(lines[: last.lineno - 1])
     lead = lines[last.lineno - 1].encode()[: last.col_offset].decode()
     return f"{before}\n{lead}print({ast.get_source_segment(text, last.value)})"
-
-
-def _shows_itself(call: ast.Call) -> bool:
-    """Whether a call draws or prints, so that its value is of no interest."""
-    root: ast.expr = call.func
-    while isinstance(root, ast.Attribute | ast.Call):
-        root = root.func if isinstance(root, ast.Call) else root.value
-    name = root.id if isinstance(root, ast.Name) else ""
-    return name in ("print", "plt", "ax", "axs", "axes", "fig", "display")
 
 
 _CALLOUTS = {
@@ -265,7 +260,6 @@ def _convert_directive(name: str, argument: str, text: str, context: LessonConte
 
 @functools.cache
 def _highlighted_languages() -> frozenset[str]:
-    """The names of the languages that can be highlighted."""
     from pygments.lexers import get_all_lexers
 
     return frozenset(alias for _, aliases, _, _ in get_all_lexers() for alias in aliases)

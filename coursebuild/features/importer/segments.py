@@ -39,7 +39,9 @@ def read_segments(text: str, name: str) -> tuple[str, list[Segment], dict[str, b
     if name.endswith(".ipynb"):
         segments, pictures = _read_notebook(text, name)
     else:
-        metadata, size = _read_front_matter(text)
+        match, size = _FRONT_MATTER.match(text), 0
+        if match is not None and isinstance(value := read_yaml(match[1] or "{}"), dict):
+            metadata, size = value, match.end()
         segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
     # The first heading of level 1, and the segments without it; later ones get level 2
     titles: list[str] = []
@@ -56,15 +58,6 @@ def read_segments(text: str, name: str) -> tuple[str, list[Segment], dict[str, b
     ]
     title, segments = (titles or [""])[0], shifted
     return str(metadata.get("title") or title), segments, pictures
-
-
-def _read_front_matter(text: str) -> tuple[Mapping[str, Any], int]:
-    """Return the YAML values at the beginning of a text, and the length of that part."""
-    match = _FRONT_MATTER.match(text)
-    if match is None:
-        return {}, 0
-    value = read_yaml(match[1] or "{}")
-    return (value, match.end()) if isinstance(value, dict) else ({}, 0)
 
 
 def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[Segment]:
@@ -144,7 +137,13 @@ def _read_cells(cells: list[dict[str, Any]]) -> tuple[list[Segment], dict[str, b
     for number, cell in enumerate(cells, 1):
         place, source = f"cell {number}", _join_lines(cell.get("source", ""))
         if cell.get("cell_type") == "markdown":
-            pictures = _decode_attachments(cell.get("attachments") or {})
+            pictures = {}
+            for name, kinds in (cell.get("attachments") or {}).items():
+                for data in kinds.values():
+                    try:
+                        pictures[name] = base64.b64decode(_join_lines(data))
+                    except (binascii.Error, ValueError):
+                        continue
             for picture, data in pictures.items():
                 source = source.replace(f"attachment:{picture}", f"attachment:{number}-{picture}")
                 attachments[f"{number}-{picture}"] = data
@@ -172,14 +171,3 @@ def _read_cells(cells: list[dict[str, Any]]) -> tuple[list[Segment], dict[str, b
 
 def _join_lines(source: str | list[str]) -> str:
     return source if isinstance(source, str) else "".join(source)
-
-
-def _decode_attachments(attachments: Mapping[str, Any]) -> dict[str, bytes]:
-    pictures = {}
-    for name, kinds in attachments.items():
-        for data in kinds.values():
-            try:
-                pictures[name] = base64.b64decode(_join_lines(data))
-            except (binascii.Error, ValueError):
-                continue
-    return pictures

@@ -206,11 +206,9 @@ class SourceFiles:
             self._list()
 
     def __iter__(self) -> Iterator[str]:
-        """Iterate over the paths."""
         return iter(tuple(self._real_paths))
 
     def __contains__(self, path: str) -> bool:
-        """Whether a file has this path."""
         return path in self._real_paths
 
     def find(self, path: str) -> str:

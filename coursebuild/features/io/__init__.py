@@ -7,7 +7,7 @@ it. All three must be there, once, in this order.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
@@ -68,7 +68,16 @@ def parse_io(fence: Fence, texts: TextParser) -> Parsed[Io]:
             notes = [Note("first given here", first.span)]
             message = f"`{part.label}:` is given twice"
             diagnostics.append(diagnose("io-repeated", part.span, message, notes=notes))
-    diagnostics += (*_check_unlabelled(unlabelled), *_check_order(parts))
+    for line in [line for line in unlabelled.lines if line.text.strip()][:1]:
+        help = "begin with a line `INPUT: …`"
+        span, message = trim(line).span(), "this text belongs to no line of the io block"
+        diagnostics.append(diagnose("io-stray", span, message, help=help))
+    expected = [label for label in LABELS if label in parts]
+    swaps = [(label, first) for label, first in zip(parts, expected, strict=True) if label != first]
+    for label, expected_label in swaps[:1]:
+        message = f"`{label}:` comes before `{expected_label}:`"
+        help = "the order is `INPUT:`, `PROCESS:`, `OUTPUT:`"
+        diagnostics.append(diagnose("io-order", parts[label].span, message, help=help))
     contents: dict[str, tuple[Inline, ...]] = {}
     for label in LABELS:
         text = _join_lines(parts[label].lines) if label in parts else None
@@ -94,22 +103,6 @@ def _split_at_labels(body: Excerpt) -> list[_Part]:
             span = line.span(label.start(1), label.end())
             parts.append(_Part(label[1], span, [line.slice(label.end())]))
     return parts
-
-
-def _check_unlabelled(part: _Part) -> Iterator[Diagnostic]:
-    for line in [line for line in part.lines if line.text.strip()][:1]:
-        help = "begin with a line `INPUT: …`"
-        span, message = trim(line).span(), "this text belongs to no line of the io block"
-        yield diagnose("io-stray", span, message, help=help)
-
-
-def _check_order(parts: Mapping[str, _Part]) -> Iterator[Diagnostic]:
-    expected = [label for label in LABELS if label in parts]
-    swaps = [(label, first) for label, first in zip(parts, expected, strict=True) if label != first]
-    for label, first in swaps[:1]:
-        message = f"`{label}:` comes before `{first}:`"
-        help = "the order is `INPUT:`, `PROCESS:`, `OUTPUT:`"
-        yield diagnose("io-order", parts[label].span, message, help=help)
 
 
 def _diagnose_missing(

@@ -100,7 +100,24 @@ def compile_lab(lab: Lab, name: str) -> LabModule:
     members = tuple(_members(lab))
     code = "".join(f"export const {member} = {text};\n" for member, text in members)
     literal = "{" + ", ".join(f"{member}: {text}" for member, text in members) + "}"
-    return LabModule(name, code, f"({literal})", _config(lab, name))
+    fields = lab.fields
+    config = {"id": name} | {field: getattr(fields, field) for field in _FIELDS}
+    config |= {
+        "overlays": _overlays(fields),
+        "controls": [control_data(control) for control in fields.controls],
+        "readouts": [{"label": r.label, "digits": r.digits} for r in fields.readouts],
+        "plots": [_plot_data(plot) for plot in fields.plots],
+        "expect": [
+            {"after": c.steps, "t": c.t, "min": c.min, "max": c.max, "diverges": c.diverges}
+            for c in fields.expect
+        ],
+    }
+    if fields.goal is not None:
+        config["goal"] = {"hold": fields.goal.hold, "log": list(_log_data(fields, fields.goal.log))}
+    if lab.kind == MJCF and lab.xml is not None:
+        config |= {"kind": MJCF, "xml": lab.xml.text.rstrip("\n")}
+    data: dict[str, Any] = to_builtins(config)
+    return LabModule(name, code, f"({literal})", data)
 
 
 def _members(lab: Lab) -> Iterator[tuple[str, str]]:
@@ -143,28 +160,6 @@ _FIELDS = (
 """Fields of a lab that are passed on as written; only overlays become a list."""
 _PLOT = ("ylabel", "xlabel", "window", "ymin", "ymax", "height", "refLines")
 """Fields of a plot that are passed on as written."""
-
-
-def _config(lab: Lab, name: str) -> dict[str, Any]:
-    """Return what the page, the worker and the trial need besides code."""
-    fields = lab.fields
-    config = {"id": name} | {field: getattr(fields, field) for field in _FIELDS}
-    config |= {
-        "overlays": _overlays(fields),
-        "controls": [control_data(control) for control in fields.controls],
-        "readouts": [{"label": r.label, "digits": r.digits} for r in fields.readouts],
-        "plots": [_plot_data(plot) for plot in fields.plots],
-        "expect": [
-            {"after": c.steps, "t": c.t, "min": c.min, "max": c.max, "diverges": c.diverges}
-            for c in fields.expect
-        ],
-    }
-    if fields.goal is not None:
-        config["goal"] = {"hold": fields.goal.hold, "log": list(_log_data(fields, fields.goal.log))}
-    if lab.kind == MJCF and lab.xml is not None:
-        config |= {"kind": MJCF, "xml": lab.xml.text.rstrip("\n")}
-    data: dict[str, Any] = to_builtins(config)
-    return data
 
 
 def _log_data(fields: SimLab, log: tuple[LogEntry, ...]) -> Iterator[tuple[float | str, ...]]:

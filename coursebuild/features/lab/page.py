@@ -96,6 +96,11 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
     view, words, address = page_view(page, block), page.renderer.words, ""
     if view.key and page.inputs.address:  # leads from paper to the lab
         address = f"{page.inputs.address}#{quote(view.key)}"
+    if block.kind != MJCF or block.xml is None:
+        source = Markup("")
+    else:
+        html = page.highlight("xml", block.xml.text.rstrip("\n"))
+        source = page.template("blocks/code.html", language="xml", html=html)
     return page.template(
         "lab/lab.html",
         lab=view,
@@ -105,7 +110,7 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
         code=qr_svg(address, words("lab.code")) if address else "",
         goal=page.inlines(block.goal),
         goal_key=(block.progress_keys() or ("",))[0],
-        source=_source(page, block),
+        source=source,
         note=page.blocks(block.note),
     )
 
@@ -116,7 +121,13 @@ def page_view(page: PageContext, block: Lab) -> LabView:
     live = trial if isinstance(trial, PublishedLab) else None
     view = lab_view(page.renderer.words, page.place, block, live)
     href = "" if model is None else page.href(ModelTarget(model))
-    view = replace(view, model_href=href, start=_start(page, block))
+    key = block.fields.key
+    if key is None or isinstance(key, str):
+        start = key
+    else:
+        names = page.inputs.keyframes.get(block.fields.model or "", ())
+        start = (names[key] if 0 <= key < len(names) else "") or str(key)
+    view = replace(view, model_href=href, start=start)
     if block.label is None:
         return view
     return replace(view, number=page.number(block.label), label=block.label.id)
@@ -149,14 +160,6 @@ def lab_view(words: Strings, place: Place, block: Lab, live: PublishedLab | None
 
 
 _SUBJECTS = {PLOT: "lab.static_plot", ODE: "lab.static_ode"}
-
-
-def _source(page: PageContext, block: Lab) -> Markup:
-    """The model that the reader can edit, as code."""
-    if block.kind != MJCF or block.xml is None:
-        return Markup("")
-    html = page.highlight("xml", block.xml.text.rstrip("\n"))
-    return page.template("blocks/code.html", language="xml", html=html)
 
 
 def lab_picture(block: Lab, lab: Struct | None) -> Picture | None:
@@ -207,20 +210,15 @@ def _recorded_view(
     )
 
 
-def _start(page: PageContext, block: Lab) -> str | None:
-    """Return the name of the keyframe that the lab starts from."""
-    key = block.fields.key
-    if key is None or isinstance(key, str):
-        return key
-    names = page.inputs.keyframes.get(block.fields.model or "", ())
-    return (names[key] if 0 <= key < len(names) else "") or str(key)
-
-
 def _values(words: Strings, control: Control) -> str:
     """Say what a control can be set to, and its initial value."""
     match control:
         case Slider():
-            values = _range(words, control)
+            ends = words("lab.between", min=number(control.min), max=number(control.max))
+            ends = f"{ends} {control.unit}".rstrip()
+            values = (
+                words("lab.step", range=ends, step=number(control.step)) if control.step else ends
+            )
             initial = f"{number(control.value, control.digits)} {control.unit}".rstrip()
         case Select():
             values = ", ".join(label for label, _ in control.options)
@@ -230,14 +228,7 @@ def _values(words: Strings, control: Control) -> str:
     return words("lab.initial", values=values, initial=initial)
 
 
-def _range(words: Strings, slider: Slider) -> str:
-    ends = words("lab.between", min=number(slider.min), max=number(slider.max))
-    ends = f"{ends} {slider.unit}".rstrip()
-    return words("lab.step", range=ends, step=number(slider.step)) if slider.step else ends
-
-
 def _plot(words: Strings, plot: Plot) -> tuple[str, tuple[str, ...]]:
-    """Describe a plot: its axes, and the names of its lines."""
     title = words(
         "lab.plot",
         ylabel=plot.ylabel or words("lab.value"),
@@ -338,10 +329,24 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     words, view = writer.words, page_view(writer.page, lab)
     parts = [f"**{words('lab.label')}: {escape_marks(view.title)}**"]
     if view.recorded is not None:
-        parts += _write_recording(writer, view.recorded)
+        parts.append(picture(view.recorded.alt, writer.locate(view.recorded.picture)))
+        if readouts := view.recorded.record.readouts:
+            rows = [(escape_line(label), escape_line(value)) for label, value in readouts]
+            parts += [
+                f"{escape_marks(view.recorded.at)}:",
+                table((words("lab.readouts"), ""), rows),
+            ]
     if lab.goal:
         parts.append(f"**{words('lab.goal')}:** {writer.inlines(lab.goal)}")
-    parts.append(_describe(writer, view))
+    text = f"{escape_marks(view.subject)}."
+    if view.model is not None:
+        name = link(escape_marks(view.model), writer.locate(view.model_href))
+        text = f"{escape_marks(view.subject)} {name}."
+    if view.start:
+        text += f" {words('lab.start')} {code_span(view.start)}."
+    if view.stop is not None:
+        text += f" {words('lab.stops', t=view.stop)}"
+    parts.append(text)
     if lab.kind == MJCF and lab.xml is not None:
         parts.append(fence("xml", lab.xml.text))
     if view.controls:
@@ -354,29 +359,6 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     parts.append("\n".join(displays))
     parts += [writer.blocks(lab.note), link(words("exports.run_lab"), writer.live)]
     return "\n\n".join(filter(None, parts))
-
-
-def _write_recording(writer: MarkdownWriter, recorded: RecordedView) -> Iterator[str]:
-    """Write the picture, and the readouts at the end."""
-    yield picture(recorded.alt, writer.locate(recorded.picture))
-    if readouts := recorded.record.readouts:
-        yield f"{escape_marks(recorded.at)}:"
-        rows = [(escape_line(label), escape_line(value)) for label, value in readouts]
-        yield table((writer.words("lab.readouts"), ""), rows)
-
-
-def _describe(writer: MarkdownWriter, view: LabView) -> str:
-    """Say what is simulated, from which start, and until when."""
-    words = writer.words
-    text = f"{escape_marks(view.subject)}."
-    if view.model is not None:
-        name = link(escape_marks(view.model), writer.locate(view.model_href))
-        text = f"{escape_marks(view.subject)} {name}."
-    if view.start:
-        text += f" {words('lab.start')} {code_span(view.start)}."
-    if view.stop is not None:
-        text += f" {words('lab.stops', t=view.stop)}"
-    return text
 
 
 def _list_displays(writer: MarkdownWriter, view: LabView) -> Iterator[tuple[str, tuple[str, ...]]]:

@@ -47,7 +47,16 @@ def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
         yield from _check_expect(claim, controls, structs)
     goal = node.get("goal")
     if isinstance(goal, ObjectNode):
-        yield from _check_log(goal, controls)
+        before = 0.0
+        for entry in goal.objects("log"):
+            step, time = entry.get("do"), entry.get("t")
+            if step is not None:
+                yield from _check_step(step, "do", controls)
+            if isinstance(time, NumberNode):
+                if time.value < before:
+                    message = f"`t` must be at least that of the entry before, {before:g}"
+                    yield diagnose("field-value", time.mark, message)
+                before = time.value
 
 
 def known_controls(node: ObjectNode, structs: Structs) -> Controls:
@@ -149,20 +158,6 @@ def check_steps(node: Node, name: str, controls: Controls) -> Iterator[Diagnosti
             yield from _check_step(step, f"{name}[{i}]", controls)
     else:
         yield from _check_step(node, name, controls)
-
-
-def _check_log(goal: ObjectNode, controls: Controls) -> Iterator[Diagnostic]:
-    """Check the log of a goal: its controls exist, and its times are in order."""
-    before = 0.0
-    for entry in goal.objects("log"):
-        step, time = entry.get("do"), entry.get("t")
-        if step is not None:
-            yield from _check_step(step, "do", controls)
-        if isinstance(time, NumberNode):
-            if time.value < before:
-                message = f"`t` must be at least that of the entry before, {before:g}"
-                yield diagnose("field-value", time.mark, message)
-            before = time.value
 
 
 def _check_step(node: Node, name: str, controls: Controls) -> Iterator[Diagnostic]:

@@ -47,7 +47,7 @@ from coursebuild.features.lab.equations.equation_trial import (
 from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.inputs import equation_inputs, inputs_of, trial_data
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
-from coursebuild.features.lab.reply import LabOutput, MainRun, TrialReply, read_reply, reply_bytes
+from coursebuild.features.lab.reply import LabOutput, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 from coursebuild.features.lab.verdict import (
     code_diagnostic,
@@ -302,7 +302,6 @@ class _LabTrial(Struct, frozen=True):
     def _fail(
         self, module: LabModule, diagnostics: list[Diagnostic]
     ) -> tuple[TrialResult, list[Diagnostic]]:
-        """Make the result of a lab that could not be tried."""
         line = TrialLine(module.name, self.lab.fields.title, self.trial.owner, "failed")
         return TrialResult(self.lab.span, line, LabOutput(module.code, module.config)), diagnostics
 
@@ -331,7 +330,16 @@ class _LabTrial(Struct, frozen=True):
             raise ValueError("a reply without a main run has a failure")
         failures = tuple(failure_diagnostics(lab, reply)) if lab.is_of_text else ()
         remarks, main = tuple(remark_diagnostics(lab, reply)), reply.main
-        output = LabOutput(module.code, _add_camera(module.config, main))
+        config = module.config
+        if main is not None:
+            # The camera that the trial worked out
+            scene = main["scene"]
+            camera = {name: scene["camera"][name] for name in Camera.__struct_fields__}
+            framing = {"camera": camera, "floor": scene["floor"], "arrows": main["arrows"]}
+            config = config | framing
+            if "xml" in config:  # the reader may change the model to one that it does not suit
+                config["extent"] = scene["extent"]
+        output = LabOutput(module.code, config)
         if self.context.static and not failures and main is not None:
             # Draw the start of the main run
             from coursebuild.features.lab.picture.static import draw_picture
@@ -399,18 +407,6 @@ class _LabTrial(Struct, frozen=True):
         if self.lab.verify.rtol is not None:
             return steps
         return min(steps, max(1, round(_PARITY_SECONDS / float(main["timestep"]))))
-
-
-def _add_camera(config: dict[str, Any], main: MainRun | None) -> dict[str, Any]:
-    """Add to a lab's data the camera and the scene's extent that its trial worked out."""
-    if main is None:
-        return config
-    scene = main["scene"]
-    camera = {name: scene["camera"][name] for name in Camera.__struct_fields__}
-    framing = {"camera": camera, "floor": scene["floor"], "arrows": main["arrows"]}
-    if "xml" in config:  # the reader may change the model to one that this camera does not suit
-        framing["extent"] = scene["extent"]
-    return config | framing
 
 
 def _is_lasting(reply: TrialReply) -> bool:

@@ -22,7 +22,7 @@ from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.lab.compile import LabCode, pieces
 from coursebuild.features.lab.javascript import dotted_names, parse, text_of, walk
 from coursebuild.features.lab.model import MJCF, Entry, Lab
-from coursebuild.features.lab.reply import Parity, TrialFailure, TrialReply
+from coursebuild.features.lab.reply import TrialFailure, TrialReply
 from coursebuild.features.lab.schema import Button
 
 _EXPLANATIONS = {
@@ -123,9 +123,24 @@ def failure_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     for failure in failures:
         if failure.entry == () or failure.kind not in of_main_run:
             yield _make_diagnostic(lab, failure)
-    yield from _check_depth_claim(lab, trial)
-    if trial.main is not None and trial.main["parity"] is not None:
-        yield from _check_parity(lab, trial.main["parity"])
+    if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
+        message = "the lab says `deep`, but no bodies overlapped deeply"
+        span = lab.place(("verify", "deep"))
+        fix = Fix("remove `deep`", "false", "true", safe=True)
+        yield diagnose("lab-shallow", span, message, help=fix)
+    parity = None if trial.main is None else trial.main["parity"]
+    if parity is not None and not parity.is_within_tolerance(lab.verify.rtol):
+        time = (parity.first or 0) * parity.timestep
+        tolerance = parity.tolerance(lab.verify.rtol)
+        yield diagnose(
+            "lab-parity",
+            lab.place(("verify", "rtol")),
+            f"the browser's engine and native MuJoCo differ from step {parity.first} on "
+            f"(t = {time:.6g} s), by up to {parity.relative:.1e} of the state, where {tolerance:g} "
+            "is allowed",
+            help="a controller that changes `model` while it runs cannot be repeated natively; "
+            f"where the motion is chaotic say how far it may part: {_spellings(lab)['parity']}",
+        )
 
 
 def remark_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
@@ -164,14 +179,6 @@ def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
             return from_start
 
 
-def _check_depth_claim(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    if lab.verify.deep and not any(failure.kind == "deep" for failure in trial.failures):
-        message = "the lab says `deep`, but no bodies overlapped deeply"
-        span = lab.place(("verify", "deep"))
-        fix = Fix("remove `deep`", "false", "true", safe=True)
-        yield diagnose("lab-shallow", span, message, help=fix)
-
-
 _SMALL = 0.1
 
 
@@ -187,7 +194,9 @@ def _make_diagnostic(lab: Lab, failure: TrialFailure) -> Diagnostic:
         case "nan" if failure.entry[0] == "expect":
             special_help = ""
         case "expect" if (expr := lab.fields.expect[int(failure.entry[1])].expr) is not None:
-            message = f"`{_shorten(expr)}` {message}"
+            line = " ".join(expr.split())
+            code = line if len(line) <= 60 else line[:59] + "…"
+            message = f"`{code}` {message}"
         case "goal" if failure.entry[-1] == "log":
             kind = "log"
         case "timeout" if message == "did not finish in time":
@@ -237,23 +246,6 @@ def _check_reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
     yield diagnose("lab-reset", lab.place(entry), message, help=help)
 
 
-def _check_parity(lab: Lab, parity: Parity) -> Iterator[Diagnostic]:
-    """Report a difference between the engines that is larger than allowed."""
-    if parity.is_within_tolerance(lab.verify.rtol):
-        return
-    time = (parity.first or 0) * parity.timestep
-    tolerance = parity.tolerance(lab.verify.rtol)
-    yield diagnose(
-        "lab-parity",
-        lab.place(("verify", "rtol")),
-        f"the browser's engine and native MuJoCo differ from step {parity.first} on "
-        f"(t = {time:.6g} s), by up to {parity.relative:.1e} of the state, where {tolerance:g} is "
-        "allowed",
-        help="a controller that changes `model` while it runs cannot be repeated natively; where "
-        f"the motion is chaotic say how far it may part: {_spellings(lab)['parity']}",
-    )
-
-
 _SPELLINGS = {
     "diverges": ('"expect": [{"t": …, "diverges": true}]', "diverges=…"),
     "deep": ('"verify": {"deep": true}', "deep"),
@@ -265,11 +257,6 @@ _SPELLINGS = {
 def _spellings(lab: Lab) -> dict[str, str]:
     """Return how a lab's author writes settings: in the JSON, or as keys of the fence."""
     return {name: f"`{pair[lab.kind == MJCF]}`" for name, pair in _SPELLINGS.items()}
-
-
-def _shorten(code: str) -> str:
-    line = " ".join(code.split())
-    return line if len(line) <= 60 else line[:59] + "…"
 
 
 _OPEN_OBJECTS = ("ctx", "value", "globalThis")
@@ -322,7 +309,6 @@ def _references(code: Excerpt) -> Iterator[NameReference]:
 
 
 def _declarations(node: Node) -> Iterator[Node]:
-    """Yield the names that a node declares."""
     if node.type in ("formal_parameters", "array_pattern", "object_pattern"):
         yield from node.named_children
     for field in ("name", "parameter", "left"):

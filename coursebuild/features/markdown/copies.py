@@ -72,12 +72,25 @@ def _document_copy(inputs: PageInputs, page: PageContext) -> str:
     place, words, document = page.place, page.renderer.words, page.document
     page_href = place.href(place.path)
     writer = DocumentWriter(page, lambda href: markdown_href(place, href), page_href)
+    rows = []
+    scripts = inputs.values.get("scripts")
+    if isinstance(scripts, tuple) and scripts:
+        script_links = (link(code_span(path), href) for path, href in scripts)
+        rows.append(f"{escape_line(words('lesson.scripts'))}: {', '.join(script_links)}")
+    for name, key in (
+        ("leads", "lesson.leads"),
+        ("previous", "lesson.previous"),
+        ("following", "lesson.next"),
+    ):
+        links = lesson_links(inputs.values.get(name), writer.locate)
+        if links:
+            rows.append(f"{escape_line(words(key))}: {', '.join(links)}")
     parts = (
         *head(inputs, words, writer.locate),
         writer.blocks(document.blocks),
         writer.footnotes(document.footnotes),
         writer.references(),
-        *_footer(inputs, words, writer.locate),
+        *(["___", "\n".join(f"- {row}" for row in rows)] if rows else []),
     )
     return "\n\n".join(filter(None, parts))
 
@@ -90,14 +103,6 @@ def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
     parts = [f"# {escape_line(f'{lesson.id} {lesson.title}')}"]
     if lesson.summary:
         parts.append(guard_lines(escape_line(lesson.summary)))
-    parts.append(" · ".join(_facts(inputs, lesson, words, locate)))
-    if lesson.objectives:
-        items = "\n".join(f"- {guard_lines(escape_line(text))}" for text in lesson.objectives)
-        parts.append(f"{escape_line(words('lesson.objectives'))}\n\n{items}")
-    return parts
-
-
-def _facts(inputs: PageInputs, lesson: LessonLink, words: Strings, locate: Locate) -> list[str]:
     facts = []
     level = inputs.values.get("level")
     if isinstance(level, LevelView):
@@ -112,7 +117,11 @@ def _facts(inputs: PageInputs, lesson: LessonLink, words: Strings, locate: Locat
     needs = lesson_links(lesson.needs, locate)
     if needs:
         facts.append(f"{escape_line(words('lesson.needs'))} {', '.join(needs)}")
-    return facts
+    parts.append(" · ".join(facts))
+    if lesson.objectives:
+        items = "\n".join(f"- {guard_lines(escape_line(text))}" for text in lesson.objectives)
+        parts.append(f"{escape_line(words('lesson.objectives'))}\n\n{items}")
+    return parts
 
 
 def lesson_links(value: object, locate: Locate) -> list[str]:
@@ -123,24 +132,6 @@ def lesson_links(value: object, locate: Locate) -> list[str]:
         for lesson in lessons
         if isinstance(lesson, LessonLink)
     ]
-
-
-def _footer(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:
-    """Return links to scripts and further lessons."""
-    rows = []
-    scripts = inputs.values.get("scripts")
-    if isinstance(scripts, tuple) and scripts:
-        script_links = (link(code_span(path), href) for path, href in scripts)
-        rows.append(f"{escape_line(words('lesson.scripts'))}: {', '.join(script_links)}")
-    for name, key in (
-        ("leads", "lesson.leads"),
-        ("previous", "lesson.previous"),
-        ("following", "lesson.next"),
-    ):
-        links = lesson_links(inputs.values.get(name), locate)
-        if links:
-            rows.append(f"{escape_line(words(key))}: {', '.join(links)}")
-    return ["___", "\n".join(f"- {row}" for row in rows)] if rows else []
 
 
 LLMS_PATH = "llms.txt"
@@ -164,27 +155,22 @@ def write_llms(library: Library) -> bytes:
         pages = (page for page in course.pages if page.section == section)
         rows = (_row(library, urls.page_path(page), page.title, "") for page in pages)
         parts.append("\n".join((f"## {escape_line(section)}", "", *rows)))
-    parts += _optional_part(library)
-    return visible("\n\n".join(parts) + "\n").encode()
-
-
-def _optional_part(library: Library) -> list[str]:
-    """Return the list of pages that can be left out where there is little room."""
-    course, words = library.course, library.words
-    rows = [_row(library, urls.HOME, words("site.map"), "")]
-    rows += [
+    # What can be left out where there is little room
+    optional_rows = [_row(library, urls.HOME, words("site.map"), "")]
+    optional_rows += [
         _row(library, urls.page_path(page), page.title, "")
         for page in course.pages
         if not page.section and not page.is_home
     ]
-    rows += [
+    optional_rows += [
         _row(library, urls.model_page_path(m.name), words("model.title", name=m.name), "")
         for m in course.models
     ]
     if library.reports.cases:
         title, text = words("numerics.title"), words("numerics.description")
-        rows.append(_row(library, urls.NUMERICS, title, text))
-    return ["\n".join(("## Optional", "", *rows))]
+        optional_rows.append(_row(library, urls.NUMERICS, title, text))
+    parts.append("\n".join(("## Optional", "", *optional_rows)))
+    return visible("\n\n".join(parts) + "\n").encode()
 
 
 def _row(library: Library, path: str, title: str, text: str) -> str:

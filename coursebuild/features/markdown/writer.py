@@ -241,7 +241,15 @@ class DocumentWriter:
                 return escape_marks(_MINUS.sub("\u2212", inline.text))
             case model.Math():
                 tag = self._tag(inline.span.start) if inline.display else ""
-                return _formula(inline, tag, room)
+                tex = inline.tex.text  # which can end with a comment
+                tex = f"{tex}\n{tag}" if tag else tex
+                if room == "cell":  # a pipe would end the cell, and an escaped one is another sign
+                    tex = tex.replace(r"\|", r"\Vert{}").replace("|", r"\vert{}")
+                if _COMMENT.search(tex):  # the line end ends the comment
+                    tex = _remove_empty_lines(tex)
+                elif "\n" in tex:
+                    tex = " ".join(part.strip() for part in tex.split("\n"))
+                return f"$${tex}$$" if inline.display else f"${tex}$"
             case model.Emphasis() | model.Strong() | model.Term() | model.Strikethrough():
                 mark = _delimiter(inline)
                 return f"{mark}{self._join_inlines(inline.children, room)}{mark}"
@@ -358,7 +366,6 @@ def _text(node: model.Text, room: _Room) -> str:
 
 
 def _escape_pipes(text: str, room: _Room) -> str:
-    """Escape the pipes of a text in a cell of a table."""
     return _PIPE.sub(r"\\|", text) if room == "cell" else text
 
 
@@ -368,18 +375,6 @@ def _delimiter(node: model.Emphasis | model.Strong | model.Term | model.Striketh
         return "~~"
     mark = "_" if node.span.text[:1] == "_" else "*"
     return mark * 2 if isinstance(node, model.Strong) else mark
-
-
-def _formula(node: model.Math, tag: str, room: _Room) -> str:
-    """Write a formula between dollar signs, with its number if it has one."""
-    tex = f"{node.tex.text}\n{tag}" if tag else node.tex.text  # it can end with a comment
-    if room == "cell":  # a pipe would end the cell, and an escaped one is another sign
-        tex = tex.replace(r"\|", r"\Vert{}").replace("|", r"\vert{}")
-    if _COMMENT.search(tex):  # the line end ends the comment
-        tex = _remove_empty_lines(tex)
-    elif "\n" in tex:
-        tex = " ".join(part.strip() for part in tex.split("\n"))
-    return f"$${tex}$$" if node.display else f"${tex}$"
 
 
 def _remove_empty_lines(tex: str) -> str:

@@ -122,7 +122,6 @@ class DocumentNames(Struct, frozen=True, dict=True):
 
     @functools.cached_property
     def names(self) -> CodeNames:
-        """What the bytes hold."""
         return msgspec.json.decode(self.data, type=CodeNames)
 
     @property
@@ -194,7 +193,6 @@ def document_names(document: model.Document) -> DocumentNames | None:
 
 
 def _read_script(script: model.Script, names: CodeNames) -> None:
-    """Add what a script defines and imports."""
     members: dict[str, set[str]] = {}
     for node in python_nodes(script.code.text.rstrip("\n")):
         definition = ""

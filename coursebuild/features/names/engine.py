@@ -108,7 +108,6 @@ class EngineTable(Struct, frozen=True, dict=True):
 
     @functools.cached_property
     def names(self) -> EngineNames:
-        """The names."""
         return _decode(self.data)
 
 
@@ -132,7 +131,12 @@ def engine_names(
     packages = [Path(folder) for folder in folders if folder.endswith("-packages")]
     states = [str(folder.stat().st_mtime_ns) for folder in packages if folder.is_dir()]
     key = key_of(engine, version, python, *sorted(modules), "", *states, _code())
-    return EngineTable(_recall(store, python, key, tuple(sorted(modules))))
+    data = _in_memory.get(key) or store.get(_KIND, key, bytes)
+    if data is None:
+        data = msgspec.json.encode(list_names(python, tuple(sorted(modules))))
+        store.put(_KIND, key, data)
+    _in_memory[key] = data
+    return EngineTable(data)
 
 
 @functools.cache
@@ -142,16 +146,6 @@ def _code() -> str:
 
 
 _in_memory: dict[str, bytes] = {}
-
-
-def _recall(store: Store, python: str, key: str, modules: tuple[str, ...]) -> bytes:
-    """The names from this process, the store or a child."""
-    data = _in_memory.get(key) or store.get(_KIND, key, bytes)
-    if data is None:
-        data = msgspec.json.encode(list_names(python, modules))
-        store.put(_KIND, key, data)
-    _in_memory[key] = data
-    return data
 
 
 def list_names(python: str, modules: Iterable[str] = ()) -> EngineNames:

@@ -167,15 +167,12 @@ def _script_cells(writer: DocumentWriter, section: str, block: Script) -> Iterat
             remarks.append(writer.recording(recording))
     if block.norun:
         remarks.insert(0, writer.words("exports.norun"))
-    yield code_cell(f"code-{_slug(block.path)}", _magic(block) + block.code.text, output)
-    if remarks:
-        yield _text_cell(section, "\n\n".join(remarks))
-
-
-def _magic(block: Script) -> str:
     options = [f"--requires={','.join(block.requires)}"] if block.requires else []
     options += ["--norun"] if block.norun else []
-    return f"{shlex.join((_MAGIC, *options, block.path, *block.args))}\n"
+    magic = shlex.join((_MAGIC, *options, block.path, *block.args))
+    yield code_cell(f"code-{_slug(block.path)}", f"{magic}\n{block.code.text}", output)
+    if remarks:
+        yield _text_cell(section, "\n\n".join(remarks))
 
 
 def _text_cell(section: str, text: str) -> Cell:
@@ -248,7 +245,11 @@ def _setup_cells(site: SiteContext, lesson: Lesson, archive: zips.Archive) -> It
     scripts = [script.path for script in document_scripts(lesson.document)]
     early = _imported_early(site, scripts, files)
     files = {path: data for path, data in files.items() if path not in scripts or path in early}
-    included = _select_smallest(files)
+    room, included = _MAX_SIZE, {}
+    for path, data in sorted(files.items(), key=lambda item: (len(item[1]), item[0])):
+        room -= len(data)
+        if room >= 0:
+            included[path] = data
     words = site.library.words
     title = f"## {escape_marks(words('exports.before'))}"
     text = escape_marks(words("exports.setup" if files else "exports.setup_none"))
@@ -266,18 +267,12 @@ def _setup_cells(site: SiteContext, lesson: Lesson, archive: zips.Archive) -> It
         title = ""
     yield markdown_cell("before-setup", f"{title}\n\n{text}".strip())
     template = site.assets.template("notebook/setup.py")
-    code = _setup_code(template, included, sorted(files.keys() - included.keys()))
+    packed = base64.b64encode(zips.pack_files(included)).decode() if included else ""
+    lines = "\n".join(packed[start : start + 100] for start in range(0, len(packed), 100))
+    missing = tuple(sorted(files.keys() - included.keys()))
+    code = template.replace("ELSEWHERE = ()", f"ELSEWHERE = {missing!r}")
+    code = code.replace('FILES = ""', f'FILES = """\n{lines}\n"""' if packed else 'FILES = ""')
     yield code_cell("setup", code, hidden=True)
-
-
-def _select_smallest(files: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the files that a notebook can contain, the smallest first."""
-    room, selection = _MAX_SIZE, {}
-    for path, data in sorted(files.items(), key=lambda item: (len(item[1]), item[0])):
-        room -= len(data)
-        if room >= 0:
-            selection[path] = data
-    return selection
 
 
 def _imported_early(site: SiteContext, scripts: list[str], files: Mapping[str, bytes]) -> set[str]:
@@ -298,14 +293,6 @@ def _imported_early(site: SiteContext, scripts: list[str], files: Mapping[str, b
                 pending += [modules[name] for name in names if name in modules]
         early |= visited.intersection(scripts[number:])
     return early
-
-
-def _setup_code(template: str, files: Mapping[str, bytes], missing: list[str]) -> str:
-    """Return the cell that writes the files and defines the magic."""
-    packed = base64.b64encode(zips.pack_files(files)).decode() if files else ""
-    lines = "\n".join(packed[start : start + 100] for start in range(0, len(packed), 100))
-    code = template.replace("ELSEWHERE = ()", f"ELSEWHERE = {tuple(missing)!r}")
-    return code.replace('FILES = ""', f'FILES = """\n{lines}\n"""' if packed else 'FILES = ""')
 
 
 def launch_services(course: Course, path: str) -> tuple[tuple[str, str], ...]:

@@ -188,30 +188,28 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
     own_models, built_in = _split(options, names)
     measurement: Measurement[CaseReport] = Measurement(())
     if built_in or not own_models:
-        measurement = _check_problems(options, built_in)
+        problems = _select_problems(built_in)
+        recorded = read_record(options.root, STABILITY)
+        if isinstance(recorded, ReportFailure):
+            measurement = Measurement((), failures=(recorded,))
+        else:
+            measurement = _CaseRun(options, use_store=False).all(problems)
+            new = {case.name for case in measurement.reports}
+            old = [case for case in recorded if not built_in or case.name in new]
+            engine = engine_version()
+            other_engines = sorted({case.machine.engine for case in old} - {engine})
+            remarks = tuple(
+                f"recorded with MuJoCo {engine_then}, measured with {engine}"
+                for engine_then in other_engines
+            )
+            departures = case_departures(old, measurement.reports)
+            measurement = replace(
+                measurement,
+                checked=(RecordCheck("stability", STABILITY.path(), departures, remarks),),
+            )
     if not own_models:
         return measurement
     return _join_reports(measurement, bench.check(options, own_models))
-
-
-def _check_problems(options: Options, names: tuple[str, ...]) -> Measurement[CaseReport]:
-    problems = _select_problems(names)
-    recorded = read_record(options.root, STABILITY)
-    if isinstance(recorded, ReportFailure):
-        return Measurement((), failures=(recorded,))
-    measurement = _CaseRun(options, use_store=False).all(problems)
-    new = {case.name for case in measurement.reports}
-    old = [case for case in recorded if not names or case.name in new]
-    engine = engine_version()
-    other_engines = sorted({case.machine.engine for case in old} - {engine})
-    remarks = tuple(
-        f"recorded with MuJoCo {engine_then}, measured with {engine}"
-        for engine_then in other_engines
-    )
-    departures = case_departures(old, measurement.reports)
-    return replace(
-        measurement, checked=(RecordCheck("stability", STABILITY.path(), departures, remarks),)
-    )
 
 
 class _CaseRun(MeasuringRun):

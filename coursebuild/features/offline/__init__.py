@@ -21,11 +21,10 @@ from collections.abc import Iterable, Iterator
 from coursebuild.core.drawing.contrast import GROUNDS_LIGHT
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.features import Feature, PageKind, PagePart
-from coursebuild.core.model import Course
 from coursebuild.core.model.course import ThemeFile
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.assets import Assets, Names, hashed_name, page_script
+from coursebuild.core.pages.assets import Names, hashed_name, page_script
 from coursebuild.core.pages.context import SiteContext
 from coursebuild.core.pages.strings import direction
 from coursebuild.core.pages.theme import picture_size
@@ -50,22 +49,17 @@ _FOR_MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.WORKER, "llms.txt")
 
 def offline_files(site: SiteContext) -> Iterator[OutputFile | FileList]:
     """Yield all of them."""
-    yield from _application_files(site.library.course, site.assets, site.names)
-    key = step_key("list of files", site.names)
-    yield FileList(urls.FILES, key, functools.partial(listing, shell_of(site.names)))
-
-
-def _application_files(course: Course, assets: Assets, names: Names) -> tuple[OutputFile, ...]:
+    course, assets, names = site.library.course, site.assets, site.names
     theme = course.theme
     icons = [_entry(names.icon, theme.icon or theme.touch_icon)]
     if theme.touch_icon is not None and theme.icon is not None:
         icons.append(_entry(names.touch_icon, theme.touch_icon))
-    icon_files: list[OutputFile] = []
     if not (theme.icon or theme.touch_icon):
         for name, side in (("192", 192), ("512", 512), ("maskable", 512)):
             data = assets.file(f"icons/icon-{name}.png")
-            icon_files.append(OutputFile(hashed_name(f"assets/icon-{name}.png", data), data))
-            icons.append(_png(icon_files[-1].path, f"{side}x{side}"))
+            file = OutputFile(hashed_name(f"assets/icon-{name}.png", data), data)
+            yield file
+            icons.append(_png(file.path, f"{side}x{side}"))
         icons[-1]["purpose"] = "maskable"
     manifest = {
         "id": "./",
@@ -83,12 +77,10 @@ def _application_files(course: Course, assets: Assets, names: Names) -> tuple[Ou
         "icons": icons,
     }
     text = json.dumps({k: v for k, v in manifest.items() if v}, ensure_ascii=False, indent=1)
-    worker = page_script(assets.file("js/service-worker.js"))
-    return (
-        *icon_files,
-        OutputFile(urls.MANIFEST, f"{text}\n".encode("utf-8", "replace")),
-        OutputFile(urls.WORKER, worker),
-    )
+    yield OutputFile(urls.MANIFEST, f"{text}\n".encode("utf-8", "replace"))
+    yield OutputFile(urls.WORKER, page_script(assets.file("js/service-worker.js")))
+    key = step_key("list of files", names)
+    yield FileList(urls.FILES, key, functools.partial(listing, shell_of(names)))
 
 
 def _entry(path: str, file: ThemeFile | None) -> dict[str, str]:

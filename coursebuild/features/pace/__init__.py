@@ -82,29 +82,27 @@ def check(course: model.Course, documents: Iterable[model.Document]) -> Iterator
     by_path = {document.source.path: document for document in documents}
     for lesson in course.lessons:
         if lesson.path in by_path:
-            yield from _compare(lesson, _efforts_of(by_path[lesson.path]), course.pace)
+            efforts = _efforts_of(by_path[lesson.path])
+            main = f"the main path of lesson {lesson.id} takes"
+            further = f"the further sections of lesson {lesson.id} take"
+            for field, part, map_minutes, effort in (
+                ("minutes", main, lesson.minutes, efforts.main),
+                ("further", further, lesson.further, efforts.further),
+            ):
+                estimate = effort.minutes(course.pace)
+                if abs(estimate - (map_minutes or 0)) <= max(_MINUTES, _SHARE * estimate):
+                    continue
+                map_says = "does not say so" if map_minutes is None else f"says {map_minutes}"
+                message = f"{part} about {estimate} minutes, and the map {map_says}"
+                help = f"write `{field} = {estimate}`"
+                if field == "minutes" and estimate > (map_minutes or estimate):
+                    help += ", or mark sections that only some need with `{.further}`"
+                yield diagnose("lesson-minutes", lesson.span, message, help=help)
 
 
 def _efforts_of(document: model.Document) -> Efforts:
     summary = (document.summaries or {}).get("pace")
     return summary if isinstance(summary, Efforts) else count_efforts(document)
-
-
-def _compare(lesson: model.Lesson, efforts: Efforts, pace: model.Pace) -> Iterator[Diagnostic]:
-    main, further = f"the main path of lesson {lesson.id} takes", "the further sections of lesson"
-    for field, part, map_minutes, effort in (
-        ("minutes", main, lesson.minutes, efforts.main),
-        ("further", f"{further} {lesson.id} take", lesson.further, efforts.further),
-    ):
-        estimate = effort.minutes(pace)
-        if abs(estimate - (map_minutes or 0)) <= max(_MINUTES, _SHARE * estimate):
-            continue
-        map_says = "does not say so" if map_minutes is None else f"says {map_minutes}"
-        message = f"{part} about {estimate} minutes, and the map {map_says}"
-        help = f"write `{field} = {estimate}`"
-        if field == "minutes" and estimate > (map_minutes or estimate):
-            help += ", or mark sections that only some need with `{.further}`"
-        yield diagnose("lesson-minutes", lesson.span, message, help=help)
 
 
 FEATURE = Feature(

@@ -59,12 +59,9 @@ def _question_pages(library: Library, place: urls.Place) -> tuple[QuestionPage, 
         if text:
             id = owner.id if isinstance(owner, Lesson) else ""
             href = place.href(urls.owner_path(owner))
-            pages.append(QuestionPage(id, owner.title, href, text, _count_questions(text)))
+            count = sum(len(part.partition(":")[2].split(",")) for part in text.split(" "))
+            pages.append(QuestionPage(id, owner.title, href, text, count))
     return tuple(pages)
-
-
-def _count_questions(quiz_index: str) -> int:
-    return sum(len(part.partition(":")[2].split(",")) for part in quiz_index.split(" "))
 
 
 _TROUBLE = "progress.trouble."

@@ -337,7 +337,18 @@ def _convert(node: HtmlElement) -> Element:
 
 def _convert_as(node: HtmlElement, name: str) -> Element:
     """Make an element of this name with the attributes and the content of a node."""
-    formula = element(f"m:{name}", _attributes(node, name))
+    names = _ATTRIBUTES[name].split()
+    attributes = {key: value for key, value in node.attributes.items() if key in names}
+    if name == "mtd":
+        for mark in sorted(node.classes & _ALIGNMENTS.keys()):
+            attributes["columnalign"] = _ALIGNMENTS[mark]
+    colour = _COLOUR.search(node.attributes.get("style", ""))
+    if colour is not None and "mathcolor" in names:
+        attributes["mathcolor"] = colour[1]
+    for key in ("width", "height", "depth", "lspace", "rspace"):
+        if key in attributes and not _LENGTH.fullmatch(attributes[key]):
+            del attributes[key]
+    formula = element(f"m:{name}", dict(sorted(attributes.items())))
     for child in node.children:
         if isinstance(child, str):
             if name in _WORDS:
@@ -352,19 +363,3 @@ def _convert_as(node: HtmlElement, name: str) -> Element:
         else:
             add(formula, child.text)
     return formula
-
-
-def _attributes(node: HtmlElement, name: str) -> dict[str, str]:
-    """Return the attributes of a node that MathML 2.0 has for an element of this name."""
-    names = _ATTRIBUTES[name].split()
-    attributes = {key: value for key, value in node.attributes.items() if key in names}
-    if name == "mtd":
-        for mark in sorted(node.classes & _ALIGNMENTS.keys()):
-            attributes["columnalign"] = _ALIGNMENTS[mark]
-    colour = _COLOUR.search(node.attributes.get("style", ""))
-    if colour is not None and "mathcolor" in names:
-        attributes["mathcolor"] = colour[1]
-    for key in ("width", "height", "depth", "lspace", "rspace"):
-        if key in attributes and not _LENGTH.fullmatch(attributes[key]):
-            del attributes[key]
-    return dict(sorted(attributes.items()))

@@ -74,7 +74,11 @@ def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | No
     if not isinstance(node, ObjectNode):
         return Parsed(None, sort_diagnostics(diagnostics))
     nodes = node.objects("questions")
-    diagnostics += _check_ids(nodes)
+    ids = [node.get("id") for node in nodes]
+    places = [(id.value, id.span) for id in ids if isinstance(id, StringNode)]
+    help = "a learner's answer is kept under it; give each question its own, or none"
+    message = "the question id `{}` is used twice in this quiz"
+    diagnostics += check_unique(places, "question-id-repeated", message, help=help)
     keys = _keys(nodes, decoding)
     questions: list[AnyQuestion] = []
     for question_node in nodes:
@@ -122,19 +126,24 @@ def _keys(nodes: tuple[ObjectNode, ...], decoding: Decoding[QuizFile]) -> dict[O
 # ---------------------------------------------------------------------------------------- checks
 
 
-def _check_ids(nodes: tuple[ObjectNode, ...]) -> Iterator[Diagnostic]:
-    ids = [node.get("id") for node in nodes]
-    places = [(id.value, id.span) for id in ids if isinstance(id, StringNode)]
-    help = "a learner's answer is kept under it; give each question its own, or none"
-    message = "the question id `{}` is used twice in this quiz"
-    yield from check_unique(places, "question-id-repeated", message, help=help)
-
-
 def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnostic]:
     sim = node.get("sim")
     match decoding.structs.get(node):
         case MultipleChoice() | Predict() as fields:
-            yield from _check_choices(node, fields)
+            yield from _check_distinct(node, "options", "two options are the same: `{}`")
+            count = len(fields.options)
+            spans = [item.span for item in node.items("answer")] or [node.place("answer")]
+            answers = list(zip(fields.answers, spans, strict=True))
+            for number, span in answers:
+                if not 0 <= number < count:
+                    message = f"there is no option {number}: they are numbered 0 to {count - 1}"
+                    yield diagnose("quiz-answer", span, message)
+            yield from check_unique(answers, "quiz-answer", "the option {} is named twice")
+            if fields.feedback is not None and len(fields.feedback) != count:
+                texts = "1 text" if len(fields.feedback) == 1 else f"{len(fields.feedback)} texts"
+                message = f"`feedback` has {texts} for {count} options"
+                help = 'an option without feedback has `""`'
+                yield diagnose("field-value", node.place("feedback"), message, help=help)
         case Numeric() as fields:
             if fields.answer == 0 and fields.tol is None:
                 message = (
@@ -151,23 +160,6 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
         from coursebuild.features.lab.relations import check_lab
 
         yield from check_lab(sim, decoding.structs)
-
-
-def _check_choices(node: ObjectNode, fields: MultipleChoice | Predict) -> Iterator[Diagnostic]:
-    yield from _check_distinct(node, "options", "two options are the same: `{}`")
-    count = len(fields.options)
-    spans = [item.span for item in node.items("answer")] or [node.place("answer")]
-    answers = list(zip(fields.answers, spans, strict=True))
-    for number, span in answers:
-        if not 0 <= number < count:
-            message = f"there is no option {number}: they are numbered 0 to {count - 1}"
-            yield diagnose("quiz-answer", span, message)
-    yield from check_unique(answers, "quiz-answer", "the option {} is named twice")
-    if fields.feedback is not None and len(fields.feedback) != count:
-        texts = "1 text" if len(fields.feedback) == 1 else f"{len(fields.feedback)} texts"
-        message = f"`feedback` has {texts} for {count} options"
-        help = 'an option without feedback has `""`'
-        yield diagnose("field-value", node.place("feedback"), message, help=help)
 
 
 def _check_distinct(node: ObjectNode, name: str, message: str) -> Iterator[Diagnostic]:

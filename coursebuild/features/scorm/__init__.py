@@ -30,38 +30,34 @@ pages."""
 
 def package_files(context: ExportContext) -> Iterator[SiteFile]:
     """Yield the files of the site, a page that opens each lesson, and the manifest."""
-    files: list[SiteFile] = [file for path, file in context.site().items() if _is_packed(path)]
+    files: list[SiteFile] = [
+        file
+        for path, file in context.site().items()
+        if path not in _MACHINES and not (path.startswith("assets/") and path.endswith(_COPIES))
+    ]
     script = page_script(context.assets.file("js/scorm.js"))
     files.append(OutputFile("sco/scorm.css", context.assets.file("css/scorm.css")))
     files.append(OutputFile("sco/scorm.js", script))
     yield from files
     for lesson in context.course.written_lessons:
-        yield OutputFile(_start_path(lesson), _start_page(context, lesson))
+        language = context.course.language or "en"
+        html = context.library.render(
+            "scorm/start.html",
+            language=language,
+            direction=direction(language),
+            course_key=context.course.key,
+            policy=policy(""),
+            title=f"{lesson.id} {lesson.title}",
+            lesson=lesson.id,
+            address=urls.Place(_start_path(lesson)).href(urls.lesson_path(lesson)),
+        )
+        yield OutputFile(_start_path(lesson), f"{html}\n".encode("utf-8", "replace"))
     manifest = _manifest(context.course, sorted(file.path for file in files))
     yield OutputFile("imsmanifest.xml", manifest)
 
 
-def _is_packed(path: str) -> bool:
-    return path not in _MACHINES and not (path.startswith("assets/") and path.endswith(_COPIES))
-
-
 def _start_path(lesson: Lesson) -> str:
     return f"sco/{lesson.id}-{lesson.slug}.html"
-
-
-def _start_page(context: ExportContext, lesson: Lesson) -> bytes:
-    language = context.course.language or "en"
-    html = context.library.render(
-        "scorm/start.html",
-        language=language,
-        direction=direction(language),
-        course_key=context.course.key,
-        policy=policy(""),
-        title=f"{lesson.id} {lesson.title}",
-        lesson=lesson.id,
-        address=urls.Place(_start_path(lesson)).href(urls.lesson_path(lesson)),
-    )
-    return f"{html}\n".encode("utf-8", "replace")
 
 
 def _manifest(course: Course, paths: Iterable[str]) -> bytes:

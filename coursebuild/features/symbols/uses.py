@@ -105,7 +105,6 @@ def _unwrap(element: Element) -> Element:
 
 
 def _collect(element: Element, symbols: dict[str, None]) -> None:
-    """Add the symbols of an element."""
     symbol = _symbol(element) if element.tag in _SYMBOLS else None
     if symbol is None:
         for child in element:
@@ -126,7 +125,11 @@ def _symbol(element: Element, *, is_declared: bool = False) -> str | None:
     if bare.tag == "mi":
         return _letter(bare.text or "", bare.get("mathvariant") == "normal", is_declared)
     if bare.tag in _ACCENT_ELEMENTS:
-        return _accented_symbol(bare, is_declared=is_declared)
+        letter, sign = _symbol(bare[0], is_declared=is_declared), _unwrap(bare[1])
+        accent = sign.text or ""
+        if letter is None or sign.tag != "mo" or not accent or not set(accent) <= _ACCENTS:
+            return None
+        return f"<{bare.tag}>{letter}<mo>{escape(accent)}</mo></{bare.tag}>"
     if bare.tag not in _SCRIPTS:
         return None
     base = _symbol(bare[0], is_declared=is_declared)
@@ -146,23 +149,12 @@ def _symbol(element: Element, *, is_declared: bool = False) -> str | None:
 def _letter(text: str, is_upright: bool, is_declared: bool) -> str | None:
     if not any(map(str.isalpha, text)) or (text in _NO_SYMBOLS and not is_declared):
         return None
-    if not is_declared and _is_latin(text) and (is_upright or (text.isascii() and len(text) > 1)):
+    is_latin = all(unicodedata.name(char, "").startswith("LATIN") for char in text)
+    is_word = is_upright or (text.isascii() and len(text) > 1)
+    if not is_declared and is_word and (text.isascii() or is_latin):
         return None
     variant = ' mathvariant="normal"' if is_upright else ""
     return f"<mi{variant}>{escape(text)}</mi>"
-
-
-def _is_latin(text: str) -> bool:
-    return text.isascii() or all(unicodedata.name(char, "").startswith("LATIN") for char in text)
-
-
-def _accented_symbol(element: Element, *, is_declared: bool) -> str | None:
-    """Return a symbol with an accent."""
-    base, mark = _symbol(element[0], is_declared=is_declared), _unwrap(element[1])
-    text = mark.text or ""
-    if base is None or mark.tag != "mo" or not set(text) or not set(text) <= _ACCENTS:
-        return None
-    return f"<{element.tag}>{base}<mo>{escape(text)}</mo></{element.tag}>"
 
 
 def _index(element: Element) -> str | None:
@@ -323,16 +315,6 @@ def used_symbols(library: Library) -> Iterator[tuple[Lesson, SymbolUse]]:
                 yield owner, use
 
 
-def _course_symbols(library: Library) -> list[CourseSymbol]:
-    rows: dict[str, CourseSymbol] = {}
-    for owner, use in used_symbols(library):
-        row = rows.setdefault(use.symbol, CourseSymbol(use))
-        row.owners.append(owner)
-        if use.meaning:
-            row.meanings.setdefault((use.meaning, use.unit), []).append(owner)
-    return sorted(rows.values(), key=lambda row: sort_key(row.first.symbol))
-
-
 class MeaningView(Struct, frozen=True):
     """What a symbol stands for; `places` are the lessons that say so, if others differ."""
 
@@ -356,25 +338,31 @@ class SymbolView(Struct, frozen=True):
 def symbols_values(library: Library) -> dict[str, object]:
     """Return the values for the template of the index."""
     place = urls.Place("symbols/index.html")
-    rows = [_symbol_view(library, place, row) for row in _course_symbols(library)]
+    symbols: dict[str, CourseSymbol] = {}
+    for owner, use in used_symbols(library):
+        row = symbols.setdefault(use.symbol, CourseSymbol(use))
+        row.owners.append(owner)
+        if use.meaning:
+            row.meanings.setdefault((use.meaning, use.unit), []).append(owner)
+    rows: list[SymbolView] = []
+    for row in sorted(symbols.values(), key=lambda row: sort_key(row.first.symbol)):
+        anchor, section = row.first.section
+        names = (name_outside(library, row.owners[0], target) for target in row.first.targets)
+        is_ambiguous = len(row.meanings) > 1
+        rows.append(
+            SymbolView(
+                Markup(f"<math>{row.first.symbol}</math>"),
+                tuple(
+                    MeaningView(text, unit, owner_links(place, owners) if is_ambiguous else None)
+                    for (text, unit), owners in row.meanings.items()
+                ),
+                owner_link(place, row.owners[0], anchor),
+                fill_in(section, names),
+                owner_links(place, row.owners[1:]),
+            )
+        )
     return {
         "declared": tuple(row for row in rows if row.meanings),
         "undeclared": tuple(row for row in rows if not row.meanings),
         "glossary": added_page(library, place, "glossary"),
     }
-
-
-def _symbol_view(library: Library, place: urls.Place, row: CourseSymbol) -> SymbolView:
-    anchor, section = row.first.section
-    names = (name_outside(library, row.owners[0], target) for target in row.first.targets)
-    is_ambiguous = len(row.meanings) > 1
-    return SymbolView(
-        Markup(f"<math>{row.first.symbol}</math>"),
-        tuple(
-            MeaningView(text, unit, owner_links(place, owners) if is_ambiguous else None)
-            for (text, unit), owners in row.meanings.items()
-        ),
-        owner_link(place, row.owners[0], anchor),
-        fill_in(section, names),
-        owner_links(place, row.owners[1:]),
-    )

@@ -164,12 +164,10 @@ class Claims(Struct, frozen=True):
 
     @property
     def proven(self) -> int:
-        """The number of proven claims."""
         return self.bound + self.computed + self.given
 
     @property
     def all(self) -> int:
-        """The number of claims."""
         return self.proven + len(self.unsourced) + len(self.open)
 
     @property
@@ -290,8 +288,10 @@ class _Counter:
                 case model.Image():
                     numbers = {number.text for number in find_claims(inline.alt)}
                     self.alternatives += [(inline.span, number) for number in sorted(numbers)]
-                case model.Link(target=model.UrlTarget() | model.TermTarget()):
-                    if not _is_address(inline):
+                case model.Link(target=model.UrlTarget() | model.TermTarget() as target):
+                    texts = (child for child in inline.children if isinstance(child, model.Text))
+                    text = "".join(child.text for child in texts)
+                    if isinstance(target, model.TermTarget) or text not in target.url:
                         self.inlines(inline.children)
                 case model.Emphasis() | model.Strong() | model.Strikethrough() | model.Term():
                     self.inlines(inline.children)
@@ -359,12 +359,6 @@ def find_claims(text: str) -> Iterator[Number]:
 
 def _given_kind(source: str) -> str:
     return "given" if source else _NO_SOURCE
-
-
-def _is_address(link: model.Link) -> bool:
-    """Whether a link has its address as its text."""
-    text = "".join(child.text for child in link.children if isinstance(child, model.Text))
-    return isinstance(link.target, model.UrlTarget) and text in link.target.url
 
 
 def _is_claim(side: FormulaSide, tex: str) -> bool:

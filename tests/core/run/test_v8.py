@@ -17,13 +17,7 @@ import pytest
 
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.run import v8
-from coursebuild.core.run.v8 import (
-    Isolate,
-    LimitError,
-    MathEngine,
-    ScriptError,
-    StoppedError,
-)
+from coursebuild.core.run.v8 import Isolate, LimitError, MathEngine, ScriptError, StoppedError
 from support.fixture_cases import fixture_text
 from support.run_code import run_code
 from support.runners import processor_time

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import difflib
 import re
-import textwrap
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -24,7 +23,6 @@ from msgspec.structs import replace
 
 from coursebuild.core.registry import installed_features
 from coursebuild.core.scripts.edit import apply_edits
-from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.rules import GROUPS, RULES, Rule
 from coursebuild.core.text.source import Source
@@ -47,16 +45,14 @@ def catalogue_page() -> str:
     errors = sum(rule.severity == "error" for rule in RULES.values())
     names = {name for group in GROUPS.values() for name in group}
     groups = {**GROUPS, _OTHER_GROUP: [name for name in RULES if name not in names]}
-    contents = " · ".join(f"[{title}](#{slug(title)})" for title in groups)
     head = f"""\
 # Rules
 
-Each diagnostic names its rule, as in `error[output-drift]`; `coursebuild explain output-drift`
-prints its entry. There are {errors} errors and {len(RULES) - errors} warnings. An error
-keeps the site from being published. A warning can be [silenced](course-map.md#silence), an error
-cannot. `--fix` and `--unsafe` are options of [`coursebuild check`](commands.md#fix).
-
-{textwrap.fill(contents, 120, break_on_hyphens=False)}
+There are {errors} errors, which keep the site from being published, and {len(RULES) - errors}
+warnings, which can be [silenced](course-map.md#silence). `coursebuild explain output-drift` prints
+an entry: an example of its message and help, and what the rule means if the message says less.
+[`--fix`](commands.md#fix) is named where `coursebuild check` can mend a mistake; of other rules,
+`coursebuild explain RULE --format json` says why it cannot.
 """
     return head + "".join(
         f"\n## {title}\n" + "".join(_entry(RULES[name]) for name in group)
@@ -67,21 +63,35 @@ cannot. `--fix` and `--unsafe` are options of [`coursebuild check`](commands.md#
 def _entry(rule: Rule) -> str:
     """A section with the first message of the rule's first case."""
     case, *_ = CASES[rule.name]
-    outputs = [case.expected for case in CASES[rule.name]]
-    options = [o for o in ("--fix", "--fix --unsafe") if f"\n{o} writes" in "".join(outputs)]
-    cure = " or ".join(f"`{option}`" for option in options) + " can mend it."
-    if rule.no_fix:
-        cure = f"No fix: {rule.no_fix}."
-    if command_of(case) != "check":
-        cure += f" Reported by `coursebuild {command_of(case)}`."
     blocks = case.expected.rstrip("\n").split("\n\n")
     message = next(block for block in blocks if block.startswith(f"{rule.severity}[{rule.name}]"))
-    message = re.sub(r"\n  --> .*(\n +\|$)?", "", message, count=1, flags=re.MULTILINE)
-    marks = "`" * max(3, 1 + max(map(len, re.findall("`+", message)), default=2))
-    return (
-        f"\n### {rule.name}\n\n{rule.severity.capitalize()}. {rule.summary} {cure}\n\n"
-        f"{marks}\n{message}\n{marks}\n"
-    )
+    first, *lines = message.splitlines()
+    helps = [line.replace("=", "", 1).strip() for line in lines if line.startswith("    = help: ")]
+    message = "\n".join([f"    {first}", *(f"        {help}" for help in helps)])
+
+    sentences = []
+    if len(_words(rule.summary) - _words(message)) > 1:  # or else the message says as much
+        sentences.append(rule.summary)
+    outputs = "".join(case.expected for case in CASES[rule.name])
+    options = [o for o in ("--fix", "--fix --unsafe") if f"\n{o} writes" in outputs]
+    if options:
+        sentences.append(" or ".join(f"`{option}`" for option in options) + " mends it.")
+    if command_of(case) != "check":
+        sentences.append(f"Reported by `coursebuild {command_of(case)}`.")
+    text = f"{' '.join(sentences)}\n\n" if sentences else ""
+    return f"\n### {rule.name}\n\n{text}{message}\n"
+
+
+def _words(text: str) -> set[str]:
+    """The words that carry the meaning of a text, without endings."""
+    words = set(re.findall("[a-z0-9]+", text.lower())) - _SMALL_WORDS
+    return {re.sub("(ing|ed|es|s|e)$", "", word) for word in words}
+
+
+_SMALL_WORDS = set(
+    """a an the is are of in or and not no as on by to it that this has have was be been its there
+    at what than with for from one can cannot may""".split()
+)
 
 
 installed_features()  # they add their own rules

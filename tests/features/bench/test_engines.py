@@ -181,7 +181,7 @@ def test_the_text_of_a_report() -> None:
     text = engines_text([report()], Style(width=160))
     words = " ".join(text.split())
     assert "MJX, 32 bits, A Card 0.00200" in words
-    assert "9 µs (×12) 1 µs (×1.2) –" in words
+    assert "9 µs ×12 1 µs ×1.2 –" in words
     assert "MJX, 64 bits: failed: TypeError: <int64>" in words
     assert "X: refused: no cones" in words
     assert "MJX, 32 bits, A Card, 4096 worlds: not tried: a step would take about 1e+02 s." in words

@@ -29,7 +29,7 @@ from coursebuild.core.run.sandbox import examine_sandbox
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import LAB_ENGINE
-from coursebuild.report.text import GREEN, RED, YELLOW, Style, visible
+from coursebuild.report.text import GREEN, RED, YELLOW, visible
 
 EXAMPLES = """\
 examples:
@@ -73,18 +73,14 @@ def run(arguments: argparse.Namespace) -> int:
     required = (_python, _mujoco, _lab_engine, _fonts, _folder)
     for make_probes in (*required, _store, _locks, _disk, _rendering, _sandbox):
         for probe in make_probes(folder):
-            write(_format_line(probe, style), CLEAN)
+            word, colour = ("broken", RED) if probe.is_required else ("-", YELLOW)
+            if probe.ok:
+                word, colour = "ok", GREEN
+            line = f"{style.paint(f'{word:<8}', colour)} {visible(probe.text)}\n"
+            write(line if probe.ok else f"{line}         help: {visible(probe.cure)}\n", CLEAN)
             if probe.is_required and not probe.ok:
                 status = FAILURE
     return status
-
-
-def _format_line(probe: Probe, style: Style) -> str:
-    word, colour = ("broken", RED) if probe.is_required else ("-", YELLOW)
-    if probe.ok:
-        word, colour = "ok", GREEN
-    line = f"{style.paint(f'{word:<8}', colour)} {visible(probe.text)}\n"
-    return line if probe.ok else f"{line}         help: {visible(probe.cure)}\n"
 
 
 def _python(_: Path) -> Iterator[Probe]:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
 
 from coursebuild.cli.arguments import add_lessons, options_of
 from coursebuild.cli.output import CLEAN, FAILURE, fail, write
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import FileChange
-from coursebuild.core.model import Course, Lesson
-from coursebuild.core.text.diagnostics import Parsed
+from coursebuild.core.model import Lesson
 from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.format import format_document
@@ -39,7 +37,13 @@ def run(arguments: argparse.Namespace) -> int:
     root = options_of(arguments).root
     course, status = load_course(root), CLEAN
     new_texts: dict[Source, str] = {}
-    for source, new in _format_documents(course, select(course, tuple(arguments.lessons), root)):
+    documents = select(course, tuple(arguments.lessons), root)
+    for owner, document in course.owned_documents:
+        if documents is not None and owner.path not in documents:
+            continue
+        source, lesson, width = document.source, isinstance(owner, Lesson), course.width
+        callouts, words = course.callout_names, course.words
+        new = format_document(source, callouts, lesson=lesson, width=width, words=words)
         mistakes = [f"{location(d.span)}: {d.message}" for d in new.diagnostics]
         if read_bytes(root, source.path) != source.text.encode():
             mistakes = [f"{source.path} is not UTF-8"]
@@ -56,16 +60,3 @@ def run(arguments: argparse.Namespace) -> int:
         changes = [FileChange(s.path, s.text.encode(), t.encode()) for s, t in new_texts.items()]
         return max(status, apply_changes(root, changes))
     return write("".join(f"{line}\n" for line in lines), FAILURE if lines else status)
-
-
-def _format_documents(
-    course: Course, documents: frozenset[str] | None
-) -> Iterator[tuple[Source, Parsed[str]]]:
-    callouts = course.callout_names
-    for owner, document in course.owned_documents:
-        if documents is None or owner.path in documents:
-            source, lesson, width = document.source, isinstance(owner, Lesson), course.width
-            yield (
-                source,
-                format_document(source, callouts, lesson=lesson, width=width, words=course.words),
-            )

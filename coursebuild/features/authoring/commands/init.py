@@ -57,7 +57,15 @@ def run(arguments: argparse.Namespace) -> int:
     root = Path(folder).resolve()
     check_path(root)
     undo_changes(root, Progress().say)
-    files = _read_files()
+    files = {".vscode/course.schema.json": json_schema("course")}
+    for file in sorted(_COURSE.rglob("*")):
+        if file.is_file() and "__pycache__" not in file.parts:
+            path = file.relative_to(_COURSE).as_posix()
+            data = file.read_bytes().replace(b"VERSION", __version__.encode())
+            files[_PATHS_BY_FILE.get(path, path)] = data
+    _, requirements = re.split("(?m)^(?=[^#])", locked_requirements(), maxsplit=1)
+    comment = f"# What coursebuild {__version__} was tested with, as its release locks it.\n"
+    files[".github/requirements.txt"] = f"{comment}{requirements}".encode()
     existing = [path for path in files if (root / path).exists() or (root / path).is_symlink()]
     for path in (path for path in _KEPT if path in existing):
         existing.remove(path)
@@ -93,17 +101,3 @@ def _make_repository(root: Path) -> bool:
     if process.returncode:
         Progress().say(f"no Git repository was made: {process.stderr.strip()}")
     return process.returncode == 0
-
-
-def _read_files() -> dict[str, bytes]:
-    """Return all files of the course, by path."""
-    files = {".vscode/course.schema.json": json_schema("course")}
-    for file in sorted(_COURSE.rglob("*")):
-        if file.is_file() and "__pycache__" not in file.parts:
-            path = file.relative_to(_COURSE).as_posix()
-            data = file.read_bytes().replace(b"VERSION", __version__.encode())
-            files[_PATHS_BY_FILE.get(path, path)] = data
-    _, requirements = re.split("(?m)^(?=[^#])", locked_requirements(), maxsplit=1)
-    comment = f"# What coursebuild {__version__} was tested with, as its release locks it.\n"
-    files[".github/requirements.txt"] = f"{comment}{requirements}".encode()
-    return files

@@ -53,7 +53,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError(f"no lesson is called `{arguments.old}`", help=help)
     edits = rename_references(course, lesson, new)
     changes = _list_changes(root, course, lesson, new, edits)
-    doubtful = doubtful_places(course, lesson, new, edits, _read_code(root))
+    files = (path for top in (*FOLDERS, "src") for path in (root / top).rglob("*.*"))
+    code = [path for path in files if path.suffix in (".py", ".js") and path.is_file()]
+    sources = read_sources(root, sorted(path.relative_to(root).as_posix() for path in code)).value
+    doubtful = doubtful_places(course, lesson, new, edits, sources)
     if doubtful and not arguments.leave:
         lines = [f"{plural(len(doubtful), 'place')} may mean lesson {lesson.id}:"]
         for span in doubtful:
@@ -86,10 +89,3 @@ def _list_changes(
         FileChange(replace(lesson, id=new).path, None, lesson_change.new),
         FileChange(lesson.path, lesson_change.old, None),
     ]
-
-
-def _read_code(root: Path) -> tuple[Source, ...]:
-    """Read the code of the project, which can mention lessons."""
-    files = (path for top in (*FOLDERS, "src") for path in (root / top).rglob("*.*"))
-    code = [path for path in files if path.suffix in (".py", ".js") and path.is_file()]
-    return read_sources(root, sorted(path.relative_to(root).as_posix() for path in code)).value

@@ -68,6 +68,10 @@ def main() -> None:
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)  # engines print what they compile
     os.dup2(null, 2)
+    # The threads of JAX's pool on the processor, by default one for each core. Two wait for each
+    # other: 4,096 worlds of a model with contacts stopped for ever within some hundred steps
+    # (jaxlib 0.10.2, two cores), and ran through with eight.
+    os.environ.setdefault("NPROC", str(max(8, 2 * (os.cpu_count() or 1))))
     print("ready", file=replies, flush=True)
     for line in sys.stdin:
         request = msgspec.json.decode(line, type=Request)

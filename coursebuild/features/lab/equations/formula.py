@@ -136,7 +136,6 @@ def _diagnose(text: Excerpt, mistake: _MistakeError) -> Diagnostic:
 
 
 def _emit(node: ast.expr, names: Mapping[str, int], program: Program) -> None:
-    """Append the program of a node."""
     parts: Sequence[ast.expr]
     match node:
         case ast.Constant(value=bool() as truth):

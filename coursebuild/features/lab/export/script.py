@@ -200,7 +200,6 @@ def _keyframe(key: int | str | None) -> str:
 
 
 def _introduction(lab: Lab, metadata: ExportMetadata) -> str:
-    """Say what the script is and how to run it."""
     title = f"{_one_line(lab.fields.title)}: " if lab.fields.title else ""
     origin = (
         f"From the course “{_one_line(metadata.course)}”, for MuJoCo {metadata.engine}. It starts "
@@ -217,7 +216,6 @@ def _introduction(lab: Lab, metadata: ExportMetadata) -> str:
 
 
 def _comment(control: Slider | Select) -> list[str]:
-    """Write the comment above the constant of a control."""
     unit = f" ({_one_line(control.unit)})" if control.unit else ""
     text = f"The control “{_one_line(control.label)}”{unit}"
     if isinstance(control, Select):

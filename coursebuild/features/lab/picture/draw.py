@@ -277,7 +277,8 @@ class _Canvas:
             normals[facing < 0] *= -1
         texel = np.ones((1, 3))
         if solid.texture is not None:
-            steps = buffer.depth[samples] / self.eye.focal * _sharpness(facing)
+            longer = 1 / np.maximum(np.abs(facing), 1e-3)
+            steps = buffer.depth[samples] / self.eye.focal * np.maximum(longer / _SHARPER, 1.0)
             texel = solid.texture.texels(places, local_normals, attributes[:, UV], steps)
         base = np.array(solid.rgba[:3])
         colour = shade(self.light, solid.material, base, texel, (points, normals, toward_eye))
@@ -297,9 +298,3 @@ def _batches(samples: NDArray[np.int64], width: int) -> Iterator[Samples]:
     """Yield samples, counted row by row, not too many at once."""
     for start in range(0, len(samples), _AT_ONCE):
         yield np.divmod(samples[start : start + _AT_ONCE], width)
-
-
-def _sharpness(cosines: Array) -> Array:
-    """Return by how much to blur a surface that is seen at an angle, given the cosines."""
-    longer = 1 / np.maximum(np.abs(cosines), 1e-3)
-    return np.maximum(longer / _SHARPER, 1.0)

@@ -90,7 +90,6 @@ class _Scene:
         return (solid for solid in solids if solid is not None)
 
     def _marks(self) -> Iterator[Solid]:
-        """Make springs and pins."""
         for spring in self.scene["springs"]:
             starts = (self.layout["geoms"] + _GEOM * spring[end] for end in ("from", "to"))
             a, b = (self._row(start, 3) for start in starts)

@@ -69,14 +69,6 @@ def _camera(lab: Lab, record: dict[str, Any]) -> FreeCamera:
     return FreeCamera(record["azimuth"], record["elevation"], distance, target, fovy)
 
 
-def _scale(lab: Lab, camera: FreeCamera) -> tuple[float, float]:
-    """Return a round length, m, and its length in the picture, pixels, at the camera's target."""
-    width, height = _size(lab)
-    metre = height / (2 * camera.distance * math.tan(math.radians(camera.fovy) / 2))
-    length = round_length(_BAR * width / metre)
-    return length, length * metre
-
-
 def png(pixels: NDArray[np.uint8]) -> bytes:
     """Write an RGBA picture as a PNG file, with the same bytes each time."""
     opaque = bool((pixels[..., 3] == 255).all())
@@ -109,7 +101,11 @@ def lab_record(lab: Lab, main: MainRun) -> LabRecord:
         (readout.label, _format_value(value, readout.digits))
         for readout, value in zip(lab.fields.readouts, last["readouts"] or (), strict=False)
     )
-    scale = _scale(lab, _camera(lab, main["scene"]["camera"]))
+    camera = _camera(lab, main["scene"]["camera"])
+    width, height = _size(lab)
+    metre = height / (2 * camera.distance * math.tan(math.radians(camera.fovy) / 2))
+    length = round_length(_BAR * width / metre)
+    scale = length, length * metre
     return LabRecord(_size(lab), scale, first["time"], readouts, last["time"], plots)
 
 

@@ -100,7 +100,6 @@ def _make_items(
 def _find_names(
     texts: OpenTexts, cursor: Span, subject: str, prefix: re.Match[str]
 ) -> Mapping[str, str]:
-    """Return the names of all things of a kind, each with a description."""
     library = texts.library
     match subject:
         case "lesson":

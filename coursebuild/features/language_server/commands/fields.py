@@ -85,7 +85,15 @@ def field_place(source: Source, offset: int) -> FieldPlace | None:
     if kind not in (roots := schema_roots()):
         return None
     span, objects = _find_token(body, offset)
-    return _place_of_token(span, objects, roots[kind][0]) if objects else None
+    if not objects:
+        return None
+    declared_type = inspect.type_info(roots[kind][0])
+    for object, key in objects[:-1]:
+        field = _fields(declared_type, object.members).get(key)
+        declared_type = _mapping_value(declared_type) if field is None else field.type
+    innermost, key = objects[-1]
+    keys = frozenset(innermost.members) - {span.text.strip('"')}
+    return FieldPlace(span, _fields(declared_type, innermost.members), keys, key)
 
 
 def fence_at(source: Source, offset: int) -> tuple[str, Span] | None:
@@ -124,18 +132,6 @@ def _find_token(body: Span, offset: int) -> tuple[Span, list[tuple[_Object, str]
 
 
 # --- declarations
-
-
-def _place_of_token(
-    span: Span, objects: list[tuple[_Object, str]], root: type[Struct]
-) -> FieldPlace:
-    declared_type = inspect.type_info(root)
-    for object, key in objects[:-1]:
-        field = _fields(declared_type, object.members).get(key)
-        declared_type = _mapping_value(declared_type) if field is None else field.type
-    innermost, key = objects[-1]
-    keys = frozenset(innermost.members) - {span.text.strip('"')}
-    return FieldPlace(span, _fields(declared_type, innermost.members), keys, key)
 
 
 def _fields(declared_type: inspect.Type, members: Mapping[str, str]) -> dict[str, inspect.Field]:

@@ -93,7 +93,18 @@ def look_up(texts: OpenTexts, source: Source, position: types.Position) -> Refer
         for node in reversed([*blocks, *inlines]):
             if referent := lookup.look_up_node(node, offset):
                 return referent
-    return _look_up_field(texts.library, source, offset)
+    place = field_place(source, offset)
+    if place is None or place.field is None or not place.text:
+        return None
+    key, lesson = place.key, texts.library.lessons.get(place.text)
+    if lesson is not None and key in ("id", "prerequisites"):
+        definition = lesson.span if lesson.document is None else lesson.document.source.span(0, 0)
+        title = f"**Lesson {lesson.id}: {escape_text(lesson.title)}**"
+        return Referent(place.span, title, definition, model.LessonTarget(lesson.id, None))
+    if key == "rule" and place.text in RULES:
+        return Referent(place.span, RULES[place.text].summary)
+    text = "" if key else field_description(place.field.type)
+    return Referent(place.span, f"{code_span(place.text)}: {text}") if text else None
 
 
 def label_titles(library: Library, owner: Owner | None, document: model.Document) -> dict[str, str]:
@@ -119,21 +130,6 @@ def _covers(span: Span, offset: int) -> bool:
 
 def _touches(span: Span, offset: int) -> bool:
     return span.start <= offset <= span.end
-
-
-def _look_up_field(library: Library, source: Source, offset: int) -> Referent | None:
-    place = field_place(source, offset)
-    if place is None or place.field is None or not place.text:
-        return None
-    key, lesson = place.key, library.lessons.get(place.text)
-    if lesson is not None and key in ("id", "prerequisites"):
-        definition = lesson.span if lesson.document is None else lesson.document.source.span(0, 0)
-        title = f"**Lesson {lesson.id}: {escape_text(lesson.title)}**"
-        return Referent(place.span, title, definition, model.LessonTarget(lesson.id, None))
-    if key == "rule" and place.text in RULES:
-        return Referent(place.span, RULES[place.text].summary)
-    text = "" if key else field_description(place.field.type)
-    return Referent(place.span, f"{code_span(place.text)}: {text}") if text else None
 
 
 class _Lookup:

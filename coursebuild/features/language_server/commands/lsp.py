@@ -48,7 +48,10 @@ def run(arguments: argparse.Namespace) -> int:
     from coursebuild.features.language_server.commands.server import Server
 
     options = replace(options_of(arguments), progress=Progress(quiet=True))
-    stdin, stdout = _take_streams()
+    # Nothing else in this process may use the client's streams.
+    stdin, stdout = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)
     live_course = LiveCourse(options, Style(), site=False)
     server = Server(live_course.session)
     try:
@@ -61,14 +64,6 @@ def run(arguments: argparse.Namespace) -> int:
         return CLEAN
     finally:
         live_course.close()
-
-
-def _take_streams() -> tuple[BinaryIO, BinaryIO]:
-    """Return the client's streams, and keep all else in this process from using them."""
-    streams = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-    os.dup2(2, 1)
-    return streams
 
 
 def _answer(server: Server, stdin: BinaryIO, stdout: BinaryIO) -> None:

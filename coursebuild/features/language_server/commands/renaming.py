@@ -166,7 +166,6 @@ def _label_name(texts: OpenTexts, path: str, label: str, span: Span) -> _Name | 
 
 
 def _labels(document: model.Document) -> dict[str, Span]:
-    """Return the explicit labels of a document, and their places."""
     labels = {}
     for node in (*model.document_blocks(document), *model.document_inlines(document)):
         if isinstance(node, model.Math | model.Labelled) and node.label is not None:
