@@ -39,7 +39,7 @@ from coursebuild.numerics.pilot import apply, with_setting
 from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, RowVerdict, WorkPrecisionRow
-from coursebuild.numerics.reports.shown_errors import Quantity, seconds_text, setting_text
+from coursebuild.numerics.reports.shown_errors import SEEN, Quantity, seconds_text, setting_text
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.simulation import STATE, full_state, initial_data, silent
 
@@ -224,10 +224,6 @@ class FrontPoint(Struct, frozen=True):
         """Whether this costs less, beyond what timing can tell."""
         is_separate = self.cost.high < rival.cost.low
         return is_separate and self.cost.value * (1 + COST_SLACK) < rival.cost.value
-
-
-SEEN = Quantity("seen", "")
-"""What a learner sees: it is compared where no other error is declared and resolved."""
 
 
 def _place(row: WorkPrecisionRow, quantity: Quantity) -> FrontPoint | None:

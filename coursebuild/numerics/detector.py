@@ -192,8 +192,7 @@ def driving_force(model: Any, scenario: Scenario) -> str:
     has_actuators = model.nu and not model.opt.disableflags & int(
         mujoco.mjtDisableBit.mjDSBL_ACTUATION
     )
-    # Without a command too, where their range leaves 0 out.
-    has_commands |= any(
+    is_pushing = any(  # without a command too, as the range leaves 0 out
         np.any((limited != 0) & ((ranges[:, 0] > 0) | (ranges[:, 1] < 0)))
         for limited, ranges in (
             (model.actuator_ctrllimited, model.actuator_ctrlrange),
@@ -208,7 +207,8 @@ def driving_force(model: Any, scenario: Scenario) -> str:
     has_fluid = model.opt.density > 0 or model.opt.viscosity > 0
     causes = (
         (
-            has_actuators and (has_commands or model.na or np.any(model.actuator_biastype)),
+            has_actuators
+            and (has_commands or is_pushing or model.na or np.any(model.actuator_biastype)),
             "actuators act",
         ),
         (np.any(model.geom_surfacevel), "a surface moves"),

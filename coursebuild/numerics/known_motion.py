@@ -1,7 +1,7 @@
 """The references that a scene's motion is measured against, and how well they are known.
 
 Entry points: `find_reference(model, pilot)`, the reference of a scene; `find_references(model,
-pilot)`, by cone where something touches; `find_conserved(…)`, `mean_late_energy(…)`.
+pilot)`, by cone where something touches; `find_conserved(…)`.
 
 1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; DOP853 does it
    again. Their difference bounds the error of the reference. Both take the same accelerations, so
@@ -22,7 +22,6 @@ pilot)`, by cone where something touches; `find_conserved(…)`, `mean_late_ener
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import Any
 
@@ -446,16 +445,3 @@ def find_conserved(model: Any, pilot: Pilot, reference: KnownMotion) -> tuple[fl
     drifts = energy_drift(energies), momentum_drift(momenta)
     is_conserved = [drift is not None and abs(drift) < CONSERVED for drift in drifts]
     return scale if is_conserved[0] else None, is_conserved[1]
-
-
-def mean_late_energy(model: Any, pilot: Pilot, reference: KnownMotion) -> float | None:
-    """Mean kinetic energy after the horizon, J, in small steps; `None` where that is the end."""
-    scenario = pilot.scene.scenario
-    if reference.horizon > scenario.duration - scenario.sample * 1.5:
-        return None
-    integrator = Integrator.RK4 if pilot.smooth else Integrator.IMPLICITFAST
-    step = min(pilot.scene.timesteps) / 2
-    fine = without_sleep(with_integrator(model, integrator, step))
-    run = simulate(pilot.setup, fine)
-    mean = float(run.energy[1:][run.states.times > reference.horizon * (1 + 1e-9), 1].mean())
-    return mean if math.isfinite(mean) and mean > 0 else None

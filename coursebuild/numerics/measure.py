@@ -21,17 +21,33 @@ be measured.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.problem import Array, Motion, Reference, Sizes
-from coursebuild.numerics.reports.scene_report import FLOORS, Errors, FittedOrder, OrderRow
+from coursebuild.numerics.pilot import Pilot
+from coursebuild.numerics.problem import STANDARD, Array, Integrator, Motion, Reference, Sizes
+from coursebuild.numerics.reports.scene_report import (
+    FLOORS,
+    Errors,
+    FittedOrder,
+    MeasuredSetting,
+    OrderRow,
+    WorkPrecisionRow,
+)
 from coursebuild.numerics.scene import Scene
-from coursebuild.numerics.simulation import EngineStates, Run, initial_data
+from coursebuild.numerics.simulation import (
+    EngineStates,
+    Run,
+    initial_data,
+    motion_of,
+    simulate,
+    with_integrator,
+    without_sleep,
+)
 from mjcourse.spatial import angular_distance
 
 _LOWEST, _HIGHEST = 100.0, 0.1
@@ -140,6 +156,31 @@ def fit_orders(
     return OrderRow(integrator, fit("position"), fit("attitude"), fit("velocity"))
 
 
+def fit_scene_orders(
+    model: Any,
+    rows: Iterable[WorkPrecisionRow],
+    baseline: MeasuredSetting,
+    states: EngineStates,
+    floor: Sizes,
+) -> tuple[OrderRow, ...]:
+    """The orders of all integrators in a scene, under the solver of its own setting.
+
+    `states` and `floor` are those of the reference.
+    """
+    motion = motion_of(model, states)
+    angles = angular_distance(motion.attitude[:1], motion.attitude)
+    extent = Sizes(
+        float(np.linalg.norm(np.ptp(motion.position, axis=0))),
+        float(angles.max(initial=0.0)),
+        float(np.linalg.norm(np.ptp(motion.velocity, axis=0))),
+    )
+    runs: dict[str, list[tuple[float, Errors]]] = {name.value: [] for name in STANDARD}
+    for row in rows:
+        if row.setting.solver_settings == baseline.solver_settings:
+            runs[row.setting.integrator].append((row.setting.timestep, row))
+    return tuple(fit_orders(name, errors, floor, extent) for name, errors in runs.items())
+
+
 def energy_drift(energy: Array, scale: float | None = None) -> float | None:
     """The largest change of potential and kinetic energy together, with its sign.
 
@@ -160,6 +201,19 @@ def mean_energy(run: Run, horizon: float, expected: float | None) -> float | Non
     if expected is None or len(energies) < 2 or not np.isfinite(energies).all():
         return None
     return float(energies.mean()) / expected - 1
+
+
+def mean_late_energy(model: Any, pilot: Pilot, horizon: float) -> float | None:
+    """Mean kinetic energy after a horizon (s), J, in small steps; `None` where that is the end."""
+    scenario = pilot.scene.scenario
+    if horizon > scenario.duration - scenario.sample * 1.5:
+        return None
+    integrator = Integrator.RK4 if pilot.smooth else Integrator.IMPLICITFAST
+    step = min(pilot.scene.timesteps) / 2
+    fine = without_sleep(with_integrator(model, integrator, step))
+    run = simulate(pilot.setup, fine)
+    mean = float(run.energy[1:][run.states.times > horizon * (1 + 1e-9), 1].mean())
+    return mean if math.isfinite(mean) and mean > 0 else None
 
 
 def energy_scale(energy: Array) -> float:
@@ -259,6 +313,17 @@ def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
             case _:
                 values.append(data.sensor(quantity.name).data.copy())
     return np.array(values)
+
+
+def least_known(
+    model: Any, scene: Scene, states: EngineStates, second_states: EngineStates
+) -> tuple[float, float]:
+    """Below which two references know nothing of what is seen, and of the declared quantity."""
+    least_seen = FLOORS * visible_error(model, scene, states, second_states)
+    if not quantity_name(model, scene):
+        return least_seen, 0.0
+    gaps = quantity_values(model, scene, states) - quantity_values(model, scene, second_states)
+    return least_seen, FLOORS * float(np.linalg.norm(gaps, axis=1).max())
 
 
 Pair: TypeAlias = tuple[int, int]

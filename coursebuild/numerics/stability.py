@@ -61,11 +61,10 @@ from coursebuild.numerics.simulation import (
 _REACH, _NEAR = 10.0, 2.0
 """The grid is tried down to this part of the shortest timestep that is lost; from other starts so
 far below and beyond it."""
-_GRID, _FINE = 16, 1e-4
-_QUICK_GRID, _COARSE = 6, 1e-2
-_CLOSER, _QUICK_CLOSER = 32, 8
-"""The timesteps that are tried in a decade, and the relative width at which a bisection ends; those
-that are tried from half the limit on up to it."""
+_GRID, _FINE, _CLOSER = 16, 1e-4, 32
+_QUICK_GRID, _COARSE, _QUICK_CLOSER = 6, 1e-2, 8
+"""The timesteps that are tried in a decade, the relative width at which a bisection ends, and the
+timesteps that are tried from half the limit up to it."""
 STARTS, QUICK_STARTS, NEARBY = 5, 3, 1e-4
 """The starts of runs, the own one among them, and how far the others are from it: rad, or relative
 to the model's extent."""
@@ -206,7 +205,7 @@ def search_row(
     """Search for the largest stable timestep between two (s), and for what speaks against it.
 
     1. From the own start over the span: a grid, falling, down to a tenth of the largest timestep
-       below which nothing was lost, and a bisection at its end. Then a finer grid below that.
+       below which nothing was lost, a bisection at its end, and a finer grid below that.
     2. About that all starts over both spans, which makes the map; then a bisection for the start
        that is lost first, and one for the own start over the doubled span.
     3. Where nothing drives the motion, the first timestep at which energy rises.
@@ -286,10 +285,7 @@ def _bisect(
 def _look_closer(
     is_lost: Callable[[float], bool], grid: list[float], resolution: float, quick: bool
 ) -> float:
-    """`_bisect`, until none is lost of many timesteps below what it gives: islands are narrow.
-
-    With impacts it is the phase of the steps that decides, so that a run is lost here and there.
-    """
+    """`_bisect`, until none of many timesteps below is lost: with impacts islands are narrow."""
     largest = _bisect(is_lost, grid, resolution)
     while largest:
         top = min(largest, grid[-1])
@@ -312,8 +308,8 @@ def _first_gain(
     if not math.isfinite(setup.energy):
         return None
     least = _GAIN * setup.kinetic
-    lost = min((h for h in laboratory.own_steps() if laboratory.is_lost(0, h)), default=math.inf)
-    grid = [h for h in grid if h < lost] + [lost] * math.isfinite(lost)
+    lost = [h for h in laboratory.own_steps() if laboratory.is_lost(0, h)]
+    grid = [*(h for h in grid if not lost or h < lost[0]), *lost[:1]]
 
     def gain(step: float) -> float:
         trial = laboratory.trial(0, step)

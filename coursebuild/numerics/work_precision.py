@@ -39,13 +39,14 @@ from coursebuild.numerics.known_motion import (
     find_conserved,
     find_nearby,
     find_references,
-    mean_late_energy,
 )
 from coursebuild.numerics.measure import (
     energy_drift,
     errors,
-    fit_orders,
+    fit_scene_orders,
+    least_known,
     mean_energy,
+    mean_late_energy,
     measure_slip,
     momentum_drift,
     quantity_name,
@@ -62,17 +63,16 @@ from coursebuild.numerics.pilot import (
     settings,
     with_setting,
 )
-from coursebuild.numerics.problem import STANDARD, Integrator, Sizes
+from coursebuild.numerics.problem import Integrator
 from coursebuild.numerics.reports.scene_report import (
-    FLOORS,
     MeasuredSetting,
-    OrderRow,
     ScenarioReport,
     StableRow,
     WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.shown_errors import (
     Quantity,
+    compared_quantity,
     is_idle,
     setting_text,
     solving_parts,
@@ -90,7 +90,6 @@ from coursebuild.numerics.simulation import (
 )
 from coursebuild.numerics.stability import run_trial, stable_rows
 from coursebuild.numerics.sweep import measure_expected
-from mjcourse.spatial import angular_distance
 
 
 class Basis(Struct, frozen=True, eq=False):
@@ -144,9 +143,13 @@ def measure_scenario(
     baseline = own_setting(model, pilot)
     reference = cones[baseline.cone].reference
     conserved = find_conserved(model, pilot, reference)
-    late_energy = mean_late_energy(model, pilot, reference)
+    late_energy = mean_late_energy(model, pilot, reference.horizon)
     leasts = zip(
-        *(_least_known(model, scene, cone.reference) for cone in cones.values()), strict=True
+        *(
+            least_known(model, scene, cone.reference.states, cone.reference.second_states)
+            for cone in cones.values()
+        ),
+        strict=True,
     )
     basis = Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
     measurements = _measure_settings(basis, settings(model, pilot, quick=quick), tell)
@@ -159,7 +162,8 @@ def measure_scenario(
     tell(f"{scene.name}: stable timesteps")
     largest = stable_rows(model, pilot, quick=quick)
     limits = {row.integrator: row.largest for row in largest if row.largest is not None}
-    quantity = _compared_quantity(basis, measured_rows)
+    figure = Quantity("figure", quantity_name(model, scene), basis.least_figure)
+    quantity = compared_quantity(measured_rows, figure, basis.least_seen)
     rows = front(mark_luck(measured_rows, limits, quantity), quantity)
     judgement = verdict(
         rows, noticeable, quantity, lambda setting: _holds(basis, rows, setting, quantity, quick)
@@ -182,7 +186,9 @@ def measure_scenario(
         notes=_notes(basis, largest, rows, cost_of, quantity),
         figure=quantity_name(model, scene),
         rows=rows,
-        orders=_fit_orders(basis, rows) if pilot.smooth else (),
+        orders=fit_scene_orders(model, rows, baseline, reference.states, reference.floor)
+        if pilot.smooth
+        else (),
         figures=tuple(measure_expected(model, scene, baseline)),
         stable=largest,
         verdict=judgement,
@@ -223,24 +229,6 @@ def _measure_settings(
             idle_solving |= {setting.solver_settings} if row.same else set()
         rows_by_setting[setting] = row, sees
     return [rows_by_setting[setting] for setting in choices if setting in rows_by_setting]
-
-
-def _least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[float, float]:
-    """Below which nothing is known of what is seen, and of the declared quantity."""
-    states, second_states = reference.states, reference.second_states
-    least_seen = FLOORS * visible_error(model, scene, states, second_states)
-    if not quantity_name(model, scene):
-        return least_seen, 0.0
-    gaps = quantity_values(model, scene, states) - quantity_values(model, scene, second_states)
-    return least_seen, FLOORS * float(np.linalg.norm(gaps, axis=1).max())
-
-
-def _compared_quantity(basis: Basis, rows: Sequence[WorkPrecisionRow]) -> Quantity:
-    """The error to compare settings by: the declared one, unless only what is seen is resolved."""
-    name = quantity_name(basis.model, basis.pilot.scene)
-    seen = Quantity("seen", "", basis.least_seen)
-    figure = Quantity("figure", name, basis.least_figure)
-    return figure if name and (figure.is_resolved(rows) or not seen.is_resolved(rows)) else seen
 
 
 def _holds(
@@ -356,27 +344,6 @@ def _with_costs(
         seconds = timing.nanoseconds.scale(1e-9 / scene.scenario.duration)
         timed_rows[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
     return timed_rows, None if base == baseline else base
-
-
-def _fit_orders(basis: Basis, rows: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, ...]:
-    baseline, reference = basis.baseline, basis.reference
-    motion = motion_of(basis.model, reference.states)
-    angles = angular_distance(motion.attitude[:1], motion.attitude)
-    extent = Sizes(
-        float(np.linalg.norm(np.ptp(motion.position, axis=0))),
-        float(angles.max(initial=0.0)),
-        float(np.linalg.norm(np.ptp(motion.velocity, axis=0))),
-    )
-    orders = []
-    for integrator in STANDARD:
-        runs = [
-            (row.setting.timestep, row)
-            for row in rows
-            if (row.setting.integrator, row.setting.solver_settings)
-            == (integrator.value, baseline.solver_settings)
-        ]
-        orders.append(fit_orders(integrator.value, runs, reference.floor, extent))
-    return tuple(orders)
 
 
 def _measure_setting(

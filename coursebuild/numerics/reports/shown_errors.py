@@ -1,7 +1,7 @@
 """Which errors of reports are shown, and the texts of settings, times and statuses.
 
-Entry points: `quantities(report)`, `main_quantity`; `setting_text`, `seconds_text`, `status_text`;
-`limit_text` and `map_text`, of largest stable timesteps.
+Entry points: `quantities(report)`, `main_quantity`, `compared_quantity`; `setting_text`,
+`seconds_text`, `status_text`; `limit_text` and `map_text`, of largest stable timesteps.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import (
@@ -53,7 +54,7 @@ def quantities(report: ScenarioReport) -> tuple[Quantity, ...]:
     """The errors that some row has, what the scenario declares to be measured first."""
     candidates = (
         Quantity("figure", report.figure or "figure", report.least_figure),
-        Quantity("seen", "what is seen (1: just visible)", report.least_seen),
+        replace(SEEN, least=report.least_seen),
         Quantity("position", "position (m or rad)", FLOORS * report.floor),
         Quantity("attitude", "attitude (rad)", FLOORS * report.floor),
         Quantity("velocity", "velocity (m/s or rad/s)", FLOORS * report.velocity_floor),
@@ -63,6 +64,20 @@ def quantities(report: ScenarioReport) -> tuple[Quantity, ...]:
         for quantity in candidates
         if any(quantity.value_of(row) is not None for row in report.rows)
     )
+
+
+SEEN = Quantity("seen", "what is seen (1: just visible)")
+"""What a learner sees: it is compared where no other error is declared and resolved."""
+
+
+def compared_quantity(rows: Iterable[MeasuredRun], figure: Quantity, least_seen: float) -> Quantity:
+    """The error to compare settings by: the declared one, unless only what is seen is resolved.
+
+    `figure` has no label where none is declared.
+    """
+    rows, visible = tuple(rows), replace(SEEN, least=least_seen)
+    is_compared = figure.is_resolved(rows) or not visible.is_resolved(rows)
+    return figure if figure.label and is_compared else visible
 
 
 def is_idle(row: WorkPrecisionRow) -> bool:
