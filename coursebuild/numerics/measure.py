@@ -121,7 +121,7 @@ def fit_order(
         return None
     x, y = np.array(usable).T
     slopes = np.diff(y) / np.diff(x)
-    slope, shift = np.polyfit(x, y, 1)
+    slope, shift = np.polyfit(x, y, 1).tolist()
     freedom = len(x) - 2
     deviation = math.sqrt(float(np.sum((y - slope * x - shift) ** 2)) / freedom)
     error = deviation / math.sqrt(float(np.sum((x - x.mean()) ** 2)))
@@ -129,7 +129,7 @@ def fit_order(
     finest, finer, fine = slopes[:3].tolist()
     if (finer - finest) * (fine - finer) > 0:  # not noise: they tend to a slope beyond the finest
         uncertainty = max(uncertainty, abs(slope - finest) + _BEYOND * abs(finer - finest))
-    fit = FittedOrder(float(slope), uncertainty, float(np.ptp(slopes)))
+    fit = FittedOrder(slope, uncertainty, float(np.ptp(slopes)))
     return fit if fit.uncertainty <= _UNCERTAIN and fit.bend <= _BENT else None
 
 

@@ -9,7 +9,7 @@ import math
 import mujoco
 import numpy as np
 import pytest
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
 from coursebuild.numerics.cases import measure, orders
 from coursebuild.numerics.measure import errors, fit_order
@@ -76,6 +76,7 @@ def test_an_order_is_fitted_only_where_errors_lie_on_a_line() -> None:
     tending_fit = fit_order(steps[4:8], tending[:4], 0.0)
     assert tending_fit is not None
     assert 0.01 < tending_fit.value - 1 < tending_fit.uncertainty < 0.1
+    assert {type(part) for part in astuple(tending_fit)} == {float}, "reports hold no others"
     bent = [h**2 + 50 * h**4 for h in steps]
     assert fit_order(steps, bent, 0.0) is None
     wavy = [h**2 * (1.3 if n % 2 else 1) for n, h in enumerate(steps)]
