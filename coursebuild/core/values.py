@@ -214,7 +214,11 @@ def _make_constructor(kind: Any) -> Callable[..., Any]:
     fields = kind.__struct_fields__ if issubclass(kind, Struct) else kind._fields
     has_keyword_fields = len(kind.__match_args__) < len(fields)
     hints = get_type_hints(kind)
-    tests = [(_classes(hints[field]), _make_type_test(hints[field])) for field in fields]
+    tests: list[tuple[frozenset[type], Callable[[Any], bool]]] = []
+    for hint in (hints[field] for field in fields):
+        members = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+        classes = frozenset(member for member in members if isinstance(member, type))
+        tests.append((classes, _make_type_test(hint)))  # most values need only the former
 
     def make(*items: Any) -> Any:
         for (classes, test), item in zip(tests, items, strict=True):
@@ -223,12 +227,6 @@ def _make_constructor(kind: Any) -> Callable[..., Any]:
         return kind(**dict(zip(fields, items, strict=True))) if has_keyword_fields else kind(*items)
 
     return make
-
-
-def _classes(hint: Any) -> frozenset[type]:
-    """Classes whose values are of a type: most need no further test."""
-    members = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
-    return frozenset(member for member in members if isinstance(member, type))
 
 
 @functools.cache

@@ -29,7 +29,7 @@ from coursebuild.report import Report
 from coursebuild.report.values import plural
 
 if TYPE_CHECKING:
-    from coursebuild.core.model.sensitivity import Sensitivity
+    from coursebuild.core.scripts.sensitivity import Sensitivity
     from coursebuild.pipeline.shards import Shard
 
 

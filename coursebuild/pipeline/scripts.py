@@ -22,7 +22,6 @@ from coursebuild.core.files.write import remove_leftovers
 from coursebuild.core.model import Course, Mode, Recording, Table, find_blocks
 from coursebuild.core.model.addresses import RecordedFigure
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
-from coursebuild.core.model.sensitivity import FINER_RUNS, RUNS, Sensitivity
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.run_store import RunStore, longest_first
 from coursebuild.core.scripts.compare import compare
@@ -30,7 +29,13 @@ from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.scripts.failures import is_lost
 from coursebuild.core.scripts.figures import compare_figure
 from coursebuild.core.scripts.findings import count_unproven
-from coursebuild.core.scripts.sensitivity import is_worth_moving, sensitivity
+from coursebuild.core.scripts.sensitivity import (
+    FINER_RUNS,
+    RUNS,
+    Sensitivity,
+    is_worth_moving,
+    sensitivity,
+)
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 from coursebuild.pipeline.options import Options

@@ -9,7 +9,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from coursebuild.core.model.results import TrialLine
-from coursebuild.core.model.sensitivity import Sensitivity
+from coursebuild.core.scripts.sensitivity import Sensitivity
 from coursebuild.core.text.characters import clean_xml
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.rules import RULES, rule_address

@@ -22,7 +22,7 @@ from typing import assert_never
 from msgspec import Struct
 
 from coursebuild.core.model.results import TrialLine
-from coursebuild.core.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
+from coursebuild.core.scripts.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
 from coursebuild.core.text.characters import TAB, cells
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Span

@@ -19,7 +19,7 @@ from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Span
 
 if TYPE_CHECKING:
-    from coursebuild.core.model.sensitivity import Sensitivity
+    from coursebuild.core.scripts.sensitivity import Sensitivity
 
 
 class ScriptLine(Struct, frozen=True):

@@ -31,7 +31,8 @@ def regenerate(text: str) -> str:
 
     def part(match: re.Match[str]) -> str:
         name, *words = match[2].split()
-        return f"{match[1]}\n{_MAKERS[name](text, *words)}\n\n{match[3]}"
+        made = _MAKERS[name](text, *words)
+        return f"{match[1]}\n{made}\n\n{match[3]}" if made else match[1] + match[3]
 
     return _PART.sub(part, text)
 
@@ -154,10 +155,12 @@ def _row(action: argparse.Action) -> tuple[str, str]:
 
 
 def _options(text: str) -> str:
-    rows = (
-        (name, ", ".join(f"`{command}`" for command in commands), meaning)
-        for (name, meaning), commands in _shared().items()
-    )
+    rows: list[tuple[str, ...]] = []
+    last_names: list[str] = []
+    for (argument, meaning), names in _shared().items():
+        commands = ", ".join(f"`{command}`" for command in names)
+        rows.append((argument, "the same" if names == last_names else commands, meaning))
+        last_names = names
     return _table("argument | of | meaning", rows)
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Collection, Iterator, Mapping
-from typing import TypeAlias, assert_never
+from typing import assert_never
 from urllib.parse import SplitResult, unquote, urlsplit
 
 from msgspec import Struct
@@ -61,10 +61,6 @@ from coursebuild.core.text.diagnostics import (
     propose,
 )
 from coursebuild.core.text.source import Span
-
-_NamedTarget: TypeAlias = (
-    LessonTarget | LevelTarget | PageTarget | ModelTarget | ExampleTarget | TermTarget
-)
 
 _HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
 
@@ -227,7 +223,7 @@ _LESSON_NAME = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
 """A file name or an address that begins with the id of a lesson, as in `4.2-inertia.md`."""
 
 
-def _suggest_lesson(target: _NamedTarget, targets: LinkTargets) -> str:
+def _suggest_lesson(target: Target, targets: LinkTargets) -> str:
     """A help: the lesson whose file or slug the link names, or those of its level."""
     if not isinstance(target, LessonTarget):
         return ""
@@ -256,11 +252,7 @@ def _check_document_anchor(
 
 
 def _check_anchor(
-    span: Span,
-    anchor: str,
-    page_name: str,
-    ids: Collection[str],
-    listings: Mapping[str, str],
+    span: Span, anchor: str, page_name: str, ids: Collection[str], listings: Mapping[str, str]
 ) -> Iterator[Diagnostic]:
     """Report an anchor that is no id of a page and names no lines of its listings."""
     name = unquote(anchor)

@@ -45,9 +45,7 @@ def typesetter_digest() -> str:
 
 
 def package_versions(
-    names: frozenset[str],
-    modules: frozenset[str] = frozenset(),
-    path: Sequence[str] = sys.path,
+    names: frozenset[str], modules: frozenset[str] = frozenset(), path: Sequence[str] = sys.path
 ) -> tuple[str, ...]:
     """The names and versions of packages and of all that they need, from their `.dist-info`.
 

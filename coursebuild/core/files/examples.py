@@ -105,10 +105,7 @@ class _Update:
     """One run: record what is planned, do it, record what was done."""
 
     def __init__(
-        self,
-        root: Path,
-        known_hashes: Mapping[str, tuple[str, ...]],
-        scripts: Mapping[str, bytes],
+        self, root: Path, known_hashes: Mapping[str, tuple[str, ...]], scripts: Mapping[str, bytes]
     ) -> None:
         self.root = root
         self.known_hashes = known_hashes

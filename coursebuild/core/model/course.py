@@ -268,8 +268,7 @@ class Limits(Struct, frozen=True, forbid_unknown_fields=True):
         ),
     ] = 8.0
     lab: Annotated[
-        float,
-        Meta(gt=0, le=100_000, description="seconds of processor time for trying one lab"),
+        float, Meta(gt=0, le=100_000, description="seconds of processor time for trying one lab")
     ] = 8.0
 
 

@@ -117,9 +117,7 @@ def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
             yield from walk_blocks(child_blocks(block))
 
 
-def main_and_further(
-    blocks: tuple[Block, ...],
-) -> Iterator[tuple[bool, tuple[Block, ...]]]:
+def main_and_further(blocks: tuple[Block, ...]) -> Iterator[tuple[bool, tuple[Block, ...]]]:
     """Cut a text into parts, each with whether it is a section that goes further.
 
     Such a section ends before the next heading that is not below its own.

@@ -75,20 +75,15 @@ class InstalledPackages:
         if distribution is not None:
             return distribution
         spec = _spec(module, self._folders) or _spec(module, [str(_LIBRARY)])
-        return ABSENT if spec is None else f"files {_content(spec)}"
-
-
-def _content(spec: ModuleSpec) -> str:
-    """A hash of a module's files."""
-    if not spec.submodule_search_locations:
-        return file_state(spec.origin or "")[:16]
-    digest = hashlib.sha256()
-    for top in sorted(spec.submodule_search_locations):
-        for file in sorted(Path(top).rglob("*")):
-            if "__pycache__" not in file.parts and file.is_file():
-                state = file_state(str(file))
-                digest.update(f"{file.relative_to(top).as_posix()}\0{state}\0".encode())
-    return digest.hexdigest()[:16]
+        if spec is None or not spec.submodule_search_locations:
+            return ABSENT if spec is None else f"files {file_state(spec.origin or '')[:16]}"
+        digest = hashlib.sha256()
+        for top in sorted(spec.submodule_search_locations):
+            for file in sorted(Path(top).rglob("*")):
+                if "__pycache__" not in file.parts and file.is_file():
+                    state = file_state(str(file))
+                    digest.update(f"{file.relative_to(top).as_posix()}\0{state}\0".encode())
+        return f"files {digest.hexdigest()[:16]}"
 
 
 def distributions(
@@ -148,7 +143,15 @@ def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str
             if name in seen_names or name == _TOOL_PACKAGE:  # the first on the path counts
                 continue
             seen_names.add(name)
-            for module in _modules(distribution):
+            top_level = distribution.read_text("top_level.txt") or ""
+            modules = {module.rpartition("/")[2] for module in top_level.split()}
+            for file in () if top_level else distribution.files or ():
+                first = file.parts[0] if file.parts else ""
+                if len(file.parts) > 1 and first.isidentifier():
+                    modules.add(first)
+                elif len(file.parts) == 1 and file.suffix in (".py", ".so", ".pyd"):
+                    modules.add(first.split(".")[0])
+            for module in modules:
                 names_by_module.setdefault(module, set()).add(f"{name} {distribution.version}")
         names = {module: ", ".join(sorted(names)) for module, names in names_by_module.items()}
         store.put_value("installed", key, names)
@@ -161,21 +164,6 @@ def _names(folder: str) -> list[str]:
         return sorted(os.listdir(folder))  # noqa: PTH208
     except OSError:
         return []
-
-
-def _modules(distribution: importlib.metadata.Distribution) -> set[str]:
-    """The top-level modules of a distribution."""
-    top_level = distribution.read_text("top_level.txt")
-    if top_level:
-        return {module.rpartition("/")[2] for module in top_level.split()}
-    modules = set()
-    for file in distribution.files or ():
-        first = file.parts[0] if file.parts else ""
-        if len(file.parts) > 1 and first.isidentifier():
-            modules.add(first)
-        elif len(file.parts) == 1 and file.suffix in (".py", ".so", ".pyd"):
-            modules.add(first.split(".")[0])
-    return modules
 
 
 # --- environments with other versions

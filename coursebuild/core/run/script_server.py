@@ -292,8 +292,16 @@ class _Work:
                 is_ended = worker.excess is not None  # by us, whatever the sandbox makes of it
                 if self.interpreter is not None and not is_ended and worker.status() > 0:
                     raise EffectError(f"{self.interpreter.python} cannot run scripts")
+                path = self.jobs[index].path
                 status = worker.status() if self.sandbox is None else -signal.SIGKILL
-                self._finish(index, _lost_run(self.jobs[index].path, status, worker.excess))
+                if status >= 0:
+                    raise RuntimeError(f"the supervisor of {path} failed with status {status}")
+                outcome, killer = Outcome.KILLED, signal.Signals(-status).name
+                text = f"the process that supervises this script was killed by {killer}\n"
+                if worker.excess is not None:
+                    outcome, excess = worker.excess
+                    text = f"its sandbox was stopped, because what ran in it {excess}\n"
+                self._finish(index, ScriptRun(path, outcome, -status, "", text, 0.0))
             return False
         if worker.job is not None and worker.excess is None:
             try:
@@ -372,16 +380,3 @@ def _package_states(interpreter: Interpreter | None) -> tuple[object, ...]:
         with contextlib.suppress(OSError):
             states.append((folder, Path(folder).stat().st_mtime_ns))
     return tuple(states)
-
-
-def _lost_run(path: str, status: int, excess: tuple[Outcome, str] | None) -> ScriptRun:
-    """The result of a script whose supervisor died."""
-    if status >= 0:
-        raise RuntimeError(f"the supervisor of {path} failed with status {status}")
-    if excess is not None:
-        outcome, text = excess
-        text = f"its sandbox was stopped, because what ran in it {text}\n"
-        return ScriptRun(path, outcome, -status, "", text, 0.0)
-    name = signal.Signals(-status).name
-    text = f"the process that supervises this script was killed by {name}\n"
-    return ScriptRun(path, Outcome.KILLED, -status, "", text, 0.0)

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import errno
 import struct
-from collections.abc import Iterator
 
 from msgspec import Struct
 
@@ -181,22 +180,20 @@ def compile_filter(machine: str) -> bytes | None:
                 program.append(_instruction(_EQUAL, number, 0, 1))
                 program.append(_instruction(_RETURN, _FAIL | error))
     for condition in _CONDITIONS:
-        body = list(_test(condition))
+        # Refuse the call if the condition holds; else load its number again.
+        body = [
+            _instruction(_LOAD, _ARGUMENTS + 8 * condition.argument),
+            _instruction(_MASK, condition.mask),
+        ]
+        for left, value in reversed(list(enumerate(reversed(condition.values)))):
+            if_equal, if_not = (left, int(left == 0)) if condition.is_refused else (left + 1, 0)
+            body.append(_instruction(_EQUAL, value, if_equal, if_not))
+        body.append(_instruction(_RETURN, _FAIL | condition.error))
+        body.append(_instruction(_LOAD, _NUMBER))
         program.append(_instruction(_EQUAL, condition.numbers[column], 0, len(body)))
         program += body
     program.append(_instruction(_RETURN, _ALLOW))
     return b"".join(program)
-
-
-def _test(condition: _Condition) -> Iterator[bytes]:
-    """Refuse the call if the condition holds; else load its number again."""
-    yield _instruction(_LOAD, _ARGUMENTS + 8 * condition.argument)
-    yield _instruction(_MASK, condition.mask)
-    for left, value in reversed(list(enumerate(reversed(condition.values)))):
-        if_equal, if_not = (left, int(left == 0)) if condition.is_refused else (left + 1, 0)
-        yield _instruction(_EQUAL, value, if_equal, if_not)
-    yield _instruction(_RETURN, _FAIL | condition.error)
-    yield _instruction(_LOAD, _NUMBER)
 
 
 def _instruction(code: int, value: int, if_true: int = 0, if_false: int = 0) -> bytes:

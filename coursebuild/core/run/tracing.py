@@ -36,6 +36,7 @@ import mmap
 import posix
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from importlib.machinery import PathFinder
 from posixpath import normpath
 from types import FrameType
@@ -146,7 +147,7 @@ class Tracer:
         for name in ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "pty.spawn"):
             handlers[name] = self._on_program
         for name, paths in _CHANGES.items():
-            handlers[f"os.{name}"] = self._make_change_handler(paths)
+            handlers[f"os.{name}"] = partial(self._on_change, paths)
         find = handlers.get
 
         def hook(event: str, args: tuple[object, ...]) -> None:
@@ -298,14 +299,9 @@ class Tracer:
         elif not self.is_by_import():
             self.note_opaque(LISTS_OUTSIDE)
 
-    def _make_change_handler(
-        self, paths: tuple[tuple[int, int], ...]
-    ) -> Callable[[tuple[object, ...]], None]:
-        def change(args: tuple[object, ...]) -> None:
-            for path, folder in paths:
-                self.note_write(_join_descriptor(args[folder] if folder else -1, args[path]))
-
-        return change
+    def _on_change(self, paths: Iterable[tuple[int, int]], args: tuple[object, ...]) -> None:
+        for path, folder in paths:
+            self.note_write(_join_descriptor(args[folder] if folder else -1, args[path]))
 
     def _on_program(self, args: tuple[object, ...]) -> None:
         if not self.is_by_import():

@@ -120,7 +120,12 @@ class Isolate:
         self._running: Future[Any] | None = None
         self._is_stopped = False
         self._resources = contextlib.ExitStack()
-        self._loop = self._resources.enter_context(_event_loop())
+        self._loop = asyncio.new_event_loop()
+        thread = threading.Thread(target=self._loop.run_forever, name="v8", daemon=True)
+        thread.start()
+        self._resources.callback(self._loop.close)  # the last one is called first
+        self._resources.callback(thread.join)
+        self._resources.callback(self._loop.call_soon_threadsafe, self._loop.stop)
         self._racer = self._resources.enter_context(mini_racer(self._loop))
         self._racer.set_hard_memory_limit(memory)
         self._resources.callback(lambda: self._submit(_end_tasks()).result())
@@ -218,20 +223,6 @@ class Isolate:
         await asyncio.gather(task, self._racer.eval_cancelable("0"), return_exceptions=True)
         shown_limit = seconds if progress is None else min(seconds, progress.patience)
         raise LimitError(f"ran for more than {shown_limit:g} s")
-
-
-@contextlib.contextmanager
-def _event_loop() -> Iterator[asyncio.AbstractEventLoop]:
-    """An event loop in a thread of its own."""
-    loop = asyncio.new_event_loop()
-    thread = threading.Thread(target=loop.run_forever, name="v8", daemon=True)
-    thread.start()
-    try:
-        yield loop
-    finally:
-        loop.call_soon_threadsafe(loop.stop)
-        thread.join()
-        loop.close()
 
 
 async def _end_tasks() -> None:

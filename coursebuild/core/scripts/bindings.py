@@ -95,10 +95,7 @@ class PrintedOutputs:
     """What bindings depend on: the recorded outputs of a course and the runs of its scripts."""
 
     def __init__(
-        self,
-        verdicts: Iterable[Verdict],
-        runs: Iterable[ScriptRun],
-        scripts: Iterable[str] = (),
+        self, verdicts: Iterable[Verdict], runs: Iterable[ScriptRun], scripts: Iterable[str] = ()
     ) -> None:
         """`scripts` are the paths of all scripts of the course, run or not."""
         self.runs = {run.path: run for run in runs}
@@ -225,12 +222,9 @@ def _check(
     if varying and (
         not steady or _holds(bound_text, [n for r in varying for n in printed_lines(r)])
     ):
-        return diagnose(
-            "binding-volatile",
-            binding.text_span,
-            f"`{binding.text}` is bound to an output that differs from run to run",
-            help="remove `{out}`, or narrow `volatile` so that this number is compared",
-        )
+        message = f"`{binding.text}` is bound to an output that differs from run to run"
+        help = "remove `{out}`, or narrow `volatile` so that this number is compared"
+        return diagnose("binding-volatile", binding.text_span, message, help=help)
     return _mismatch(binding, path, lines, before)
 
 
@@ -292,28 +286,18 @@ def _mismatch(
     `before` are the lines by which it held when it was last checked, if that is known.
     """
     bound_text = BoundText.of(binding.text)
+    stray, label = bound_text.stray, ""
     if not bound_text.numbers:
-        return diagnose(
-            "binding-mismatch",
-            binding.text_span,
-            f"`{binding.text}` is not in the output of `{path}`",
-            help="write it as it is printed, or remove `{out}`",
-        )
-    if (stray := bound_text.stray) and replace(bound_text, before="", after="").is_in(lines):
-        return diagnose(
-            "binding-mismatch",
-            binding.text_span,
-            f"`{path}` printed no `{stray}` beside the number in `{binding.text}`",
-            help=Fix(f"remove the `{stray}`", "", stray),
-        )
-    label, better = _propose(bound_text, lines, list(map(PrintedLine, before)))
-    return diagnose(
-        "binding-mismatch",
-        binding.text_span,
-        f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown",
-        label=label,
-        help=Fix(f"write `{better}`", better, safe=True) if better else "",
-    )
+        message = f"`{binding.text}` is not in the output of `{path}`"
+        help = "write it as it is printed, or remove `{out}`"
+    elif stray and replace(bound_text, before="", after="").is_in(lines):
+        message = f"`{path}` printed no `{stray}` beside the number in `{binding.text}`"
+        help = Fix(f"remove the `{stray}`", "", stray)
+    else:
+        label, better = _propose(bound_text, lines, list(map(PrintedLine, before)))
+        message = f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown"
+        help = Fix(f"write `{better}`", better, safe=True) if better else ""
+    return diagnose("binding-mismatch", binding.text_span, message, label=label, help=help)
 
 
 def _propose(

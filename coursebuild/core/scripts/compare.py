@@ -42,11 +42,16 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
-from coursebuild.core.scripts.diff import find_differences, number_change, quote, text_diff
+from coursebuild.core.scripts.diff import (
+    find_differences,
+    number_change,
+    quote,
+    text_diff,
+    varying_times,
+)
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.tables import compare_table
-from coursebuild.core.scripts.varying import varying_times
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -174,17 +179,12 @@ def repeat_findings(
             notes.append(Note(f"it ended otherwise: {ends}"))
         if diff := text_diff(before.stdout, now.stdout):
             notes.append(Note("its output:\n" + diff))
-        diagnostics.append(
-            diagnose(
-                "script-unrepeatable",
-                by_path[now.path].script.span.first_line(),
-                f"`{now.path}` behaves differently than before, though nothing that "
-                "it is known to depend on has changed",
-                help="make it do the same each time (a fixed seed, no clock, files that it opens "
-                "itself), or put `volatile` on its output",
-                notes=notes,
-            )
-        )
+        message = f"`{now.path}` behaves differently than before, though nothing that it is known "
+        message += "to depend on has changed"
+        help = "make it do the same each time (a fixed seed, no clock, files that it opens itself)"
+        help += ", or put `volatile` on its output"
+        place = by_path[now.path].script.span.first_line()
+        diagnostics.append(diagnose("script-unrepeatable", place, message, help=help, notes=notes))
     return tuple(diagnostics)
 
 

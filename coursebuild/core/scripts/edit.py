@@ -349,19 +349,12 @@ def check_source_parts(course: Course, read: ReadText) -> Iterator[Diagnostic]:
                 if first < len(code_lines)
                 else source.place
             )
-            yield diagnose(
-                "source-part",
-                span,
-                f"this differs from what `{source.path}` holds",
-                label=f"it has `{file_lines[first].strip()}` here"
-                if first < len(file_lines)
-                else "",
-                help=Fix(
-                    "run `coursebuild update`, which copies it here",
-                    edits=(whole_lines(source.body_span, source.prefix, file_lines),),
-                    safe=True,
-                ),
-            )
+            has_line = first < len(file_lines)
+            label = f"it has `{file_lines[first].strip()}` here" if has_line else ""
+            edits = (whole_lines(source.body_span, source.prefix, file_lines),)
+            help = Fix("run `coursebuild update`, which copies it here", edits=edits, safe=True)
+            message = f"this differs from what `{source.path}` holds"
+            yield diagnose("source-part", span, message, label=label, help=help)
 
 
 def _source_parts(course: Course) -> Iterator[tuple[PlainCode, SourcePart]]:

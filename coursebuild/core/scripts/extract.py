@@ -135,10 +135,5 @@ def _find_clash(
         message = f"`{new.path}` is a file here and a folder of `{first.path}`"
     else:
         message = f"`{first.path}` is a file and cannot be a folder of `{new.path}`"
-    return diagnose(
-        "script-repeated",
-        new.script.path_span,
-        message,
-        help="give one of them another path",
-        notes=[Note(note, first.script.path_span)],
-    )
+    help, notes = "give one of them another path", [Note(note, first.script.path_span)]
+    return diagnose("script-repeated", new.script.path_span, message, help=help, notes=notes)

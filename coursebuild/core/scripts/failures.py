@@ -89,14 +89,6 @@ def _find_line(match: re.Match[str], scripts: Scripts) -> tuple[Extraction, Span
     return (extraction, without_indentation(span)) if extraction and span else None
 
 
-def _find_innermost_line(stderr: str, scripts: Scripts) -> tuple[Extraction, Span] | None:
-    """The script and the lesson's line where a traceback or a crash dump ends."""
-    dump = stderr.rfind(_CRASH)
-    frames = list(_FRAME.finditer(stderr, max(0, dump)))
-    lines = (_find_line(match, scripts) for match in (frames if dump >= 0 else reversed(frames)))
-    return next(filter(None, lines), None)
-
-
 def without_indentation(span: Span) -> Span:
     """A line from its first letter on."""
     lead = len(span.text) - len(span.text.lstrip())
@@ -104,10 +96,7 @@ def without_indentation(span: Span) -> Span:
 
 
 def failure_diagnostic(
-    extraction: Extraction,
-    run: ScriptRun,
-    scripts: Scripts,
-    find_module: FindModule = lambda _: "",
+    extraction: Extraction, run: ScriptRun, scripts: Scripts, find_module: FindModule = lambda _: ""
 ) -> Diagnostic | None:
     """What is wrong with a run; `None` where it ended well or the script was not run.
 
@@ -121,7 +110,11 @@ def failure_diagnostic(
     fence = extraction.script.span.first_line()
     source, span, label = extraction, fence, ""
     if run.outcome in (Outcome.FAILED, Outcome.KILLED, Outcome.TIMEOUT):
-        source, span = _find_innermost_line(stderr, scripts) or (extraction, fence)
+        # The innermost line of a script, where a traceback or a crash dump ends
+        dump = stderr.rfind(_CRASH)
+        frames = list(_FRAME.finditer(stderr, max(0, dump)))
+        lines = (_find_line(m, scripts) for m in (frames if dump >= 0 else reversed(frames)))
+        source, span = next(filter(None, lines), (extraction, fence))
         label = "" if span is fence else "it was here"
     if run.outcome is Outcome.FAILED:
         if not (_parses(source) and _parses(extraction)):
@@ -176,12 +169,9 @@ def _failure_wording(extraction: Extraction, run: ScriptRun) -> tuple[str, str, 
 
 def silence_diagnostic(recording: Recording, path: str) -> Diagnostic:
     """An output is recorded, and the script printed no line."""
-    return diagnose(
-        "script-silent",
-        recording.caption_span,
-        f"an output is recorded here, but `{path}` printed nothing",
-        help="print what is recorded, or remove the recorded output",
-    )
+    message = f"an output is recorded here, but `{path}` printed nothing"
+    help = "print what is recorded, or remove the recorded output"
+    return diagnose("script-silent", recording.caption_span, message, help=help)
 
 
 def _parses(extraction: Extraction) -> bool:

@@ -233,12 +233,8 @@ def drift_diagnostic(
     """
     recording, update = verdict.recording, f"`coursebuild update {owner}`"
     if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
-        return diagnose(
-            "output-drift",
-            recording.caption_span,
-            f"no output of `{recording.script}` is recorded yet",
-            help=f"run {update}",
-        )
+        message = f"no output of `{recording.script}` is recorded yet"
+        return diagnose("output-drift", recording.caption_span, message, help=f"run {update}")
     changes = verdict.changes
     first, *rest = sorted(changes, key=lambda change: change.span.start)
     notes = [Note(_describe_difference(change), change.span) for change in rest[:_MAX_NOTES]]

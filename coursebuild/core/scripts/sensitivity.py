@@ -23,17 +23,18 @@ Entry points: `sensitivity` (a script), `noise_warnings`.
 
 from __future__ import annotations
 
+import enum
 import math
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 from itertools import pairwise
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Course, Mode, Recording
 from coursebuild.core.model.results import Change, Outcome, ScriptRun
-from coursebuild.core.model.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
 from coursebuild.core.scripts.bound_numbers import printed_lines
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import quote
@@ -41,6 +42,90 @@ from coursebuild.core.scripts.lines import same_number
 from coursebuild.core.scripts.numbers import Number, difference, round_like, scan, unit
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
+
+PERTURBATION = 1e-12
+"""How far initial states are moved, relative."""
+RUNS = 4
+"""Runs with moved states of each script: two pairs in opposite directions, the second pair half as
+far away."""
+FINER_RUNS = (-1, -2)
+"""The numbers of the runs in which each step is made as 2 and as 4: two raised to the number less
+its sign."""
+CHAOTIC = 1e8
+"""A simulation is chaotic if its states are more than this many times as far apart at the end as at
+the beginning: fewer than eight of a number's sixteen digits are left."""
+
+
+class Standing(enum.Enum):
+    """Whether the sensitivity of a script could be measured, and if not, why."""
+
+    MEASURED = "measured"
+    NO_MUJOCO = "without-mujoco"
+    """It does not import MuJoCo."""
+    NOT_MOVED = "not-moved"
+    """No initial state in it could be moved."""
+    UNRECORDED = "unrecorded"
+    """None of its output is recorded and compared."""
+    DRIFTED = "drifted"
+    """It prints something other than recorded, or does not run to its end."""
+    FAILED = "failed"
+    """It did not run to its end with moved states."""
+
+
+class Doubt(Struct, frozen=True):
+    """A recorded number with digits that do not repeat, or have not converged."""
+
+    span: Span
+    printed: str
+    digits: int
+    """Significant digits printed."""
+    repeat: int
+    """How many of them stay the same when initial states are moved."""
+    converged: int | None
+    """How many of them are those of ever smaller timesteps; `None` where not known."""
+    least: str
+    most: str
+    """The smallest and the largest value printed in its place with moved initial states."""
+    halved: str
+    """The text printed in its place with half the timestep; empty where not known."""
+    quartered: str
+    """The same with a quarter of the timestep."""
+    instead: str
+    """The number with only the digits that repeat and converge; empty if none does, or a count."""
+    compared: bool
+    """Whether verification would report the difference as drift."""
+
+
+class Flip(Struct, frozen=True):
+    """Text between numbers that changed, disappeared or was added when states were moved."""
+
+    span: Span
+    printed: str
+    other: str
+    compared: bool
+
+
+class Sensitivity(Struct, frozen=True):
+    """The sensitivity of a script."""
+
+    path: str
+    lesson: str
+    """Id of the lesson or page that it is extracted from."""
+    standing: Standing
+    numbers: int = 0
+    """How many recorded numbers were examined."""
+    amplification: float | None = None
+    """The largest growth of the distance between states from beginning to end; `None` where no
+    final state is known."""
+    unhalved: str = ""
+    """Why nothing is known about shorter timesteps; empty where something is."""
+    doubts: tuple[Doubt, ...] = ()
+    flips: tuple[Flip, ...] = ()
+
+    @property
+    def chaotic(self) -> bool:
+        return self.amplification is not None and self.amplification > CHAOTIC
+
 
 _MAX_NOTES = 20
 _AS_MOVED = 11
@@ -307,11 +392,17 @@ def _end_states(run: ScriptRun) -> dict[int, list[tuple[float, list[float]]]]:
 
 def noise_warnings(sensitivity: Sensitivity) -> Iterator[Diagnostic]:
     """A warning where the verification compares what moved states change."""
-    warnings = [
-        (doubt.span, _describe_doubt(doubt))
-        for doubt in sensitivity.doubts
-        if doubt.compared and (doubt.repeat < _AS_MOVED or doubt.digits > _EXACT_DIGITS)
-    ]
+    warnings: list[tuple[Span, str]] = []
+    for doubt in sensitivity.doubts:
+        if not doubt.compared or (doubt.repeat >= _AS_MOVED and doubt.digits <= _EXACT_DIGITS):
+            continue
+        text = "no digit repeats"
+        if doubt.repeat:
+            text = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
+            number = _only_number(doubt.printed)
+            instead = "" if number is None else _round_to(number, doubt.repeat)
+            text += f", print {instead}" if instead else ""
+        warnings.append((doubt.span, f"{text}: printed from {doubt.least} to {doubt.most}"))
     for flip in (flip for flip in sensitivity.flips if flip.compared):
         text = f"printed as {quote(flip.other, _WIDTH)} too"
         if not flip.other.strip():
@@ -349,13 +440,3 @@ def describe_growth(sensitivity: Sensitivity) -> str:
     if size is None or not math.isfinite(size):
         return "its states part without bounds"
     return f"states end {size:.0e} times as far apart as they began"
-
-
-def _describe_doubt(doubt: Doubt) -> str:
-    values = f"printed from {doubt.least} to {doubt.most}"
-    if not doubt.repeat:
-        return f"no digit repeats: {values}"
-    repeat = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
-    number = _only_number(doubt.printed)
-    instead = "" if number is None else _round_to(number, doubt.repeat)
-    return f"{repeat}{f', print {instead}' if instead else ''}: {values}"

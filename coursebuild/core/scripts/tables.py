@@ -82,10 +82,7 @@ def table_rows(
 
 
 def compare_table(
-    recording: model.Recording,
-    table: model.Table,
-    comparison: model.Comparison,
-    stdout: str,
+    recording: model.Recording, table: model.Table, comparison: model.Comparison, stdout: str
 ) -> Verdict:
     """The verdict on a recorded table."""
     rows, printed = table_rows(table, comparison.filters), Side.of(stdout, comparison.filters)
@@ -123,7 +120,23 @@ class TableMatcher:
             lines = [-1] * len(self.rows)
             for number, line in pair([_row_text(r) for r in self.rows], self.lines, self._weight):
                 lines[number] = line
-        return tuple(self._match_row(row, line) for row, line in zip(self.rows, lines, strict=True))
+        matches: list[RowMatch] = []
+        for row, line in zip(self.rows, lines, strict=True):
+            if line < 0 or self._matches(row, line):
+                matches.append(RowMatch(row, line, ()))
+                continue
+            canonical = self._canonical_line(line)
+            pairs = tuple(
+                (cell, recorded, printed)
+                for cell, place in zip(
+                    row, _nearest_places(row, canonical, self._numbers_match), strict=True
+                )
+                for recorded, printed in zip(
+                    cell.canonical.numbers, canonical.numbers_at(cell.canonical, place), strict=True
+                )
+            )
+            matches.append(RowMatch(row, line, pairs))
+        return tuple(matches)
 
     def find_matching_lines(self) -> list[int] | None:
         """A line for each row, in order, if all of them match."""
@@ -146,20 +159,6 @@ class TableMatcher:
             return MATCH
         is_alike = _stands_in(self.rows[row], self._canonical_line(line), always_match)
         return _ALIKE_WEIGHT if is_alike else 0
-
-    def _match_row(self, row: tuple[RowCell, ...], line: int) -> RowMatch:
-        if line < 0 or self._matches(row, line):
-            return RowMatch(row, line, ())
-        canonical = self._canonical_line(line)
-        places = _nearest_places(row, canonical, self._numbers_match)
-        pairs = tuple(
-            (cell, recorded, printed)
-            for cell, place in zip(row, places, strict=True)
-            for recorded, printed in zip(
-                cell.canonical.numbers, canonical.numbers_at(cell.canonical, place), strict=True
-            )
-        )
-        return RowMatch(row, line, pairs)
 
 
 def _is_word(character: str) -> bool:

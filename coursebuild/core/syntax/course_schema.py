@@ -201,8 +201,7 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
 
     title: Annotated[Text, Meta(description="plain text")]
     id: Annotated[
-        Slug | None,
-        Meta(description="what readers' progress is kept under; without it, the title"),
+        Slug | None, Meta(description="what readers' progress is kept under; without it, the title")
     ] = None
     summary: Annotated[
         str, Meta(description="one or two sentences, for the home page and search engines")
@@ -212,8 +211,7 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
         Meta(description="the language of the lessons and the interface, as in `en` or `pt-BR`"),
     ] = "en"
     base_url: Annotated[
-        Url | None,
-        Meta(description="where the site will stand: for the sitemap and the 404 page"),
+        Url | None, Meta(description="where the site will stand: for the sitemap and the 404 page")
     ] = None
     repository: Annotated[
         Url | None, Meta(description="where its sources are: pages get a link to edit their file")

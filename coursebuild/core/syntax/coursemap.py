@@ -18,6 +18,7 @@ import graphlib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal
+from itertools import pairwise
 
 from msgspec.structs import asdict
 
@@ -107,10 +108,7 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
 
 
 def _build_course(
-    source: Source,
-    root: ObjectNode,
-    fields: CourseFile,
-    levels: tuple[Level, ...],
+    source: Source, root: ObjectNode, fields: CourseFile, levels: tuple[Level, ...]
 ) -> Course:
     settings, verify = fields.course, fields.verify or VerifyTable()
     table, gate = root.object("course"), root.object("verify")
@@ -228,28 +226,22 @@ def _check_files(decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
             message = f"a page cannot have the id `{fields.id}`"
             help = "the site has a file of this name already"
             yield diagnose("field-value", node.place("id"), message, help=help)
-        problem = _path_problem(fields.file)
+        path, parts, problem = fields.file, fields.file.split("/"), ""
+        if "\\" in path:
+            problem = "has a backslash: folders are separated by `/`"
+        elif path.startswith(("/", "~")) or re.match(r"[A-Za-z]:", path):
+            problem = "is not relative to the project"
+        elif ".." in parts:
+            problem = "leads out of its folder by `..`"
+        elif "" in parts or "." in parts or any(ord(char) < 32 for char in path):
+            problem = "is not a plain path"
+        elif not path.endswith(".md"):
+            problem = "is no Markdown file: its name ends in `.md`"
         if problem:
-            message = f"`{shorten(fields.file)}` {problem}"
+            message = f"`{shorten(path)}` {problem}"
             help = "a path relative to the project, as in `content/pages/about.md`"
             yield diagnose("field-value", place, message, help=help)
     yield from check_unique(files, "field-value", "two pages have the file `{}`")
-
-
-def _path_problem(path: str) -> str:
-    """What is wrong with the path of a page; empty if nothing is."""
-    if "\\" in path:
-        return "has a backslash: folders are separated by `/`"
-    if path.startswith(("/", "~")) or re.match(r"[A-Za-z]:", path):
-        return "is not relative to the project"
-    parts = path.split("/")
-    if ".." in parts:
-        return "leads out of its folder by `..`"
-    if "" in parts or "." in parts or any(ord(char) < 32 for char in path):
-        return "is not a plain path"
-    if not path.endswith(".md"):
-        return "is no Markdown file: its name ends in `.md`"
-    return ""
 
 
 # ---------------------------------------------------------------------------------- prerequisites
@@ -277,24 +269,20 @@ def _check_prerequisites(lessons: list[Lesson], ids: Iterable[str]) -> Iterator[
             return
         except graphlib.CycleError as error:
             circle: list[str] = error.args[1][:0:-1]
-        first = circle.index(next(name for name in graph if name in circle))  # as in the map
-        yield _diagnose_cycle([lesson_by_id[name] for name in circle[first:] + circle[:first]])
+        at = circle.index(next(name for name in graph if name in circle))  # the first in the map
+        circle = [*circle[at:], *circle[: at + 1]]
         graph = {name: graph[name] for name in graph if name not in circle}
-
-
-def _diagnose_cycle(circle: list[Lesson]) -> Diagnostic:
-    places = []
-    for lesson, required in zip(circle, [*circle[1:], circle[0]], strict=True):
-        span = lesson.prerequisite_spans[lesson.prerequisites.index(required.id)]
-        places.append(Note(f"{lesson.id} requires {required.id} here", span))
-    span = places[0].span or circle[0].span
-    if len(circle) == 1:
-        message = f"lesson {circle[0].id} requires itself"
-        return diagnose("prerequisite-cycle", span, message, help="remove it")
-    names = " → ".join([*(lesson.id for lesson in circle), circle[0].id])
-    message = f"lessons require each other in a circle: {names}"
-    help = "remove one of these prerequisites"
-    return diagnose("prerequisite-cycle", span, message, help=help, notes=places[1:])
+        notes = []
+        for name, required in pairwise(circle):
+            lesson = lesson_by_id[name]
+            span = lesson.prerequisite_spans[lesson.prerequisites.index(required)]
+            notes.append(Note(f"{name} requires {required} here", span))
+        message, help = f"lesson {circle[0]} requires itself", "remove it"
+        if len(notes) > 1:
+            message = f"lessons require each other in a circle: {' → '.join(circle)}"
+            help = "remove one of these prerequisites"
+        place = notes[0].span or lesson_by_id[circle[0]].span
+        yield diagnose("prerequisite-cycle", place, message, help=help, notes=notes[1:])
 
 
 _VARIABLE = re.compile(r"(?!PYTHON|PATH$|TMPDIR$)[A-Za-z_][A-Za-z0-9_]*")

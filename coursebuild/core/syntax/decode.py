@@ -84,14 +84,12 @@ class Decoding(Struct, Generic[S], frozen=True):
 def decode(node: Node, type: type[S], name: str, format: Format) -> Decoding[S]:
     """Read a node as a struct; messages call the whole `name`, as in `the quiz`."""
     decoder = _Decoder(format)
-    value = decoder.decode_value(node, _inspect_type(type), name)
+    value = decoder.decode_value(node, _type_info(type), name)
     whole = value if isinstance(value, type) else None
     return Decoding(whole, tuple(decoder.diagnostics), decoder.structs, tuple(decoder.texts))
 
 
-@functools.cache
-def _inspect_type(type: type[Struct]) -> inspect.Type:
-    return inspect.type_info(type)
+_type_info = functools.cache(inspect.type_info)
 
 
 class _Decoder:

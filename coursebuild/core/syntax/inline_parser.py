@@ -41,8 +41,6 @@ MAX_NESTING = 20
 MAX_RUN = 200
 """Emphasis marks in a row; a longer run is text."""
 
-InlineRule = Callable[[StateInline, bool], bool]
-
 
 def inline_tokens(src: str, env: EnvType, *, html: bool = False) -> list[PositionedToken]:
     """The inline tokens of a block's content; `env` has its `references`.
@@ -196,7 +194,7 @@ def _line_end(state: StateInline, silent: bool) -> bool:
     return True
 
 
-InlineRules = dict[str, tuple[InlineRule, ...]]
+InlineRules = dict[str, tuple[Callable[[StateInline, bool], bool], ...]]
 """Rules by the first character of what they read."""
 
 _RULES: InlineRules = {

@@ -223,7 +223,15 @@ def _read_comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparis
     """The comparison that the keys of a `text` fence ask for; `None` without keys."""
     rtol = _read_tolerance(keys.get("rtol"), diagnostics)
     atol = _read_tolerance(keys.get("atol"), diagnostics)
-    _check_contradictions(keys, diagnostics)
+    words = [w for w in keys.words if w.key != "volatile" or w.value is None]
+    for first, second in ((a, b) for i, b in enumerate(words) for a in words[:i]):
+        modes = {_MODES[first.key], _MODES[second.key]}
+        if len(modes) == 2 and ("ellipsis" not in modes or "volatile" in modes):
+            message = f"`{second.key}` contradicts `{first.key}`"
+            notes = [Note(f"`{first.key}` is given here", first.key_span)]
+            diagnostic = diagnose("recording-keys", second.key_span, message, notes=notes)
+            diagnostics.append(diagnostic)
+            break
     ellipsis = keys.get("ellipsis") is not None
     volatile, word = "", keys.get("volatile")
     if word is not None and word.value_text is not None:
@@ -269,20 +277,6 @@ def _read_tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal
     )
     diagnostics.append(diagnose("fence-key-value", word.value_span, message))
     return None
-
-
-def _check_contradictions(keys: FenceKeys, diagnostics: list[Diagnostic]) -> None:
-    """Report the first key that contradicts one before it."""
-    words = [w for w in keys.words if w.key != "volatile" or w.value is None]
-    for i, second in enumerate(words):
-        for first in words[:i]:
-            modes = {_MODES[first.key], _MODES[second.key]}
-            if len(modes) == 2 and ("ellipsis" not in modes or "volatile" in modes):
-                message = f"`{second.key}` contradicts `{first.key}`"
-                notes = [Note(f"`{first.key}` is given here", first.key_span)]
-                diagnostic = diagnose("recording-keys", second.key_span, message, notes=notes)
-                diagnostics.append(diagnostic)
-                return
 
 
 def read_figure(

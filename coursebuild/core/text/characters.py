@@ -43,12 +43,10 @@ TAB = 4
 
 def cells(text: str) -> int:
     """The number of columns that a text takes."""
-    return sum(map(_cells, text))
-
-
-def _cells(char: str) -> int:
-    if char == "\t":
-        return TAB
-    if unicodedata.combining(char) or char == "\u200d":
-        return 0
-    return 2 if unicodedata.east_asian_width(char) in ("W", "F") else 1
+    width = 0
+    for char in text:
+        if char == "\t":
+            width += TAB
+        elif not unicodedata.combining(char) and char != "\u200d":
+            width += 2 if unicodedata.east_asian_width(char) in ("W", "F") else 1
+    return width

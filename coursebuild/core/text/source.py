@@ -21,6 +21,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Container, Sequence
 from functools import cached_property
 from itertools import accumulate, chain, count
+from operator import itemgetter
 
 from msgspec import Struct
 
@@ -140,10 +141,6 @@ class Span(Struct, frozen=True):
         return self.source is inner.source and self.start <= inner.start and inner.end <= self.end
 
 
-def _text_offset(piece: tuple[int, int]) -> int:
-    return piece[0]
-
-
 class Excerpt(Struct, frozen=True):
     """Text out of a source; its pieces say where each part of the text stands."""
 
@@ -178,7 +175,7 @@ class Excerpt(Struct, frozen=True):
         """Source offset of the character at text offset `at`."""
         text_at, source_at = self.pieces[-1]
         if at < text_at:
-            i = bisect_right(self.pieces, at, key=_text_offset) - 1
+            i = bisect_right(self.pieces, at, key=itemgetter(0)) - 1
             text_at, source_at = self.pieces[max(i, 0)]
         return min(source_at + (at - text_at), len(self.source.text))
 
@@ -194,8 +191,8 @@ class Excerpt(Struct, frozen=True):
         end = len(self.text) if end is None else end
         pieces: tuple[tuple[int, int], ...] = ((0, self.offset(start)),)
         if len(self.pieces) > 1:
-            first = bisect_right(self.pieces, start, key=_text_offset)
-            last = bisect_left(self.pieces, end, lo=first, key=_text_offset)
+            first = bisect_right(self.pieces, start, key=itemgetter(0))
+            last = bisect_left(self.pieces, end, lo=first, key=itemgetter(0))
             pieces += tuple((t - start, s) for t, s in self.pieces[first:last])
         return Excerpt(self.source, self.text[start:end], pieces)
 

@@ -35,19 +35,13 @@ COMMON = tuple(
     """.split()
 )
 """Units that are valid without asking Pint; others are proposed from among these."""
-_NAMES = {
-    **{"meter": "m", "metre": "m", "second": "s", "sec": "s", "gram": "g", "kilogram": "kg"},
-    **{"joule": "J", "watt": "W", "pascal": "Pa", "radian": "rad", "degree": "°", "hertz": "Hz"},
-    **{
-        "newton": "N",
-        "minute": "min",
-        "hour": "h",
-        "kelvin": "K",
-        "volt": "V",
-        "ampere": "A",
-        "percent": "%",
-    },
-}
+_NAMES = dict(
+    name.split("=")
+    for name in """
+    meter=m metre=m second=s sec=s gram=g kilogram=kg joule=J watt=W pascal=Pa radian=rad degree=°
+    hertz=Hz newton=N minute=min hour=h kelvin=K volt=V ampere=A percent=%
+    """.split()
+)
 _PRODUCT_UNITS = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
 """Units that are often written without the space between them."""
 
@@ -144,22 +138,14 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
         word = match[0].replace("\u2126", "Ω")
         if word in COMMON or (word != "rads" and _registry().parse_unit_name(word)):
             continue  # Pint takes `rads` for a dose of radiation
-        likely = _suggest_unit(word)
+        units = (unit for unit in COMMON if unit.casefold() == word.casefold())
+        pairs = ((first, word.removeprefix(first)) for first in _PRODUCT_UNITS)
+        products = (f"{a} {b}" for a, b in pairs if b != word and b in _PRODUCT_UNITS)
+        likely = next(units, "") or next(products, "")
+        likely = likely or nearest(word, (*COMMON, *_NAMES), cutoff=0.6) or ""
+        likely = _NAMES.get(likely, likely)
         help = "leave it out, and name in words what is counted"
         if likely:
             help = Fix(f"did you mean `{likely}`?", likely, safe=_NAMES.get(word) == likely)
         message = f"there is no unit `{word}`"
         yield diagnose("unit-unknown", unit.span(*match.span()), message, help=help)
-
-
-def _suggest_unit(word: str) -> str:
-    """The unit that the author of a word likely meant; empty if none is like it."""
-    for unit in COMMON:
-        if unit.casefold() == word.casefold():
-            return unit
-    for first in _PRODUCT_UNITS:
-        second = word.removeprefix(first)
-        if second != word and second in _PRODUCT_UNITS:
-            return f"{first} {second}"
-    likely = nearest(word, (*COMMON, *_NAMES), cutoff=0.6) or ""
-    return _NAMES.get(likely, likely)

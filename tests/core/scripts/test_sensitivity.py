@@ -10,8 +10,13 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Filter, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
-from coursebuild.core.model.sensitivity import Sensitivity, Standing
-from coursebuild.core.scripts.sensitivity import is_worth_moving, noise_warnings, sensitivity
+from coursebuild.core.scripts.sensitivity import (
+    Sensitivity,
+    Standing,
+    is_worth_moving,
+    noise_warnings,
+    sensitivity,
+)
 from support.sample_lessons import DIGITS, EXACT, course, describe, document, recording, tolerance
 
 TRACE = Trace((), (), (), ("mujoco",), "")

@@ -48,11 +48,9 @@ def catalogue_page() -> str:
     head = f"""\
 # Rules
 
-There are {errors} errors, which keep the site from being published, and {len(RULES) - errors}
-warnings, which can be [silenced](course-map.md#silence). `coursebuild explain output-drift` prints
-an entry: an example of its message and help, and what the rule means if the message says less.
-[`--fix`](commands.md#fix) is named where `coursebuild check` can mend a mistake; of other rules,
-`coursebuild explain RULE --format json` says why it cannot.
+{errors} rules are errors, which keep the site from being published; {len(RULES) - errors} are
+warnings, which can be [silenced](course-map.md#silence). `coursebuild explain RULE` prints an
+entry; with `--format json`, it also says why [`--fix`](commands.md#fix) cannot mend a mistake.
 """
     return head + "".join(
         f"\n## {title}\n" + "".join(_entry(RULES[name]) for name in group)
