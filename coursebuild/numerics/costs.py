@@ -40,8 +40,9 @@ from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, RowVerdict, WorkPrecisionRow
 from coursebuild.numerics.reports.shown_errors import (
     ERROR_SLACK,
+    SEEN,
+    Quantity,
     Rows,
-    compared_error,
     front_point,
     seconds_text,
     setting_text,
@@ -194,6 +195,8 @@ def scenario_job(
 
     def job() -> None:
         for state, parts in runs:
+            if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
+                mujoco.mj_resetData(model, data)  # a state does not say who sleeps
             mujoco.mj_setState(model, data, state, STATE)
             for command, steps in parts:
                 if command is not None:
@@ -208,7 +211,7 @@ _WORTH_SAYING = 0.1
 
 
 def mark_luck(
-    rows: Rows, limits: Mapping[str, float], least: float
+    rows: Rows, limits: Mapping[str, float], quantity: Quantity = SEEN
 ) -> tuple[WorkPrecisionRow, ...]:
     """Rows that say where their errors are luck.
 
@@ -217,21 +220,21 @@ def mark_luck(
     Args:
         rows: of a scenario.
         limits: the largest stable timesteps (s) under the scene's own solver, by integrator.
-        least: errors that are no larger are not resolved.
+        quantity: the error by which they are compared.
     """
     own_setting = next(row.setting for row in rows if row.own)
     marked_rows = []
     for row in rows:
-        setting, place = row.setting, compared_error(row)
+        setting, place = row.setting, quantity.value_of(row)
         limit = limits.get(setting.integrator, math.inf)
         luck, is_usual = "", setting.solver_settings == own_setting.solver_settings
         if place is not None and is_usual and setting.timestep > limit * (1 + 1e-9):
             luck = f"it is beyond its largest stable timestep, {seconds_text(limit, 3)}"
         for rival in rows:
-            work, error = _more_work(rival.setting, setting), compared_error(rival)
+            work, error = _more_work(rival.setting, setting), quantity.value_of(rival)
             if luck or not work or place is None or error is None:
                 continue
-            if error > max(place * (1 + ERROR_SLACK), least):
+            if error > max(place * (1 + ERROR_SLACK), quantity.least):
                 luck = f"its error rises with {work}"
         marked_rows.append(replace(row, lucky=luck))
     return tuple(marked_rows)
@@ -249,7 +252,7 @@ def _more_work(dear: MeasuredSetting, cheap: MeasuredSetting) -> str:
 def verdict(
     rows: Rows,
     noticeable: Sequence[bool | None],
-    least: float = 0.0,
+    quantity: Quantity = SEEN,
     holds: Callable[[MeasuredSetting], bool] = lambda _: True,
     horizon_error: str = "0.1",
 ) -> RowVerdict:
@@ -258,16 +261,17 @@ def verdict(
     Args:
         rows: of a scenario; they know their place.
         noticeable: whether a learner sees the error of a row; `None` where that is not known.
-        least: errors that are no larger are not resolved.
+        quantity: the error by which settings are compared.
         holds: whether the advantage of another setting holds from starts nearby too.
         horizon_error: the error at which predictions of a chaotic scene end, in words.
     """
     own_index = next(number for number, row in enumerate(rows) if row.own)
     row, is_noticeable = rows[own_index], noticeable[own_index]
     if row.reasons:
-        return _verdict_of_lost(rows, row)
+        return _verdict_of_lost(rows, row, quantity)
     error = None if is_noticeable is None else row.seen
-    own_place, remark = front_point(row), _describe_error(error)
+    least_seen = quantity.least if quantity.name == SEEN.name else 0.0
+    own_place, remark = front_point(row, quantity), _describe_error(error, least_seen)
     if row.parted is not None:
         text = _verdict_of_chaos(rows, row, horizon_error)
         return RowVerdict(False, None, None, None, is_noticeable, text)
@@ -287,8 +291,13 @@ def verdict(
         text = "no other setting is cheaper without being less accurate"
         return RowVerdict(True, None, None, None, is_noticeable, text + remark)
     better = rows[row.dominated_by]
-    better_place = front_point(better)
+    better_place = front_point(better, quantity)
     assert better_place is not None
+    are_unresolved = max(own_place.error, better_place.error) <= quantity.least
+    if are_unresolved and {is_noticeable, noticeable[row.dominated_by]} != {False}:
+        text = "no setting can be called better: the reference resolves no error of "
+        text += f"{setting_text(better.setting)}, or of the scene's own setting"
+        return RowVerdict(False, None, None, None, is_noticeable, text + remark)
     ratios = (
         better_place.cost.value / own_place.cost.value,
         better_place.error / own_place.error if own_place.error else 1.0,
@@ -300,7 +309,9 @@ def verdict(
         text += " here, which is within what such runs differ by"
         return RowVerdict(True, None, None, None, is_noticeable, text + remark)
     text = f"{setting_text(better.setting)} is better: it {_describe_ratios(*ratios)}"
-    if better_place.error <= least < own_place.error:
+    if are_unresolved:
+        text += ", as far as the reference resolves"
+    elif better_place.error <= quantity.least:
         text += ", or more: the reference resolves no more"
     return RowVerdict(False, row.dominated_by, *ratios, is_noticeable, text + remark)
 
@@ -329,11 +340,11 @@ def _cheapest_unseen(rows: Rows, own_cost: float, *, hopeless: bool) -> str:
     return f"; the cheapest without one that is seen is {name}, at {times}"
 
 
-def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow) -> RowVerdict:
+def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> RowVerdict:
     """The verdict on a scene that does not run under its own setting: what does."""
     text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
     text += "; ".join(row.reasons)
-    candidates = [(p, n) for n, r in enumerate(rows) if r.front and (p := front_point(r))]
+    candidates = [(p, n) for n, r in enumerate(rows) if r.front and (p := front_point(r, quantity))]
     if not candidates:
         return RowVerdict(False, None, None, None, None, text)
     better = min(candidates, key=lambda c: (c[0].error, c[0].cost.value, c[1]))[1]
@@ -357,9 +368,10 @@ def _describe_ratios(cost: float, error: float) -> str:
     return f"{cheap} and {exact}"
 
 
-def _describe_error(error: float | None) -> str:
+def _describe_error(error: float | None, least: float) -> str:
     if error is None:
         return "; whether its error can be seen is not known"
     if error >= 1:
         return f"; its error can be seen: it is {error:.2g} times what an eye can tell"
-    return f"; its error cannot be seen: it is {error:.2g} of what an eye can tell"
+    size = f"{'less than ' if 0 < error <= least else ''}{error:.2g}"
+    return f"; its error cannot be seen: it is {size} of what an eye can tell"

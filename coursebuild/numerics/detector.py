@@ -192,13 +192,28 @@ def driving_force(model: Any, scenario: Scenario) -> str:
     has_actuators = model.nu and not model.opt.disableflags & int(
         mujoco.mjtDisableBit.mjDSBL_ACTUATION
     )
-    damping = model.dof_damping, model.tendon_damping
+    is_pushing = any(  # without a command too, as the range leaves 0 out
+        np.any((limited != 0) & ((ranges[:, 0] > 0) | (ranges[:, 1] < 0)))
+        for limited, ranges in (
+            (model.actuator_ctrllimited, model.actuator_ctrlrange),
+            (model.actuator_forcelimited, model.actuator_forcerange),
+        )
+    )
+    damping = [
+        getattr(model, f"{owner}_{name}")
+        for owner in ("dof", "tendon", "actuator")
+        for name in ("damping", "dampingpoly")
+    ]
     has_fluid = model.opt.density > 0 or model.opt.viscosity > 0
     causes = (
         (
-            has_actuators and (has_commands or model.na or np.any(model.actuator_biastype)),
+            has_actuators
+            and (has_commands or is_pushing or model.na or np.any(model.actuator_biastype)),
             "actuators act",
         ),
+        (np.any(model.geom_surfacevel), "a surface moves"),
+        (np.any(model.geom_adhesion) or np.any(model.pair_adhesion), "contacts adhere"),
+        (has_fluid and np.any(model.geom_fluid[:, 0]), "a fluid stores energy"),
         (has_fluid and np.any(model.opt.wind), "wind blows"),
         (np.any(model.body_gravcomp), "gravity is compensated"),
         (min(np.min(values, initial=0) for values in damping) < 0, "damping is negative"),

@@ -1,7 +1,7 @@
 """The references that a scene's motion is measured against, and how well they are known.
 
 Entry points: `find_reference(model, pilot)`, the reference of a scene; `find_references(model,
-pilot)`, by cone where something touches; `find_conserved(…)`, `mean_late_energy(…)`.
+pilot)`, by cone where something touches; `find_conserved(…)`.
 
 1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; DOP853 does it
    again. Their difference bounds the error of the reference. Both take the same accelerations, so
@@ -22,7 +22,6 @@ pilot)`, by cone where something touches; `find_conserved(…)`, `mean_late_ener
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import Any
 
@@ -64,6 +63,7 @@ from coursebuild.numerics.simulation import (
     simulate,
     states_of,
     with_integrator,
+    without_sleep,
 )
 
 EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
@@ -82,6 +82,8 @@ _STIFFER = (2.0, 4.0)
 """How many times shorter time constants of contacts are when an exact motion is checked."""
 _APPROACH = 0.8
 """The part of a difference that twice the stiffness may leave."""
+_NEARBY_GAP = 2.0
+"""How many times farther from the engine an exact motion may be from starts nearby."""
 CONSERVED = 1e-8
 """The relative change, over the reference, below which a quantity counts as conserved."""
 _STEP = 1e-6
@@ -145,18 +147,25 @@ def find_nearby(
 ) -> EngineStates | None:
     """The states of a scene's reference from another start; `None` where nobody knows them.
 
-    `declared_reference`: the reference from the start that is declared, which was checked.
+    `declared_reference`: the reference from the start that is declared, which was checked. A
+    course's own exact motion may hold from there only, so it counts where nothing is integrated,
+    and as long as it stays about as near to the engine as it does there.
     """
     if pilot.scene.declaration.closed_form:
         return None
+    model = without_sleep(model)
     try:
         reference = _find_computed(model, pilot, quick=quick)
     except SceneError:
         return None
     exact = pilot.scene.exact if declared_reference.kind == "closed" else None
-    if exact is None:
+    if exact is None or reference.kind == "ode":
         return reference.states
-    return next(iter(_exact_states(model, pilot, exact, reference).values()))
+    states = next(iter(_exact_states(model, pilot, exact, reference).values()))
+    gap = _gap(model, states, reference.states).place
+    usual_gap = _gap(model, declared_reference.states, declared_reference.second_states).place
+    is_usual = gap <= _NEARBY_GAP * max(usual_gap, reference.floor.place)
+    return states if is_usual else reference.states
 
 
 def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
@@ -382,7 +391,8 @@ class Cone(Struct, frozen=True):
 
 def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[str, Cone]:
     """The references of a scene by cone; under "" where nothing touches."""
-    reference, scene = find_reference(model, pilot, quick=quick), pilot.scene
+    model, scene = without_sleep(model), pilot.scene
+    reference = find_reference(model, pilot, quick=quick)
     if not pilot.contact:
         return {"": Cone(reference, None, 0.0)}
     limits = {}
@@ -434,15 +444,3 @@ def find_conserved(model: Any, pilot: Pilot, reference: KnownMotion) -> tuple[fl
     drifts = energy_drift(energies), momentum_drift(momenta)
     is_conserved = [drift is not None and abs(drift) < CONSERVED for drift in drifts]
     return scale if is_conserved[0] else None, is_conserved[1]
-
-
-def mean_late_energy(model: Any, pilot: Pilot, reference: KnownMotion) -> float | None:
-    """Mean kinetic energy after the horizon, J, in small steps; `None` where that is the end."""
-    scenario = pilot.scene.scenario
-    if reference.horizon > scenario.duration - scenario.sample * 1.5:
-        return None
-    integrator = Integrator.RK4 if pilot.smooth else Integrator.IMPLICITFAST
-    fine = with_integrator(model, integrator, min(pilot.scene.timesteps) / 2)
-    run = simulate(pilot.setup, fine)
-    mean = float(run.energy[1:][run.states.times > reference.horizon * (1 + 1e-9), 1].mean())
-    return mean if math.isfinite(mean) and mean > 0 else None

@@ -30,7 +30,12 @@ from msgspec import Struct
 
 from coursebuild.numerics.pilot import scales
 from coursebuild.numerics.problem import Array, Integrator, Limit, Scenario
-from coursebuild.numerics.simulation import advance, initial_data, with_integrator
+from coursebuild.numerics.simulation import (
+    advance,
+    initial_data,
+    with_integrator,
+    without_sleep,
+)
 
 _STEP, _NEAR_STEP = 1e-4, 1e-7
 """Steps of differences, relative to a model's extent or to 1 rad; where something touches, shorter
@@ -46,6 +51,8 @@ MOST_STATES, _MOST_ORBIT_STATES = 120, 24
 """Numbers in a state up to which there is theory."""
 _RELAXING, _POLISHING, _GRID = 20_000, 30, 24
 """Steps and iterations to look for a rest, and timesteps tried in a decade."""
+_END = 1e-30
+"""The solver's tolerance: with none at all `discrete` divides nothing by nothing at a rest."""
 _STILL = 1e-9
 """The part of the strongest acceleration below which Newton's method goes on."""
 _LONGEST_ORBIT, _ORBIT_GRID = 200, 16
@@ -68,10 +75,10 @@ class FixedState(Struct, frozen=True, eq=False):
 
 
 def _converged(model: Any, integrator: Integrator, timestep: float) -> Any:
-    """A copy of a model whose solver goes to its end, so that differences are smooth."""
-    variant = with_integrator(model, integrator, timestep)
+    """A copy of a model that is awake and whose solver goes to its end: differences are smooth."""
+    variant = without_sleep(with_integrator(model, integrator, timestep))
     variant.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    variant.opt.iterations, variant.opt.tolerance = max(100, int(variant.opt.iterations)), 0.0
+    variant.opt.iterations, variant.opt.tolerance = max(100, int(variant.opt.iterations)), _END
     return variant
 
 

@@ -10,7 +10,8 @@ be measured.
 2. No error is given below ten times the floor, by which the reference itself may be off.
 3. An order is the slope where the error is over a hundred floors and under 0.1: nearer to the floor
    rounding is measured, beyond 0.1 the asymptotic law does not hold yet. It is given only where
-   those errors lie on a line, in a logarithmic plot.
+   those errors lie on a line, in a logarithmic plot. Where slopes still tend somewhere, the
+   interval holds that limit too.
 4. In the reference, two geoms stick to each other between two samples where a point in which they
    touch hardly moves along the surface, at both of them. A body that rolls sticks too.
 5. In another run the speed of that point along the surface, added up over the same time, is creep:
@@ -20,23 +21,41 @@ be measured.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.problem import Array, Motion, Reference, Sizes
-from coursebuild.numerics.reports.scene_report import FLOORS, Errors, FittedOrder, OrderRow
+from coursebuild.numerics.pilot import Pilot
+from coursebuild.numerics.problem import STANDARD, Array, Integrator, Motion, Reference, Sizes
+from coursebuild.numerics.reports.scene_report import (
+    FLOORS,
+    Errors,
+    FittedOrder,
+    MeasuredSetting,
+    OrderRow,
+    WorkPrecisionRow,
+)
 from coursebuild.numerics.scene import Scene
-from coursebuild.numerics.simulation import EngineStates, Run, initial_data
+from coursebuild.numerics.simulation import (
+    EngineStates,
+    Run,
+    initial_data,
+    motion_of,
+    simulate,
+    with_integrator,
+    without_sleep,
+)
 from mjcourse.spatial import angular_distance
 
 _LOWEST, _HIGHEST = 100.0, 0.1
 """An order is fitted to errors over so many floors, and under so much."""
 _FEWEST = 4
 """Errors that an order needs."""
+_BEYOND = 2.0
+"""How many times the last change of slopes their limit may be beyond the last slope."""
 _UNCERTAIN, _BENT = 0.25, 0.25
 """The widest half interval of an order, and the largest bend, with which it is given."""
 
@@ -102,12 +121,15 @@ def fit_order(
         return None
     x, y = np.array(usable).T
     slopes = np.diff(y) / np.diff(x)
-    slope, shift = np.polyfit(x, y, 1)
+    slope, shift = np.polyfit(x, y, 1).tolist()
     freedom = len(x) - 2
     deviation = math.sqrt(float(np.sum((y - slope * x - shift) ** 2)) / freedom)
     error = deviation / math.sqrt(float(np.sum((x - x.mean()) ** 2)))
-    student = float(stdtrit(freedom, 0.975))  # an interval of 95 %
-    fit = FittedOrder(float(slope), student * error, float(np.ptp(slopes)))
+    uncertainty = float(stdtrit(freedom, 0.975)) * error  # an interval of 95 %
+    finest, finer, fine = slopes[:3].tolist()
+    if (finer - finest) * (fine - finer) > 0:  # not noise: they tend to a slope beyond the finest
+        uncertainty = max(uncertainty, abs(slope - finest) + _BEYOND * abs(finer - finest))
+    fit = FittedOrder(slope, uncertainty, float(np.ptp(slopes)))
     return fit if fit.uncertainty <= _UNCERTAIN and fit.bend <= _BENT else None
 
 
@@ -134,6 +156,31 @@ def fit_orders(
     return OrderRow(integrator, fit("position"), fit("attitude"), fit("velocity"))
 
 
+def fit_scene_orders(
+    model: Any,
+    rows: Iterable[WorkPrecisionRow],
+    baseline: MeasuredSetting,
+    states: EngineStates,
+    floor: Sizes,
+) -> tuple[OrderRow, ...]:
+    """The orders of all integrators in a scene, under the solver of its own setting.
+
+    `states` and `floor` are those of the reference.
+    """
+    motion = motion_of(model, states)
+    angles = angular_distance(motion.attitude[:1], motion.attitude)
+    extent = Sizes(
+        float(np.linalg.norm(np.ptp(motion.position, axis=0))),
+        float(angles.max(initial=0.0)),
+        float(np.linalg.norm(np.ptp(motion.velocity, axis=0))),
+    )
+    runs: dict[str, list[tuple[float, Errors]]] = {name.value: [] for name in STANDARD}
+    for row in rows:
+        if row.setting.solver_settings == baseline.solver_settings:
+            runs[row.setting.integrator].append((row.setting.timestep, row))
+    return tuple(fit_orders(name, errors, floor, extent) for name, errors in runs.items())
+
+
 def energy_drift(energy: Array, scale: float | None = None) -> float | None:
     """The largest change of potential and kinetic energy together, with its sign.
 
@@ -154,6 +201,19 @@ def mean_energy(run: Run, horizon: float, expected: float | None) -> float | Non
     if expected is None or len(energies) < 2 or not np.isfinite(energies).all():
         return None
     return float(energies.mean()) / expected - 1
+
+
+def mean_late_energy(model: Any, pilot: Pilot, horizon: float) -> float | None:
+    """Mean kinetic energy after a horizon (s), J, in small steps; `None` where that is the end."""
+    scenario = pilot.scene.scenario
+    if horizon > scenario.duration - scenario.sample * 1.5:
+        return None
+    integrator = Integrator.RK4 if pilot.smooth else Integrator.IMPLICITFAST
+    step = min(pilot.scene.timesteps) / 2
+    fine = without_sleep(with_integrator(model, integrator, step))
+    run = simulate(pilot.setup, fine)
+    mean = float(run.energy[1:][run.states.times > horizon * (1 + 1e-9), 1].mean())
+    return mean if math.isfinite(mean) and mean > 0 else None
 
 
 def energy_scale(energy: Array) -> float:
@@ -260,6 +320,16 @@ def quantity_errors(model: Any, scene: Scene, states: EngineStates, exact: Engin
     gaps = quantity_values(model, scene, states) - quantity_values(model, scene, exact)
     distances: Array = np.linalg.norm(gaps, axis=1)
     return distances
+
+
+def least_known(
+    model: Any, scene: Scene, states: EngineStates, second_states: EngineStates
+) -> tuple[float, float]:
+    """Below which two references know nothing of what is seen, and of the declared quantity."""
+    least_seen = FLOORS * visible_error(model, scene, states, second_states)
+    if not quantity_name(model, scene):
+        return least_seen, 0.0
+    return least_seen, FLOORS * float(quantity_errors(model, scene, states, second_states).max())
 
 
 Pair: TypeAlias = tuple[int, int]

@@ -36,6 +36,7 @@ from coursebuild.numerics.simulation import (
     integrator_of,
     set_integrator,
     with_integrator,
+    without_sleep,
 )
 
 NUDGE = 1e-10
@@ -91,7 +92,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
         SceneError: it diverges even there.
     """
     step, scenario = min(scene.timesteps), scene.scenario
-    variant = with_integrator(model, integrator_of(model), step)
+    variant = without_sleep(with_integrator(model, integrator_of(model), step))
     variant.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data, errors = initial_data(scenario, variant), horizon_errors(variant, scene)
     twins, sizes = _twins(variant, scenario, errors)

@@ -1,7 +1,7 @@
 """Run MuJoCo for measuring: one integrator, one timestep, states sampled on a fixed grid of times.
 
-Entry points: `compile_model`, `with_integrator`, `initial_data`, `simulate`, `advance`,
-`advance_watching`, `motion_of`, `refsafe_active`.
+Entry points: `compile_model`, `with_integrator`, `without_sleep`, `initial_data`, `simulate`,
+`advance`, `advance_watching`, `motion_of`, `refsafe_active`.
 
 1. MuJoCo's automatic reset is off, so that a state that blew up stays visible.
 2. Energy and momentum belong to the sampled state: `mjData.energy` after `mj_step` is that of the
@@ -59,6 +59,16 @@ def with_integrator(model: Any, integrator: Integrator, timestep: float) -> Any:
     model = copy.copy(model)
     set_integrator(model, integrator, timestep)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return model
+
+
+def without_sleep(model: Any) -> Any:
+    """A copy of a `mjModel` in which nothing falls asleep.
+
+    MuJoCo counts slow steps, not time: in small enough steps whatever begins from rest would sleep.
+    """
+    model = copy.copy(model)
+    model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     return model
 
 

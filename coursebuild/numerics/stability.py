@@ -61,9 +61,10 @@ from coursebuild.numerics.simulation import (
 _REACH, _NEAR = 10.0, 2.0
 """The grid is tried down to this part of the shortest timestep that is lost; from other starts so
 far below and beyond it."""
-_GRID, _FINE = 16, 1e-4
-_QUICK_GRID, _COARSE = 6, 1e-2
-"""The timesteps that are tried in a decade, and the relative width at which a bisection ends."""
+_GRID, _FINE, _CLOSER = 16, 1e-4, 32
+_QUICK_GRID, _COARSE, _QUICK_CLOSER = 6, 1e-2, 8
+"""The timesteps that are tried in a decade, the relative width at which a bisection ends, and the
+timesteps that are tried from half the limit up to it."""
 STARTS, QUICK_STARTS, NEARBY = 5, 3, 1e-4
 """The starts of runs, the own one among them, and how far the others are from it: rad, or relative
 to the model's extent."""
@@ -204,14 +205,14 @@ def search_row(
     """Search for the largest stable timestep between two (s), and for what speaks against it.
 
     1. From the own start over the span: a grid, falling, down to a tenth of the largest timestep
-       below which nothing was lost, and a bisection at its end.
+       below which nothing was lost, a bisection at its end, and a finer grid below that.
     2. About that all starts over both spans, which makes the map; then a bisection for the start
        that is lost first, and one for the own start over the doubled span.
     3. Where nothing drives the motion, the first timestep at which energy rises.
     """
     grid = _grid(search, quick)
     resolution = _COARSE if quick else _FINE
-    largest = _bisect(partial(laboratory.is_lost, 0), grid, resolution)
+    largest = _look_closer(partial(laboratory.is_lost, 0), grid, resolution, quick)
     near = [h for h in grid if h < _NEAR * min(largest, grid[-1])] or grid[:1]
     estimates = [_bisect(partial(laboratory.is_lost, 0, spans=2), near, resolution, _NEAR)]
     by_start = {
@@ -281,16 +282,34 @@ def _bisect(
     return stable
 
 
+def _look_closer(
+    is_lost: Callable[[float], bool], grid: list[float], resolution: float, quick: bool
+) -> float:
+    """`_bisect`, until none of many timesteps below is lost: with impacts islands are narrow."""
+    largest = _bisect(is_lost, grid, resolution)
+    while largest:
+        top = min(largest, grid[-1])
+        closer = np.geomspace(top / _NEAR, top, _QUICK_CLOSER if quick else _CLOSER).tolist()
+        lost = next((step for step in closer[1:-1] if is_lost(step)), None)
+        if lost is None:
+            break
+        grid = [*(step for step in grid if step < lost), lost]
+        largest = _bisect(is_lost, grid, resolution)
+    return largest
+
+
 def _first_gain(
     laboratory: Laboratory, grid: Sequence[float], setup: Setup
 ) -> tuple[float, float] | None:
     """The first timestep (s) at which energy rises in a scene that nothing drives, and by how much.
 
-    `None` where it does not, or something drives it.
+    `None` where it does not before the run is lost, or something drives it.
     """
     if not math.isfinite(setup.energy):
         return None
     least = _GAIN * setup.kinetic
+    lost = [h for h in laboratory.own_steps() if laboratory.is_lost(0, h)]
+    grid = [*(h for h in grid if not lost or h < lost[0]), *lost[:1]]
 
     def gain(step: float) -> float:
         trial = laboratory.trial(0, step)

@@ -33,13 +33,14 @@ from coursebuild.numerics.known_motion import (
     find_conserved,
     find_nearby,
     find_references,
-    mean_late_energy,
 )
 from coursebuild.numerics.measure import (
     energy_drift,
     errors,
-    fit_orders,
+    fit_scene_orders,
+    least_known,
     mean_energy,
+    mean_late_energy,
     measure_slip,
     momentum_drift,
     quantity_errors,
@@ -57,11 +58,8 @@ from coursebuild.numerics.pilot import (
     settings,
     with_setting,
 )
-from coursebuild.numerics.problem import STANDARD, Sizes
 from coursebuild.numerics.reports.scene_report import (
-    FLOORS,
     MeasuredSetting,
-    OrderRow,
     ScenarioReport,
     StableRow,
     WorkPrecisionRow,
@@ -69,6 +67,8 @@ from coursebuild.numerics.reports.scene_report import (
 )
 from coursebuild.numerics.reports.shown_errors import (
     FrontPoint,
+    Quantity,
+    compared_quantity,
     front,
     horizon_error_text,
     is_idle,
@@ -88,7 +88,6 @@ from coursebuild.numerics.simulation import (
 )
 from coursebuild.numerics.stability import run_trial, stable_rows
 from coursebuild.numerics.sweep import measure_expected
-from mjcourse.spatial import angular_distance
 
 
 class Basis(Struct, frozen=True, eq=False):
@@ -142,9 +141,13 @@ def measure_scenario(
     baseline = own_setting(model, pilot)
     reference = cones[baseline.cone].reference
     conserved = find_conserved(model, pilot, reference)
-    late_energy = mean_late_energy(model, pilot, reference)
+    late_energy = mean_late_energy(model, pilot, reference.horizon)
     leasts = zip(
-        *(_least_known(model, scene, cone.reference) for cone in cones.values()), strict=True
+        *(
+            least_known(model, scene, cone.reference.states, cone.reference.second_states)
+            for cone in cones.values()
+        ),
+        strict=True,
     )
     basis = Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
     measurements = _measure_settings(basis, settings(model, pilot, quick=quick), tell)
@@ -157,11 +160,12 @@ def measure_scenario(
     tell(f"{scene.name}: stable timesteps")
     largest = stable_rows(model, pilot, quick=quick)
     limits = {row.integrator: row.largest for row in largest if row.largest is not None}
-    least = basis.least_figure if quantity_name(model, scene) else basis.least_seen
-    rows = front(mark_luck(measured_rows, limits, least))
+    figure = Quantity("figure", quantity_name(model, scene), basis.least_figure)
+    quantity = compared_quantity(measured_rows, figure, basis.least_seen)
+    rows = front(mark_luck(measured_rows, limits, quantity), quantity)
+    holds = partial(_holds, basis, rows, quantity, quick)
     error = horizon_error(model, scene)
-    holds = partial(_holds, basis, rows, quick)
-    judgement = verdict(rows, noticeable, least, holds, horizon_error_text(error))
+    judgement = verdict(rows, noticeable, quantity, holds, horizon_error_text(error))
     return ScenarioReport(
         name=scene.name,
         title=scene.title,
@@ -177,10 +181,12 @@ def measure_scenario(
         lyapunov=pilot.lyapunov,
         horizons=None if pilot.lyapunov is None else pilot.horizons,
         smooth=pilot.smooth,
-        notes=_notes(basis, largest, rows, cost_of),
+        notes=_notes(basis, largest, rows, cost_of, quantity),
         figure=quantity_name(model, scene),
         rows=rows,
-        orders=_fit_orders(basis, rows) if pilot.smooth else (),
+        orders=fit_scene_orders(model, rows, baseline, reference.states, reference.floor)
+        if pilot.smooth
+        else (),
         figures=tuple(measure_expected(model, scene, baseline)),
         stable=largest,
         verdict=judgement,
@@ -224,17 +230,12 @@ def _measure_settings(
     return [rows_by_setting[setting] for setting in choices if setting in rows_by_setting]
 
 
-def _least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[float, float]:
-    """Below which nothing is known of what is seen, and of the declared quantity."""
-    states, second_states = reference.states, reference.second_states
-    least_seen = FLOORS * visible_error(model, scene, states, second_states)
-    if not quantity_name(model, scene):
-        return least_seen, 0.0
-    return least_seen, FLOORS * float(quantity_errors(model, scene, states, second_states).max())
-
-
 def _holds(
-    basis: Basis, rows: Sequence[WorkPrecisionRow], quick: bool, better: MeasuredSetting
+    basis: Basis,
+    rows: Sequence[WorkPrecisionRow],
+    quantity: Quantity,
+    quick: bool,
+    better: MeasuredSetting,
 ) -> bool:
     """Whether another setting is better than the scene's own from starts nearby too."""
     model, pilot = basis.model, basis.pilot
@@ -258,11 +259,13 @@ def _holds(
             if not run.judgement.ok or row.cost is None:
                 return False
             states = run.states.head(len(exact.times))
-            error = visible_error(model, scene, states, exact)
-            if quantity_name(model, scene):
+            if quantity.name == "figure":
                 error = float(quantity_errors(model, near.scene, states, exact).max())
-            least = basis.least_figure if quantity_name(model, scene) else basis.least_seen
-            points.append(FrontPoint(row.cost, max(error, least)))
+                error = max(error, quantity.least)
+            else:
+                error = max(visible_error(model, scene, states, exact), quantity.least)
+                error += basis.cones[row.setting.cone].visible_model_error
+            points.append(FrontPoint(row.cost, error))
         if not points[0].beats(points[1]):
             return False
     return True
@@ -279,6 +282,7 @@ def _notes(
     largest: Sequence[StableRow],
     rows: Sequence[WorkPrecisionRow],
     cost_of: MeasuredSetting | None,
+    compared_quantity: Quantity,
 ) -> tuple[str, ...]:
     """Remarks for reading the figures."""
     model, pilot, reference = basis.model, basis.pilot, basis.reference
@@ -286,6 +290,9 @@ def _notes(
     if cost_of is not None:
         text = setting_text(cost_of)
         notes.append(f"costs are relative to {text}, as the scene's own setting does not run")
+    figure = quantity_name(model, pilot.scene)
+    if figure and compared_quantity.name != "figure":
+        notes.append(f"no error of the {figure} is resolved: settings are compared by what is seen")
     idle = [", ".join(solving_parts(r.setting, basis.baseline)) for r in rows if is_idle(r)]
     if idle:
         notes.append(f"the same motion to the bit, and no time saved, with {'; '.join(idle)}")
@@ -299,6 +306,8 @@ def _notes(
     if pilot.scene.declaration.horizon_error and pilot.lyapunov is None:
         error = horizon_error_text(horizon_error(model, pilot.scene))
         notes.append(f"no run that begins 1e-10 away comes to be off by {error}: it is not chaotic")
+    if int(model.opt.enableflags) & mujoco.mjtEnableBit.mjENBL_SLEEP:
+        notes.append("nothing sleeps in the reference, so errors hold what sleep changes")
     if drivers := driving_force(model, pilot.scene.scenario):
         notes.append(f"energy is not judged: {drivers}")
     states = np.abs(np.hstack([reference.states.qpos, reference.states.qvel, reference.states.act]))
@@ -336,27 +345,6 @@ def _with_costs(
         seconds = timing.nanoseconds.scale(1e-9 / scene.scenario.duration)
         timed_rows[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
     return timed_rows, None if base == baseline else base
-
-
-def _fit_orders(basis: Basis, rows: Sequence[WorkPrecisionRow]) -> tuple[OrderRow, ...]:
-    baseline, reference = basis.baseline, basis.reference
-    motion = motion_of(basis.model, reference.states)
-    angles = angular_distance(motion.attitude[:1], motion.attitude)
-    extent = Sizes(
-        float(np.linalg.norm(np.ptp(motion.position, axis=0))),
-        float(angles.max(initial=0.0)),
-        float(np.linalg.norm(np.ptp(motion.velocity, axis=0))),
-    )
-    orders = []
-    for integrator in STANDARD:
-        runs = [
-            (row.setting.timestep, row)
-            for row in rows
-            if (row.setting.integrator, row.setting.solver_settings)
-            == (integrator.value, baseline.solver_settings)
-        ]
-        orders.append(fit_orders(integrator.value, runs, reference.floor, extent))
-    return tuple(orders)
 
 
 def _measure_setting(

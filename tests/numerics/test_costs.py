@@ -13,12 +13,14 @@ from coursebuild.numerics.costs import (
     Job,
     costs,
     mark_luck,
+    scenario_job,
     time_jobs,
     verdict,
 )
+from coursebuild.numerics.problem import Scenario
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import MeasuredSetting, WorkPrecisionRow
-from coursebuild.numerics.reports.shown_errors import FrontPoint, front
+from coursebuild.numerics.reports.shown_errors import FrontPoint, Quantity, front
 from coursebuild.numerics.scene import scenes
 from support.bench_reports import diverged_row, row
 from support.surveys import NO_DECLARATIONS
@@ -135,6 +137,30 @@ def test_costs_are_of_the_whole_scenario(monkeypatch: pytest.MonkeyPatch) -> Non
     assert timings[0].ratio.value == pytest.approx(ends[0] / ends[1], rel=1e-4)
 
 
+def test_a_run_in_which_bodies_sleep_is_the_same_each_time() -> None:
+    """Data were made for a model that does not sleep, and hold who slept at the end."""
+    model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><geom type="plane" size="1 1 1"/>
+      <body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
+      <body pos="0 0 .9"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
+    </worldbody></mujoco>""")
+    ends: list[bytes] = []
+    advance = mujoco.mj_step
+
+    def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int = 1) -> None:
+        advance(model, data, nstep)
+        ends.append(data.qpos.tobytes())
+
+    job = scenario_job(model, [Scenario(1.0, 0.1)], 0.002)
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mujoco, "mj_step", step)
+        for _ in range(3):
+            job()
+    data = mujoco.MjData(model)
+    advance(model, data, 500)
+    assert ends == [data.qpos.tobytes()] * 3
+
+
 Point = tuple[float, float] | None
 """Cost and error; `None`: a run that was lost."""
 
@@ -238,7 +264,7 @@ def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:
         row("Euler", 0.004 / 2**n, cost=2.0 ** (n - own_number), seen=error, own=n == own_number)
         for n, error in enumerate(errors)
     ]
-    return mark_luck(rows, {"Euler": 0.0025}, 1e-6)
+    return mark_luck(rows, {"Euler": 0.0025}, Quantity("seen", "", 1e-6))
 
 
 def test_errors_that_do_not_fall_or_belong_to_no_stable_run_are_luck() -> None:
@@ -262,7 +288,7 @@ def test_fewer_iterations_that_err_less_are_luck() -> None:
         row("Euler", 0.002, iterations=n, seen=error, cost=cost, own=n == 100, **solving)
         for n, error, cost in ((1, 1e-4, 0.8), (100, 1.4e-4, 1.0))
     )
-    few, many = front(mark_luck((few, many), {}, 0.0))
+    few, many = front(mark_luck((few, many), {}))
     assert few.lucky == "its error rises with more iterations" and not few.front and many.front
     judgement = verdict((few, many), [False, False])
     assert judgement.on_front and judgement.text.startswith("no other setting is cheaper")
@@ -279,11 +305,30 @@ def test_verdicts_claim_only_what_holds() -> None:
     assert text.startswith("no difference that holds: implicit at 2 ms takes 0.93 of the time")
     large = (small[0], row("RK4", 0.008, cost=0.5, seen=1e-6))
     assert verdict(front(large), [False] * 2).better == 1
-    assert "errs 1e+03 times less, or more: " in verdict(front(large), [False] * 2, 1e-6).text
+    text = verdict(front(large), [False] * 2, Quantity("seen", "", 1e-6)).text
+    assert "errs 1e+03 times less, or more: " in text
     judgement = verdict(
         front(large), [False] * 2, holds=lambda setting: setting.integrator != "RK4"
     )
     assert judgement.better is None and "no difference that holds" in judgement.text
+
+
+def test_what_is_not_resolved_makes_no_setting_better() -> None:
+    rows = rows_with_front((1, 2.0), (0.5, 2.0))
+    judgement = verdict(rows, [None, None], Quantity("seen", "", 2.0))
+    assert judgement.better is None and not judgement.on_front
+    assert judgement.text == (
+        "no setting can be called better: the reference resolves no error of RK4 at 10 ms, or of "
+        "the scene's own setting; whether its error can be seen is not known"
+    )
+    rows = rows_with_front((1, 1e-9), (0.5, 1e-9))
+    judgement = verdict(rows, [False, False], Quantity("seen", "", 1e-9))
+    assert judgement.better == 1, "what nobody can see may as well be cheap"
+    assert judgement.text == (
+        "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more, as far as the "
+        "reference resolves; its error cannot be seen: it is less than 1e-09 of what an eye can "
+        "tell"
+    )
 
 
 def test_where_the_own_setting_is_lost_the_others_are_weighed() -> None:

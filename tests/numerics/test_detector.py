@@ -122,6 +122,10 @@ def test_where_energy_can_be_judged() -> None:
         (servo, "", "", "", none, "actuators act"),
         (servo, '<flag actuation="disable"/>', "", "", none, ""),
         ("", "", 'damping="2" frictionloss="1"', "", none, ""),
+        ("", "", 'damping="2 -1"', "", none, "damping is negative"),
+        ('<motor joint="j" damping="-1"/>', "", "", "", none, "damping is negative"),
+        ('<motor joint="j" ctrlrange="1 2"/>', "", "", "", none, "actuators act"),
+        ('<motor joint="j" forcerange="1 2"/>', "", "", "", none, "actuators act"),
         ("", "", 'damping="-2"', "", none, "damping is negative"),
     ):
         text = f"""<mujoco><option>{option}</option><worldbody><body>
@@ -134,6 +138,16 @@ def test_where_energy_can_be_judged() -> None:
     assert driving_force(model, none) == "gravity is compensated", "wind is nothing in a vacuum"
     model.opt.density = 1.2
     assert driving_force(model, none) == "wind blows, gravity is compensated"
+    model.opt.wind[0], model.body_gravcomp[1] = 0.0, 0.0
+    assert driving_force(model, none) == ""
+    for field, cause in (
+        (model.geom_fluid, "a fluid stores energy"),
+        (model.geom_surfacevel, "a surface moves"),
+        (model.geom_adhesion, "contacts adhere"),
+    ):
+        field.flat[0] = 1.0
+        assert driving_force(model, none) == cause
+        field.flat[0] = 0.0
 
 
 def test_a_state_that_shot_up_and_came_back_is_seen() -> None:

@@ -77,9 +77,9 @@ def test_where_something_jumps_the_engine_is_its_own_reference(model: Any, reaso
     assert pilot.jumps == (reason,)
     reference = find_reference(model, pilot, quick=True)
     assert reference.kind == "self"
-    step = min(scene.timesteps) / 8
-    assert reference.source == f"the engine itself: implicitfast at {step:g} s, Newton's solver"
-    assert reference.second == f"the same under Euler at {2 * step:g} s"
+    step = 1e6 * min(scene.timesteps) / 8
+    assert reference.source == f"the engine itself: implicitfast at {step:.6g} µs, Newton's solver"
+    assert reference.second == f"the same under Euler at {2 * step:.6g} µs"
     assert reference.floor.place > 1e-7, "it is not called better known than it is"
 
 

@@ -9,7 +9,7 @@ import math
 import mujoco
 import numpy as np
 import pytest
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
 from coursebuild.numerics.cases import measure, orders
 from coursebuild.numerics.measure import errors, fit_order
@@ -72,6 +72,11 @@ def test_an_order_is_fitted_only_where_errors_lie_on_a_line() -> None:
     assert fit_order(steps[2:5], clean[2:5], 0.0) is None  # three are often on one
     assert fit_order(steps, [1e-12] * 12, 1e-12) is None
     assert fit_order(steps, clean, 0.0, extent=1e-7) is None  # as large as the motion
+    tending = [h * (1 + h + h**2) for h in steps[4:]]  # an order of 1, not where it is measured yet
+    tending_fit = fit_order(steps[4:8], tending[:4], 0.0)
+    assert tending_fit is not None
+    assert 0.01 < tending_fit.value - 1 < tending_fit.uncertainty < 0.1
+    assert {type(part) for part in astuple(tending_fit)} == {float}, "reports hold no others"
     bent = [h**2 + 50 * h**4 for h in steps]
     assert fit_order(steps, bent, 0.0) is None
     wavy = [h**2 * (1.3 if n % 2 else 1) for n, h in enumerate(steps)]

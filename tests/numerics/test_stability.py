@@ -13,6 +13,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import Declarations, DeclaredScenario
 from coursebuild.core.text.source import Source
+from coursebuild.features.bench.commands.measurement import english
+from coursebuild.features.bench.scenario_view import stable_cells
 from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.linearization import Theory, find_rest, find_theory
 from coursebuild.numerics.pilot import run_pilot
@@ -126,6 +128,38 @@ def test_the_largest_is_below_everything_that_is_lost(
     assert row.steps == math.ceil(5.0 / row.largest)
 
 
+def test_narrow_islands_below_the_limit_are_looked_for() -> None:
+    """They lie between timesteps of the grid, as where a ball strikes in a phase of a step."""
+    for low, high in ((40.0, 41.0), (38.1, 38.9)):
+        row = search(lambda _, step, __: low < step < high or step > 50, (1.0, 1000.0))  # noqa: B023
+        assert row.largest == pytest.approx(low, rel=2e-4)
+    row = search(lambda _, step, __: 600 < step < 620, (1.0, 1000.0))
+    assert row.largest == pytest.approx(600, rel=2e-4), "though all of the grid is stable"
+
+
+def test_energy_counts_up_to_the_first_loss_only() -> None:
+    """Bodies deep in each other end a run before its energy rises."""
+
+    def row_of(rises: float) -> StableRow:
+        def run(_: int, step: float, __: float) -> StabilityTrial:
+            status = RunStatus.DIVERGED if step > 30 else RunStatus.OK
+            return StabilityTrial(
+                step, status, 1.0, 9.0 if rises < step < 30 or step > 300 else 1.0
+            )
+
+        setup = Setup(scenario=Scenario(5.0, 5.0), energy=1.0, kinetic=1.0)
+        laboratory = Laboratory(run, 5.0, 1)
+        return search_row(laboratory, Integrator.RK4, (1.0, 1000.0), setup, Theory())
+
+    gain = row_of(20.0).gain
+    assert gain is not None and gain[0] == pytest.approx(20, rel=0.03) and gain[1] == 8.0
+    assert row_of(30.0).gain is None
+    row = row_of(0.1)
+    assert row.gain is not None and row.gain[0] == row.searched[0]
+    assert stable_cells(english(), row)[3].startswith("from ≤ "), "no shorter one was tried"
+    assert "≤" not in stable_cells(english(), row_of(20.0))[3]
+
+
 def test_only_digits_on_which_spans_and_starts_agree_are_printed() -> None:
     """Over twice the time it is lost a little earlier, and from one of the starts much earlier."""
     row = search(lambda _, step, span: step > 25.4 + 0.4 / span, (1.0, 1000.0))
@@ -196,6 +230,34 @@ def test_theory_at_rest_is_that_of_formulas() -> None:
             if computed.timestep != pytest.approx(exact.timestep, rel=1e-4):
                 mismatches.append((problem.name, integrator, computed.timestep, exact.timestep))
     assert mismatches == []
+
+
+def test_theory_of_models_that_sleep_or_lie_exactly_still() -> None:
+    """A model with sleep has the limits that it has awake, and `discrete` none for springs."""
+    discs = """<mujoco><option gravity="0 0 0" sleep_tolerance="0.1"><flag sleep="{}"/></option>
+    <worldbody>{}</worldbody><tendon>{}</tendon></mujoco>"""
+    bodies = "".join(
+        f'<body pos="{n} 0 0"><joint name="j{n}" axis="1 0 0"/>'
+        '<inertial pos="0 0 0" mass="1" diaginertia=".01 .01 .01"/></body>'
+        for n in range(5)
+    )
+    springs = [(0, 0), (0, 1), (1, 2), (2, 3), (3, 4), (4, 4)]
+    tendons = "".join(
+        f'<fixed stiffness="4"><joint joint="j{a}" coef="1"/>'
+        + (f'<joint joint="j{b}" coef="-1"/>' if a != b else "")
+        + "</fixed>"
+        for a, b in springs
+    )
+    exact = 1 / (20 * math.sin(math.radians(75)))  # 2 / ω of the fastest mode
+    for sleep in ("disable", "enable"):
+        model = mujoco.MjModel.from_xml_string(discs.format(sleep, bodies, tendons))
+        scenario = Scenario(2.0, 0.04, qpos=(0.2, 0.0, 0.0, 0.0, -0.1))
+        theory = find_theory(model, scenario, None, smooth=True)
+        for integrator, limit in ((Integrator.EULER, exact), (Integrator.RK4, exact * 2**0.5)):
+            computed = theory.limit(integrator, (1e-3, 1.0))
+            assert computed is not None and computed.timestep == pytest.approx(limit, rel=1e-5)
+        computed = theory.limit(Integrator.DISCRETE, (1e-3, 1.0))
+        assert computed is not None and computed.timestep == math.inf
 
 
 def test_theory_along_a_period_is_where_a_pendulum_is_lost() -> None:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from typing import Any
 
 import mujoco
+import numpy as np
 import pytest
+from msgspec.structs import replace
 
+from coursebuild.numerics.problem import Array
 from coursebuild.numerics.reports.scene_report import ScenarioReport
-from coursebuild.numerics.scene import SceneError, scenes
+from coursebuild.numerics.scene import ExactMotion, ExactStates, SceneError, scenes
 from coursebuild.numerics.work_precision import measure_scenario
 from support.bench_runs import FAMILY, MODELS, measure, orders, row
 from support.surveys import NO_DECLARATIONS, parse_declared
@@ -284,3 +288,89 @@ def test_the_error_of_a_pyramid_is_among_what_is_seen() -> None:
     )
     assert round_one.seen is not None and round_one.seen < own_row.seen / 5
     assert report.verdict.noticeable is True
+
+
+def test_a_cone_that_is_better_from_starts_nearby_too() -> None:
+    """The pyramid's own error counts there as it does from the declared start."""
+    mjcf = """<mujoco><option timestep="0.004"/><worldbody>
+      <geom type="plane" size="9 9 1" friction="0.4"/>
+      <body pos="0 0 0.1"><freejoint/><geom type="box" size="0.2 0.2 0.1" mass="1"/></body>
+    </worldbody></mujoco>"""
+    text = '[[scenario]]\nname = "a"\nduration = 0.48\nsample = 0.016\nqvel = [2, 2, 0, 0, 0, 0]\n'
+    model = mujoco.MjModel.from_xml_string(mjcf)
+    (scene,) = scenes(model, parse_declared(text), quick=True)
+    ticks = itertools.count(step=2_000_000)
+    report = measure_scenario(model, scene, quick=True, clock=ticks.__next__)
+    assert report.verdict.better is not None, report.verdict.text
+    assert report.rows[report.verdict.better].setting.cone == "elliptic"
+
+
+TURNTABLE = """<mujoco><option timestep="0.004" integrator="{}"/><worldbody><body>
+  <joint axis="0 0 1"/><joint axis="0 1 0"/><geom size=".05" pos="0 0 -1" mass="1"/>
+</body></worldbody></mujoco>"""
+
+
+def test_an_exact_motion_of_one_start_says_nothing_of_starts_nearby(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A conical pendulum goes round evenly, so every timestep is exact; beside it none is."""
+    model = mujoco.MjModel.from_xml_string(TURNTABLE.format("implicitfast"))
+    tilt = 0.7
+    rate = math.sqrt(9.81 / math.cos(tilt))
+    text = f"""[[scenario]]
+name = "a"
+qpos = [0, {tilt}]
+qvel = [{rate!r}, 0]
+duration = 0.8
+sample = 0.08
+"""
+    (scene,) = scenes(model, parse_declared(text), quick=True)
+
+    def states(times: Array, qpos: Array, qvel: Array) -> ExactStates:
+        turns = np.column_stack([qpos[0] + qvel[0] * times, np.full_like(times, qpos[1])])
+        return ExactStates({"motion": (turns, np.tile(qvel, (len(times), 1)))})
+
+    scene = replace(scene, exact=ExactMotion(scene.declaration.span, states))
+    advance, now = mujoco.mj_step, [0]
+
+    def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int = 1) -> None:
+        now[0] += 10_000 * nstep
+        advance(model, data, nstep)
+
+    monkeypatch.setattr(mujoco, "mj_step", step)
+    report = measure_scenario(model, scene, quick=True, clock=lambda: now[0])
+    costs = [line.cost.value for line in report.rows if line.cost]
+    assert min(costs) < 0.9 * max(costs), "longer steps cost less"
+    assert report.reference == "closed"
+    assert all(line.seen is not None and line.seen < 1e-9 for line in report.rows)
+    assert report.verdict.better is None, report.verdict.text
+
+
+def test_a_reference_does_not_sleep() -> None:
+    """In steps so short that ten of them are slow, a disc that was let go would stay there."""
+    mjcf = """<mujoco><option timestep="0.005" integrator="RK4" gravity="0 0 0"
+        sleep_tolerance="0.01"><flag sleep="{}"/></option>
+      <worldbody><body><joint axis="0 0 1" stiffness="4" damping="0.3"/>
+        <geom type="cylinder" size="0.2 0.02" mass="5"/></body></worldbody></mujoco>"""
+    text = '[[scenario]]\nname = "a"\nqpos = [0.3]\nduration = 0.8\nsample = 0.08\n'
+    awake, sleeping = (
+        measure(mujoco.MjModel.from_xml_string(mjcf.format(flag)), text, quick=True)[0]
+        for flag in ("disable", "enable")
+    )
+    assert sleeping.reference == awake.reference == "ode" and sleeping.floor == awake.floor
+    asleep, usual = (row(report, "RK4", 0.00125).position for report in (sleeping, awake))
+    assert asleep and usual and usual[0] < 1e-9 and asleep[0] > 1e-3
+    assert "nothing sleeps in the reference, so errors hold what sleep changes" in sleeping.notes
+
+
+def test_where_a_declared_error_is_not_resolved_what_is_seen_is_compared() -> None:
+    """A sensor of what stays at rest has no error; the ball that falls has one."""
+    mjcf = """<mujoco><option timestep="0.004"/><worldbody>
+      <body><joint name="x" type="slide" axis="0 0 1" damping="1"/><geom size=".1" mass="1"/></body>
+      <body pos="1 0 0"><joint name="y" type="slide" axis="1 0 0"/><geom size=".1" mass="1"/></body>
+    </worldbody><sensor><jointpos name="side" joint="y"/></sensor></mujoco>"""
+    text = '[[scenario]]\nname = "a"\nduration = 0.8\nsample = 0.08\nmeasure = "sensor:side"\n'
+    (report,) = measure(mujoco.MjModel.from_xml_string(mjcf), text, quick=True)
+    assert {line.figure for line in report.rows} == {(0.0, 0.0)}
+    note = "no error of the sensor side is resolved: settings are compared by what is seen"
+    assert note in report.notes

@@ -287,7 +287,9 @@ def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:
     gain = ""
     if row.gain is not None:
         step, energy = row.gain
-        gain = words("measured.gained", time=seconds_text(step, 2), energy=f"{energy:.2g}")
+        bound = "≤ " if step <= row.searched[0] else ""  # the shortest that was tried gains too
+        time = bound + seconds_text(step, 2)
+        gain = words("measured.gained", time=time, energy=f"{energy:.2g}")
     return (
         largest,
         _theory(words, row.theory, has_theory=bool(row.formula)),

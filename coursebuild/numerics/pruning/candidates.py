@@ -218,6 +218,10 @@ def display_name(element: Element) -> str:
     return name or place_of(element)
 
 
+_RESISTANCE = ("damping", "dampingpoly", "armature")
+"""Properties by which an actuator resists motion, whatever its command."""
+
+
 def _is_forceless_actuator(
     model: Any, ids: Collection[int], scenarios: Collection[Scenario]
 ) -> bool:
@@ -230,8 +234,11 @@ def _is_forceless_actuator(
     for i in ids:
         ranges = [(model.actuator_ctrllimited[i], model.actuator_ctrlrange[i])]
         ranges += [(model.actuator_forcelimited[i], model.actuator_forcerange[i])]
+        first = int(model.actuator_ctrladr[i])
+        controls = slice(first, first + int(model.actuator_ctrlnum[i]))
         if (
-            any(row[i] for row in commands)
+            any(np.any(row[controls]) for row in commands)
+            or any(np.any(getattr(model, f"actuator_{name}")[i]) for name in _RESISTANCE)
             or model.actuator_biastype[i] != mujoco.mjtBias.mjBIAS_NONE
             or model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE
             or model.actuator_gaintype[i] not in linear
@@ -394,7 +401,7 @@ SETTINGS = frozenset(name for _, name, _ in _OTHER_SETTINGS)
 def other_settings(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
     """Other solver settings, for a model in which a constraint was ever active.
 
-    None asks for more work than the model's own.
+    None is the model's own, or asks for more work.
     """
     if not any(run.constrained for run in runs):
         return []
@@ -404,9 +411,19 @@ def other_settings(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
         "tolerance": option.tolerance >= 1e-6,
         "noslip_iterations": option.noslip_iterations == 0,
         "multiccd": bool(option.disableflags & int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)),
+        "island": bool(option.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ISLAND)),
+        "sleep": bool(option.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP)),
+    }
+    own_names = {
+        name: kind(getattr(option, name)).name.rpartition("_")[2]
+        for name, kind in (
+            ("solver", mujoco.mjtSolver),
+            ("cone", mujoco.mjtCone),
+            ("jacobian", mujoco.mjtJacobian),
+        )
     }
     return [
         Item(name, value, None, edits=set_option(text.main, tag, name, value))
         for tag, name, value in _OTHER_SETTINGS
-        if not is_spared.get(name, False)
+        if not is_spared.get(name, False) and value.upper() != own_names.get(name)
     ]

@@ -71,15 +71,15 @@ def index_map(model: Any, losses: Mapping[str, Collection[int]]) -> IndexMap:
     mocap = model.body_mocapid[body]
     joints = np.flatnonzero(np.isin(model.jnt_bodyid, body))
     joints = np.setdiff1d(joints, [*losses.get("joint", ())])
-    ctrl = np.setdiff1d(np.arange(model.nu), [*losses.get("actuator", ())])
+    actuators = np.setdiff1d(np.arange(model.nactuator), [*losses.get("actuator", ())])
     sensors = np.setdiff1d(np.arange(model.nsensor), [*losses.get("sensor", ())])
     geoms = np.setdiff1d(np.arange(model.ngeom), [*losses.get("geom", ())])
     widths = [_WIDTHS.get(int(kind), 1) for kind in model.jnt_type[joints]]
     return {
         "nq": _ranges(model.jnt_qposadr[joints], widths),
         "nv": np.flatnonzero(np.isin(model.dof_jntid, joints)),
-        "na": _ranges(model.actuator_actadr[ctrl], model.actuator_actnum[ctrl]),
-        "nu": ctrl,
+        "na": _ranges(model.actuator_actadr[actuators], model.actuator_actnum[actuators]),
+        "nu": _ranges(model.actuator_ctrladr[actuators], model.actuator_ctrlnum[actuators]),
         "nbody": body,
         "nmocap": mocap[mocap >= 0].astype(np.int64),
         "neq": np.setdiff1d(np.arange(model.neq), [*losses.get("equality", ())]),

@@ -48,7 +48,7 @@ KINDS: Mapping[str, tuple[mujoco.mjtObj, str]] = {
     "geom": (mujoco.mjtObj.mjOBJ_GEOM, "ngeom"),
     "site": (mujoco.mjtObj.mjOBJ_SITE, "nsite"),
     "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, "nsensor"),
-    "actuator": (mujoco.mjtObj.mjOBJ_ACTUATOR, "nu"),
+    "actuator": (mujoco.mjtObj.mjOBJ_ACTUATOR, "nactuator"),
     "tendon": (mujoco.mjtObj.mjOBJ_TENDON, "ntendon"),
     "equality": (mujoco.mjtObj.mjOBJ_EQUALITY, "neq"),
 }

@@ -104,7 +104,10 @@ class Reach:
         mujoco.mj_kinematics(model, data)
         self._ancestries = [self._ancestry(b) for b in range(model.nbody)]
         self._shells: dict[Pair, Shell | None] = {}
-        self._pair_margin = float(np.max(model.pair_margin, initial=0.0))
+        # What adheres pulls across its gap; an override comes instead of all margins.
+        pair_margins = model.pair_margin + model.pair_gap
+        self._pair_margin = float(np.max(pair_margins, initial=model.opt.o_margin))
+        self._margins = model.geom_margin + model.geom_gap
 
     def _ancestry(self, body: int) -> list[int]:
         """A body and its ancestors, up to the world."""
@@ -120,7 +123,7 @@ class Reach:
         body_a, body_b = int(model.geom_bodyid[a]), int(model.geom_bodyid[b])
         ancestors = set(self._ancestries[body_b])
         common = next(body for body in self._ancestries[body_a] if body in ancestors)
-        margin = float(model.geom_margin[a] + model.geom_margin[b]) + self._pair_margin
+        margin = float(self._margins[a] + self._margins[b]) + self._pair_margin
         gap = margin + _SLACK * (1.0 + margin)
         first, second = self.shell(a, common), self.shell(b, common)
         if first is None or second is None:

@@ -120,7 +120,7 @@ def _chart(
 ) -> Chart:
     if work != "cost":
         pairs = list(zip(report.rows, works, strict=True))
-        places = front([replace(row, cost=x) for row, x in pairs])
+        places = front([replace(row, cost=x) for row, x in pairs], quantity)
         rows = tuple(
             replace(row, front=place.front, dominated_by=place.dominated_by)
             for (row, _), place in zip(pairs, places, strict=True)

@@ -1,7 +1,8 @@
 """Which errors of reports are shown, which settings are worth their cost, and texts of both.
 
-Entry points: `quantities(report)`, `main_quantity`; `front(rows)`; `setting_text`, `seconds_text`,
-`status_text`; `limit_text` and `map_text`, of largest stable timesteps.
+Entry points: `quantities(report)`, `main_quantity`, `compared_quantity`; `front(rows)`;
+`setting_text`, `seconds_text`, `status_text`; `limit_text` and `map_text`, of largest stable
+timesteps.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ def quantities(report: ScenarioReport) -> tuple[Quantity, ...]:
     """The errors that some row has, what the scenario declares to be measured first."""
     candidates = (
         Quantity("figure", report.figure or "figure", report.least_figure),
-        Quantity("seen", "what is seen (1: just visible)", report.least_seen),
+        replace(SEEN, least=report.least_seen),
         Quantity("position", "position (m or rad)", FLOORS * report.floor),
         Quantity("attitude", "attitude (rad)", FLOORS * report.floor),
         Quantity("velocity", "velocity (m/s or rad/s)", FLOORS * report.velocity_floor),
@@ -66,6 +67,20 @@ def quantities(report: ScenarioReport) -> tuple[Quantity, ...]:
         for quantity in candidates
         if any(quantity.value_of(row) is not None for row in report.rows)
     )
+
+
+SEEN = Quantity("seen", "what is seen (1: just visible)")
+"""What a learner sees: it is compared where no other error is declared and resolved."""
+
+
+def compared_quantity(rows: Iterable[MeasuredRun], figure: Quantity, least_seen: float) -> Quantity:
+    """The error to compare settings by: the declared one, unless only what is seen is resolved.
+
+    `figure` has no label where none is declared.
+    """
+    rows, visible = tuple(rows), replace(SEEN, least=least_seen)
+    is_compared = figure.is_resolved(rows) or not visible.is_resolved(rows)
+    return figure if figure.label and is_compared else visible
 
 
 def is_idle(row: WorkPrecisionRow) -> bool:
@@ -102,23 +117,19 @@ class FrontPoint(Struct, frozen=True):
         return is_separate and self.cost.value * (1 + COST_SLACK) < rival.cost.value
 
 
-def compared_error(row: WorkPrecisionRow) -> float | None:
-    """The error by which settings are compared; `None` where the row has none."""
-    return row.seen if row.figure is None else row.figure[0]
-
-
-def front_point(row: WorkPrecisionRow) -> FrontPoint | None:
+def front_point(row: WorkPrecisionRow, quantity: Quantity) -> FrontPoint | None:
     """The cost and error of a setting; `None` where it was lost, or not timed."""
-    error = compared_error(row)
+    error = quantity.value_of(row)
     return None if row.cost is None or error is None else FrontPoint(row.cost, error)
 
 
-def front(rows: Rows) -> tuple[WorkPrecisionRow, ...]:
+def front(rows: Rows, quantity: Quantity = SEEN) -> tuple[WorkPrecisionRow, ...]:
     """Rows that say whether they are on the front, and otherwise which row dominates them.
 
     A lucky row is on no front, and dominates none.
     """
-    places = {n: place for n, row in enumerate(rows) if (place := front_point(row)) is not None}
+    points = ((n, front_point(row, quantity)) for n, row in enumerate(rows))
+    places = {n: point for n, point in points if point is not None}
     better = {
         n: [m for m, rival in places.items() if not rows[m].lucky and rival.beats(own_place)]
         for n, own_place in places.items()

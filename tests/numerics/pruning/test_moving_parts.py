@@ -15,14 +15,19 @@ def test_actuators_that_nobody_commands() -> None:
     <motor name="push" joint="pivot"/>
     <position name="servo" joint="pivot" kp="10"/>
     <motor name="lazy" joint="pivot" ctrllimited="true" ctrlrange="1 2"/>
+    <motor name="brake" joint="rest" damping="1"/>
+    <motor name="rotor" joint="rest" armature="1"/>
+    <pid name="two" joint="rest" kp="5"/>
+    <motor name="last" joint="rest"/>
   </actuator>
-  <keyframe><key name="up" qpos="1" ctrl="0 0 0"/></keyframe>"""
+  <keyframe><key name="up" qpos="1 0" ctrl="0 0 0 0 0 0 0 0"/></keyframe>"""
+    resting = '<body pos="9 0 0"><joint name="rest"/><geom size=".1"/></body>'
     clock = itertools.count(step=10**6).__next__
-    survey = run_survey(scene(rest=rest), clock=clock)
+    survey = run_survey(scene(PENDULUM + resting, rest=rest), clock=clock)
     finding = findings_by_kind(survey)["actuator-idle"]
-    assert names(finding) == ["push"] and finding.label == PROVED_LABEL
+    assert names(finding) == ["push", "last"] and finding.label == PROVED_LABEL
     assert finding.saving.time == 1.0
-    assert '<key name="up" qpos="1" ctrl="0 0"/>' in fixed_text(survey)
+    assert '<key name="up" qpos="1 0" ctrl="0 0 0 0 0 0"/>' in fixed_text(survey)
 
 
 def test_scenarios_that_number_commands_keep_actuators_from_being_changed() -> None:

@@ -96,6 +96,11 @@ def test_margins_count() -> None:
     assert find_separate(near_model, possible_pairs(near_model)) and not find_separate(
         far_model, possible_pairs(far_model)
     )
+    for gap in ('gap="1.9" adhesion="1"', 'margin="1" gap="0.9"'):  # it pulls across its gap
+        gap_model = compile_model(body.replace('margin="{}"', gap))
+        assert not find_separate(gap_model, possible_pairs(gap_model)), gap
+    near_model.opt.o_margin = 1.9  # in place of all margins, once a flag is set
+    assert not find_separate(near_model, possible_pairs(near_model))
     pair = '<contact><pair geom1="a" geom2="b" margin="1.9"/></contact>'
     mjcf = """<geom name="a" size=".1" pos="2 0 0"/>
         <body><joint/><geom name="b" size=".1"/></body>"""

@@ -347,8 +347,10 @@ def _summary(report: DietReport, style: Style) -> list[str]:
     if report.fixed is not None and len(fixable) > 1 and len(fixable) < len(findings):
         lines += style.wrap(f"after --fix: {_saving(report.fixed)}", "  ")
     kinds_by_reason: dict[str, list[str]] = {}
+    found_kinds = {finding.kind for finding in report.findings}
     for attempt in report.tried:
-        kinds_by_reason.setdefault(attempt.reason, []).append(attempt.kind)
+        things = f" {name_list(attempt.places)}" if attempt.kind in found_kinds else ""
+        kinds_by_reason.setdefault(attempt.reason, []).append(attempt.kind + things)
     for reason, kinds in kinds_by_reason.items():
         outcome = f"not found, because {reason}" if reason else "tried and needed"
         lines += style.wrap(f"{outcome}: {name_list(list(dict.fromkeys(kinds)))}", "  ", FAINT)
