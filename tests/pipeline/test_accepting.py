@@ -1,0 +1,193 @@
+"""`serve`: what a script prints anew is accepted in the page, alone or with others, and undone."""
+
+from __future__ import annotations
+
+import json
+import signal
+
+import pytest
+
+from coursebuild.core.files.locks import project_lock
+from support.preview_process import Events, serve_preview
+from support.scratch_course import GOOD, WAIT_FOR_GO, Make, block
+
+pytestmark = pytest.mark.site
+
+
+def test_output_is_accepted(make: Make) -> None:
+    lesson = "## Random\r\n\r\n" + GOOD.replace("\n", "\r\n").replace(
+        "3.14159\r\n```\r\n\r\n", "3\r\n```\r\n"
+    )
+    folder = make(lesson)
+    with serve_preview(folder) as preview, preview.events() as events:
+
+        def offered(page: Events) -> bool:
+            return any(output.get("offer") for output in page.news["outputs"])
+
+        events.until(offered)
+        (output,) = events.news["outputs"]
+        assert (output["script"], output["nth"], output["state"]) == (
+            "examples/hello.py",
+            0,
+            "drift",
+        )
+        assert output["rows"] == [
+            ["-", [["hello ", False], ["3", True]]],
+            ["+", [["hello ", False], ["3.14159", True]]],
+        ]
+        request = {"page": "lessons/1.1-one.html", "id": output["offer"]}
+        body = json.dumps(request).encode()
+        right = {"Origin": f"http://127.0.0.1:{preview.port}"}
+        before = folder.read(folder.lesson())
+        unsaid = (403, "a request that changes something says where it comes from\n")
+        other_origin = (403, "pages of other origins cannot use the preview\n")
+        alone = (403, "this preview answers only as localhost\n")
+        unread = (400, {"message": "the request cannot be read"})
+        no_such_offer = (
+            409,
+            {"message": "this is no longer what the page offers; look at it again"},
+        )
+        for changes, data, answer in (
+            ({"Origin": ""}, body, unsaid),
+            ({"Origin": "http://evil.example"}, body, other_origin),
+            ({"Origin": "http://127.0.0.1:9"}, body, other_origin),
+            ({"Host": "evil.example"}, body, alone),
+            ({}, b"{", unread),
+            ({}, b"[1]", unread),
+            ({}, b'{"page": 1, "id": 2}', unread),
+            ({}, b"x" * 70_000, unread),
+            ({}, json.dumps({**request, "id": "0" * 24}).encode(), no_such_offer),
+            ({}, json.dumps({**request, "page": "index.html"}).encode(), no_such_offer),
+        ):
+            headers = {name: value for name, value in (right | changes).items() if value}
+            assert preview.accept(data, **headers) == answer, (changes, data[:40])
+        assert folder.read(folder.lesson()) == before
+        assert preview.accept(body, **right) == (200, {"message": ""})
+        assert folder.read(folder.lesson()) == before.replace(b"hello 3\r", b"hello 3.14159\r")
+        events.wait_until_settled()
+        assert events.news["outputs"][0]["state"] == "verified"
+    undone = folder.main("undo")
+    assert (undone.status, undone.out) == (0, f"restored {folder.lesson()}\n")
+    assert folder.read(folder.lesson()) == before
+
+
+def test_several_offers_are_accepted_at_once_or_not_at_all(make: Make) -> None:
+    lesson = "## Two\n\n" + block("a.py", "print(1)", "2") + block("b.py", "print(3)", "4")
+    folder = make(lesson)
+    with serve_preview(folder) as preview, preview.events() as events:
+        events.until(lambda page: sum(bool(o.get("offer")) for o in page.news["outputs"]) == 2)
+        ids = [output["offer"] for output in events.news["outputs"]]
+        for bad_ids in ("", " ", f"{ids[0]} {'0' * 24}"):
+            assert preview.accept_offer(bad_ids)[0] == 409
+        assert folder.text(folder.lesson()) == lesson
+        assert preview.accept_offer(" ".join(ids)) == (200, {"message": ""})
+        changed = lesson.replace("```text\n2\n", "```text\n1\n").replace(
+            "```text\n4\n", "```text\n3\n"
+        )
+        assert folder.text(folder.lesson()) == changed
+        events.wait_until_settled()
+    assert folder.main("undo").status == 0
+    assert folder.text(folder.lesson()) == lesson
+
+
+def test_each_click_is_undone_alone_and_needs_no_other_command_to_end(make: Make) -> None:
+    lesson = "> [!nte] One\n>\n> Text.\n\n> [!tpi] Two\n>\n> Text.\n"
+    folder = make(lesson)
+    with serve_preview(folder) as preview, preview.events() as events:
+        events.until(lambda page: sum(bool(p.get("offer")) for p in page.news["problems"]) == 2)
+        with project_lock(folder.root):  # as `check` holds it while scripts run
+            assert preview.accept_offer(events.news["problems"][0]["offer"])[0] == 200
+        half = lesson.replace("nte", "note")
+        assert folder.text(folder.lesson()) == half
+        events.until(lambda page: [p["line"] for p in page.news["problems"]] == ["> [!tpi] Two"])
+        assert preview.accept_offer(events.news["problems"][0]["offer"])[0] == 200
+    for text in (half, lesson):
+        assert folder.main("undo").status == 0
+        assert folder.text(folder.lesson()) == text
+    assert folder.main("undo").status == 1
+
+
+def test_what_runs_is_told_with_the_time_that_it_took(make: Make) -> None:
+    slow = f"{WAIT_FOR_GO}import time\ntime.sleep(1.2)\nprint(1)"
+    folder = make("## Slow\n\n" + block("slow.py", slow, "1", info="timeout=600"))
+    folder.write("go", "")
+    assert folder.run("check").status == 0
+    (folder.root / "go").unlink()
+    with serve_preview(folder) as preview, preview.events() as events:
+        events.wait_until_settled()
+        assert events.news["running"] == []
+        folder.replace(folder.lesson(), "1.2", "1.3")
+        events.until(lambda page: bool(page.news["running"]))
+        (script,) = events.news["running"]
+        assert (script["path"], script["last"] > 1.0) == ("examples/slow.py", True)
+        assert abs(events.hello["now"] - script["began"]) < 10_000  # by the same clock
+        folder.write("go", "")
+        events.wait_until_settled()
+        assert events.news["running"] == []
+        line = preview.wait_for_line("running examples/slow.py (")
+        assert line.endswith(" s the last time)")
+
+
+def test_what_changed_since_is_not_written(make: Make) -> None:
+    folder = make(GOOD.replace("hello 3.14159", "hello 3"))
+    with serve_preview(folder) as preview, preview.events() as events:
+        events.until(lambda page: any(o.get("offer") for o in page.news["outputs"]))
+        id = events.news["outputs"][0]["offer"]
+        # A lesson is saved while the server is suspended, so that it has not noticed.
+        preview.process.send_signal(signal.SIGSTOP)
+        folder.replace(folder.lesson(), "## Hello", "## Mine")
+        mine = folder.read(folder.lesson())
+        preview.process.send_signal(signal.SIGCONT)
+        status, answer = preview.accept_offer(id)
+        assert status == 409
+        assert answer["message"] in (
+            "content/lessons/1.1-one.md was changed in the meantime",
+            "this is no longer what the page offers; look at it again",
+        )
+        assert folder.read(folder.lesson()) == mine
+
+
+def test_what_cannot_be_recorded_is_not_offered(make: Make) -> None:
+    """An output that differs from run to run; a number whose line in the output is unknown."""
+    clock = "import time\nprint('took', time.time_ns())"
+    code = "print('period', 2.95, 's')\nprint('half', 1.975, 's')"
+    folder = make(
+        "## Swing\n\n"
+        + block("clock.py", clock, "took 12")
+        + block("x.py", code, "period 2.95 s\nhalf 1.975 s")
+        + "`2.006`{out}\n"
+    )
+    with serve_preview(folder) as preview, preview.events() as events:
+        events.until(lambda page: any(o.get("refused") for o in page.news["outputs"]))
+        (output, _) = events.news["outputs"]
+        assert output["offer"] is None
+        assert output["refused"] == "two runs of the script printed different lines"
+        events.until(lambda page: bool(page.news["numbers"]))
+        (number,) = events.news["numbers"]
+        assert (number["better"], number["offer"]) == ("", None)
+        assert number["label"] == "the nearest printed value is 1.975"
+
+
+def test_output_is_accepted_and_then_the_number_in_its_place(make: Make) -> None:
+    """The number in its place, not the nearest number, which is another quantity."""
+    code = "print('period', 2.95, 's')\nprint('half', 1.975, 's')"
+    prose = "The period is `2.006`{out}.\n"
+    folder = make(
+        "## Swing\n\n" + block("x.py", code, "period 2.006 s\nhalf 1.003 s") + prose,
+        "## Again\n\n`2.01 s`{out=examples/x.py} and `1.003`{out=examples/x.py}\n",
+    )
+    with serve_preview(folder) as preview, preview.events() as events:
+        events.until(lambda page: any(o.get("offer") for o in page.news["outputs"]))
+        assert events.news["numbers"] == []  # the recorded outputs confirm them
+        assert preview.accept_offer(events.news["outputs"][0]["offer"]) == (200, {"message": ""})
+        events.until(lambda page: bool(page.news["numbers"]))
+        (number,) = events.news["numbers"]
+        assert (number["text"], number["better"]) == ("2.006", "2.950")
+        assert number["label"] == "2.95 is printed where 2.006 was"
+        assert preview.accept_offer(number["offer"]) == (200, {"message": ""})
+        events.wait_until_settled("binding-mismatch", "binding-mismatch")
+        assert prose.replace("2.006", "2.950") in folder.text(folder.lesson())
+        assert [problem["label"] for problem in events.news["problems"]] == [
+            "2.95 is printed where 2.006 was",
+            "1.975 is printed where 1.003 was",
+        ]
