@@ -324,7 +324,16 @@ def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
     if chart.unit_label and y.low < 0 < y.high:
         look = 'stroke="currentColor" stroke-dasharray="1 3" stroke-width="1.2"'
         yield path(f"M{x.start:.1f} {y(1.0):.1f}H{x.end:.1f}", look)
-        yield label(x.start + 6, y(1.0) - 4, chart.unit_label, f"{FINE} {HALO}")
+        half = text_width(chart.unit_label, TICK_SIZE) / 2
+        left, right, at = x.start + 6 + half, x.end - 6 - half, y(1.0) - 4
+        places = [_place(point, x, y) for line in chart.lines for point in line.points]
+
+        def room(middle: float) -> float:
+            gaps = [max(abs(px - middle) / (half + RING), abs(py - at) / SIZE) for px, py in places]
+            return min(gaps, default=0.0)
+
+        middle = right if room(right) > room(left) else left
+        yield label(middle, at, chart.unit_label, f'text-anchor="middle" {FINE} {HALO}')
 
 
 def _place(point: Point, x: Scale, y: Scale) -> tuple[float, float]:
