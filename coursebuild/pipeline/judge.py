@@ -136,7 +136,8 @@ def _refuse_unrepeated(course: Course, lines: Iterable[ScriptLine]) -> Iterator[
             yield diagnose(
                 "output-unrepeated",
                 by_path[line.path].span.first_line(),
-                f"what is recorded of `{line.path}` is from its only run, and not yet repeated",
+                f"the output recorded from `{line.path}` comes from its only run, "
+                "which is not yet repeated",
                 help=f"run `coursebuild check --sensitivity {line.lesson}`",
             )
 

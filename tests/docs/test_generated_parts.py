@@ -178,6 +178,8 @@ def _command(text: str, name: str) -> str:
     if re.search(r"[|>]", examples):  # what a table of arguments cannot say; `help` shows all
         lines = "\n".join(line[2:] for line in examples.splitlines())
         parts.append(f"```console\n{lines}\n```")
+    if not [*_actions(name)]:
+        parts.append("It takes no arguments.")
     return "\n\n".join(parts)
 
 

@@ -265,6 +265,6 @@ def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnosti
     if unmatched:
         at = unmatched[-1]
         end = at + (2 if text[at] == "\\" else 1)
-        help = "write the other one, or `\\lbrack`, `\\rbrack` where one stands alone"
+        help = "write the missing one, or `\\lbrack`, `\\rbrack` where one stands alone"
         message = f"`{text[at:end]}` has no matching bracket"
         yield diagnose("math-brackets", tex.span(at, end), message, help=help)

@@ -128,7 +128,7 @@ def _find_clash(
         return None
     note = f"`{first.path}` is written here"
     if first.path == new.path:
-        message, note = f"`{new.path}` is the file of two blocks", "the first one is here"
+        message, note = f"two blocks have the file `{new.path}`", "the first one is here"
     elif key in files:
         message = f"`{new.path}` and `{first.path}` are one file where case does not count"
     elif key in folders:

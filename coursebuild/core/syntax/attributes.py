@@ -294,9 +294,9 @@ def check_heading(
         help = Fix(help, edits=_deepen(span, 1))
         if span.text.rstrip().endswith("\n======="):
             help = "a merge conflict may have left the line of `=` behind: delete it"
-        message = "a lesson has no heading of level 1"
+        message = "a lesson cannot have a heading of level 1"
         if not lesson:
-            message = "a page has no heading of level 1 but its title, at its top"
+            message = "a page can have no heading of level 1 but its title, at its top"
         diagnostics.append(diagnose("heading-top", span, message, help=help))
     if previous is not None and level > previous + 1:
         message = f"a heading of level {level} follows one of level {previous}"

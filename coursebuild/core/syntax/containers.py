@@ -252,7 +252,7 @@ def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterat
     gap = Span(source, before.span.end, block.span.start)
     if isinstance(block, model.Heading) and block.span.text.strip() == before.span.text.strip():
         place, message = block.span.first_line(), "this heading is repeated here"
-        yield diagnose("text-repeated", place, message, help=Fix("delete it once", ""))
+        yield diagnose("text-repeated", place, message, help=Fix("delete one of the two", ""))
     if isinstance(before, model.Callout) and isinstance(block, model.BlockQuote):
         last = before.span.text.rstrip(" \t\r\n>")[-1:]
         text = f"{before.span.text}\n{block.span.text}"

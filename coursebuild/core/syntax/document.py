@@ -77,7 +77,7 @@ def parse_document(
     state = ParsingState(callouts, lesson, words)
     base = read_markdown(source)
     if (front := _YAML.match(base.text) or _TOML.match(base.text)) is not None:
-        message = f"a {'lesson' if lesson else 'page'} has no front matter"
+        message = f"a {'lesson' if lesson else 'page'} cannot have front matter"
         help = "its title and everything else about it are in content/course.toml; "
         help += "begin with the text"
         help = Fix(help, edits=(Edit(base.span(0, front.end()), ""),))

@@ -145,7 +145,7 @@ def read_keys(
         elif key in words_by_key:
             notes = [Note("first given here", words_by_key[key].key_span)]
             message, is_same = f"`{key}` is given twice", words_by_key[key].value == word.value
-            help = Fix("leave one out", edits=word.removal if is_same else (), safe=True)
+            help = Fix("delete one of them", edits=word.removal if is_same else (), safe=True)
             diagnostic = diagnose(
                 "fence-key-repeated", word.key_span, message, help=help, notes=notes
             )

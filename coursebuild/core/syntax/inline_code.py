@@ -54,7 +54,7 @@ def check_inline_code(content: Excerpt, start: int, end: int, code: str) -> Iter
         rest = shorter
     if bracket := re.search(r"(?<=\w)[()\[\]{}](?=\w)", rest):
         message = f"`{bracket[0]}` has no matching bracket"
-        yield diagnose("markup-unread", span, message, help="write the other one, or a blank")
+        yield diagnose("markup-unread", span, message, help="write the missing one, or a blank")
     # A letter and a backtick change places easily, as in "i`mpratio`" and "`body_mass `while".
     letter, first = _LETTER_BEFORE.search(text, max(start - 2, 0), start), start - 1
     if letter is None and text[start:end].endswith(" `"):

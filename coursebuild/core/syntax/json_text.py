@@ -189,7 +189,7 @@ class _Reader:
                 self.report(self.offset, self.offset + 1, message, Fix("remove one", "", safe=True))
                 self.offset += 1
             if self.peek() == closer:
-                self.report(comma, comma + 1, f"a comma before `{closer}`", _COMMA_HELP)
+                self.report(comma, comma + 1, f"there is a comma before `{closer}`", _COMMA_HELP)
         elif char != closer:
             key = _KEY.match(self.text, self.offset)
             if not (key if closer == "}" else char and char in '"{[-0123456789'):

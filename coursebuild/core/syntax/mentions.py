@@ -133,7 +133,7 @@ def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> D
         case _:
             return None
     message = f"the text of this link says `{label}`, and it leads to the {kind} `{name}`"
-    help = "name the same in both"
+    help = "name the same one in both"
     return diagnose("link-text", span, message, help=help) if label != name else None
 
 

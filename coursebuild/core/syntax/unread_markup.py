@@ -299,7 +299,7 @@ def find_repetitions(content: Excerpt) -> Iterator[Diagnostic]:
         r"^(\S.{2,22}\w)(?:[-*+>]|#+|\d+\.) (?=\1)", content.text, re.MULTILINE
     ):
         message = f"`{shorten(line[0])}` stands here twice"
-        help = Fix("delete it once", "")
+        help = Fix("delete one of the two", "")
         yield diagnose("text-repeated", content.span(*line.span()), message, help=help)
     for line in re.finditer(r"^\S.{23,}", content.text, re.MULTILINE):
         at = line[0].find(line[0][:12], 12)
@@ -308,7 +308,7 @@ def find_repetitions(content: Excerpt) -> Iterator[Diagnostic]:
         if is_begun and line[0].startswith(half, at) and line[0].count(half.rstrip()) == 2:
             span = content.span(line.start() + at, line.start() + at + len(half))
             message = f"`{shorten(half)}` is repeated here"
-            yield diagnose("text-repeated", span, message, help=Fix("delete it once", ""))
+            yield diagnose("text-repeated", span, message, help=Fix("delete one of the two", ""))
 
 
 def _mask_all_but(texts: Sequence[tuple[int, str]], whole: str) -> str:

@@ -44,7 +44,7 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
         for comparison in comparisons.get(tex.span().start, ()):
             span, message = tex.span(comparison.start, comparison.end), comparison.message
             if comparison.kind == "wrong":
-                result = re.match(r"(-?[\d.]+) is the result", message)
+                result = re.match(r"the result is (-?[\d.]+)", message)
                 is_number = re.fullmatch(r"-?[\d.]+", span.text) is not None
                 fix = Fix(comparison.help, result[1] if result and is_number else None)
                 mistake = diagnose("formula-arithmetic", span, message, help=fix)

@@ -143,7 +143,7 @@ def _find_mistake(left: Expression, right: Expression, relation: str) -> Formula
     if agrees(numeral, value, relation):
         return None
     digits = max(numeral.digits + 2, 4)
-    message = f"{format_number(value / numeral.unit_size, digits)} is the result, not this"
+    message = f"the result is {format_number(value / numeral.unit_size, digits)}, not this"
     is_rounded = numeral.is_whole and relation == "=" and agrees(numeral, value, "≈")
     help = "write `\\approx` where a whole number is rounded" if is_rounded else ""
     return FormulaComparison("wrong", side.start, side.end, message, help)
@@ -314,7 +314,7 @@ class SymbolComparison:
                 return None
             digits = max(numeral.digits + 2, 4)
             result = format_number(value / (numeral.unit_size * unit_size), digits)
-            mistakes.append(self._mistake(index, f"{result} is the result", ", not this"))
+            mistakes.append(self._mistake(index, f"the result is {result}", ", not this"))
         return mistakes[0]
 
     def _mistake(self, index: int, message: str, end: str) -> FormulaComparison:

@@ -143,7 +143,9 @@ def _check(bench: Bench, course: Course) -> Iterator[Diagnostic]:
         commands[ENGINES.path(bench.model)] = ENGINES.command(bench.model)
     for path, command in commands.items():
         if path not in course.files:
-            message = f"nothing was recorded of the model `{bench.model}`, and the page says so"
+            message = (
+                f"no measurements of the model `{bench.model}` are recorded, and the page says so"
+            )
             help = f"measure it with `{command}`"
             yield diagnose("bench-unrecorded", bench.model_span, message, help=help)
 

@@ -82,7 +82,7 @@ def test_of_another_kind_only_what_all_have_is_checked() -> None:
     assert messages('{"title": 4, "points": [1,], "height": 5, "a": 1, "a": 2}', "graph") == [
         "2:11-12 field-type: `title` must be a string, not the number 4"
         ' [put it between quotes: `"4"`]',
-        "2:26-27 json-syntax: a comma before `]` [remove the comma]",
+        "2:26-27 json-syntax: there is a comma before `]` [remove the comma]",
         "2:40-41 field-value: `height` must be at least 80, not 5",
         "2:51-54 field-repeated: `a` is given twice",
     ]

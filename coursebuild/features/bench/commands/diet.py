@@ -87,7 +87,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     writes.add_argument(
         "--record", action="store_true", help="write the findings to content/reports/"
     )
-    parser.add_argument("--quick", action="store_true", help="short runs, rough times")
+    parser.add_argument("--quick", action="store_true", help="short runs and rough times")
     add_format(parser, "text", "json")
     add_cache(parser)
     add_executors(parser)
@@ -311,7 +311,7 @@ def diet_text(reports: Sequence[DietReport], style: Style) -> str:
 def _model(report: DietReport, style: Style) -> str:
     head = style.paint(visible(report.model), BOLD)
     if report.quick:
-        head += "  " + style.paint("quick: short runs, rough times", YELLOW)
+        head += "  " + style.paint("quick: short runs and rough times", YELLOW)
     lines = [head]
     names = [scenario.name for scenario in report.scenarios if scenario.status == "ok"]
     lines += style.wrap(f"in {name_list(names)}" if names else "in no scenario", "  ")
