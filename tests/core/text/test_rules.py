@@ -51,6 +51,7 @@ def catalogue_page() -> str:
 {errors} rules are errors, which keep the site from being published; {len(RULES) - errors} are
 warnings, which can be [silenced](course-map.md#silence). `coursebuild explain RULE` prints an
 entry; with `--format json`, it also says why [`--fix`](commands.md#fix) cannot mend a mistake.
+Where `--fix` or `--unsafe` stands over a message, that option mends it.
 """
     return head + "".join(
         f"\n## {title}\n" + "".join(_entry(RULES[name]) for name in group)
@@ -72,10 +73,10 @@ def _entry(rule: Rule) -> str:
         sentences.append(rule.summary)
     outputs = "".join(case.expected for case in CASES[rule.name])
     options = [o for o in ("--fix", "--fix --unsafe") if f"\n{o} writes" in outputs]
-    if options:
-        sentences.append(" or ".join(f"`{option}`" for option in options) + " mends it.")
     if command_of(case) != "check":
         sentences.append(f"Reported by `coursebuild {command_of(case)}`.")
+    if options:
+        sentences.append(", ".join(f"`{option.split()[-1]}`" for option in options))
     text = f"{' '.join(sentences)}\n\n" if sentences else ""
     return f"\n### {rule.name}\n\n{text}{message}\n"
 
