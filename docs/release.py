@@ -2,6 +2,8 @@
 
 Entry points, as commands: `python docs/release.py WORD …`.
 
+- `owner https://github.com/NAME/coursebuild https://NAME.github.io/coursebuild/`: writes these
+  addresses, of the repository and of its site, wherever they are named.
 - `version 0.2.0`: writes a new version wherever it stands, and its heading into CHANGELOG.md.
 - `check [TAG]`: fails if files differ in the version, or if a tag of this commit is another one.
 - `maps FOLDER`: completes the maps in a copy of the sources with what only the publisher knows: the
@@ -40,7 +42,7 @@ PLACES = {
         '"coursebuild",\n      "version": "{}",\n',
     ],
     "docs/how-to/continuous-integration.md": [
-        "OWNER/coursebuild@v{}\n",
+        "/coursebuild@v{}\n",
         "    version: {}\n",
         "    rev: v{}\n",
     ],
@@ -61,6 +63,35 @@ def set_version(version: str) -> None:
     text = changes.read_text(encoding="utf-8")
     heading = f"## Unreleased\n\n## {version}\n"
     changes.write_text(text.replace("## Unreleased\n", heading, 1), encoding="utf-8")
+
+
+def set_owner(repository: str, site: str) -> None:
+    """Write the addresses of the repository, on GitHub, and of its site, which ends in a slash."""
+    name = repository.removeprefix("https://github.com/")
+    if not re.fullmatch(r"[\w.-]+/coursebuild", name) or not re.fullmatch(r"https://\S+/", site):
+        raise SystemExit("as `owner https://github.com/NAME/coursebuild https://SITE/`, please")
+    links = f"**[Open the course]({site})**, made with coursebuild, or [the manual]({site}docs/)."
+    for path, old, new in (
+        ("coursebuild/__init__.py", 'REPOSITORY = ""\n', f'REPOSITORY = "{repository}"\n'),
+        ("coursebuild/__init__.py", 'SITE = ""\n', f'SITE = "{site}"\n'),
+        ("README.md", "<!-- links to the site -->\n", f"{links}\n"),
+        (
+            "CITATION.cff",
+            "\nauthors:\n",
+            f"\nrepository-code: {repository}\nurl: {site}\nauthors:\n",
+        ),
+        ("docs/how-to/continuous-integration.md", "OWNER/coursebuild", name),
+        (
+            "docs/how-to/continuous-integration.md",
+            "`OWNER` is\nwhoever owns the repository; t",
+            "T",
+        ),
+        ("docs/explanation/dependencies.md", "OWNER/coursebuild", name),
+    ):
+        text = (ROOT / path).read_text(encoding="utf-8")
+        if old not in text:
+            raise SystemExit(f"{path} has an owner already")
+        (ROOT / path).write_text(text.replace(old, new), encoding="utf-8")
 
 
 def check_places() -> None:
@@ -168,6 +199,8 @@ def write_notes(release: Path) -> None:
 def main(word: str, *arguments: str) -> None:
     """Do what the first word says."""
     match word:
+        case "owner":
+            set_owner(*arguments)
         case "version":
             set_version(*arguments)
         case "check":

@@ -24,12 +24,13 @@ PLACES = (
     "editors/vscode/package-lock.json",
     "docs/how-to/continuous-integration.md",
 )
+OWNER_PLACES = ("README.md", "docs/explanation/dependencies.md")
 
 
 @pytest.fixture
 def repository(tmp_path: Path) -> Path:
     """A repository of the files that have a version."""
-    for path in (*PLACES, "docs/release.py", "CHANGELOG.md"):
+    for path in (*PLACES, *OWNER_PLACES, "docs/release.py", "CHANGELOG.md"):
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / path, tmp_path / path)
     git(tmp_path, "init", "-q")
@@ -66,6 +67,22 @@ def test_a_new_version_is_written_everywhere(repository: Path) -> None:
     commit(repository)
     git(repository, "tag", "v9.0.0")
     assert release(repository, "check") == ""
+
+
+def test_the_owner_is_written_wherever_there_was_none(repository: Path) -> None:
+    address, site = "https://github.com/apple/coursebuild", "https://apple.github.io/coursebuild/"
+    call = "as `owner https://github.com/NAME/coursebuild https://SITE/`, please\n"
+    assert release(repository, "owner", "apple/tree", site) == call
+    assert release(repository, "owner", address, site.removesuffix("/")) == call
+    assert release(repository, "owner", address, site) == ""
+    assert not [path for path in repository.rglob("*.md") if "OWNER" in path.read_text("utf-8")]
+    assert f"**[Open the course]({site})**" in (repository / "README.md").read_text("utf-8")
+    tool = (repository / "coursebuild/__init__.py").read_text("utf-8")
+    assert f'\nREPOSITORY = "{address}"\n' in tool and f'\nSITE = "{site}"\n' in tool
+    assert release(repository, "version", "9.0.0") == ""
+    assert release(repository, "owner", address, site) == (
+        "coursebuild/__init__.py has an owner already\n"
+    )
 
 
 def test_files_with_another_version_are_named(repository: Path) -> None:

@@ -29,7 +29,7 @@ WEEKLY = ".github/workflows/weekly.yml"
 TEMPLATES = ROOT / "coursebuild/features/authoring/course"
 WRITTEN = {path: (TEMPLATES / Path(path).name).read_text() for path in (COURSE, WEEKLY)}
 PINNED_ACTION = re.compile(
-    r"[\w-]+/[\w/-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+\b.*|\./|OWNER/coursebuild@v"
+    r"[\w-]+/[\w/-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+\b.*|\./|[\w-]+/coursebuild@v"
     + re.escape(__version__)
 )
 INSTALLATION = re.compile(
