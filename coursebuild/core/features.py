@@ -1,19 +1,9 @@
 """The interface of features: kinds of fences and pages, files of a site, exports, commands.
 
-Entry point: `Feature`, with `FenceKind`, `PageKind`, `ModelPart`, `PagePart`, `PageCopy`,
-`Trials`, `Exporter`, `Command` and `ExecutorKind`.
-
-A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
-points `coursebuild.features` of any installed package, or in a file that the course map names
-(`features = ["features/NAME.py"]`; see `registry.use_course_features`). All three work alike.
-docs/how-to/features.md says how to write one.
-
-What the core asks of a parsed block are methods of `FeatureBlock` (`core.model`), so that a parsed
-course can be used without loading its features. What pages and other features ask of it stands in
-its `FenceKind`.
-
-All that features are given is defined below this module: `Fence`, `Library`, `PageContext` and so
-on know no feature. What asks features, from parsing a fence to listing pages, is above `registry`.
+A feature is a module with a `FEATURE`, in `coursebuild.features`, under the entry points
+`coursebuild.features` of any installed package, or in a file that the course map names; see
+docs/how-to/features.md. What the core asks of a parsed block are methods of `FeatureBlock`
+(`core.model`), so that a parsed course can be used without loading its features.
 """
 
 from __future__ import annotations
@@ -157,10 +147,7 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
 
 
 class PageKind(Struct, frozen=True, kw_only=True):
-    """A page that a feature adds to the site, at `NAME/index.html`.
-
-    The interface texts `NAME.title` and `NAME.description` are its title and description.
-    """
+    """A page of a feature at `NAME/index.html`, with texts `NAME.title` and `NAME.description`."""
 
     name: str
     values: Callable[[Library], Mapping[str, object]]

@@ -1,15 +1,6 @@
-"""What MuJoCo says about models and MJCF blocks, as diagnostics at the right line.
+"""What MuJoCo says about models, MJCF blocks and declared scenarios, at the right line.
 
-Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, models, texts)`.
-
-1. `mjcf_texts` makes a whole model of each `mjcf` block and of each block of a feature that holds
-   a model, and counts the lines put before the author's.
-2. `check_compiled` compares the results of the compiler with what the lesson says, and lets
-   features check the names that they use. A file that only other models include need not compile
-   by itself.
-3. The scenarios declared for a model are compared with it: the model has what they name, states and
-   commands have as many numbers as it takes, and its timestep divides the times at which the state
-   is sampled and commands change.
+A file that only other models include need not compile by itself.
 """
 
 from __future__ import annotations

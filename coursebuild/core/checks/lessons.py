@@ -1,8 +1,4 @@
-"""Check a whole course: lessons, links, mentions, terms, formulas and the rules of features.
-
-Entry points: `check_course`; `check_document`, the same for one document; `document_formulas`, and
-`check_formulas`, which reports those that do not parse or look mistyped.
-"""
+"""Check a whole course: lessons, terms, formulas and the rules of features."""
 
 from __future__ import annotations
 
@@ -88,7 +84,6 @@ def _check_core_rules(
 
 
 def _check_features(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:
-    """Yield what features find wrong in some documents of a course."""
     for feature in features():
         if feature.check is not None:
             try:
@@ -112,7 +107,6 @@ def _find_failing(
 
 
 def _check_unproven(course: Course) -> Iterator[Diagnostic]:
-    """Report scripts that the map lets pass unproven and that are not there, or always run."""
     scripts = {s.path: s for document in course.documents for s in document_scripts(document)}
     first: dict[str, Span] = {}
     for entry in course.unproven:

@@ -1,11 +1,4 @@
-"""Check that every link, mention and image of the sources leads somewhere.
-
-Entry points: `link_targets(course)`; `check_links`, for one document.
-
-1. Collect what can be linked to: lessons, levels, pages, models, scripts, files, and the anchors of
-   each document.
-2. Walk each document's inlines and compare.
-"""
+"""Check that every link, mention and image of the sources leads somewhere."""
 
 from __future__ import annotations
 
@@ -17,38 +10,7 @@ from urllib.parse import SplitResult, unquote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.model import (
-    Course,
-    Document,
-    ExampleTarget,
-    HtmlBlock,
-    Image,
-    LessonTarget,
-    LevelTarget,
-    Link,
-    MjcfModel,
-    ModelTarget,
-    PageTarget,
-    RawInline,
-    Target,
-    Term,
-    TermTarget,
-    UrlTarget,
-    block_inlines,
-    computed_once,
-    document_anchors,
-    document_blocks,
-    document_scripts,
-    find_inlines,
-    is_comment,
-    line_anchor,
-    linked_lines,
-    listing_anchor,
-    local_file,
-    model_anchors,
-    resolve,
-    walk_inlines,
-)
+from coursebuild.core import model
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -68,10 +30,10 @@ _HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", 
 class LinkTargets(Struct, frozen=True):
     """Everything that a link may lead to."""
 
-    lessons: Mapping[str, Document | None]
+    lessons: Mapping[str, model.Document | None]
     levels: frozenset[str]
-    pages: Mapping[str, Document | None]
-    models: Mapping[str, MjcfModel]
+    pages: Mapping[str, model.Document | None]
+    models: Mapping[str, model.MjcfModel]
     scenarios: Mapping[str, tuple[str, ...]]
     """Those that models declare, by the model's name."""
     scripts: frozenset[str]
@@ -80,19 +42,19 @@ class LinkTargets(Struct, frozen=True):
     """The first definition of each, by its id."""
 
 
-def link_targets(course: Course) -> LinkTargets:
+def link_targets(course: model.Course) -> LinkTargets:
     """What the course offers as targets."""
     scripts: set[str] = set()
     terms: dict[str, Span] = {}
     for document in course.documents:
-        scripts.update(script.path for script in document_scripts(document))
-        for term in find_inlines(document, Term):
+        scripts.update(script.path for script in model.document_scripts(document))
+        for term in model.find_inlines(document, model.Term):
             terms.setdefault(term.id, term.span)
     return LinkTargets(
         {lesson.id: lesson.document for lesson in course.lessons},
         frozenset(level.id for level in course.levels),
         {page.id: page.document for page in course.pages},
-        {model.name: model for model in course.models},
+        {mjcf.name: mjcf for mjcf in course.models},
         {d.model: tuple(scenario.name for scenario in d.scenarios) for d in course.declarations},
         frozenset(scripts),
         frozenset(course.files),
@@ -100,40 +62,41 @@ def link_targets(course: Course) -> LinkTargets:
     )
 
 
-def anchors(document: Document) -> Mapping[str, Span]:
-    """The ids that a link may name in a document, and the spans to which they lead.
-
-    For lines of scripts, see `_check_anchor`. They are kept with the document.
-    """
+def anchors(document: model.Document) -> Mapping[str, Span]:
+    """The ids that a link may name in a document, but for lines of scripts, and their spans."""
 
     def collect() -> dict[str, Span]:
-        return {id: span for id, _, span in document_anchors(document)}
+        return {id: span for id, _, span in model.document_anchors(document)}
 
-    return computed_once(document, "anchors", collect)
+    return model.computed_once(document, "anchors", collect)
 
 
-def check_links(course: Course, document: Document, targets: LinkTargets) -> Iterator[Diagnostic]:
+def check_links(
+    course: model.Course, document: model.Document, targets: LinkTargets
+) -> Iterator[Diagnostic]:
     """Report each link, mention or image of a document that leads nowhere."""
     recorded_spans = {figure.span for figure in recorded_figures(document)}
-    for block in document_blocks(document):
-        if isinstance(block, HtmlBlock):
+    for block in model.document_blocks(document):
+        if isinstance(block, model.HtmlBlock):
             yield from _check_html(block, course, document, targets)
-        for inline in walk_inlines(block_inlines(block)):
-            if isinstance(inline, Link):
-                target = resolve(inline.target, course, document.source.path)
+        for inline in model.walk_inlines(model.block_inlines(block)):
+            if isinstance(inline, model.Link):
+                target = model.resolve(inline.target, course, document.source.path)
                 yield from _check_link(inline, target, document, targets)
-            elif isinstance(inline, Image) and inline.url_span not in recorded_spans:
+            elif isinstance(inline, model.Image) and inline.url_span not in recorded_spans:
                 place, subject = inline.url_span, "the image "
                 yield from _check_media(subject, inline.url, place, document, targets)
-            elif isinstance(inline, RawInline):
+            elif isinstance(inline, model.RawInline):
                 yield from _check_html(inline, course, document, targets)
 
 
 def _check_html(
-    html: HtmlBlock | RawInline, course: Course, document: Document, targets: LinkTargets
+    html: model.HtmlBlock | model.RawInline,
+    course: model.Course,
+    document: model.Document,
+    targets: LinkTargets,
 ) -> Iterator[Diagnostic]:
-    """Check raw HTML: what the course allows, links to this page, and the files that it shows."""
-    if course.html == "none" and not (is_comment(html) or html.html.startswith("</")):
+    if course.html == "none" and not (model.is_comment(html) or html.html.startswith("</")):
         message, help = "the course allows no raw HTML", "write it in Markdown"
         yield diagnose("html-forbidden", html.span, message, help=help)
     elif course.html == "safe":
@@ -151,60 +114,59 @@ def _check_html(
 
 
 def _check_link(
-    link: Link, target: Target, document: Document, targets: LinkTargets
+    link: model.Link, target: model.Target, document: model.Document, targets: LinkTargets
 ) -> Iterator[Diagnostic]:
     span = link.target_span
-    if isinstance(target, UrlTarget):
+    if isinstance(target, model.UrlTarget):
         yield from _check_url(span, target.url, document, targets)
         return
     lacks = "is not in the course map"
     names: Collection[str]
     match target:
-        case LessonTarget(id=name):
+        case model.LessonTarget(id=name):
             rule, names, missing = "link-lesson", targets.lessons, f"lesson {name} {lacks}"
-        case LevelTarget(id=name):
+        case model.LevelTarget(id=name):
             rule, names, missing = "link-level", targets.levels, f"level {name} {lacks}"
-        case PageTarget(id=name):
+        case model.PageTarget(id=name):
             rule, names, missing = "link-page", targets.pages, f"no page `{name}` in the course map"
-        case ModelTarget(name=name):
+        case model.ModelTarget(name=name):
             rule, names, missing = "link-model", targets.models, f"no model `{name}` in models/"
-        case ExampleTarget(path=name):
+        case model.ExampleTarget(path=name):
             missing = f"no lesson has a script `{name}`"
             rule, names = "link-example", targets.scripts
-        case TermTarget(id=name):
+        case model.TermTarget(id=name):
             missing = f"no lesson defines the term `{name}`"
             rule, names = "link-term", targets.terms
         case _:
             assert_never(target)
     if name not in names:
-        if isinstance(target, LessonTarget) and target.id in targets.levels:
+        if isinstance(target, model.LessonTarget) and target.id in targets.levels:
             help = f"{target.id} is a level: {_link_help('level', target.id)}"
             help = Fix(help, edits=_rename_kind(span, "Lesson", "Level"))
-        elif isinstance(target, LevelTarget) and target.id in targets.lessons:
+        elif isinstance(target, model.LevelTarget) and target.id in targets.lessons:
             help = f"{target.id} is a lesson: {_link_help('lesson', target.id)}"
             help = Fix(help, edits=_rename_kind(span, "Level", "Lesson"))
         else:
             help = _suggest_lesson(target, targets) or did_you_mean(name, names)
         yield diagnose(rule, span, missing, help=help)
-    elif isinstance(target, ModelTarget):
+    elif isinstance(target, model.ModelTarget):
         if target.anchor:
             # The ids that `templates/model.html` writes. Only scenarios that `models/NAME.toml`
             # declares have one, as others are unknown before they are measured.
             source, scenarios = targets.models[name].source, targets.scenarios.get(name, ())
-            ids = {*model_anchors(scenarios), listing_anchor(source.path)}
+            ids = {*model.model_anchors(scenarios), model.listing_anchor(source.path)}
             listings = {source.path: source.text.rstrip()}
             page_name = f"the page of the model `{name}`"
             yield from _check_anchor(span, target.anchor, page_name, ids, listings)
-    elif isinstance(target, LessonTarget):
+    elif isinstance(target, model.LessonTarget):
         lesson = targets.lessons[name]
         yield from _check_document_anchor(span, target.anchor, lesson, f"lesson {name}")
-    elif isinstance(target, PageTarget):
+    elif isinstance(target, model.PageTarget):
         page = targets.pages[name]
         yield from _check_document_anchor(span, target.anchor, page, f"page `{name}`")
 
 
 def _link_help(kind: str, id: str) -> str:
-    """How to write a link to a lesson, a level or a page."""
     if kind == "level":
         return f"write `Level {id}` in the text, which becomes a link"
     if kind == "lesson":
@@ -213,7 +175,6 @@ def _link_help(kind: str, id: str) -> str:
 
 
 def _rename_kind(span: Span, old: str, new: str) -> tuple[Edit, ...]:
-    """The edit of the word before the number in a mention."""
     start = span.start - len(old) - 1
     place = span.source.span(start, start + len(old)) if start >= 0 else span
     return (Edit(place, new),) if place.text == old else ()
@@ -223,9 +184,9 @@ _LESSON_NAME = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
 """A file name or an address that begins with the id of a lesson, as in `4.2-inertia.md`."""
 
 
-def _suggest_lesson(target: Target, targets: LinkTargets) -> str:
+def _suggest_lesson(target: model.Target, targets: LinkTargets) -> str:
     """A help: the lesson whose file or slug the link names, or those of its level."""
-    if not isinstance(target, LessonTarget):
+    if not isinstance(target, model.LessonTarget):
         return ""
     match = _LESSON_NAME.fullmatch(target.id)
     if match and match[1] in targets.lessons:
@@ -241,13 +202,13 @@ def _suggest_lesson(target: Target, targets: LinkTargets) -> str:
 
 
 def _check_document_anchor(
-    span: Span, anchor: str | None, document: Document | None, page_name: str
+    span: Span, anchor: str | None, document: model.Document | None, page_name: str
 ) -> Iterator[Diagnostic]:
     if anchor and document is None:
         message = f"{page_name} is planned, so it has no anchor `#{anchor}` yet"
         yield diagnose("link-anchor", span, message, help="link to the lesson itself")
     elif anchor and document is not None:
-        listings = {script.path: script.code.text for script in document_scripts(document)}
+        listings = {script.path: script.code.text for script in model.document_scripts(document)}
         yield from _check_anchor(span, anchor, page_name, anchors(document), listings)
 
 
@@ -258,8 +219,8 @@ def _check_anchor(
     name = unquote(anchor)
     if name in ids:
         return
-    listing, first, last = linked_lines(name) or ("", 0, 0)
-    path = next((p for p in listings if line_anchor(p, first) == f"{listing}.L{first}"), None)
+    listing, first, last = model.linked_lines(name) or ("", 0, 0)
+    path = next((p for p in listings if model.line_anchor(p, first) == f"{listing}.L{first}"), None)
     if path is None:
         help = did_you_mean(anchor, ids)
     else:
@@ -275,7 +236,7 @@ def _check_anchor(
 
 
 def _check_url(
-    span: Span, url: str, document: Document, targets: LinkTargets
+    span: Span, url: str, document: model.Document, targets: LinkTargets
 ) -> Iterator[Diagnostic]:
     parts = urlsplit_or_none(url)
     if parts is None:
@@ -303,9 +264,9 @@ _ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
 
 
 def _check_file(
-    url: str, span: Span, document: Document, targets: LinkTargets
+    url: str, span: Span, document: model.Document, targets: LinkTargets
 ) -> Iterator[Diagnostic]:
-    path = local_file(url, document.source.path)
+    path = model.local_file(url, document.source.path)
     if path not in targets.files:
         help = _suggest_file(path, url, document.source.path, targets)
         yield diagnose("link-file", span, f"no file `{path}`", help=help)
@@ -333,9 +294,8 @@ def _suggest_file(path: str, url: str, source_path: str, targets: LinkTargets) -
 
 
 def _check_media(
-    subject: str, url: str, span: Span, document: Document, targets: LinkTargets
+    subject: str, url: str, span: Span, document: model.Document, targets: LinkTargets
 ) -> Iterator[Diagnostic]:
-    """Check that a file that a page shows is one of the course."""
     parts = urlsplit_or_none(url)
     if parts is None or parts.scheme or parts.netloc:
         message = f"{subject}`{url}` is not a file of the course"

@@ -1,7 +1,4 @@
-"""Blocks: what a document is made of.
-
-Entry points: the union `Block`, and `Document`.
-"""
+"""Blocks: what a document is made of."""
 
 from __future__ import annotations
 
@@ -88,10 +85,7 @@ class Callout(Struct, frozen=True):
 
 
 class CodeBlock(Labelled, frozen=True):
-    """A fenced or indented code block that has no meaning of its own here.
-
-    `info` is the raw info string, `language` its first word.
-    """
+    """A code block that has no meaning of its own here; `language` is the first word of `info`."""
 
     span: Span
     language: str
@@ -109,10 +103,7 @@ class HtmlBlock(Struct, frozen=True):
 
 
 class HtmlFlow(Struct, frozen=True):
-    """HTML in a quiz text, where math between the tags is still math.
-
-    `children` are raw tags and inlines in order, without a paragraph around them.
-    """
+    """HTML in a quiz text: raw tags and inlines, as math between the tags is still math."""
 
     span: Span
     children: tuple[Inline, ...]
@@ -265,10 +256,7 @@ class Recording(Struct, frozen=True):
 
 
 class Mjcf(Labelled, frozen=True):
-    """A model or fragment in MJCF.
-
-    `fragment` names the element that it belongs into, `error` the message it must fail with.
-    """
+    """A model, or what belongs into the element `fragment`; it may have to fail with `error`."""
 
     span: Span
     code: Excerpt
@@ -300,10 +288,7 @@ class PlainCode(Labelled, frozen=True):
 
 
 class FeatureBlock(Labelled, frozen=True):
-    """A block that a feature adds; its methods answer what the rest of the tool must know.
-
-    A block without something need not override the method.
-    """
+    """A block that a feature adds; its methods answer what the rest of the tool must know."""
 
     span: Span
 
@@ -368,10 +353,7 @@ Block: TypeAlias = (
 
 
 class Footnote(Struct, frozen=True):
-    """A footnote that the text refers to.
-
-    `number` is its place in the order of first reference, `references` how many there are.
-    """
+    """A footnote that the text refers to; numbers follow the order of first reference."""
 
     span: Span
     label: str

@@ -1,7 +1,4 @@
-"""Inlines: the content of a paragraph, a heading or a cell.
-
-Entry points: the union `Inline`; `plain_text`, `without_links`.
-"""
+"""Inlines: the content of a paragraph, a heading or a cell."""
 
 from __future__ import annotations
 
@@ -240,11 +237,7 @@ class HardBreak(Struct, frozen=True):
 
 
 class FootnoteRef(Struct, frozen=True):
-    """`[^label]`.
-
-    `number` is its place in the order of first reference, `occurrence` counts references to it,
-    both from 1.
-    """
+    """`[^label]`, with its place in the order of first reference and its own among them, from 1."""
 
     span: Span
     label: str

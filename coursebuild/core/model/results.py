@@ -1,8 +1,4 @@
-"""The results of running a course: values made by runners, read by comparisons, reports and pages.
-
-Entry points: `ScriptRun`, `Verdict`. They are part of the model because the stages that make them
-and those that read them do not import each other.
-"""
+"""The results of running a course: values made by runners, read by comparisons, reports, pages."""
 
 from __future__ import annotations
 
@@ -194,10 +190,7 @@ class DriftKind(enum.Enum):
 
 
 class Change(Struct, frozen=True):
-    """One difference between a recorded output and a run.
-
-    For a number, `relative_error` and `digits` say how far apart the two values are.
-    """
+    """One difference between a recorded output and a run; for a number, how far apart they are."""
 
     kind: DriftKind
     span: Span
@@ -230,10 +223,7 @@ class Formula(Struct, frozen=True):
 
 
 class MathError(Struct, frozen=True):
-    """Why a formula does not parse.
-
-    `position` is an offset in code points into the TeX, `None` where unknown.
-    """
+    """Why a formula does not parse; the position is in code points of its TeX, if it is known."""
 
     message: str
     position: int | None

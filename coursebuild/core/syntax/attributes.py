@@ -1,10 +1,4 @@
-"""Attributes in braces after inline content and headings, and the anchors of a document.
-
-Entry points: `TERM`, `SYMBOL` and `LABEL`, which find braces, also on the next line, as does
-`split_label`; `read_pairs`, `read_term` and `read_meaning`, which read them; `read_attributes`
-(`## Title {#id .class}`), `Anchors` (unique ids), `slug`, `check_heading`. A value with spaces
-stands in quotes.
-"""
+"""Attributes in braces after inline content and headings, and the anchors of a document."""
 
 from __future__ import annotations
 
@@ -204,7 +198,6 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
 
 
 def _reject(title: Excerpt, place: Excerpt, message: str, help: str = _HELP) -> Parsed[Attributes]:
-    """A heading without attributes, as those that it has are wrong at `place`."""
     diagnostic = diagnose("heading-attributes", place.span(), message, help=help)
     return Parsed(Attributes(title), (diagnostic,))
 
@@ -309,7 +302,6 @@ def check_heading(
 
 
 def _deepen(heading: Span, levels: int) -> tuple[Edit, ...]:
-    """The edit that gives a heading so many more levels, if it begins with `#`."""
     marks = re.match("#+", heading.text)
     if marks is None:
         return ()

@@ -1,12 +1,6 @@
 """Fences become blocks according to their kind: scripts, code that is only shown, models.
 
-Entry points: `read_block`; `parse_python`. Fences of features are read by the features.
-
-1. Keys of a script: `file`, `timeout`, `requires`, `args`, `figure`, `norun`, `diverges`, `deep`,
-   `writes`, `record`. Code that is only shown may have `fragment`, if it need not parse, or `show`,
-   if it is copied from a file.
-2. `mjcf` is a model or a fragment of one. Keys: `fragment="worldbody"` (where the fragment goes;
-   `worldbody/body` names nested elements), `error="…"` (the message it must fail with).
+Fences of features are read by the features.
 """
 
 from __future__ import annotations
@@ -252,7 +246,6 @@ def read_block(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
 
 
 def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
-    """The block of a fence; recorded outputs are read in `recording`."""
     if not fence.is_closed or fence.inner is not None:
         return _read_unclosed(fence, state)
     match fence.kind:

@@ -1,14 +1,6 @@
 """The file beside a model, models/NAME.toml: its scenarios, and the findings of `diet` to keep.
 
-Entry point: `parse_declarations(source)`.
-
-1. The TOML is read into nodes, and these into the declared tables, from which the JSON Schema for
-   editors is made too.
-2. Rules that types cannot express are checked on every table whose own fields are right: names
-   differ, a duration is a whole number of samples and a sample one of timesteps, all commands have
-   the same length.
-3. If nothing is wrong, the tables become the declarations. What depends on the compiled model is
-   checked in `core/checks/compiled`.
+What depends on the compiled model is checked in `core/checks/compiled`.
 """
 
 from __future__ import annotations

@@ -1,14 +1,8 @@
 """Fences: code blocks of the text, of which other modules make scripts, quizzes and so on.
 
-Entry points: `read_fence`, which makes a `Fence` of a token; `find_likely_end` and
-`find_likely_start`, which guess where a fence was meant to end or begin; `TextParser` and
-`Prose.read`, for the Markdown in fences of features, which shares the footnotes, anchors and rules
-of its document.
-
-Info strings are `kind [name] [key=value | key="value with spaces" | flag]…`: `read_keys`
-compares the words after the kind with the keys that it has (for a `Fence`, call its method `keys`),
-`split_words` only splits. In a quoted value a backslash stands before a quote and a backslash.
-Mistakes are diagnostics at the word that is wrong; the rest is still read.
+Info strings are `kind [name] [key=value | key="value with spaces" | flag]…`. In a quoted value a
+backslash stands before a quote and a backslash. Mistakes are diagnostics at the word that is wrong;
+the rest is still read.
 """
 
 from __future__ import annotations
@@ -226,7 +220,6 @@ def _diagnose_malformed(info: Excerpt, at: int, end: int) -> tuple[Diagnostic, i
 
 
 def _unescape(value: Excerpt) -> Excerpt:
-    """A quoted value without its backslashes."""
     escapes = [(match.start(), match.start(1)) for match in _ESCAPE.finditer(value.text)]
     starts, ends = [0, *(b for _, b in escapes)], [*(a for a, _ in escapes), len(value.text)]
     return Excerpt.join([value.slice(a, b) for a, b in zip(starts, ends, strict=True)])
@@ -363,7 +356,6 @@ def find_likely_start(head: Span) -> Span | None:
 
 
 def _is_python(text: str) -> bool:
-    """Whether a text parses as Python."""
     try:
         ast.parse(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError):

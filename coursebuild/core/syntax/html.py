@@ -1,8 +1,5 @@
 """Raw HTML: its tags, whether they balance, the files that it shows, and what it must not hold.
 
-Entry points: `tags` and `tag_at`, which scan; `Balance`, which tracks open elements; `find_media`;
-`find_address`, the place of an address; `find_forbidden`.
-
 Elements whose end tag may be left out, void elements, comments and raw text never give a false
 alarm. An element must be closed in the block, list item or emphasis in which it was opened, as it
 would break the structure of the page otherwise.
@@ -81,7 +78,6 @@ def tag_at(text: str, at: int) -> Tag | None:
 
 @functools.lru_cache(maxsize=4)
 def _end_tag_ends(text: str, name: str) -> list[int]:
-    """The offsets at which the end tags of an element end."""
     return [match.end() for match in re.finditer(rf"</{name}\s*>", text, re.IGNORECASE)]
 
 
@@ -196,17 +192,13 @@ def find_address(text: str, url: str) -> tuple[int, int] | None:
 
 
 def _attributes(text: str, tag: Tag) -> Iterator[tuple[str, int, int]]:
-    """The names of the attributes with a value, and where these values stand.
-
-    They are read one after the other, as the text of one may occur in the value of another.
-    """
+    """The attributes with a value, and its place; in order, as a value may hold others."""
     for match in _ATTRIBUTE.finditer(text, tag.start, tag.end) if tag.name else ():
         if match[1]:
             yield match[1].lower(), *match.span(match.lastindex or 0)
 
 
 def _addresses(text: str, attribute: str, start: int, end: int) -> Iterator[tuple[int, int]]:
-    """The places of the addresses in the value of an attribute."""
     if attribute == "srcset":
         for candidate in _CANDIDATE.finditer(text, start, end):
             yield candidate.span(1)
@@ -304,7 +296,7 @@ def _check_tag(html: str, tag: re.Match[str]) -> Iterator[tuple[int, int, str]]:
 
 
 def _find_forbidden_part(element: str, name: str, value: str) -> str:
-    """The part of an attribute that is forbidden, in words; empty if it is allowed."""
+    """The forbidden part of an attribute, in words; empty if it is allowed."""
     if "</title" in value.lower():  # ends a `<title>` of HTML even inside quotes
         return f"`{name}` with the end of a title"
     if name in _ADDRESSES:

@@ -1,15 +1,4 @@
-"""Inline content: markdown-it's inline tokens become `Inline` nodes with spans.
-
-Entry point: `read_inlines`. There is one pass over the flat tokens, with a stack of open
-emphasis, strong, strikethrough, links and terms:
-
-1. Texts and soft line ends are collected; the next token of another kind turns them into `Text`,
-   `SoftBreak` and links of mentions.
-2. An opening token puts a frame on the stack; its closing token makes a node of the nodes collected
-   since.
-3. Mistakes are reported on the way: wrong attributes and schemes, images without text, unknown
-   footnotes, formulas without end.
-"""
+"""Inline content: one pass over markdown-it's flat tokens makes `Inline` nodes with spans."""
 
 from __future__ import annotations
 
@@ -21,24 +10,7 @@ from markdown_it.helpers import parseLinkDestination
 from markdown_it.token import Token
 from msgspec import Struct, field
 
-from coursebuild.core.model import (
-    Citation,
-    CitedWork,
-    CodeSpan,
-    Emphasis,
-    FootnoteRef,
-    HardBreak,
-    Image,
-    Inline,
-    Link,
-    Math,
-    NumberBinding,
-    RawInline,
-    Strikethrough,
-    Strong,
-    Term,
-    plain_text,
-)
+from coursebuild.core import model
 from coursebuild.core.syntax.attributes import collapse_spaces, read_meaning, read_term, term_id
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
@@ -70,7 +42,7 @@ class _Frame(Struct):
     """An open inline, and the nodes in it so far."""
 
     token: PositionedToken | None
-    nodes: list[Inline] = field(default_factory=list)
+    nodes: list[model.Inline] = field(default_factory=list)
 
 
 def read_inlines(
@@ -81,11 +53,11 @@ def read_inlines(
     *,
     mentions: bool = True,
     html: bool = False,
-) -> tuple[Inline, ...]:
+) -> tuple[model.Inline, ...]:
     """The inlines of a block's content.
 
-    `mentions` says whether "Lesson 2.2" becomes a link. In `html` only tags, entities and formulas
-    are read, and its elements may be closed in another block.
+    In `html` only tags, entities and formulas are read, and its elements may be closed in
+    another block.
     """
     tokens = inline_tokens(content.text, {"references": references}, html=html)
     reader = _TokenReader(content, state, references, balance, mentions)
@@ -98,7 +70,7 @@ def read_inlines(
 
 
 class _TokenReader:
-    """Reads the tokens of one block's content."""
+    """Reads the tokens of one block, with a stack of open emphasis, links and terms."""
 
     def __init__(
         self,
@@ -119,7 +91,9 @@ class _TokenReader:
         self.open_literals = 0
         """How many elements of HTML are open in which every character stands for itself."""
 
-    def read(self, tokens: Iterable[PositionedToken], *, html: bool = False) -> tuple[Inline, ...]:
+    def read(
+        self, tokens: Iterable[PositionedToken], *, html: bool = False
+    ) -> tuple[model.Inline, ...]:
         for token in tokens:
             kind = token.type
             if kind in ("text", "text_special"):
@@ -193,39 +167,39 @@ class _TokenReader:
             return
         opening, children = frame.token, tuple(frame.nodes)
         assert opening is not None
-        node: Inline | None
+        node: model.Inline | None
         match token.type:
             case "link_close":
                 node = self._close_link(opening, token, children)
             case "term_close":
                 node = self._close_term(opening, token, children)
             case "strong_close":
-                node = Strong(self.content.span(opening.start - 1, token.end + 1), children)
+                node = model.Strong(self.content.span(opening.start - 1, token.end + 1), children)
             case "em_close":
-                node = Emphasis(self.content.span(opening.start, token.end), children)
+                node = model.Emphasis(self.content.span(opening.start, token.end), children)
             case _:
-                node = Strikethrough(self.content.span(opening.start, token.end), children)
+                node = model.Strikethrough(self.content.span(opening.start, token.end), children)
         self.open_links -= token.type in ("link_close", "term_close")
         siblings.extend(children if node is None else (node,))
 
     def _close_term(
-        self, opening: PositionedToken, closing: PositionedToken, children: tuple[Inline, ...]
-    ) -> Term | None:
+        self, opening: PositionedToken, closing: PositionedToken, children: tuple[model.Inline, ...]
+    ) -> model.Term | None:
         assert closing.map is not None
         span = self.content.span(opening.start, closing.end)
         report = self.report
         given_name = read_term(self.content.slice(*closing.map), report)
         if given_name is None:
             return None
-        name = given_name or collapse_spaces(plain_text(children))
+        name = given_name or collapse_spaces(model.plain_text(children))
         if not term_id(name):
             report(diagnose("term-attribute", span, "the term has no letters and no digits"))
             return None
-        return Term(span, children, name, term_id(name), bool(given_name))
+        return model.Term(span, children, name, term_id(name), bool(given_name))
 
     def _close_link(
-        self, opening: PositionedToken, closing: PositionedToken, children: tuple[Inline, ...]
-    ) -> Link | None:
+        self, opening: PositionedToken, closing: PositionedToken, children: tuple[model.Inline, ...]
+    ) -> model.Link | None:
         url = str(opening.attrs["href"])
         span = self.content.span(opening.start, closing.end)
         destination = self.content.span(opening.start + 1, closing.end - 1)
@@ -238,7 +212,7 @@ class _TokenReader:
         title, target = str(opening.attrs.get("title", "")), classify(url)
         if (diagnostic := check_link_text(target, children, span)) is not None:
             self.report(diagnostic)
-        return Link(span, target, destination, title, children)
+        return model.Link(span, target, destination, title, children)
 
     def _find_destination(self, start: int, label_end: int, end: int) -> Span:
         """The span of the destination of a link or image: in itself, or in its definition."""
@@ -264,7 +238,7 @@ class _TokenReader:
     def _add_leaf(self, token: PositionedToken) -> None:
         self._flush()
         span = self.content.span(token.start, token.end)
-        node: Inline | None = None
+        node: model.Inline | None = None
         match token.type:
             case "math":
                 node = self._read_math(token, span)
@@ -272,7 +246,7 @@ class _TokenReader:
                 self.state.diagnostics += check_inline_code(
                     self.content, token.start, token.end, token.content
                 )
-                node = CodeSpan(span, token.content, token.info == "code")
+                node = model.CodeSpan(span, token.content, token.info == "code")
             case "number_binding" | "number_given":
                 node = self._read_number(token, span)
             case "html_inline":
@@ -280,40 +254,42 @@ class _TokenReader:
             case "image":
                 node = self._read_image(token, span)
             case "hardbreak":
-                node = HardBreak(span)
+                node = model.HardBreak(span)
             case "footnote_ref":
                 node = self._read_footnote(token, span)
             case "citation":
-                node = Citation(span, tuple(self._read_works(token)))
+                node = model.Citation(span, tuple(self._read_works(token)))
             case _:
                 raise AssertionError(f"no inline for token {token.type}")
         if node is not None:
             self.stack[-1].nodes.append(node)
 
-    def _read_math(self, token: PositionedToken, span: Span) -> Math:
+    def _read_math(self, token: PositionedToken, span: Span) -> model.Math:
         assert token.map is not None
         if not token.content.strip():
             self.report(diagnose("math-syntax", span, "the formula is empty"))
         tex, display = self.content.slice(*token.map), token.info == "display"
         if token.meta["braces"] is None:
-            return Math(span, tex, display)
+            return model.Math(span, tex, display)
         braces, report = self.content.slice(*token.meta["braces"]), self.report
         if not display:
-            return Math(span, tex, display, None, *read_meaning(braces, report))
+            return model.Math(span, tex, display, None, *read_meaning(braces, report))
         label = take_label(braces, "eq", self.state)
-        return Math(span, tex, display, label)
+        return model.Math(span, tex, display, label)
 
-    def _read_number(self, token: PositionedToken, span: Span) -> NumberBinding:
+    def _read_number(self, token: PositionedToken, span: Span) -> model.NumberBinding:
         assert token.map is not None
         start, end = token.map
         if end - start == len(token.content) + 2:
             start, end = start + 1, end - 1
         place = self.content.span(start, end)
         if token.type == "number_given":
-            return NumberBinding(span, token.content, place, None, collapse_spaces(token.info))
-        return NumberBinding(span, token.content, place, token.info or None)
+            return model.NumberBinding(
+                span, token.content, place, None, collapse_spaces(token.info)
+            )
+        return model.NumberBinding(span, token.content, place, token.info or None)
 
-    def _read_html(self, token: PositionedToken, span: Span) -> RawInline:
+    def _read_html(self, token: PositionedToken, span: Span) -> model.RawInline:
         html = self.content.slice(token.start, token.end)
         for tag in tags(html.text):
             self.balance.add(tag, html)
@@ -322,9 +298,9 @@ class _TokenReader:
                 self.open_links = max(0, self.open_links + step)
             elif tag.name in LITERAL:
                 self.open_literals = max(0, self.open_literals + step)
-        return RawInline(span, html.text, find_media(html), find_forbidden(html))
+        return model.RawInline(span, html.text, find_media(html), find_forbidden(html))
 
-    def _read_image(self, token: PositionedToken, span: Span) -> Image:
+    def _read_image(self, token: PositionedToken, span: Span) -> model.Image:
         url, alt = str(token.attrs["src"]), alt_text(token.children or [])
         label_end = token.start + 2 + len(token.content)
         place = self._find_destination(token.start + 1, label_end, token.end)
@@ -336,20 +312,21 @@ class _TokenReader:
             help = "say in the brackets what it shows, for readers who cannot see it"
             message = "the image has no alternative text"
             self.report(diagnose("image-alt", span, message, help=help))
-        return Image(span, url, alt, str(token.attrs.get("title", "")), place)
+        return model.Image(span, url, alt, str(token.attrs.get("title", "")), place)
 
-    def _read_works(self, token: PositionedToken) -> Iterator[CitedWork]:
-        """The works of a citation."""
+    def _read_works(self, token: PositionedToken) -> Iterator[model.CitedWork]:
         at = token.start + 1
         for part in token.content.split(";"):
             before, _, rest = part.partition("@")
             key, _, locator = rest.partition(",")
             start = at + len(before) + 1
             span = self.content.span(start, start + len(key.rstrip()))
-            yield CitedWork(span, key.strip(), collapse_spaces(before), collapse_spaces(locator))
+            yield model.CitedWork(
+                span, key.strip(), collapse_spaces(before), collapse_spaces(locator)
+            )
             at += len(part) + 1
 
-    def _read_footnote(self, token: PositionedToken, span: Span) -> FootnoteRef | None:
+    def _read_footnote(self, token: PositionedToken, span: Span) -> model.FootnoteRef | None:
         reference = self.state.notes.refer(token.content, span)
         if reference is None:
             self.pieces.append(TextPiece(f"[^{token.content}]", token.start, token.end))

@@ -1,8 +1,4 @@
-"""Labels, by which formulas, figures, tables, listings and labs get numbers: `{#fig:flip}`.
-
-Entry points: `read_label`, of braces that `attributes` has found; `take_label`, which also keeps
-its id; `label_block`, for a block and the label on its first line; `reject_label`.
-"""
+"""Labels, by which formulas, figures, tables, listings and labs get numbers: `{#fig:flip}`."""
 
 from __future__ import annotations
 

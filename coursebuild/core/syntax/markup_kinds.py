@@ -1,9 +1,7 @@
 """The kinds of markup that readers would see as it is written.
 
-Entry points: `BROKEN`, markup of ours that is not whole; `FOREIGN`, that of other tools; `IN_HTML`,
-what is unread between tags; `ONCE`; `REWRITES`, what to write instead; `LANGUAGES` and
-`PLAIN_TEXTS`, of blocks. Patterns are searched for in a text in which NUL stands for all that was
-read, so that a mark directly after a NUL stands directly after a link, code and so on.
+Patterns are searched for in a text in which NUL stands for all that was read, so that a mark
+directly after a NUL stands directly after a link, code and so on.
 """
 
 from __future__ import annotations

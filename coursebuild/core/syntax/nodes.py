@@ -1,14 +1,7 @@
-"""Values of JSON and TOML that know where they stand.
+"""Values of JSON and TOML that know where they stand, and the words of messages for them.
 
-Entry points: the union `Node`, `Member`; for the parsers `replace_escapes`, `check_tex_escapes`,
-`tex_word` and `odd_character`. Both languages give the same nodes, so that one decoder serves both.
-
-A node keeps offsets into the excerpt that was parsed; its `span` in the lesson is worked out on
-demand. Nodes compare by identity: two equal numbers at two places are two nodes. Only their parser
-changes them.
-
-The words of messages for types and for the author's values: `Format` (`JSON`, `TOML`), `accepts`,
-`wrong_type_message`, `type_help`, `format_name`, `format_value`, `shorten`.
+Both languages give the same nodes, so that one decoder serves both. Nodes compare by identity: two
+equal numbers at two places are two nodes. Only their parser changes them.
 """
 
 from __future__ import annotations
@@ -56,7 +49,6 @@ class StringNode(_PositionedNode, eq=False):
 
     @property
     def value(self) -> str:
-        """The text, escapes resolved."""
         return self.excerpt.text
 
 

@@ -1,8 +1,4 @@
-"""The state that the readers of one document share: diagnostics, anchors, footnotes, scripts.
-
-Entry point: `ParsingState`. A document is read once, from its first line to its last, with the
-texts inside quizzes and labs.
-"""
+"""The state that the readers of one document share: diagnostics, anchors, footnotes, scripts."""
 
 from __future__ import annotations
 

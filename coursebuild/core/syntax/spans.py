@@ -1,13 +1,4 @@
-"""Tokens and parser states of markdown-it that keep positions.
-
-Entry points: `BlockState`, `InlineState` (markdown-it's parser states, whose tokens are
-`PositionedToken`s); `read_markdown`, `normalize`, `trim`.
-
-1. Block rules cut lines out of the text, a whole file or a text in JSON, by `getLines`;
-   `BlockState` cuts them as an excerpt.
-2. Inline rules work on one block's content; `InlineState` keeps the start and the end of each token
-   in it.
-"""
+"""Tokens and parser states of markdown-it that keep positions."""
 
 from __future__ import annotations
 

@@ -1,15 +1,4 @@
-"""Block content: markdown-it's block tokens become `Block` nodes with spans.
-
-Entry points: `TextReader`, which reads the blocks of a text; `NestedTextParser`, the `TextParser`
-for quizzes and labs.
-
-1. `TextReader` makes the tokens, and collects the explicit ids and the footnotes in them
-   (`_scan_tokens`), which must be known before the first reference.
-2. It walks the flat tokens once, with a method for each kind of block; containers read the blocks
-   inside them by recursion.
-3. A paragraph looks ahead: `Output:` and the block below it are one `Recording`, as is an `output`
-   fence without it.
-"""
+"""Block content: markdown-it's flat block tokens become `Block` nodes with spans."""
 
 from __future__ import annotations
 
@@ -73,7 +62,6 @@ class TextReader:
         self._scan_tokens()
 
     def _scan_tokens(self) -> None:
-        """Collect explicit ids and footnotes, and report what nests too deep."""
         for i, token in enumerate(self.tokens):
             if token.type == "heading_open" and self.tokens[i + 1].content.endswith("}"):
                 name = read_attributes(trim(token.text)).value.id
@@ -103,7 +91,6 @@ class TextReader:
     # -- walking
 
     def _read_blocks(self, stop: str | None) -> tuple[model.Block, ...]:
-        """The blocks up to a closing token, which is skipped."""
         blocks: list[model.Block] = []
         self.balance.enter()
         while self.index < len(self.tokens):
@@ -203,7 +190,6 @@ class TextReader:
         return self.tokens[self.index] if self.index < len(self.tokens) else None
 
     def _peek_info(self) -> str | None:
-        """The info string of the next block, if it is a fence."""
         token = self._peek()
         return token.info if token is not None and token.type == "fence" else None
 
@@ -330,7 +316,6 @@ class TextReader:
         return read_table(self.tokens, at, self.base, self.inlines, self.state.report)
 
     def _skip_footnote(self, token: PositionedToken) -> None:
-        """Skip a footnote, which is read later."""
         depth = 1
         while depth:
             kind = self.tokens[self.index].type
@@ -342,7 +327,6 @@ class TextReader:
     def _read_recording(
         self, caption: tuple[model.Inline, ...], span: Span
     ) -> model.Recording | None:
-        """The recording with the caption just read, if the next block is its body."""
         match self._peek():
             case PositionedToken(type="table_open"):
                 table, self.index = self._table_at(self.index)

@@ -1,7 +1,6 @@
 """The closed catalogue of rules: every mistake that the tool can name.
 
-Entry points: `RULES`, from name to `Rule`, and `GROUPS`. `docs/reference/rules.md` is written from
-them; a fixture in `tests/fixtures/rules/` shows for each rule what an author sees.
+A fixture in `tests/fixtures/rules/` shows for each rule what an author sees.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Units as authors write them: `kg m²`, `N*m/rad`, `mm`.
 
-Entry points: `find_unit`, how large a unit is; `check_unit`, what is wrong with one, and which was
-likely meant. The units of mechanics are known here. Pint is asked about others only, as its import
-takes longer than the build of a page.
+The units of mechanics are known here. Pint is asked about others only, as its import takes longer
+than the build of a page.
 """
 
 from __future__ import annotations
