@@ -45,9 +45,7 @@ GROUP = "coursebuild.features"
 CORE_PAGES = ("home", "level", "lesson", "stub", "models", "model", "page", "notfound")
 """The kinds of pages that every site has."""
 _FOLDERS = ("assets", "examples", "files", "lessons", "levels", "models")
-"""Folders of every site."""
 CORE_FENCES = ("mjcf", "output", "python", "text")
-"""The kinds of fences that the core reads."""
 CORE_COMMANDS = {
     "build": "verify everything and publish the site",
     "check": "verify everything without publishing",

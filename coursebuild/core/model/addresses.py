@@ -161,11 +161,8 @@ class RecordedFigure(Struct, frozen=True):
 
     script: str
     name: str
-    """The name under which the script saves it."""
     path: str
-    """The file of the course that the lesson shows."""
     span: Span
-    """Where the lesson names the figure."""
 
     @property
     def has_dark(self) -> bool:

@@ -22,9 +22,7 @@ class ThemeFile(Struct, frozen=True):
 
     path: str
     span: Span
-    """Where the map names it."""
     data: bytes = b""
-    """Its content, once it has been read."""
 
     @property
     def ending(self) -> str:
@@ -52,7 +50,6 @@ class Theme(Struct, frozen=True):
     icon: ThemeFile | None = None
     touch_icon: ThemeFile | None = None
     accent: str = ""
-    """The colour of links and buttons, as `#rrggbb`."""
     accent_dark: str = ""
     css: tuple[ThemeFile, ...] = ()
     fonts: tuple[FontFamily, ...] = ()
@@ -73,7 +70,6 @@ class Theme(Struct, frozen=True):
 
 
 PICTURES = ("logo", "logo_dark", "icon", "touch_icon")
-"""The fields of its pictures."""
 TEMPLATES = "theme/templates/"
 
 
@@ -122,7 +118,6 @@ class Lesson(LessonTable, frozen=True, kw_only=True):
     """A lesson of the map; `document` is `None` for a planned one."""
 
     span: Span
-    """Its entry in the course map."""
     prerequisite_spans: tuple[Span, ...]
     level: str
     document: Document | None
@@ -155,7 +150,6 @@ class Page(Struct, frozen=True):
     path: str
     document: Document | None
     menu: bool = True
-    """Whether it is in the menu of every page."""
     names: bool = True
     """Whether names in its inline code have to be known."""
     section: str = ""
@@ -168,7 +162,6 @@ class Page(Struct, frozen=True):
 
 
 Owner: TypeAlias = Lesson | Page
-"""The owner of a document."""
 
 
 class MjcfModel(Struct, frozen=True):
@@ -191,7 +184,6 @@ class CalloutKind(Struct, frozen=True):
     name: str
     label: str = ""
     promise: str = ""
-    """What it promises the reader."""
 
 
 class Pace(Struct, frozen=True, forbid_unknown_fields=True):
@@ -267,7 +259,6 @@ class Course(Struct, frozen=True):
     """A whole course."""
 
     map: Source
-    """course.toml."""
     title: str
     summary: str
     language: str
@@ -275,7 +266,6 @@ class Course(Struct, frozen=True):
     repository: str
     licence: str
     engine: str | None
-    """The MuJoCo version that the course is written for."""
     engine_span: Span
     truth: float | None
     """The share of the numbers in the text that must be proven."""
@@ -296,11 +286,8 @@ class Course(Struct, frozen=True):
     packages: tuple[NamedPath, ...] = ()
     """Folders that scripts import from, after their own and before all others."""
     environment: tuple[tuple[str, str], ...] = ()
-    """Environment variables of scripts, sorted."""
     python: NamedPath | None = None
-    """The interpreter of the scripts, if not the one that runs this tool."""
     strict: bool = False
-    """Whether warnings count as errors."""
     unproven: tuple[NamedPath, ...] = ()
     """The scripts that need not have been run where warnings count as errors."""
     names: tuple[str, ...] = ()
@@ -314,7 +301,6 @@ class Course(Struct, frozen=True):
     width: int = 0
     """The columns to which `fmt` wraps text; 0 leaves the author's lines."""
     html: Literal["none", "safe", "trusted"] = "safe"
-    """The raw HTML that lessons and pages may have."""
     folds: Literal["open", "closed"] = "open"
     """Whether what authors fold is printed in full."""
     limits: Limits = Limits()

@@ -11,32 +11,26 @@ from typing import Annotated, Any, TypeAlias
 from msgspec import Meta
 
 NOT_BLANK = r"\S"
-"""The pattern of a text that must not be blank."""
 
 _MARKDOWN: dict[str, Any] = {"contentMediaType": "text/markdown"}
 
 Text: TypeAlias = Annotated[str, Meta(pattern=NOT_BLANK)]
-"""Plain text, not blank."""
 
 Blocks: TypeAlias = Annotated[
     str, Meta(pattern=NOT_BLANK, extra={"text": "blocks"}, extra_json_schema=_MARKDOWN)
 ]
-"""Markdown of any length."""
 
 OptionalBlocks: TypeAlias = Annotated[
     str, Meta(extra={"text": "blocks"}, extra_json_schema=_MARKDOWN)
 ]
-"""Markdown of any length, or nothing."""
 
 Inlines: TypeAlias = Annotated[
     str, Meta(pattern=NOT_BLANK, extra={"text": "inlines"}, extra_json_schema=_MARKDOWN)
 ]
-"""Markdown that fits into a line."""
 
 Positive: TypeAlias = Annotated[float, Meta(gt=0)]
 NotNegative: TypeAlias = Annotated[float, Meta(ge=0)]
 Digits: TypeAlias = Annotated[int, Meta(ge=0, le=15)]
-"""Decimal places."""
 
 
 def describe(description: str, **bounds: Any) -> Meta:

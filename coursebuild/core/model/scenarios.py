@@ -63,7 +63,6 @@ class Measured(Struct, frozen=True):
 Expected: TypeAlias = Literal[
     "restitution", "penetration", "slip", "crossing", "last", "largest", "smallest"
 ]
-"""Quantities of a motion that theory may know."""
 
 
 class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -172,9 +171,7 @@ class DeclaredScenario(ScenarioTable, frozen=True, kw_only=True):
     """A scenario that an author declared, or that a model without declarations has."""
 
     span: Span
-    """Its table."""
     places: tuple[tuple[str, Span], ...] = ()
-    """The place of each given field."""
 
     def place(self, name: str) -> Span:
         """The span of a field's value, or of the table if the field is not given."""
@@ -226,7 +223,6 @@ class DeclaredSweep(SweepTable, frozen=True, kw_only=True):
     """A sweep with its variations parsed."""
 
     variations: tuple[Variation, ...]
-    """Those that `vary` describes."""
 
 
 class KeepTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -248,7 +244,6 @@ class Declarations(Struct, frozen=True):
     model: str
     """The name of the model: its path below `models/`, without suffix, POSIX."""
     source: Source
-    """The file, or the model's source if there is none."""
     scenarios: tuple[DeclaredScenario, ...] = ()
     keep: tuple[Keep, ...] = ()
     bench: BenchTable = BenchTable()

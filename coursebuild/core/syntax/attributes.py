@@ -223,7 +223,6 @@ class Anchors(Struct):
     explicit: dict[str, Span | None] = field(default_factory=dict)
     """Each explicit id, with the span of the heading or formula that uses it, once it was read."""
     generated: set[str] = field(default_factory=set)
-    """Ids made of the texts of headings."""
     counts: dict[str, int] = field(default_factory=dict)
     """The last number given to ids made of the same text."""
 
@@ -234,13 +233,12 @@ class Anchors(Struct):
     def take(self, name: str, span: Span) -> None:
         """Use an explicit id."""
         first = self.explicit.get(name)
-        if first is not None or name in self.generated:
-            notes = [Note("first used here", first)] if first is not None else []
-            self.report(
-                diagnose("anchor-repeated", span, f"the id `{name}` is already used", notes=notes)
-            )
-        else:
+        if first is None and name not in self.generated:
             self.explicit[name] = span
+            return
+        message = f"the id `{name}` is already used"
+        notes = [Note("first used here", first)] if first is not None else []
+        self.report(diagnose("anchor-repeated", span, message, notes=notes))
 
     def has(self, name: str) -> bool:
         """Whether a heading or a formula has an id, or asks for it."""

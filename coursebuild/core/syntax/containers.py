@@ -193,7 +193,6 @@ def _read_cells(
 _EMPTY_QUOTED = re.compile(r"^[ >]*>[ \t]*$", re.MULTILINE)
 _QUOTE_MARKS = re.compile(r"[ >]*")
 _SLIP_OF_MARK = re.compile(r" {0,3}([<.?/,;:|])(?= |$)")
-"""What a line of a quotation may begin with if `>` was mistyped."""
 
 
 def check_quotation(span: Span) -> Iterator[Diagnostic]:

@@ -109,7 +109,6 @@ def _theme_files(node: ObjectNode, name: str, paths: tuple[str, ...]) -> tuple[T
 
 
 _GITHUB = re.compile(r"https?://(?i:github\.com)/[\w-]+/[\w.-]+/?", re.ASCII)
-"""A repository on GitHub."""
 _NO_BRANCH = re.compile(
     r"[\x00-\x20\x7f~^:?*\[\\]|\.\.|//|@\{|(^|/)\.|^[-/]|[./]$|\.lock(/|$)|^@?$"
 )

@@ -178,7 +178,6 @@ def _read_id(node: Node | None) -> str:
 # ---------------------------------------------------------------------------------------- checks
 
 RESERVED_IDS = frozenset({"index", "404"})
-"""Names of pages that every site has."""
 
 
 def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diagnostic]:

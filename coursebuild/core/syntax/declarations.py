@@ -37,7 +37,6 @@ from coursebuild.core.text.diagnostics import (
 from coursebuild.core.text.source import Source
 
 MOST_SAMPLES = 100_000
-"""The most samples of the state in a scenario."""
 MOST_VALUES, MOST_THREADS = 100, 256
 """The most values of a sweep, those of all parameters together, and the most threads."""
 _TOLERANCE = 1e-9

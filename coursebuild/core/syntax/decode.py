@@ -50,7 +50,6 @@ T = TypeVar("T", bound=Struct)
 
 _NO_REMARKS: Mapping[str, str] = {}
 _INVALID = object()
-"""Stands for the value of a node that is wrong."""
 
 
 class Decoding(Struct, Generic[S], frozen=True):
@@ -60,7 +59,6 @@ class Decoding(Struct, Generic[S], frozen=True):
     """The whole; it can be there along with diagnostics, as an unknown field does no harm."""
     diagnostics: tuple[Diagnostic, ...]
     structs: Mapping[ObjectNode, Struct]
-    """Every object whose own fields are all right."""
     texts: tuple[tuple[StringNode, str], ...]
     """Every string that is Markdown, with `blocks` or `inlines`."""
 

@@ -169,7 +169,6 @@ def _line_end(state: rules_inline.StateInline, silent: bool) -> bool:
 
 
 InlineRules = dict[str, tuple[Callable[[rules_inline.StateInline, bool], bool], ...]]
-"""Rules by the first character of what they read."""
 
 _RULES: InlineRules = {
     "\n": (rules_inline.newline,),

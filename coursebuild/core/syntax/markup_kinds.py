@@ -164,7 +164,6 @@ FOREIGN = {
         "type the emoji itself",
     ),
 }
-"""Markup of other tools."""
 BROKEN = {
     "binding": MarkupKind(
         rf"(?:`{_NUMBER}[^`{{}}\n\0]{{0,20}}|(?:{_NUMBER})?`?)"
@@ -335,6 +334,5 @@ LANGUAGES = tuple(
     "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
     "toml xml yaml".split()
 )
-"""Languages that texts often show."""
 PLAIN_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
 """Names of ordinary code and text that no highlighter knows."""

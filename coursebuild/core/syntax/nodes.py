@@ -212,7 +212,6 @@ def odd_character(char: str) -> str:
 
 
 _MAX_LENGTH = 40
-"""The most characters of an author's text in a message."""
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 

@@ -15,7 +15,6 @@ _LINE_REFERENCE = re.compile(r"\b(on|at) line ([0-9]+)")
 _SHOWS = re.compile(
     r"(?:matplotlib\.pyplot|plotly\.io)\.show|mediapy\.show_\w+|IPython\.display\.(?:display|Image|Video)"
 )
-"""Functions that show a picture in a window or a notebook."""
 
 
 def find_windows(code: Excerpt) -> Iterator[Diagnostic]:

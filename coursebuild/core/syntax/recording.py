@@ -112,8 +112,7 @@ def _help_to_mark(words: Words) -> str:
 def diagnose_missing_caption(fence: Span, words: Words) -> Diagnostic:
     """The warning for a `text` block directly below a script."""
     message = "this looks like the output of the script above it, but nothing is compared"
-    help = _help_to_mark(words)
-    return diagnose("recording-caption", fence.first_line(), message, help=help)
+    return diagnose("recording-caption", fence.first_line(), message, help=_help_to_mark(words))
 
 
 def record_fence(

@@ -25,7 +25,6 @@ class PositionedToken(Token):
     start: int = -1
     end: int = -1
     text: Excerpt = NO_TEXT
-    """The content of a block."""
 
     def __post_init__(self) -> None:
         """Take the attributes as they are; a token of markdown-it would take lists of them, too."""

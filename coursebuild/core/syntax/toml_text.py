@@ -39,10 +39,9 @@ def parse_toml(
     except RecursionError:
         diagnostic = diagnose(rule, body.span(0, 0), "tables, arrays or keys are nested too deeply")
     except ValueError as error:
-        repeated_key = _diagnose_repeated_key(body, str(error))
         start, end, message, help = _describe_mistake(body.text, str(error))
         mistake = diagnose(rule, body.span(start, end), message, help=help)
-        diagnostic = repeated_key or mistake
+        diagnostic = _diagnose_repeated_key(body, str(error)) or mistake
     return Parsed(None, (diagnostic,))
 
 
@@ -302,23 +301,20 @@ def _wrong_value(text: str, start: int) -> _Mistake:
     value = scalar[0].rstrip() if scalar else ""
     if not value:
         return start, start, "a value is missing", 'an empty text is written `""`'
+    help = ""
+    if value in _BOOLEANS:
+        help = write(_BOOLEANS[value])
+    elif value in _NULLS:
+        help = "TOML has no such value; leave the field out"
+    elif value[0] in _CURLY_QUOTES:
+        help = _QUOTES_HELP
+    elif re.fullmatch(r"[+-]?[0-9]*\.?[0-9]*", value):
+        help = "a number has no leading zeros, and digits on both sides of its point"
+    elif '"' not in value and "'" not in value:
+        new = None if "\\" in value or "#" in value else f'"{value}"'
+        help = Fix(f'text needs quotes: `"{nodes.shorten(value)}"`', new, safe=True)
     message = f"`{nodes.shorten(value)}` is not a valid TOML value"
-    return start, start + len(value), message, _value_help(value)
-
-
-def _value_help(text: str) -> str:
-    if text in _BOOLEANS:
-        return write(_BOOLEANS[text])
-    if text in _NULLS:
-        return "TOML has no such value; leave the field out"
-    if text[0] in _CURLY_QUOTES:
-        return _QUOTES_HELP
-    if re.fullmatch(r"[+-]?[0-9]*\.?[0-9]*", text):
-        return "a number has no leading zeros, and digits on both sides of its point"
-    if '"' in text or "'" in text:
-        return ""
-    new = None if "\\" in text or "#" in text else f'"{text}"'
-    return Fix(f'text needs quotes: `"{nodes.shorten(text)}"`', new, safe=True)
+    return start, start + len(value), message, help
 
 
 def _expected_instead(text: str, at: int, noun: str, help: str) -> _Mistake:

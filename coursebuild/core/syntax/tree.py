@@ -22,7 +22,6 @@ from coursebuild.core.syntax.containers import (
 from coursebuild.core.syntax.fence import read_fence
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_tree import read_inlines
-from coursebuild.core.syntax.labels import reject_label, take_label
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
@@ -133,18 +132,18 @@ class TextReader:
         caption, braces = split_label(content)
         span, following = content.span(), self._peek()
         if caption.text.startswith(TABLE) and following and following.type == "table_open":
-            label = take_label(braces, "tab", self.state)
+            label = self.state.take_label(braces, "tab")
             inlines = self.inlines(trim(caption.slice(len(TABLE))))
             table, self.index = self._table_at(self.index)
             return replace(table, span=span.to(table.span), label=label, caption=inlines)
         if braces is None:
             return None
         if caption.text.startswith(FIGURE):
-            label = take_label(braces, "fig", self.state)
+            label = self.state.take_label(braces, "fig")
             inlines, shows_image = read_figure(self.inlines(caption), span, self.state.figures)
             if not shows_image:
                 message = "no image stands in the paragraph of this label"
-                reject_label(braces, message, "show one: `![…](file.svg)`", self.state)
+                self.state.reject_label(braces, message, "show one: `![…](file.svg)`")
             return model.Paragraph(span, inlines, False, shows_image, label=label)
         words = (TABLE, *self.state.words.output)
         if not any(word in caption.text[:24] for word in words):
@@ -153,13 +152,13 @@ class TextReader:
         if is_caption(inlines, self.state.words):
             recording = self._read_recording(inlines, caption.span())
         if recording is not None and isinstance(recording.body, model.Table):
-            label = take_label(braces, "tab", self.state)
+            label = self.state.take_label(braces, "tab")
             return replace(recording, body=replace(recording.body, label=label))
         message, help = "no table follows the caption of this label", "put one directly below it"
         if recording is not None:
             message = "an output that is no table has no label"
             help = "write `{#lst:name}` on the first line of its script"
-        reject_label(braces, message, help, self.state)
+        self.state.reject_label(braces, message, help)
         return recording or model.Paragraph(span, inlines)
 
     def _is_caption(self, content: Excerpt, inlines: tuple[model.Inline, ...]) -> bool:
@@ -269,7 +268,7 @@ class TextReader:
         elif not tex.text:
             self.state.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
         braces = LABEL.match(text.text, end + 2)
-        label = take_label(text.slice(*braces.span(1)) if braces else None, "eq", self.state)
+        label = self.state.take_label(text.slice(*braces.span(1)) if braces else None, "eq")
         return model.MathBlock(self._span(token), tex, label=label)
 
     # -- containers

@@ -85,14 +85,11 @@ class Diagnostic(Struct, frozen=True):
     """One mistake or doubt, at one place."""
 
     rule: str
-    """A name of the catalogue."""
     span: Span
     """The smallest stretch of text that is wrong."""
     message: str
     label: str = ""
-    """A remark beside the marked text."""
     help: str = ""
-    """How to mend it."""
     notes: tuple[Note, ...] = ()
     edits: tuple[Edit, ...] = ()
     """What mends it, if that is known: all of them, or none."""
@@ -262,7 +259,6 @@ def did_you_mean(name: str, known_names: Iterable[str]) -> str:
 
 
 _IDS = re.compile(r"\d+|(?<![^\W_])[^\W\d_](?![^\W_])")
-"""Numbers and single letters."""
 
 
 def propose(name: str, likely: str, names: Iterable[str] = ()) -> Fix:

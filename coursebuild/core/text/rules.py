@@ -21,7 +21,6 @@ class Rule(Struct, frozen=True):
     name: str
     severity: Severity
     summary: str
-    """Its meaning in one sentence, for the catalogue's page."""
     no_fix: str = ""
     """Why no diagnostic of it has an edit, in one clause; empty where one may have."""
 
@@ -240,7 +239,6 @@ GROUPS: dict[str, dict[str, str]] = {
         "package-reduced": "A QTI package cannot hold a question as the page shows it.",
     },
 }
-"""The meaning of each rule in one sentence, by the sections of the page of rules."""
 _WARNINGS = frozenset(
     """
     draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
@@ -287,7 +285,6 @@ _NO_FIX = {
     "leave it out, or allow it in the map": "html-forbidden",
     "leave it out, or silence the warning": "package-reduced",
 }
-"""Why rules have no edits: a reason, and the names of the rules."""
 _REASONS = {name: reason for reason, names in _NO_FIX.items() for name in names.split()}
 
 RULES: dict[str, Rule] = {

@@ -42,7 +42,6 @@ class Source(Struct, frozen=True, dict=True):
     path: str
     """POSIX path relative to the course's root."""
     text: str
-    """The decoded text, line ends as on disk."""
 
     def __repr__(self) -> str:
         return f"Source({self.path!r})"

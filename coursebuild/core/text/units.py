@@ -42,7 +42,6 @@ _NAMES = dict(
     """.split()
 )
 _PRODUCT_UNITS = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
-"""Units that are often written without the space between them."""
 
 _WORD = r"(?:°C|[^\W\d_⁰¹²³⁴-⁹]+|[°%‰])"
 _POWER = r"(?:\^?(?:[-−]?\d{1,2}|\{[-−]?\d{1,2}\}|\([-−]?\d{1,2}(?:/\d)?\))|[⁻⁰¹²³⁴-⁹]+)"
