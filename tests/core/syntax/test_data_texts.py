@@ -444,7 +444,7 @@ def test_any_edit_of_a_right_text_is_parsed_or_reported(name: str, data: st.Data
     text = read_cases(VALUE_FOLDER / f"{name}.md")[0].input
     at = data.draw(st.integers(0, len(text)))
     piece = data.draw(JSON_PIECES | TOML_PIECES | st.text(max_size=3))
-    parsed = VALUES_READ[name](text[:at] + piece + text[at + data.draw(st.integers(0, 20)) :])
-    assert parsed.value is not None or parsed.diagnostics
-    orders = [diagnostic.order for diagnostic in parsed.diagnostics]
+    result = VALUES_READ[name](text[:at] + piece + text[at + data.draw(st.integers(0, 20)) :])
+    assert result.value is not None or result.diagnostics
+    orders = [diagnostic.order for diagnostic in result.diagnostics]
     assert orders == sorted(orders)
