@@ -277,7 +277,7 @@ def plain_text(inlines: tuple[Inline, ...]) -> str:
                 parts.append(inline.text)
             case Math():
                 parts.append(inline.tex.text)
-            case Emphasis() | Strong() | Strikethrough() | Link() | Term():
+            case Parent() | Link():
                 parts.append(plain_text(inline.children))
             case Image():
                 parts.append(inline.alt)

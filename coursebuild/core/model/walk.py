@@ -37,16 +37,14 @@ from coursebuild.core.model.blocks import (
 )
 from coursebuild.core.model.inlines import (
     Citation,
-    Emphasis,
     Image,
     Inline,
     Label,
     Link,
     Math,
     NumberBinding,
+    Parent,
     RawInline,
-    Strikethrough,
-    Strong,
     Term,
 )
 from coursebuild.core.text.source import Span, key_of
@@ -57,8 +55,6 @@ AnyInline = TypeVar("AnyInline", bound=Inline)
 
 _BLOCK_CONTAINERS = (BlockQuote, Callout, ListBlock, FeatureBlock, Recording)
 """Blocks that may contain blocks."""
-_INLINE_CONTAINERS = frozenset((Emphasis, Strong, Strikethrough, Link, Term))
-"""Inlines that may contain inlines."""
 _COMMENTS = re.compile(r"(?:\s*<!--(?:(?!-->)[\s\S])*-->)*\s*")
 
 
@@ -190,9 +186,9 @@ def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
     """Every inline in order, a container before its content."""
     for inline in inlines:
         yield inline
-        if type(inline) in _INLINE_CONTAINERS:
-            yield from walk_inlines(inline.children)  # type: ignore[union-attr]
-        elif type(inline) is Math and inline.value is not None:
+        if isinstance(inline, Parent | Link):
+            yield from walk_inlines(inline.children)
+        elif isinstance(inline, Math) and inline.value is not None:
             yield inline.value
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import graphlib
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from decimal import Decimal
 from itertools import pairwise
 
@@ -18,7 +18,6 @@ from coursebuild.core import model
 from coursebuild.core.model.course import Launch
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.syntax.course_schema import (
-    CalloutTable,
     CourseFile,
     LevelTable,
     PageTable,
@@ -92,6 +91,10 @@ def _build_course(
 ) -> model.Course:
     settings, verify = fields.course, fields.verify or VerifyTable()
     table, gate = root.object("course"), root.object("verify")
+    kinds = {name: model.CalloutKind(name) for name in CALLOUTS}
+    for name, callout in fields.callouts.items():
+        texts = (callout,) if isinstance(callout, str) else (callout.label, callout.promise)
+        kinds[name] = model.CalloutKind(name, *texts)
     return model.Course(
         map=source,
         title=settings.title,
@@ -109,7 +112,7 @@ def _build_course(
         truth=verify.truth,
         truth_span=gate.place("truth"),
         filters=verify.filter,
-        callouts=callout_kinds(fields.callouts),
+        callouts=tuple(kinds.values()),
         silences=fields.silence,
         levels=levels,
         pages=tuple(
@@ -338,12 +341,3 @@ def _place(node: ObjectNode, name: str, at: int | None) -> Span:
     if not isinstance(value, StringNode) or at is None or at >= len(value.value):
         return node.place(name)
     return value.excerpt.span(at, at + 1)
-
-
-def callout_kinds(tables: Mapping[str, str | CalloutTable]) -> tuple[model.CalloutKind, ...]:
-    """The kinds that every course has, perhaps with labels of its own, and its further kinds."""
-    kinds = {name: model.CalloutKind(name) for name in CALLOUTS}
-    for name, table in tables.items():
-        texts = (table,) if isinstance(table, str) else (table.label, table.promise)
-        kinds[name] = model.CalloutKind(name, *texts)
-    return tuple(kinds.values())

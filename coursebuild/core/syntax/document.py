@@ -112,36 +112,29 @@ def _unclaimed_blocks(
                 yield block
 
 
-_MARKS = ("]{", "{#eq:")
-
-
-def _check_placement(document: model.Document) -> tuple[Diagnostic, ...]:
+def _check_placement(document: model.Document) -> Iterator[Diagnostic]:
     """Report terms and labels in places where no link could lead to them.
 
     The glossary shows the sentence around a term, so it is defined in a paragraph. The texts of
     quizzes, labs and headings are shown in several places, so no link can name one of them.
     """
-    if not any(mark in document.source.text for mark in _MARKS):
-        return ()
+    if not any(mark in document.source.text for mark in ("]{", "{#eq:")):
+        return
     elsewhere = feature_block_ids(document)
-    diagnostics: list[Diagnostic] = []
     for block in model.document_blocks(document):
         is_elsewhere = id(block) in elsewhere
         if is_elsewhere or not isinstance(block, model.Paragraph):
             message = "a term cannot be defined here"
             help = "define it in a paragraph of the text, whose sentence the glossary can show"
-            inlines = model.walk_inlines(model.block_inlines(block))
-            terms = (term.span for term in inlines if isinstance(term, model.Term))
-            diagnostics += [diagnose("term-place", span, message, help=help) for span in terms]
+            for inline in model.walk_inlines(model.block_inlines(block)):
+                if isinstance(inline, model.Term):
+                    yield diagnose("term-place", inline.span, message, help=help)
         if is_elsewhere or isinstance(block, model.Heading):
             message = "a formula has no label here"
             help = "label formulas of the text, but not those of quizzes, labs and headings"
-            formulas = model.block_formulas(block)
-            labels = (formula.label.span for formula in formulas if formula.label is not None)
-            diagnostics += [
-                diagnose("label-attribute", span, message, help=help) for span in labels
-            ]
-    return tuple(diagnostics)
+            for formula in model.block_formulas(block):
+                if formula.label is not None:
+                    yield diagnose("label-attribute", formula.label.span, message, help=help)
 
 
 def _check_ids(document: model.Document) -> Iterator[Diagnostic]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import partial
 from typing import cast
 
 from markdown_it import MarkdownIt, rules_inline
@@ -73,31 +74,20 @@ def _code_span(state: rules_inline.StateInline, silent: bool) -> bool:
     return True
 
 
-_FOOTNOTE = re.compile(r"\[\^([^\s\[\]]+)\]")
-
-
-def _footnote_reference(state: rules_inline.StateInline, silent: bool) -> bool:
-    match = _FOOTNOTE.match(state.src, state.pos, state.posMax)
-    if match is None:
-        return False
-    if not silent:
-        token = state.push("footnote_ref", "", 0)
-        token.content = match[1]
-    state.pos = match.end()
-    return True
-
-
 _CITED = r"(?:[^\[\]{}@;]*\s)?@(?:[\w.:/+-]*\w)(?:[^\S\n]*,[^\[\]{};@]*)?\s*"
-_CITATION = re.compile(rf"\[({_CITED}(?:;{_CITED})*)\](?![\[({{:])")
+_LEAVES = {
+    "citation": re.compile(rf"\[({_CITED}(?:;{_CITED})*)\](?![\[({{:])"),
+    "footnote_ref": re.compile(r"\[\^([^\s\[\]]+)\]"),
+}
 
 
-def _citation(state: rules_inline.StateInline, silent: bool) -> bool:
-    """`[see @key, p. 12; @other]`; `content` has what stands between the brackets."""
-    match = _CITATION.match(state.src, state.pos, state.posMax) if "@" in state.src else None
+def _leaf(state: rules_inline.StateInline, silent: bool, *, kind: str) -> bool:
+    """`[see @key, p. 12; @other]` or `[^label]`; `content` has what stands between the brackets."""
+    match = _LEAVES[kind].match(state.src, state.pos, state.posMax)
     if match is None:
         return False
     if not silent:
-        state.push("citation", "", 0).content = match[1]
+        state.push(kind, "", 0).content = match[1]
     state.pos = match.end()
     return True
 
@@ -177,7 +167,7 @@ _RULES: InlineRules = {
     "*": (_emphasis,),
     "_": (_emphasis,),
     "~": (_emphasis,),
-    "[": (_citation, _term, _link, _footnote_reference),
+    "[": (partial(_leaf, kind="citation"), _term, _link, partial(_leaf, kind="footnote_ref")),
     "!": (_link,),
     "<": (rules_inline.autolink, rules_inline.html_inline),
     "&": (rules_inline.entity,),

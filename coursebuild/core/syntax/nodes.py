@@ -10,7 +10,7 @@ import re
 import unicodedata
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator
-from typing import Literal, TypeAlias, assert_never
+from typing import Literal, TypeAlias
 
 import msgspec.inspect as inspect
 from msgspec import Struct
@@ -233,6 +233,12 @@ _TYPES: dict[type[inspect.Type], tuple[str, str, type[Node]]] = {
     inspect.NoneType: ("", "", NullNode),
 }
 """The words for one value and for several of a type, and the type of its node."""
+_KINDS_OF_NODES: dict[type[Node], str] = {
+    ObjectNode: "an object",
+    ArrayNode: "an array",
+    StringNode: "a string",
+    DateNode: "a date or time",
+}
 
 
 def _union_members(type: inspect.Type) -> list[inspect.Type]:
@@ -290,21 +296,9 @@ def format_value(node: Node) -> str:
 
 def wrong_type_message(node: Node, name: str, type: inspect.Type, format: Format) -> str:
     """The message for a value of the wrong type."""
-    match node:
-        case ObjectNode():
-            value = "an object"
-        case ArrayNode():
-            value = "an array"
-        case StringNode():
-            value = "a string"
-        case NumberNode():
-            value = f"the number {shorten(node.raw)}"
-        case DateNode():
-            value = "a date or time"
-        case BoolNode() | NullNode() | ErrorNode():
-            value = f"`{shorten(node.raw)}`"
-        case _:
-            assert_never(node)
+    value = _KINDS_OF_NODES.get(node.__class__, f"`{shorten(node.raw)}`")
+    if isinstance(node, NumberNode):
+        value = f"the number {shorten(node.raw)}"
     problem = f"must be {_describe_type(type)[0]}, not {value}"
     if format == TOML:
         problem = problem.replace("an object", "a table").replace("objects", "tables")
