@@ -1,15 +1,6 @@
-"""What MuJoCo says about models and MJCF blocks, as diagnostics at the right line.
+"""What MuJoCo says about models, MJCF blocks and declared scenarios, at the right line.
 
-Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, models, texts)`.
-
-1. `mjcf_texts` makes a whole model of each `mjcf` block and of each block of a feature that holds
-   a model, and counts the lines put before the author's.
-2. `check_compiled` compares the results of the compiler with what the lesson says, and lets
-   features check the names that they use. A file that only other models include need not compile
-   by itself.
-3. The scenarios declared for a model are compared with it: the model has what they name, states and
-   commands have as many numbers as it takes, and its timestep divides the times at which the state
-   is sampled and commands change.
+A file that only other models include need not compile by itself.
 """
 
 from __future__ import annotations
@@ -109,9 +100,10 @@ def check_compiled(
         result = models[model.name]
         if result.error and model.name not in included:
             diagnostics.append(diagnose_model(model, result, readable, course.models))
-        elif not result.error and (fault := _find_fault(model.source.excerpt(), 0)) is not None:
-            message = f"the model `{model.name}` holds {fault[1]}"
-            diagnostics.append(diagnose("model-error", fault[0], message, help=_FAULT_HELP))
+        elif not result.error:
+            subject, code = f"the model `{model.name}`", model.source.excerpt()
+            fault = _diagnose_fault("model-error", subject, code)
+            diagnostics += [] if fault is None else [fault]
     facts: dict[tuple[str, int], ModelFacts] = {}
     for text, result in texts:
         diagnostics += _check_text(text, result, readable, course.models)
@@ -212,10 +204,9 @@ def line_span(code: Excerpt, line: int | None, lines_before: int, fallback: Span
     return row.slice(indent, len(row.text.rstrip())).span() if row.text.strip() else row.span()
 
 
-_FAULT_HELP = "write `<` before an element and `<!-- … -->` around a comment, or delete it"
-
-
-def _find_fault(code: Excerpt, lines_before: int, text: str = "") -> tuple[Span, str] | None:
+def _diagnose_fault(
+    rule: str, subject: str, code: Excerpt, lines_before: int = 0, text: str = ""
+) -> Diagnostic | None:
     """Where XML is broken or holds words between elements, which MuJoCo may pass over."""
     parser = expat.ParserCreate()
     faults = list[tuple[int, str]]()
@@ -232,8 +223,10 @@ def _find_fault(code: Excerpt, lines_before: int, text: str = "") -> tuple[Span,
         faults.append((error.lineno, f"broken XML: {expat.ErrorString(error.code)}"))
     if not faults:
         return None
-    line, message = faults[0]
-    return line_span(code, line, lines_before, code.span()), message
+    line, fault = faults[0]
+    place = line_span(code, line, lines_before, code.span())
+    help = "write `<` before an element and `<!-- … -->` around a comment, or delete it"
+    return diagnose(rule, place, f"{subject} holds {fault}", help=help)
 
 
 def _note_opening(code: Excerpt, lines_before: int, error: str) -> tuple[Note, ...]:
@@ -258,6 +251,7 @@ def _check_text(
     if result.timeout:
         yield _diagnose_timeout(block.span.first_line(), subject, result)
         return
+    fault = _diagnose_fault("mjcf-error", subject, text.code, text.lines_before, text.text)
     if isinstance(block, Mjcf) and block.error is not None:
         span = block.error_span or block.span.first_line()
         place = line_span(text.code, result.line, text.lines_before, block.span.first_line())
@@ -269,9 +263,8 @@ def _check_text(
             message = f"the message of the compiler does not contain `{block.error}`"
             note = Note(f"it says: {result.error}", place)
             yield diagnose("mjcf-message", span, message, notes=[note])
-        elif (fault := _find_fault(text.code, text.lines_before, text.text)) is not None:
-            message = f"{subject} holds {fault[1]}"
-            yield diagnose("mjcf-error", fault[0], message, help=_FAULT_HELP)
+        elif fault is not None:
+            yield fault
         return
     if result.error:
         span = line_span(text.code, result.line, text.lines_before, block.span.first_line())
@@ -283,9 +276,8 @@ def _check_text(
         message = f"{subject} does not compile: {readable(result.error)}"
         notes = _note_opening(text.code, text.lines_before, result.error)
         yield diagnose("mjcf-error", span, message, help=help, notes=notes)
-    elif (fault := _find_fault(text.code, text.lines_before, text.text)) is not None:
-        message = f"{subject} holds {fault[1]}"
-        yield diagnose("mjcf-error", fault[0], message, help=_FAULT_HELP)
+    elif fault is not None:
+        yield fault
 
 
 _RULE = "scenario-model"

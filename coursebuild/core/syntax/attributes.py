@@ -1,10 +1,4 @@
-"""Attributes in braces after inline content and headings, and the anchors of a document.
-
-Entry points: `TERM`, `SYMBOL` and `LABEL`, which find braces, also on the next line, as does
-`split_label`; `read_pairs`, `read_term` and `read_meaning`, which read them; `read_attributes`
-(`## Title {#id .class}`), `Anchors` (unique ids), `slug`, `check_heading`. A value with spaces
-stands in quotes.
-"""
+"""Attributes in braces after inline content and headings, and the anchors of a document."""
 
 from __future__ import annotations
 
@@ -204,7 +198,6 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
 
 
 def _reject(title: Excerpt, place: Excerpt, message: str, help: str = _HELP) -> Parsed[Attributes]:
-    """A heading without attributes, as those that it has are wrong at `place`."""
     diagnostic = diagnose("heading-attributes", place.span(), message, help=help)
     return Parsed(Attributes(title), (diagnostic,))
 
@@ -230,7 +223,6 @@ class Anchors(Struct):
     explicit: dict[str, Span | None] = field(default_factory=dict)
     """Each explicit id, with the span of the heading or formula that uses it, once it was read."""
     generated: set[str] = field(default_factory=set)
-    """Ids made of the texts of headings."""
     counts: dict[str, int] = field(default_factory=dict)
     """The last number given to ids made of the same text."""
 
@@ -241,13 +233,12 @@ class Anchors(Struct):
     def take(self, name: str, span: Span) -> None:
         """Use an explicit id."""
         first = self.explicit.get(name)
-        if first is not None or name in self.generated:
-            notes = [Note("first used here", first)] if first is not None else []
-            self.report(
-                diagnose("anchor-repeated", span, f"the id `{name}` is already used", notes=notes)
-            )
-        else:
+        if first is None and name not in self.generated:
             self.explicit[name] = span
+            return
+        message = f"the id `{name}` is already used"
+        notes = [Note("first used here", first)] if first is not None else []
+        self.report(diagnose("anchor-repeated", span, message, notes=notes))
 
     def has(self, name: str) -> bool:
         """Whether a heading or a formula has an id, or asks for it."""
@@ -309,7 +300,6 @@ def check_heading(
 
 
 def _deepen(heading: Span, levels: int) -> tuple[Edit, ...]:
-    """The edit that gives a heading so many more levels, if it begins with `#`."""
     marks = re.match("#+", heading.text)
     if marks is None:
         return ()

@@ -1,12 +1,7 @@
-r"""Containers: quotations, callouts and tables, each part with its place; and lists.
+r"""Quotations, callouts, tables and lists, each part with its place, and marks that they lost.
 
-A callout is a quotation whose first line is `[!kind] Optional title`; `[!kind]- Title` makes one
-that starts folded.
-
-Entry points: `read_head`, which reads that line; `read_table`. markdown-it finds the tables and
-their rows. A row is split here, at each `|` without a backslash before it; `\|` is a `|` in the
-cell. Marks that were lost, doubled or mistyped are found by `check_quotation`, `check_neighbours`
-of a block and those above it, `check_numbers` and `check_item` of a list.
+markdown-it finds the tables and their rows. A row is split here, at each `|` without a backslash
+before it; `\|` is a `|` in the cell.
 """
 
 from __future__ import annotations
@@ -57,10 +52,7 @@ class Head(Struct, frozen=True):
 
 
 def read_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None:
-    """The head of a callout, if a blockquote's first paragraph begins with one.
-
-    Its kind is one of `kinds`, without regard to case.
-    """
+    """The head of a callout, if a quotation's first paragraph begins with one of `kinds`."""
     match = _HEAD.match(paragraph.text)
     if match is None:
         return _read_broken_head(paragraph, kinds)
@@ -201,7 +193,6 @@ def _read_cells(
 _EMPTY_QUOTED = re.compile(r"^[ >]*>[ \t]*$", re.MULTILINE)
 _QUOTE_MARKS = re.compile(r"[ >]*")
 _SLIP_OF_MARK = re.compile(r" {0,3}([<.?/,;:|])(?= |$)")
-"""What a line of a quotation may begin with if `>` was mistyped."""
 
 
 def check_quotation(span: Span) -> Iterator[Diagnostic]:

@@ -1,15 +1,8 @@
 """From nodes to declared structs, with every mistake at its place.
 
-Entry points: `decode(node, type, name, format)` → `Decoding`; `field_description` of a field; for
-rules of several fields, `has_value`, `require_one_of` and `check_unique`.
-
-1. One walk over the nodes, guided by what `msgspec.inspect` says of the type, reports everything
-   that is wrong: unknown and missing fields, wrong types, impossible values. (The parser that made
-   the nodes has reported repeated fields.)
-2. A struct is made as soon as all its own fields are right. An unknown field beside them is a
-   mistake, but no reason to leave the rest unchecked.
-3. These structs are kept by node, so that checks of rules that types cannot express run on them,
-   even if the whole is wrong.
+One walk over the nodes, guided by what `msgspec.inspect` says of the type, reports everything that
+is wrong. A struct is made as soon as all its own fields are right, and kept by its node, so that
+checks of rules that types cannot express run on it, even if the whole is wrong.
 """
 
 from __future__ import annotations
@@ -57,7 +50,6 @@ T = TypeVar("T", bound=Struct)
 
 _NO_REMARKS: Mapping[str, str] = {}
 _INVALID = object()
-"""Stands for the value of a node that is wrong."""
 
 
 class Decoding(Struct, Generic[S], frozen=True):
@@ -67,7 +59,6 @@ class Decoding(Struct, Generic[S], frozen=True):
     """The whole; it can be there along with diagnostics, as an unknown field does no harm."""
     diagnostics: tuple[Diagnostic, ...]
     structs: Mapping[ObjectNode, Struct]
-    """Every object whose own fields are all right."""
     texts: tuple[tuple[StringNode, str], ...]
     """Every string that is Markdown, with `blocks` or `inlines`."""
 
@@ -93,11 +84,7 @@ _type_info = functools.cache(inspect.type_info)
 
 
 class _Decoder:
-    """Collects the results of one walk.
-
-    A method returns the value of a node, or reports a diagnostic and returns `_INVALID`. `name` is
-    what messages call the node.
-    """
+    """One walk; methods return the value of a node, or report and return `_INVALID`."""
 
     def __init__(self, format: Format) -> None:
         self.format = format
@@ -328,7 +315,6 @@ def _field_help(name: str, type: inspect.Type) -> str:
 
 
 def _variants_with_field(key: str, variants: Mapping[str, inspect.StructType]) -> list[str]:
-    """The tags of the variants that have the field `key`."""
     return [tag for tag, variant in variants.items() if key in variant.cls.__struct_fields__]
 
 

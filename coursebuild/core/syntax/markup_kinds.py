@@ -1,9 +1,7 @@
 """The kinds of markup that readers would see as it is written.
 
-Entry points: `BROKEN`, markup of ours that is not whole; `FOREIGN`, that of other tools; `IN_HTML`,
-what is unread between tags; `ONCE`; `REWRITES`, what to write instead; `LANGUAGES` and
-`PLAIN_TEXTS`, of blocks. Patterns are searched for in a text in which NUL stands for all that was
-read, so that a mark directly after a NUL stands directly after a link, code and so on.
+Patterns are searched for in a text in which NUL stands for all that was read, so that a mark
+directly after a NUL stands directly after a link, code and so on.
 """
 
 from __future__ import annotations
@@ -166,7 +164,6 @@ FOREIGN = {
         "type the emoji itself",
     ),
 }
-"""Markup of other tools."""
 BROKEN = {
     "binding": MarkupKind(
         rf"(?:`{_NUMBER}[^`{{}}\n\0]{{0,20}}|(?:{_NUMBER})?`?)"
@@ -337,6 +334,5 @@ LANGUAGES = tuple(
     "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
     "toml xml yaml".split()
 )
-"""Languages that texts often show."""
 PLAIN_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
 """Names of ordinary code and text that no highlighter knows."""

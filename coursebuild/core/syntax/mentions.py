@@ -1,12 +1,7 @@
-"""Targets of links, schemes that a page must not have, and mentions.
-
-Entry points: `classify`, `check_scheme`, `check_raw_scheme`; `may_mention`, `text_inlines` and
-`link_mentions`, which make links of "Lesson 2.2" and "Level 18" in prose, in the words of the
-course's language.
+"""Targets of links, schemes that a page must not have, and mentions as in "Lesson 2.2".
 
 Text and soft line ends that follow each other make one run, as a mention may be broken over two
-lines. A mention becomes a `Link` whose `target_span` is the number; the text around it becomes
-`Text` and `SoftBreak`.
+lines.
 """
 
 from __future__ import annotations
@@ -113,10 +108,7 @@ _NUMBERED = re.compile(r"(?:[^\W\d_]+ )?(\d+(?:\.\d+)+)")
 
 
 def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> Diagnostic | None:
-    """The diagnostic of a text that is another lesson, or almost the name of a model or script.
-
-    A link without a text shows the name of what has a number.
-    """
+    """The diagnostic of a text that is missing, another lesson, or almost its target's name."""
     if not children:
         address = getattr(target, "url", None) or f"#{getattr(target, 'anchor', None) or ''}"
         if address.partition("#")[2].partition(":")[0] in LABEL_KINDS:

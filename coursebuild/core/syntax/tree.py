@@ -1,15 +1,4 @@
-"""Block content: markdown-it's block tokens become `Block` nodes with spans.
-
-Entry points: `TextReader`, which reads the blocks of a text; `NestedTextParser`, the `TextParser`
-for quizzes and labs.
-
-1. `TextReader` makes the tokens, and collects the explicit ids and the footnotes in them
-   (`_scan_tokens`), which must be known before the first reference.
-2. It walks the flat tokens once, with a method for each kind of block; containers read the blocks
-   inside them by recursion.
-3. A paragraph looks ahead: `Output:` and the block below it are one `Recording`, as is an `output`
-   fence without it.
-"""
+"""Block content: markdown-it's flat block tokens become `Block` nodes with spans."""
 
 from __future__ import annotations
 
@@ -33,7 +22,6 @@ from coursebuild.core.syntax.containers import (
 from coursebuild.core.syntax.fence import read_fence
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_tree import read_inlines
-from coursebuild.core.syntax.labels import reject_label, take_label
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
@@ -73,7 +61,6 @@ class TextReader:
         self._scan_tokens()
 
     def _scan_tokens(self) -> None:
-        """Collect explicit ids and footnotes, and report what nests too deep."""
         for i, token in enumerate(self.tokens):
             if token.type == "heading_open" and self.tokens[i + 1].content.endswith("}"):
                 name = read_attributes(trim(token.text)).value.id
@@ -103,7 +90,6 @@ class TextReader:
     # -- walking
 
     def _read_blocks(self, stop: str | None) -> tuple[model.Block, ...]:
-        """The blocks up to a closing token, which is skipped."""
         blocks: list[model.Block] = []
         self.balance.enter()
         while self.index < len(self.tokens):
@@ -146,18 +132,18 @@ class TextReader:
         caption, braces = split_label(content)
         span, following = content.span(), self._peek()
         if caption.text.startswith(TABLE) and following and following.type == "table_open":
-            label = take_label(braces, "tab", self.state)
+            label = self.state.take_label(braces, "tab")
             inlines = self.inlines(trim(caption.slice(len(TABLE))))
             table, self.index = self._table_at(self.index)
             return replace(table, span=span.to(table.span), label=label, caption=inlines)
         if braces is None:
             return None
         if caption.text.startswith(FIGURE):
-            label = take_label(braces, "fig", self.state)
+            label = self.state.take_label(braces, "fig")
             inlines, shows_image = read_figure(self.inlines(caption), span, self.state.figures)
             if not shows_image:
                 message = "no image stands in the paragraph of this label"
-                reject_label(braces, message, "show one: `![…](file.svg)`", self.state)
+                self.state.reject_label(braces, message, "show one: `![…](file.svg)`")
             return model.Paragraph(span, inlines, False, shows_image, label=label)
         words = (TABLE, *self.state.words.output)
         if not any(word in caption.text[:24] for word in words):
@@ -166,13 +152,13 @@ class TextReader:
         if is_caption(inlines, self.state.words):
             recording = self._read_recording(inlines, caption.span())
         if recording is not None and isinstance(recording.body, model.Table):
-            label = take_label(braces, "tab", self.state)
+            label = self.state.take_label(braces, "tab")
             return replace(recording, body=replace(recording.body, label=label))
         message, help = "no table follows the caption of this label", "put one directly below it"
         if recording is not None:
             message = "an output that is no table has no label"
             help = "write `{#lst:name}` on the first line of its script"
-        reject_label(braces, message, help, self.state)
+        self.state.reject_label(braces, message, help)
         return recording or model.Paragraph(span, inlines)
 
     def _is_caption(self, content: Excerpt, inlines: tuple[model.Inline, ...]) -> bool:
@@ -203,7 +189,6 @@ class TextReader:
         return self.tokens[self.index] if self.index < len(self.tokens) else None
 
     def _peek_info(self) -> str | None:
-        """The info string of the next block, if it is a fence."""
         token = self._peek()
         return token.info if token is not None and token.type == "fence" else None
 
@@ -283,7 +268,7 @@ class TextReader:
         elif not tex.text:
             self.state.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
         braces = LABEL.match(text.text, end + 2)
-        label = take_label(text.slice(*braces.span(1)) if braces else None, "eq", self.state)
+        label = self.state.take_label(text.slice(*braces.span(1)) if braces else None, "eq")
         return model.MathBlock(self._span(token), tex, label=label)
 
     # -- containers
@@ -330,7 +315,6 @@ class TextReader:
         return read_table(self.tokens, at, self.base, self.inlines, self.state.report)
 
     def _skip_footnote(self, token: PositionedToken) -> None:
-        """Skip a footnote, which is read later."""
         depth = 1
         while depth:
             kind = self.tokens[self.index].type
@@ -342,7 +326,6 @@ class TextReader:
     def _read_recording(
         self, caption: tuple[model.Inline, ...], span: Span
     ) -> model.Recording | None:
-        """The recording with the caption just read, if the next block is its body."""
         match self._peek():
             case PositionedToken(type="table_open"):
                 table, self.index = self._table_at(self.index)

@@ -1,7 +1,6 @@
 """The closed catalogue of rules: every mistake that the tool can name.
 
-Entry points: `RULES`, from name to `Rule`, and `GROUPS`. `docs/reference/rules.md` is written from
-them; a fixture in `tests/fixtures/rules/` shows for each rule what an author sees.
+A fixture in `tests/fixtures/rules/` shows for each rule what an author sees.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ class Rule(Struct, frozen=True):
     name: str
     severity: Severity
     summary: str
-    """Its meaning in one sentence, for the catalogue's page."""
     no_fix: str = ""
     """Why no diagnostic of it has an edit, in one clause; empty where one may have."""
 
@@ -241,7 +239,6 @@ GROUPS: dict[str, dict[str, str]] = {
         "package-reduced": "A QTI package cannot hold a question as the page shows it.",
     },
 }
-"""The meaning of each rule in one sentence, by the sections of the page of rules."""
 _WARNINGS = frozenset(
     """
     draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
@@ -288,7 +285,6 @@ _NO_FIX = {
     "leave it out, or allow it in the map": "html-forbidden",
     "leave it out, or silence the warning": "package-reduced",
 }
-"""Why rules have no edits: a reason, and the names of the rules."""
 _REASONS = {name: reason for reason, names in _NO_FIX.items() for name in names.split()}
 
 RULES: dict[str, Rule] = {

@@ -1,7 +1,7 @@
 """JSON and TOML with places: the values are those of the standard library.
 
-The diagnostics of wrong texts are `tests/fixtures/texts/`; `pytest tests/core/syntax
---rewrite-fixtures` writes their expected parts anew.
+What courses, models and quizzes become stands in `tests/fixtures/values/`, the diagnostics of wrong
+texts in `tests/fixtures/texts/`; `pytest tests/core/syntax --rewrite-fixtures` writes both anew.
 """
 
 from __future__ import annotations
@@ -9,18 +9,23 @@ from __future__ import annotations
 import datetime
 import json
 import tomllib
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from msgspec import NODEFAULT, Struct
+from msgspec.structs import fields
 
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
 from coursebuild.core.syntax.toml_text import parse_toml
-from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.core.text.source import Excerpt, Source
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed
+from coursebuild.core.text.source import Excerpt, Source, Span
+from support.fixture_cases import Case, check_cases, read_cases
 from support.text_cases import FOLDER, Reader, check_texts, parse_lab, parse_quiz, plain
 from support.text_cases import parse_text as parse
 
@@ -348,6 +353,7 @@ def test_diagnostics_of_wrong_texts(name: str, rewriting: bool) -> None:
 
 def test_every_file_of_texts_is_read() -> None:
     assert {path.stem for path in FOLDER.iterdir()} == {*READERS, "fields"}
+    assert {path.stem for path in VALUE_FOLDER.iterdir()} == {*VALUES_READ}
 
 
 def test_notes_point_at_the_first_key_and_at_the_bracket() -> None:
@@ -386,3 +392,59 @@ def test_nesting_up_to_the_limit_is_read() -> None:
     assert parse("[" * 64 + "]" * 64).diagnostics == ()
     assert read_toml("a = " + "[" * 64 + "]" * 64)[1] == ()
     assert read_toml(".".join("a" * 64) + " = 1")[1] == ()
+
+
+VALUES_READ: dict[str, Callable[[str], Parsed[Any]]] = {
+    "map": lambda text: parse_course_map(Source("content/course.toml", text)),
+    "model": lambda text: parse_declarations(Source("models/arms/arm.toml", text)),
+    "quiz": parse_quiz,
+}
+VALUE_FOLDER = FOLDER.parent / "values"
+
+
+def describe(value: object, depth: int = 0) -> str:
+    """A value in lines: its fields but for empty ones, and places as what stands there."""
+    match value:
+        case Source():
+            return f" {value.path}\n"
+        case Span() | Excerpt():
+            span = value if isinstance(value, Span) else value.span()
+            return f" {span.line}:{span.column} {span.first_line().text}\n"
+        case Struct():
+            pairs = [(f"{f.name}:", getattr(value, f.name), f.default) for f in fields(value)]
+            head = f" {type(value).__name__}\n"
+        case tuple() if any(isinstance(item, Struct | tuple) for item in value):
+            pairs, head = [("-", item, NODEFAULT) for item in value], "\n"
+        case _:
+            return f" {value!r}\n"
+    indent = "  " * depth
+    return head + "".join(
+        f"{indent}{name}{describe(part, depth + 1)}"
+        for name, part, default in pairs
+        if part != default and (default is not NODEFAULT or part not in ((), "", None, {}))
+    )
+
+
+@pytest.mark.parametrize("name", VALUES_READ)
+def test_values_of_right_texts(name: str, rewriting: bool) -> None:
+    def render(case: Case) -> str:
+        text = case.input
+        results = [VALUES_READ[name](text), VALUES_READ[name](text.replace("\n", "\r\n"))]
+        assert [result.diagnostics for result in results] == [(), ()]
+        first, second = (describe(result.value) for result in results)
+        assert first == second
+        return first
+
+    check_cases(VALUE_FOLDER / f"{name}.md", render, rewriting=rewriting)
+
+
+@settings(max_examples=150)
+@given(st.sampled_from([*VALUES_READ]), st.data())
+def test_any_edit_of_a_right_text_is_parsed_or_reported(name: str, data: st.DataObject) -> None:
+    text = read_cases(VALUE_FOLDER / f"{name}.md")[0].input
+    at = data.draw(st.integers(0, len(text)))
+    piece = data.draw(JSON_PIECES | TOML_PIECES | st.text(max_size=3))
+    result = VALUES_READ[name](text[:at] + piece + text[at + data.draw(st.integers(0, 20)) :])
+    assert result.value is not None or result.diagnostics
+    orders = [diagnostic.order for diagnostic in result.diagnostics]
+    assert orders == sorted(orders)
