@@ -81,12 +81,8 @@ def _command_candidates(
     for action in actions:
         if before[-1] in action.option_strings and action.nargs != 0:
             return action.choices or ()
-    return [
-        word
-        for action in actions
-        if not action.option_strings
-        for word in _argument_values(action, directory)
-    ]
+    positionals = [action for action in actions if not action.option_strings]
+    return [word for action in positionals for word in _argument_values(action, directory)]
 
 
 def _argument_values(action: argparse.Action, directory: str | None) -> Iterable[str]:

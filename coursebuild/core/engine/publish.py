@@ -1,7 +1,5 @@
 """Publishing a site: written whole beside the old one, then swapped in, or not at all.
 
-Entry points: `check_output_folder`, which says early whether a site may go somewhere; `publish`.
-
 1. The place is checked: it is neither the project nor a folder of the author's, and holds no file
    that we did not put there. One build publishes to a place at a time.
 2. The site is filled into a slot: a folder beside the place, on the same file system, which holds
@@ -77,18 +75,12 @@ def publish(
     jobs: int = 1,
     stage: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> tuple[str, ...]:
-    """Replace the site at `out` by these files.
+    """Replace the site at `out` by these files; return the paths of those that were written.
 
-    Args:
-        root: the course folder.
-        out: where the site goes; a link to a folder stays one.
-        files: each path once; POSIX, relative, without `..`.
-        file_list: a file that lists all the others.
-        jobs: how many copies of this process, at most, make and write files where there are many.
-        stage: a context that is entered while the files are made.
-
-    Returns:
-        The paths of the files that were written, sorted; the others have not changed.
+    They are sorted; the others have not changed. Paths are POSIX, relative, without `..`, each
+    once. `out` may be a link to a folder, and stays one. `file_list` lists all the others. `jobs`
+    is how many copies of this process, at most, make and write files where there are many; `stage`
+    is entered meanwhile.
 
     Raises:
         PublishRefusedError: a site must not go there.
@@ -140,38 +132,32 @@ def _swap(slot: Path, place: Path) -> None:
 
 def _check_place(root: Path, out: Path, place: Path) -> None:
     path = Path(os.path.normpath(root / out))
+
+    def refuse(problem: str, help: str = "") -> PublishRefusedError:
+        return PublishRefusedError(f"{out} {problem}", help=help)
+
     if path.is_relative_to(root) and not place.is_relative_to(root):
-        raise PublishRefusedError(
-            f"{out} is a link that leads out of the project",
-            help="such a link may come with a course: name the folder itself with `--out`",
-        )
+        help = "such a link may come with a course: name the folder itself with `--out`"
+        raise refuse("is a link that leads out of the project", help)
     if root.is_relative_to(place):
         relation = "is the project itself" if place == root else "holds the project"
-        raise PublishRefusedError(
-            f"{out} {relation}", help="publish to a folder of its own, such as `public`"
-        )
+        raise refuse(relation, "publish to a folder of its own, such as `public`")
     for name in _AUTHOR_FOLDERS:
         if place.is_relative_to(os.path.realpath(root / name)):
-            raise PublishRefusedError(
-                f"{out} lies in {name}/ of the project, which cannot hold a site"
-            )
+            raise refuse(f"lies in {name}/ of the project, which cannot hold a site")
     _recover(place)
     if os.path.lexists(place) and not place.is_dir():
-        raise PublishRefusedError(f"{out} is not a folder")
+        raise refuse("is not a folder")
     if os.path.ismount(place):
-        raise PublishRefusedError(
-            f"{out} is a mount point, which cannot be swapped", help="publish to a folder inside it"
-        )
+        raise refuse("is a mount point, which cannot be swapped", "publish to a folder inside it")
     try:
         foreign = foreign_files(place)
     except OSError as error:
         raise EffectError(f"{out} cannot be read: {reason(error)}") from None
     if foreign:
-        rest = f" and {len(foreign) - 3} more" if len(foreign) > 3 else ""
-        raise PublishRefusedError(
-            f"{out} holds files that coursebuild did not put there: {', '.join(foreign[:3])}{rest}",
-            help="move them away, or publish to another folder",
-        )
+        names = ", ".join(foreign[:3]) + (f" and {len(foreign) - 3} more" if foreign[3:] else "")
+        problem = f"holds files that coursebuild did not put there: {names}"
+        raise refuse(problem, "move them away, or publish to another folder")
 
 
 def exchange(a: Path, b: Path) -> bool:
@@ -364,11 +350,8 @@ def _remove_stale(
 ) -> dict[str, ManifestEntry]:
     """Remove everything from a folder but intact files and needed folders; return these files.
 
-    Args:
-        folder: its path, with a slash behind it.
-        prefix: its path in the site, likewise.
-        old_entries: the entries of the files that may stay, by path.
-        folders: the folders that may stay.
+    `folder` and `prefix`, its path in the site, end with a slash. `old_entries` are those of the
+    files that may stay, `folders` the folders.
     """
     intact: dict[str, ManifestEntry] = {}
     with os.scandir(folder) as entries:

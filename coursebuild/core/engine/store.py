@@ -1,7 +1,6 @@
 """Results that are expensive to make and depend on nothing but their key, kept in `.coursebuild/`.
 
-Entry point: `Store`, with `get` and `put`, or both in one, `get_or_make`; `get_value` and
-`put_value` for JSON. The words are those of `core.engine`.
+The words are those of `core.engine`.
 
 1. An entry lies at `.coursebuild/KIND/KEY`, or `KIND/GROUP/KEY` where several results belong
    together. It is sealed under its name with the user's key (see `core.files.trust`), and the

@@ -1,9 +1,5 @@
 """Writing files of a course: one, whole or not at all, or several together, all or none.
 
-Entry points: `write_atomic`, `check_writable`, `check_unchanged`, `remove_leftovers`;
-`change_files(root, changes)`; `undo_changes(root)`, before a command reads a course; `take_back`,
-the last changes whose journal was kept.
-
 1. The new bytes go into a temporary file in the same folder, locked as long as its writer is alive.
 2. They are synced to the disk, with the permissions and the owner of the file that they replace.
 3. If the file is still what the caller read, the temporary file is renamed over it.
@@ -49,14 +45,9 @@ def write_atomic(
 ) -> None:
     """Make `data` the content of a file of the course, or of the file that a link there leads to.
 
-    Args:
-        root: the course folder.
-        path: POSIX path relative to it.
-        data: the new content.
-        expected: the file's content when it was read; `None` if there was none, and perhaps no
-            folder either.
-        durable: whether it is an author's file, whose bytes must survive a power cut and which is
-            left alone if it is read-only. (A derived file can be made again.)
+    `expected` is the file's content when it was read; `None` if there was none, and perhaps no
+    folder either. `durable`: it is an author's file, whose bytes must survive a power cut and which
+    is left alone if it is read-only. (A derived file can be made again.)
 
     Raises:
         FileChangedError: the file has changed since; it stays as it is.
@@ -165,16 +156,14 @@ def _fill(fd: int, data: bytes, target: Path) -> None:
 
 
 def _move(temporary: str, target: Path, path: str, *, new: bool) -> None:
-    if new:  # a link, unlike a rename, never replaces a file that somebody just made
-        try:
+    try:
+        if new:  # a link, unlike a rename, never replaces a file that somebody just made
             os.link(temporary, target)
             return
-        except FileExistsError:
-            raise FileChangedError(
-                f"{path} was created by another program in the meantime"
-            ) from None
-        except OSError:
-            pass  # a file system without links
+    except FileExistsError:
+        raise FileChangedError(f"{path} was created by another program in the meantime") from None
+    except OSError:
+        pass  # a file system without links
     Path(temporary).replace(target)
 
 
@@ -286,8 +275,7 @@ def take_back(
     current_journal = journal_path(root)
     for journal in reversed(_kept_journals(current_journal) if current_journal else []):
         try:
-            data = unseal(_NAME, journal.read_bytes(), store_key(str(root)))
-            changes = msgspec.msgpack.decode(data or b"", type=tuple[FileChange, ...])
+            changes = _unseal_changes(root, journal.read_bytes())
         except (*DAMAGE, FileNotFoundError):
             journal.unlink(missing_ok=True)
             continue
@@ -302,6 +290,12 @@ def take_back(
         journal.unlink(missing_ok=True)
         return [change.path for change in unedited], edited_paths
     return None
+
+
+def _unseal_changes(root: Path, journal: bytes) -> tuple[FileChange, ...]:
+    """The changes of a journal; one of `DAMAGE` is raised where it is damaged, or not ours."""
+    data = unseal(_NAME, journal, store_key(str(root)))
+    return msgspec.msgpack.decode(data or b"", type=tuple[FileChange, ...])
 
 
 def _kept_journals(journal: Path) -> list[Path]:
@@ -333,22 +327,19 @@ def journal_path(root: Path) -> Path | None:
 def _undo(root: Path, tell: Callable[[str], None] | None) -> None:
     journal = journal_path(root)
     try:
-        data = journal.read_bytes() if journal is not None else b""
+        data = None if journal is None else journal.read_bytes()
     except OSError:
         return
-    if journal is None:
+    if journal is None or data is None:
         return
-    journaled = unseal(_NAME, data, store_key(str(root)))
     try:
-        changes = msgspec.msgpack.decode(journaled or b"", type=tuple[FileChange, ...])
+        changes = _unseal_changes(root, data)
         for change in changes:
             _check_path(root, change)
     except (*DAMAGE, OutsideProjectError):
         journal.replace(journal.with_suffix(".damaged"))
-        message = (
-            "an interrupted command left a damaged journal, so nothing was undone: "
-            "check the files that it was changing"
-        )
+        message = "an interrupted command left a damaged journal, so nothing was undone"
+        message += ": check the files that it was changing"
     else:
         message = _restore(root, changes)
         remove_leftovers({(root / change.path).parent for change in changes})
@@ -370,13 +361,11 @@ def _restore(root: Path, changes: Sequence[FileChange]) -> str:
                 restored_paths.append(change.path)
             except FileChangedError:
                 edited_paths.append(change.path)
-    message = ""
-    if restored_paths:
-        message = f"undid a change that was interrupted: {', '.join(sorted(restored_paths))}"
-    if edited_paths:
-        names = ", ".join(sorted(edited_paths))
-        message += f"{'; ' if message else ''}left as edited since: {names}"
-    return message
+    outcomes = {
+        "undid a change that was interrupted": restored_paths,
+        "left as edited since": edited_paths,
+    }
+    return "; ".join(f"{verb}: {', '.join(sorted(p))}" for verb, p in outcomes.items() if p)
 
 
 def _check_path(root: Path, change: FileChange) -> Path:

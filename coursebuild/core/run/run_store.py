@@ -1,7 +1,5 @@
 """The results of scripts: one runs again only if something that it depends on has changed.
 
-Entry point: `RunStore`.
-
 1. `get_runs`: what is known before a script runs determines a group of results; the one whose
    dependencies are all unchanged is its result. Groups that this machine lacks are looked for in
    the shared cache.
@@ -25,13 +23,7 @@ from typing import assert_never
 
 from msgspec.structs import replace
 
-from coursebuild.core.engine.digests import (
-    Clock,
-    changed_since,
-    file_state,
-    folder_state,
-    modules_in,
-)
+from coursebuild.core.engine import digests
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.locks import claim, unclaim
 from coursebuild.core.files.trust import FOLDER
@@ -92,14 +84,14 @@ class States:
         """The state of a need at this moment."""
         match need.kind:
             case Kind.FILE:
-                return file_state(self._inside + need.name)
+                return digests.file_state(self._inside + need.name)
             case Kind.LISTING:
-                return folder_state(self._inside + need.name)
+                return digests.folder_state(self._inside + need.name)
             case Kind.SOUGHT:
                 folder, modules = parse_sought(need.name)
-                return modules_in(self._inside + folder, modules)
+                return digests.modules_in(self._inside + folder, modules)
             case Kind.OUTSIDE:
-                return file_state(need.name)
+                return digests.file_state(need.name)
             case Kind.MODULE:
                 return self._installed.version(need.name)
             case Kind.PLACE:
@@ -111,11 +103,7 @@ class States:
 class RunStore:
     """The results of the scripts of a course in its store.
 
-    Args:
-        root: the course folder.
-        store: where they are kept.
-        fresh: whether all is to be run again.
-        interpreter: another one that runs them. Last runs are noted only for the course's own.
+    With `fresh`, all is to be run again. Last runs are noted only for the course's own interpreter.
     """
 
     def __init__(
@@ -135,7 +123,7 @@ class RunStore:
         """The remembered and the new run of scripts that differ though nothing changed."""
         self.edited_paths: set[str] = set()
         """The scripts that ran with another text than before."""
-        self._clock = Clock(store)
+        self._clock = digests.Clock(store)
         self._started: dict[str, int] = {}
 
     def inputs(self, job: ScriptJob, text: bytes) -> Inputs:
@@ -146,17 +134,10 @@ class RunStore:
         """The results that hold, by path; none where everything is to run."""
         if self.fresh:
             return {}
-        runs: dict[str, ScriptRun] = {}
-        missing: list[Inputs] = []
-        for inputs in all_inputs:
-            record = self.get_record(inputs)
-            if record is None:
-                missing.append(inputs)
-            else:
-                runs[inputs.path] = record.restore(self.states.places)
-        for record in self._fetch(missing):
-            runs[record.inputs.path] = record.restore(self.states.places)
-        return runs
+        local_records = [(inputs, self.get_record(inputs)) for inputs in all_inputs]
+        records = [record for _, record in local_records if record is not None]
+        records += self._fetch([inputs for inputs, record in local_records if record is None])
+        return {record.inputs.path: record.restore(self.states.places) for record in records}
 
     def get_record(self, inputs: Inputs) -> RunRecord | None:
         """The result kept on this machine that holds now."""
@@ -202,10 +183,8 @@ class RunStore:
         last = self.last_record(inputs.path)
         if last is None:
             aside = self.store.set_aside
-            return [
-                "there is no result of it on this machine",
-                *([f"{FOLDER} is not used: it {aside}"] if aside else []),
-            ]
+            reasons = [f"{FOLDER} is not used: it {aside}"] if aside else []
+            return ["there is no result of it on this machine", *reasons]
         clauses = input_changes(last.inputs, inputs)
         clauses += state_changes(last.dependencies, self.states)
         if last.reason_forgotten:
@@ -224,8 +203,7 @@ class RunStore:
     ) -> None:
         """Note what a trial depends on besides its inputs: files of the course.
 
-        `lasting`: whether its result can be used again. `timestamp`: when it ran, in seconds since
-        1970.
+        `lasting`: whether its result can be used again. `timestamp`: in seconds since 1970.
         """
         states = ((path, self.states(Need(Kind.FILE, path))) for path in sorted(files))
         dependencies = tuple(Dependency(Kind.FILE, path, state) for path, state in states)
@@ -283,7 +261,7 @@ class RunStore:
                     continue
                 case _:
                     assert_never(dependency.kind)
-            if changed_since(path, since):
+            if digests.changed_since(path, since):
                 return _REASON.format(path.removeprefix(f"{self.states.root}/"))
         return ""
 
