@@ -16,10 +16,7 @@ from coursebuild.cli.output import CLEAN, FAILURE, USAGE, say, write
 
 
 def main(arguments: list[str] | tuple[str, ...] | None = None) -> int:
-    """Run the command that the arguments name; return the exit status.
-
-    Without arguments the command is that of this process, which ends with it.
-    """
+    """Run a command; return its exit status. Without arguments it is that of this process."""
     alone = arguments is None
     if alone and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         # Until there is something to clean up, Ctrl-C ends this process at once. Python would show

@@ -117,7 +117,6 @@ class CommandServer:
 
 
 def _end_with(work: Callable[[], object]) -> NoReturn:
-    """Do some work in a copied process, which ends with it."""
     status = FAILURE
     try:
         status = int(work() or 0)  # type: ignore[call-overload]
@@ -126,7 +125,6 @@ def _end_with(work: Callable[[], object]) -> NoReturn:
 
 
 def _close_all_but(*files: int) -> None:
-    """Close what is open here except these, and the standard streams."""
     edges = [2, *sorted(files), 1 << 16]
     for before, after in itertools.pairwise(edges):
         os.closerange(before + 1, after)
@@ -135,7 +133,6 @@ def _close_all_but(*files: int) -> None:
 def _serve(
     listener: socket.socket, events: socket.socket, root: str, preview: dict[str, Any]
 ) -> None:
-    """Take commands until the preview's process ends."""
     os.setsid()  # Ctrl-C in the preview's terminal is not for commands of others
     for number in (*SIGNALS, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
@@ -174,7 +171,6 @@ def _attend(
     state: str | None,
     preview: dict[str, Any],
 ) -> None:
-    """Answer a request; have a command done."""
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     _close_all_but(connection.fileno(), events.fileno())
     files: list[int] = []

@@ -75,10 +75,7 @@ if MANUAL:
 
 
 def run(directory: str | None, words: list[str], *, alone: bool) -> int:
-    """Run the command that the words name, in a folder; return the exit status.
-
-    `alone`: the command is that of this process, which ends with it.
-    """
+    """Run the command that the words name; `alone`: this process ends with it."""
     thresholds, handlers = gc.get_threshold(), {}
     # The objects of a command live until its end, and hardly any are in cycles: collecting garbage
     # takes time for nothing, most of all when the process ends.
@@ -198,8 +195,6 @@ def parser_of(command: Command) -> argparse.ArgumentParser:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that proposes the option that was meant."""
-
     def error(self, message: str) -> NoReturn:
         """Raise a `UsageError` that says what is wrong with the command line."""
         option = re.match("unrecognized arguments: (--[^ =]+)", message)

@@ -86,7 +86,6 @@ def _command_candidates(
 
 
 def _argument_values(action: argparse.Action, directory: str | None) -> Iterable[str]:
-    """The values of a positional argument, by its name in the help."""
     if action.choices:
         return action.choices
     root = find_course_root(directory or ".")
@@ -106,7 +105,6 @@ def _argument_values(action: argparse.Action, directory: str | None) -> Iterable
 
 
 def _read_ids(root: Path) -> list[str]:
-    """The ids of the lessons and pages of a map; none where it cannot be read."""
     try:
         course = tomllib.loads((root / MAP).read_text("utf-8"))
         lessons = [lesson["id"] for level in course["level"] for lesson in level["lesson"]]

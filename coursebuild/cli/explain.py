@@ -199,17 +199,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def explain(options: Options, name: str) -> Explanation:
-    """What is known of a script, lab, lesson, page, model, or any file of the project.
-
-    Raises:
-        UsageError: the course cannot be read, or nothing in it is called so.
-    """
+    """What is known of a script, lab, lesson, page, model, or any file of the project."""
     return _Explainer(load_course(options.root), options).explain(name)
 
 
 class _Explainer:
-    """Knows a course and its last results."""
-
     def __init__(self, course: Course, options: Options) -> None:
         self.course = course
         self.root = options.root
@@ -292,7 +286,6 @@ class _Explainer:
         return _describe_run("lab", name, trial.owner, last, self.run_store.reasons(inputs))
 
     def _find_dependents(self, path: str) -> tuple[RunExplanation, ...]:
-        """Find scripts and labs whose last results depend on a file or on its folder's listing."""
         dependents = []
         for script in self.scripts:
             if script != path and self._depends(self.run_store.last_record(script), path):
@@ -321,7 +314,6 @@ class _Explainer:
 
 
 def _uses(document: Document, path: str) -> bool:
-    """Whether a document shows a file, links to it, or quotes its output."""
     for block in document_blocks(document):
         if isinstance(block, FeatureBlock):
             mentioned = block.mentioned_models()

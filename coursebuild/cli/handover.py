@@ -191,8 +191,6 @@ def connect(root: str | None) -> Iterator[socket.socket | None]:
 
 
 def _wait(connection: socket.socket, process: int) -> int:
-    """Wait for the end of a command that a preview does; return its exit status."""
-
     def pass_on(number: int, frame: object) -> None:
         with contextlib.suppress(OSError):
             connection.send(bytes([number]))

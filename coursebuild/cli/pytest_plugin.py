@@ -109,7 +109,6 @@ class CourseTests:
         return results
 
     def _find_test(self, diagnostic: str) -> str:
-        """Find the test that a diagnostic belongs to."""
         place = _PLACE.search(diagnostic)
         if place is None or place[1] not in self.tests:
             return f"{MAP}::{_MAP}"
@@ -122,7 +121,6 @@ _COURSES = pytest.StashKey[dict[str, CourseTests]]()
 
 
 def _tests_by_file(course: Course | None) -> dict[str, Mapping[str, _Lines]]:
-    """Return the tests of each file; if the map cannot be read, its test alone."""
     from coursebuild.core.model import FeatureBlock, Recording, Script, document_blocks
     from coursebuild.core.registry import feature_trials
 

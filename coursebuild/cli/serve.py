@@ -64,10 +64,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Build, serve, rebuild and reload on change, until it is interrupted.
-
-    Where the course is served so already, only say where.
-    """
+    """Serve until it is interrupted; where the course is served so already, only say where."""
     options = options_of(arguments)
     served = ask_preview(str(options.root))
     if served is not None and arguments.host == served["host"] and not arguments.embed:
@@ -130,7 +127,6 @@ def _serve(options: Options, arguments: argparse.Namespace, *, takes_commands: b
 
 
 def _propose_port(host: str, port: int, error: OSError) -> str:
-    """The command with the next port that is free, where the one that was asked for is taken."""
     for number in range(port + 1, min(port + 100, 65536)) if error.errno == EADDRINUSE else ():
         with contextlib.suppress(OSError), socket.create_server((host, number)):
             option = "" if host == "127.0.0.1" else f" --host {host}"

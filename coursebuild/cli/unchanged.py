@@ -178,7 +178,6 @@ def tool_state() -> str | None:
 
 
 def _tool() -> list[str]:
-    """The folders with installed packages, and those of the tool itself."""
     package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     source = os.path.dirname(package)
     tool = [*(folder for folder in sys.path if folder.endswith(_PACKAGES)), package]
@@ -241,6 +240,5 @@ def _numbers(status: os.stat_result, began: int | None) -> tuple[int, ...]:
 
 
 def _name(command: tuple[str, ...]) -> str:
-    """The name of the record of a command in the store."""
     text = "\0".join(command).encode("utf-8", "surrogateescape")
     return f"unchanged/{hashlib.blake2b(text, digest_size=32).hexdigest()}"

@@ -116,7 +116,6 @@ def foreign_files(place: Path) -> list[str]:
 
 
 def _files(folder: Path) -> list[str]:
-    """The paths of all files in a folder except junk."""
     paths: list[str] = []
     folders = [""]
     for prefix in folders:

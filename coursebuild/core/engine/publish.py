@@ -31,15 +31,8 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.engine.manifest import (
-    KIND,
-    MARKER,
-    Manifest,
-    ManifestEntry,
-    foreign_files,
-    holds,
-    marker,
-)
+from coursebuild.core.engine import manifest
+from coursebuild.core.engine.manifest import MARKER, Manifest, ManifestEntry
 from coursebuild.core.engine.page_pool import Workers, can_fork
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, reason
 from coursebuild.core.files.locks import folder_lock
@@ -55,11 +48,7 @@ _AUTHOR_FOLDERS = ("content", "features", "models", "examples", ".coursebuild", 
 
 
 def check_output_folder(root: Path, out: Path) -> Path:
-    """Return where the site goes: `out`, or the folder it links to; undo a killed build.
-
-    Raises:
-        PublishRefusedError: a site must not go there.
-    """
+    """Where the site goes: `out`, or the folder it links to; undo a killed build."""
     place = Path(os.path.realpath(out))
     with folder_lock(place.parent):
         _check_place(Path(os.path.realpath(root)), out, place)
@@ -101,7 +90,7 @@ def publish(
             try:
                 open_slot(root, slot)
                 entries, paths = site.fill(slot, jobs, stage)
-                if not holds(slot, entries):
+                if not manifest.holds(slot, entries):
                     message = f"another process is changing what is being written to {place}"
                     raise EffectError(message)
                 _swap(slot, place)
@@ -151,7 +140,7 @@ def _check_place(root: Path, out: Path, place: Path) -> None:
     if os.path.ismount(place):
         raise refuse("is a mount point, which cannot be swapped", "publish to a folder inside it")
     try:
-        foreign = foreign_files(place)
+        foreign = manifest.foreign_files(place)
     except OSError as error:
         raise EffectError(f"{out} cannot be read: {reason(error)}") from None
     if foreign:
@@ -161,11 +150,7 @@ def _check_place(root: Path, out: Path, place: Path) -> None:
 
 
 def exchange(a: Path, b: Path) -> bool:
-    """Swap two folders in one step; return `False` where the system or file system cannot.
-
-    Raises:
-        OSError: the system can, but refused.
-    """
+    """Swap two folders in one step; return `False` where the system or file system cannot."""
     try:
         native = getattr(ctypes.CDLL(None, use_errno=True), _EXCHANGE[sys.platform])
     except (KeyError, OSError, AttributeError):
@@ -224,8 +209,8 @@ class NewSite(Struct, frozen=True):
         try:
             return (
                 all(self.old.is_whole(path, key) for path, key in self.keys.items())
-                and holds(place, self.keys)
-                and (place / MARKER).read_bytes() == marker(self.keys)
+                and manifest.holds(place, self.keys)
+                and (place / MARKER).read_bytes() == manifest.marker(self.keys)
             )
         except OSError:
             return False
@@ -262,11 +247,10 @@ class NewSite(Struct, frozen=True):
             facts = [FileFacts(path, e.digest, e.size) for path, e in sorted(entries.items())]
             path = self.file_list.path
             entries[path] = self._write(slot, OutputFile(path, self.file_list.make(facts)))
-        _write_file(f"{slot}/{MARKER}", marker(entries))
+        _write_file(f"{slot}/{MARKER}", manifest.marker(entries))
         return entries, new_paths
 
     def _link(self, path: str, entry: ManifestEntry, slot: Path) -> bool:
-        """Link a file of the old site into the slot, if it has not changed."""
         target = f"{slot}/{path}"
         try:
             os.link(f"{self.old.place}/{path}", target, follow_symlinks=False)
@@ -286,7 +270,6 @@ class NewSite(Struct, frozen=True):
 
 
 def _write_file(path: str, data: bytes) -> str:
-    """Write a new file; return the hash of its bytes."""
     with open(path, "xb") as file:  # noqa: PTH123 - thousands of them
         file.write(data)
         os.fchmod(file.fileno(), 0o644)  # whatever the umask is
@@ -294,11 +277,7 @@ def _write_file(path: str, data: bytes) -> str:
 
 
 def new_site(old: Manifest, files: Iterable[SiteFile], file_list: FileList | None) -> NewSite:
-    """The site of these files, to be published over the one of a manifest.
-
-    Raises:
-        ValueError: a path is not valid in a site, or two files have the same.
-    """
+    """The site of these files over the one of a manifest; a `ValueError` where a path is bad."""
     by_path: dict[str, SiteFile] = {}
     keys: dict[str, str] = {}
     for file in files:
@@ -342,7 +321,7 @@ def put_away(root: Path, slot: Path) -> None:
 
 
 def _spare(root: Path) -> Path:
-    return Path(find_store(str(root))[0], KIND, "spare")
+    return Path(find_store(str(root))[0], manifest.KIND, "spare")
 
 
 def _remove_stale(

@@ -123,7 +123,6 @@ def _digest(*folders: str) -> str:
 
 
 def _lines(folder: str, inner: str) -> Iterator[str]:
-    """A line for each file, sorted, with its path inside the folder."""
     with os.scandir(folder) as entries:
         ordered = sorted(entries, key=lambda entry: entry.name)
     for entry in ordered:
@@ -137,10 +136,7 @@ def _lines(folder: str, inner: str) -> Iterator[str]:
 
 
 def step_key(name: str, *values: object) -> str:
-    """The key of what a step of this name makes from these values.
-
-    The tool's digest is part of it, so a new tool makes everything again.
-    """
+    """The key of what a step makes from these values; with a new tool, another one."""
     return fingerprint((tool_digest(), name, values))
 
 

@@ -74,7 +74,6 @@ _last: dict[str, tuple[bytes, Feature | str]] = {}
 
 
 def _run(path: str, code: bytes) -> Feature | str:
-    """The feature of a file, or a message that says why there is none."""
     name = f"course_{path.removesuffix('.py').replace('/', '.')}"
     module = sys.modules[name] = ModuleType(name)  # where decoding looks for its classes
     module.__file__ = path

@@ -43,11 +43,7 @@ class UsageError(Exception):
 
 
 def require(package: str, extra: str, purpose: str) -> None:
-    """Do nothing where a package of an extra is installed; `purpose` is what needs it.
-
-    Raises:
-        EffectError: it is not.
-    """
+    """Raise an `EffectError`, unless a package of an extra is installed that `purpose` needs."""
     if find_spec(package) is None:
         help = f"run `pip install 'coursebuild[{extra}]'`"
         raise EffectError(f"{purpose} needs the package {package}", help=help)

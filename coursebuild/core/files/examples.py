@@ -138,7 +138,6 @@ class _Update:
         )
 
     def _plan(self, path: str) -> None:
-        """Decide what to do about a script that a lesson has or had."""
         new, known_hashes = self.scripts.get(path), self.known_hashes.get(path)
         obstacle, current = self._look(path)
         if new is None and (obstacle is not None or current is None):
@@ -224,8 +223,6 @@ def _hash(data: bytes) -> str:
 
 
 class _Manifest(Struct, frozen=True):
-    """The hashes that each extracted file may have, by path."""
-
     version: int
     files: dict[str, tuple[str, ...]]
 

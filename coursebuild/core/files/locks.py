@@ -182,11 +182,7 @@ _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 @contextlib.contextmanager
 def temporary_folder() -> Iterator[str]:
-    """A new folder, removed at the end with everything in it.
-
-    Raises:
-        EffectError: there is no place for it.
-    """
+    """A new folder, removed at the end with all in it; an `EffectError` without a place."""
     import tempfile  # not above: processes that run scripts import this module, and not that
 
     try:

@@ -52,11 +52,7 @@ class CourseFiles(Struct, frozen=True):
 
 
 def find_root(path: Path | None, start: Path) -> Path:
-    """The course folder: the one named, or the nearest from `start` upwards with a course map.
-
-    Raises:
-        UsageError: the named folder is none, or there is no course here.
-    """
+    """The course folder: the one named, or the nearest from `start` upwards with a course map."""
     if path is not None:
         folder = start / path
         if folder.is_dir():
@@ -142,8 +138,6 @@ def read_folder(root: Path, folder: str) -> Parsed[tuple[Source, ...]]:
 
 
 class _Reader:
-    """A reader of one course's files that collects diagnostics."""
-
     def __init__(self, root: Path, open_texts: Mapping[str, str] = {}) -> None:
         self.root = root
         self.open_texts = open_texts
@@ -227,7 +221,6 @@ class _Reader:
         return tuple(sources)
 
     def _decode(self, path: str, data: bytes) -> Source | None:
-        """Decode a file; `None` where it is not text."""
         is_text = not data.startswith(_UTF16) and data.count(0) <= len(data) * _MAX_NUL_SHARE
         # Text with many zeros is not text, even if it is UTF-8.
         position, problem = -1 if is_text else data.find(b"\0"), "is not text"

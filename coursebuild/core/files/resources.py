@@ -69,8 +69,6 @@ class Bundle(Mapping[str, bytes]):
 
 
 def _paths(folder: Path) -> list[str]:
-    """The files below a folder by path relative to it, sorted."""
-
     def fail(error: OSError) -> None:
         raise error
 

@@ -168,11 +168,7 @@ def _strangeness(root: str, folder: str, key: bytes) -> str:
 
 
 def make_store(folder: str, root: str) -> None:
-    """Make the folder that `find_store` has found, with the mark of its owner.
-
-    Raises:
-        OSError: it cannot be made.
-    """
+    """Make the folder that `find_store` has found, with the mark of its owner."""
     os.makedirs(folder, exist_ok=True)
     for name, data in ((_OWNER, seal(_OWNER, b"", store_key(root))), (".gitignore", b"*\n")):
         path = os.path.join(folder, name)

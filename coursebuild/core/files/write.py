@@ -87,11 +87,7 @@ def write_atomic(
 
 
 def resolve_inside(root: Path, path: str) -> Path:
-    """Resolve a path of the course, with all links.
-
-    Raises:
-        OutsideProjectError: it leads out of the project.
-    """
+    """Resolve a path with all links; an `OutsideProjectError` where it leads out of the course."""
     try:
         target = Path(os.path.realpath(root / path))
     except ValueError:  # NUL
@@ -132,7 +128,6 @@ def remove_leftovers(folders: Iterable[Path]) -> None:
 
 
 def _open_temporary(folder: Path) -> tuple[int, str]:
-    """Make a new locked file in a folder; return its descriptor and path."""
     while True:
         path = folder / f"{PREFIX}{os.urandom(6).hex()}"
         fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
@@ -168,12 +163,7 @@ def _move(temporary: str, target: Path, path: str, *, new: bool) -> None:
 
 
 def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
-    """Check that a file has the expected content; `None` stands for no file.
-
-    Raises:
-        FileChangedError: it has another.
-        EffectError: it cannot be read.
-    """
+    """Raise a `FileChangedError` unless a file has this content, or there is none (`None`)."""
     try:
         current: bytes | None = target.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
@@ -304,11 +294,7 @@ def _kept_journals(journal: Path) -> list[Path]:
 
 
 def undo_changes(root: Path, tell: Callable[[str], None] | None = None) -> None:
-    """Undo the changes of a command that was killed; `tell` gets a line that says what was undone.
-
-    Raises:
-        EffectError: a file cannot be written.
-    """
+    """Undo the changes of a command that was killed; `tell` gets a line that says which."""
     journal = journal_path(root)
     if journal is not None and journal.exists():
         with project_lock(root), project_lock(root, name=_LOCK):  # whoever is at work holds it
@@ -385,7 +371,6 @@ def _check_path(root: Path, change: FileChange) -> Path:
 
 
 def _replace(root: Path, path: str, old: bytes | None, new: bytes | None) -> None:
-    """Replace the content `old` of a file by `new`."""
     if new is not None:
         write_atomic(root, path, new, expected=old)
         return

@@ -111,8 +111,6 @@ def model_key(root: Path, path: str, text: str) -> str:
 
 
 class _Compiler(JsonChild):
-    """The child that compiles."""
-
     def __init__(self, root: Path, limits: Limits, python: str | None) -> None:
         super().__init__(compile_main.__file__, limits.models, python, memory=limits.memory)
         self.root = root
@@ -170,7 +168,6 @@ class _Compiler(JsonChild):
         return CompileResult(message, timeout=True)
 
     def _find_misspelling(self, path: str, text: str, result: CompileResult) -> Misspelling | None:
-        """The name that a message is about, if others are likely."""
         texts = {path: text}
         if result.line is None or _PARSER.search(result.error):
             for file in existing_files(self.root, path, text):
@@ -200,7 +197,6 @@ class _Compiler(JsonChild):
 
     @functools.cached_property
     def _vocabulary(self) -> tuple[dict[str, dict[str, list[str]]], frozenset[str]]:
-        """The schema of MJCF, and keywords as MJCF may write them."""
         answer = self.ask((None, {}, 0.0))
         if answer is None:
             self.death()

@@ -161,7 +161,6 @@ def _tags(data: bytes) -> tuple[tuple[str, dict[str, str]], ...]:
 
 
 def _asset_candidates(folder: str, inner: str, file: str, *, strip: bool) -> list[str]:
-    """Where an asset is looked for whose kind has a folder of its own; nowhere without a name."""
     if not file:
         return []
     if strip:

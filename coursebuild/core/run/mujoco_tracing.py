@@ -67,7 +67,6 @@ def wrap(mujoco: ModuleType) -> None:
             setattr(owner, name, staticmethod(wrap_function(getattr(owner, name), before)))
 
     def spec_reader(position: int) -> CallHook:
-        """Notes the files of the specification that is the argument at `position`."""
         return lambda args, keywords: ModelFiles(active_tracer().note_read).scan_spec(
             _get_argument(args, keywords, position, "child")
         )
@@ -86,8 +85,6 @@ def wrap(mujoco: ModuleType) -> None:
 
 
 def _writer(position: int) -> CallHook:
-    """Notes a file that is written, whose name is the argument at `position`."""
-
     def note_write(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         path = _get_argument(args, keywords, position, "filename")
         if path is not None:
@@ -191,7 +188,6 @@ def _get_argument(
 
 
 def _given_names(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the files that the caller hands over as bytes."""
     tables = [value for value in (*args[1:], *keywords.values()) if hasattr(value, "keys")]
     return tuple(str(name) for table in tables for name in table.keys())  # noqa: SIM118
 

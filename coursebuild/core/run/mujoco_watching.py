@@ -60,8 +60,6 @@ _watch: _Watch | None = None
 
 
 class _Watch:
-    """Notes warnings, and checks data as it is made and reset."""
-
     def __init__(self, mujoco: ModuleType) -> None:
         self._mujoco = mujoco
         self._numpy = sys.modules["numpy"]
@@ -235,7 +233,6 @@ def _count_references(data_by_id: Mapping[int, object], key: int) -> int:
 
 
 def _name(data: Any) -> str:
-    """The name of a model; empty where it has none of its own."""
     if not hasattr(data, "model"):  # before MuJoCo 3.1
         return ""
     name = str(data.model.names.partition(b"\0")[0], "utf-8", "replace")

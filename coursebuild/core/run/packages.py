@@ -125,7 +125,6 @@ def _spec(module: str, folders: Sequence[str]) -> ModuleSpec | None:
 
 
 def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str]:
-    """The distributions, with versions, of each top-level module in these folders."""
     contents: list[list[str]] = []
     for folder in folders:
         contents.append([])
@@ -175,11 +174,7 @@ _MOST_QUOTED = 4
 
 
 def check_other_version(text: str) -> str:
-    """The version of MuJoCo that a text names, which must not be the one installed here.
-
-    Raises:
-        UsageError: it is no version, or the one installed here.
-    """
+    """The version of MuJoCo that a text names; a `UsageError` where it is none, or that of here."""
     if not _VERSION.fullmatch(text):
         raise UsageError(f"--against: {text!r} is not a version of MuJoCo, such as 3.13.0")
     if _without_zeros(text) == _without_zeros(engine_version()):
@@ -188,11 +183,7 @@ def check_other_version(text: str) -> str:
 
 
 def latest_version() -> str:
-    """The newest version of MuJoCo that pip or uv, as configured, would install here.
-
-    Raises:
-        EffectError: it finds none.
-    """
+    """The newest MuJoCo that pip or uv would install here; an `EffectError` where there is none."""
     command = _install_command(sys.executable)
     anew = ["--ignore-installed"] if _has_pip() else ["--reinstall", "--upgrade"]
     status, output = _run([*command, "--dry-run", *anew, _ENGINE])
@@ -208,11 +199,7 @@ def _without_zeros(version: str) -> str:
 
 
 def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> Interpreter:
-    """The environment with this version of MuJoCo; made if it is not there.
-
-    Raises:
-        EffectError: it cannot be made.
-    """
+    """The environment with this version of MuJoCo; an `EffectError` where it cannot be made."""
     prefix = environment_prefix(root, engine)
     folder = prefix.parent
     try:
@@ -237,11 +224,7 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
 
 
 def environment_prefix(root: Path, engine: str) -> Path:
-    """Where the environment with a version of MuJoCo is, or would be.
-
-    Raises:
-        EffectError: there is no place for it.
-    """
+    """Where the environment with a MuJoCo is, or would be; an `EffectError` without a place."""
     parts = [sys.version, sys.base_prefix, site_folders()]
     name = f"mujoco-{engine}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
     state = state_folder(str(root))
@@ -263,7 +246,6 @@ def _has_pip() -> bool:
 
 
 def _install_command(python: str) -> list[str]:
-    """The command that installs packages for a Python, without what they need."""
     plain = ["--no-deps", "--only-binary", ":all:"]
     if _has_pip():
         pip = [sys.executable, "-m", "pip", "--python", python, "install"]
@@ -311,7 +293,6 @@ def _create_environment(prefix: Path, engine: str) -> None:
 
 
 def _install_error(engine: str, output: str) -> EffectError:
-    """Why this version of MuJoCo was not installed, mostly in the installer's words."""
     tool, offline = ("pip", "PIP_NO_INDEX") if _has_pip() else ("uv", "UV_OFFLINE")
     if re.search(rf"No matching distribution found for {_ENGINE}|{_NO_VERSION}", output):
         host = f"Python {'.'.join(platform.python_version_tuple()[:2])} on {platform.machine()}"

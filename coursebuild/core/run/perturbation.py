@@ -70,8 +70,6 @@ _perturbation: _Perturbation | None = None
 
 
 class _Perturbation:
-    """Moves initial states before MuJoCo computes from them."""
-
     def __init__(self, mujoco: Any, numpy: Any, run: int) -> None:
         self._mujoco = mujoco
         self._numpy = numpy
@@ -202,7 +200,6 @@ class _Extent:
         self.begin(0.0)
 
     def begin(self, time: float) -> None:
-        """A simulation begins at this time."""
         self.start_time = self.until = time
         self.largest = [0.0, 0.0]
         """The largest |qpos| and |qvel| since then."""
@@ -210,7 +207,6 @@ class _Extent:
         """Whether coordinates that were zero have been moved."""
 
     def cover(self, data: Any) -> None:
-        """Include the state that the simulation has come to."""
         if data.time < self.until:  # MuJoCo has reset what diverged
             self.begin(data.time)
         self.until = data.time
@@ -344,7 +340,6 @@ class DividedSteps:
         mujoco_tracing.replace_rollout(self._mujoco, self._rollout)
 
     def _replace(self, name: str, divided: Callable[..., None]) -> None:
-        """Replace a function that makes a step by one that makes shorter ones."""
         real = getattr(self._mujoco, name)
 
         def function(m: Any, d: Any, *args: Any, **keywords: Any) -> None:

@@ -93,11 +93,7 @@ def to_bytes(record: RunRecord, places: Iterable[tuple[str, str]]) -> bytes:
 
 
 def from_bytes(data: bytes) -> RunRecord:
-    """Read a record from JSON.
-
-    Raises:
-        ValueError: there is none in it.
-    """
+    """Read a record from JSON; a `ValueError` says that there is none in it."""
     try:
         return msgspec.json.decode(data, type=RunRecord)
     except msgspec.DecodeError:  # perhaps for an escape that is half a letter
@@ -154,7 +150,6 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
 
 
 def _make_relative(folder: str, top: str) -> str:
-    """A folder relative to the project's; empty for the project's own."""
     return folder.removeprefix(top).lstrip("/")
 
 

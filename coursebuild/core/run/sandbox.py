@@ -79,11 +79,7 @@ class SandboxPart(Struct, frozen=True):
 
 
 def find_sandbox(root: Path) -> Sandbox:
-    """The sandbox of this machine, after a trial start for the course in a folder.
-
-    Raises:
-        EffectError: a part of it is not to be had.
-    """
+    """The sandbox of this machine, after a trial start; an `EffectError` says what it lacks."""
     sandbox, parts = examine_sandbox(root)
     for part in parts:
         if part.problem:

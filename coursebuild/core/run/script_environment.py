@@ -110,10 +110,7 @@ def wanted_packages(scripts: Iterable[Path]) -> tuple[str, ...]:
 def conditions(
     outer: Mapping[str, str], interpreter: Interpreter | None = None
 ) -> tuple[tuple[str, str], ...]:
-    """The conditions under which results are the same, by name and sorted.
-
-    `outer` is the environment of the tool; `interpreter` is another one than runs the tool.
-    """
+    """What results depend on besides files, by name and sorted; `outer`: the tool's environment."""
     values = {f"environment variable {name}": outer[name] for name in DECISIVE if name in outer}
     version = platform.python_version() if interpreter is None else interpreter.version
     values["Python"] = f"{platform.python_implementation()} {version}"
@@ -152,11 +149,7 @@ def python_version() -> str:
 
 @functools.cache
 def engine_version() -> str:
-    """The version of the installed MuJoCo, such as `3.14.0`.
-
-    Raises:
-        EffectError: there is none.
-    """
+    """The version of the installed MuJoCo, such as `3.14.0`; an `EffectError` without one."""
     version = package_version("mujoco")
     if version == "none":
         raise EffectError(
@@ -230,11 +223,7 @@ _CAN_PIN = hasattr(os, "sched_setaffinity")
 
 
 def machine(*, pinned: bool = False, interpreter: Interpreter | None = None) -> Machine:
-    """Versions, system and processor; `pinned`: times are taken on one processor alone.
-
-    Raises:
-        EffectError: MuJoCo is not installed.
-    """
+    """Versions, system and processor; `pinned`: times are taken on one processor alone."""
     return Machine(
         engine=engine_version() if interpreter is None else interpreter.engine,
         python=python_version() if interpreter is None else interpreter.version,

@@ -169,7 +169,6 @@ class ScriptServer:
                     log.unlink()
 
     def _get_worker(self, work: _Work) -> Worker:
-        """A supervisor that waits for a job: an idle or a new one."""
         packages = () if work.interpreter is None else work.interpreter.packages
         states: list[object] = []
         for folder in (*site_folders(), *packages):  # a new time: something was installed there
@@ -189,8 +188,6 @@ class ScriptServer:
 
 
 class _Work:
-    """The jobs of one run and their results."""
-
     on_start: OnStart
     on_finish: OnFinish
     claim: Claim
@@ -287,7 +284,6 @@ class _Work:
         return True
 
     def _finish_job(self, worker: Worker, index: int) -> None:
-        """Finish a job if its report is complete."""
         report = worker.take_report()
         if report is None:
             return

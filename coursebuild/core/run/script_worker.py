@@ -144,11 +144,7 @@ class Worker:
         return bool(data)
 
     def take_report(self) -> ChildReport | None:
-        """Take the next report if all of it has been read.
-
-        Raises:
-            ValueError: it is no report.
-        """
+        """Take the next report if all of it has been read; a `ValueError` says that it is none."""
         size = supervisor.LENGTH.size
         if not self._has_started and self._buffer.startswith(supervisor.STARTED):
             del self._buffer[:size]
@@ -296,7 +292,6 @@ class SandboxWatch:
         return size
 
     def _mounts_in_memory(self) -> Iterator[tuple[str, int]]:
-        """The mount points of file systems in memory, each with its device."""
         for line in self._read("1/mountinfo").splitlines():
             fields = line.split()
             kind, is_own = fields[fields.index(b"-") + 1], fields[3] == b"/"

@@ -111,8 +111,6 @@ def main(arguments: Sequence[str], initial_modules: Collection[str]) -> ScriptPr
 
 
 class _Supervisor:
-    """Runs the jobs that arrive at one descriptor, and writes reports to another."""
-
     def __init__(self, jobs: int, reports: int, *, may_fork: bool) -> None:
         self.jobs = jobs
         self.reports = reports
@@ -249,7 +247,6 @@ class _Supervisor:
         return _sibling_names(job).isdisjoint(self.preloaded.names())
 
     def _prepare_script(self, job: Job, stdout: int, stderr: int, parent: int) -> None:
-        """Prepare a script's process: its session, pipes, signals and limits."""
         os.setsid()
         if self.libc is not None:
             self.libc.prctl(_PR_SET_DUMPABLE, 1, 0, 0, 0)
@@ -277,7 +274,6 @@ def _special_names(folder: str, names: Sequence[str]) -> list[str]:
 
 
 def _sibling_names(job: Job) -> frozenset[str]:
-    """The names of files, as modules, in the folders where a script looks first."""
     names: set[str] = set()
     for folder in (os.path.dirname(f"{job['root']}/{job['path']}"), *job["folders"]):  # noqa: PTH120
         with contextlib.suppress(OSError):
@@ -286,7 +282,6 @@ def _sibling_names(job: Job) -> frozenset[str]:
 
 
 def _shared_memory(folder: str) -> mmap.mmap:
-    """Memory for a script's notes, which its process shares with this one."""
     if os.getpid() != _FIRST:
         return mmap.mmap(-1, _NOTES_BYTES)
     fd = os.open(folder, os.O_TMPFILE | os.O_RDWR)  # in a sandbox, all that is shared is a file's
@@ -298,7 +293,6 @@ def _shared_memory(folder: str) -> mmap.mmap:
 
 
 def _read_notes(shared: mmap.mmap | None, overflow: str) -> bytes:
-    """The notes of a script, from shared memory and from files in the folder `overflow`."""
     parts = []
     if shared is not None:
         end = shared.find(b"\0\0")
@@ -327,7 +321,6 @@ def missing_modules(names: Sequence[str], folders: Sequence[str], library: str) 
     all_folders, original_path = [*folders, *sys.path, *([library] if library else [])], sys.path
 
     def is_importable(name: str) -> bool:
-        """Whether each package in a dotted name is found, in the one before."""
         path: Sequence[str] | None = None
         parts = name.split(".")
         for count, part in enumerate(parts, 1):
@@ -372,7 +365,6 @@ def _report(
     missing: Sequence[str] = (),
     parts: Sequence[bytes | None] = (b"", b"", b""),
 ) -> bytes:
-    """A `ChildReport` as it is sent."""
     report = {
         "outcome": outcome,
         "status": status,

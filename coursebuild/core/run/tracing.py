@@ -392,7 +392,6 @@ class Tracer:
 
 
 def _descriptor_path(fd: int) -> str:
-    """The path of an open file, where the system tells it."""
     try:
         return posix.readlink(f"/proc/self/fd/{fd}")
     except OSError:

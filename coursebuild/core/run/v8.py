@@ -221,7 +221,6 @@ class Isolate:
 
 
 async def _end_tasks() -> None:
-    """Cancel the other tasks of the running loop, and wait until they have ended."""
     tasks = asyncio.all_tasks() - {asyncio.current_task()}
     for task in tasks:
         task.cancel()
@@ -250,11 +249,7 @@ class MathEngine:
             self._isolate = None
 
     def typeset(self, formulas: Sequence[Formula]) -> list[str | MathError]:
-        """The MathML of each formula, or why there is none; no macro outlives its formula.
-
-        Raises:
-            EffectError: Temml or V8 is not installed.
-        """
+        """The MathML of each formula, or why there is none; no macro outlives its formula."""
         with self._lock:
             results: dict[Formula, str | MathError] = {
                 formula: self._mathml[formula] for formula in formulas if formula in self._mathml

@@ -148,7 +148,6 @@ class RunningScript:
         return buffer is self.stderr or len(buffer) <= STDOUT_LIMIT
 
     def _reap_children(self) -> bool:
-        """Reap every child that has ended; return whether the script has."""
         with contextlib.suppress(ChildProcessError):
             while (child := os.waitpid(-1, os.WNOHANG))[0]:
                 if child[0] == self.pid:
