@@ -81,16 +81,11 @@ def _command_candidates(
     for action in actions:
         if before[-1] in action.option_strings and action.nargs != 0:
             return action.choices or ()
-    return [
-        word
-        for action in actions
-        if not action.option_strings
-        for word in _argument_values(action, directory)
-    ]
+    positionals = [action for action in actions if not action.option_strings]
+    return [word for action in positionals for word in _argument_values(action, directory)]
 
 
 def _argument_values(action: argparse.Action, directory: str | None) -> Iterable[str]:
-    """The values of a positional argument, by its name in the help."""
     if action.choices:
         return action.choices
     root = find_course_root(directory or ".")
@@ -110,7 +105,6 @@ def _argument_values(action: argparse.Action, directory: str | None) -> Iterable
 
 
 def _read_ids(root: Path) -> list[str]:
-    """The ids of the lessons and pages of a map; none where it cannot be read."""
     try:
         course = tomllib.loads((root / MAP).read_text("utf-8"))
         lessons = [lesson["id"] for level in course["level"] for lesson in level["lesson"]]

@@ -1,8 +1,6 @@
 """Hands a command to `coursebuild serve`, where that runs for the same course, and waits for it.
 
-Entry points: `hand_over`, which gives the command's exit status; `ask_preview`, where the preview
-is; `socket_place` and `process_state`, on which both sides must agree. The other side is
-`command_server`.
+The other side is `command_server`.
 
 1. A preview listens at a Unix socket in a folder that only its user can enter: `coursebuild` in
    `$XDG_RUNTIME_DIR`, or `run` in the state folder. The socket's name is made of the real path of
@@ -96,16 +94,9 @@ def process_state() -> str | None:
         return None
     variables = {n: v for n, v in os.environ.items() if n.startswith(_DECISIVE)}
     hard_limits = [resource.getrlimit(limit)[1] for limit in limits()]
-    parts = (
-        tool,
-        sys.prefix,
-        sys.base_prefix,
-        *sys.flags,
-        *sys.warnoptions,
-        sys.getfilesystemencoding(),
-        *hard_limits,
-        *sorted(variables.items()),
-    )
+    python = (sys.prefix, sys.base_prefix, *sys.flags, *sys.warnoptions)
+    encoding = sys.getfilesystemencoding()
+    parts = (tool, *python, encoding, *hard_limits, *sorted(variables.items()))
     return hashlib.sha256(repr(parts).encode("utf-8", "surrogateescape")).hexdigest()
 
 
@@ -200,8 +191,6 @@ def connect(root: str | None) -> Iterator[socket.socket | None]:
 
 
 def _wait(connection: socket.socket, process: int) -> int:
-    """Wait for the end of a command that a preview does; return its exit status."""
-
     def pass_on(number: int, frame: object) -> None:
         with contextlib.suppress(OSError):
             connection.send(bytes([number]))

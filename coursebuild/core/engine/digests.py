@@ -1,9 +1,7 @@
 """The state of a file or folder as a short text: the same text means the same content.
 
-Entry points: `file_state`, `folder_state`, `modules_in`; `changed_since` with a time of a `Clock`.
-
-The state of a file is its SHA-256, that of a folder a hash of the names in it; a path where nothing
-is has the state `absent`.
+That of a file is its SHA-256, that of a folder a hash of the names in it; a path where nothing is
+has the state `absent`.
 """
 
 from __future__ import annotations

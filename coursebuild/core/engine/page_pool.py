@@ -1,7 +1,5 @@
 """Work spread over forked copies of this process.
 
-Entry points: `Workers`, a context manager; `can_fork`, whether there can be any.
-
 1. A worker is forked with everything that this process has read and imported, and applies one
    function to one task at a time. What it remembers between tasks stays in it.
 2. `map` gives each task to the worker it is reserved for, or else to the first idle one, and yields

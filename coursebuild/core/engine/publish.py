@@ -1,7 +1,5 @@
 """Publishing a site: written whole beside the old one, then swapped in, or not at all.
 
-Entry points: `check_output_folder`, which says early whether a site may go somewhere; `publish`.
-
 1. The place is checked: it is neither the project nor a folder of the author's, and holds no file
    that we did not put there. One build publishes to a place at a time.
 2. The site is filled into a slot: a folder beside the place, on the same file system, which holds
@@ -33,15 +31,8 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.engine.manifest import (
-    KIND,
-    MARKER,
-    Manifest,
-    ManifestEntry,
-    foreign_files,
-    holds,
-    marker,
-)
+from coursebuild.core.engine import manifest
+from coursebuild.core.engine.manifest import MARKER, Manifest, ManifestEntry
 from coursebuild.core.engine.page_pool import Workers, can_fork
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, reason
 from coursebuild.core.files.locks import folder_lock
@@ -57,11 +48,7 @@ _AUTHOR_FOLDERS = ("content", "features", "models", "examples", ".coursebuild", 
 
 
 def check_output_folder(root: Path, out: Path) -> Path:
-    """Return where the site goes: `out`, or the folder it links to; undo a killed build.
-
-    Raises:
-        PublishRefusedError: a site must not go there.
-    """
+    """Where the site goes: `out`, or the folder it links to; undo a killed build."""
     place = Path(os.path.realpath(out))
     with folder_lock(place.parent):
         _check_place(Path(os.path.realpath(root)), out, place)
@@ -77,18 +64,12 @@ def publish(
     jobs: int = 1,
     stage: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> tuple[str, ...]:
-    """Replace the site at `out` by these files.
+    """Replace the site at `out` by these files; return the paths of those that were written.
 
-    Args:
-        root: the course folder.
-        out: where the site goes; a link to a folder stays one.
-        files: each path once; POSIX, relative, without `..`.
-        file_list: a file that lists all the others.
-        jobs: how many copies of this process, at most, make and write files where there are many.
-        stage: a context that is entered while the files are made.
-
-    Returns:
-        The paths of the files that were written, sorted; the others have not changed.
+    They are sorted; the others have not changed. Paths are POSIX, relative, without `..`, each
+    once. `out` may be a link to a folder, and stays one. `file_list` lists all the others. `jobs`
+    is how many copies of this process, at most, make and write files where there are many; `stage`
+    is entered meanwhile.
 
     Raises:
         PublishRefusedError: a site must not go there.
@@ -109,7 +90,7 @@ def publish(
             try:
                 open_slot(root, slot)
                 entries, paths = site.fill(slot, jobs, stage)
-                if not holds(slot, entries):
+                if not manifest.holds(slot, entries):
                     message = f"another process is changing what is being written to {place}"
                     raise EffectError(message)
                 _swap(slot, place)
@@ -140,46 +121,36 @@ def _swap(slot: Path, place: Path) -> None:
 
 def _check_place(root: Path, out: Path, place: Path) -> None:
     path = Path(os.path.normpath(root / out))
+
+    def refuse(problem: str, help: str = "") -> PublishRefusedError:
+        return PublishRefusedError(f"{out} {problem}", help=help)
+
     if path.is_relative_to(root) and not place.is_relative_to(root):
-        raise PublishRefusedError(
-            f"{out} is a link that leads out of the project",
-            help="such a link may come with a course: name the folder itself with `--out`",
-        )
+        help = "such a link may come with a course: name the folder itself with `--out`"
+        raise refuse("is a link that leads out of the project", help)
     if root.is_relative_to(place):
         relation = "is the project itself" if place == root else "holds the project"
-        raise PublishRefusedError(
-            f"{out} {relation}", help="publish to a folder of its own, such as `public`"
-        )
+        raise refuse(relation, "publish to a folder of its own, such as `public`")
     for name in _AUTHOR_FOLDERS:
         if place.is_relative_to(os.path.realpath(root / name)):
-            raise PublishRefusedError(
-                f"{out} lies in {name}/ of the project, which cannot hold a site"
-            )
+            raise refuse(f"lies in {name}/ of the project, which cannot hold a site")
     _recover(place)
     if os.path.lexists(place) and not place.is_dir():
-        raise PublishRefusedError(f"{out} is not a folder")
+        raise refuse("is not a folder")
     if os.path.ismount(place):
-        raise PublishRefusedError(
-            f"{out} is a mount point, which cannot be swapped", help="publish to a folder inside it"
-        )
+        raise refuse("is a mount point, which cannot be swapped", "publish to a folder inside it")
     try:
-        foreign = foreign_files(place)
+        foreign = manifest.foreign_files(place)
     except OSError as error:
         raise EffectError(f"{out} cannot be read: {reason(error)}") from None
     if foreign:
-        rest = f" and {len(foreign) - 3} more" if len(foreign) > 3 else ""
-        raise PublishRefusedError(
-            f"{out} holds files that coursebuild did not put there: {', '.join(foreign[:3])}{rest}",
-            help="move them away, or publish to another folder",
-        )
+        names = ", ".join(foreign[:3]) + (f" and {len(foreign) - 3} more" if foreign[3:] else "")
+        problem = f"holds files that coursebuild did not put there: {names}"
+        raise refuse(problem, "move them away, or publish to another folder")
 
 
 def exchange(a: Path, b: Path) -> bool:
-    """Swap two folders in one step; return `False` where the system or file system cannot.
-
-    Raises:
-        OSError: the system can, but refused.
-    """
+    """Swap two folders in one step; return `False` where the system or file system cannot."""
     try:
         native = getattr(ctypes.CDLL(None, use_errno=True), _EXCHANGE[sys.platform])
     except (KeyError, OSError, AttributeError):
@@ -238,8 +209,8 @@ class NewSite(Struct, frozen=True):
         try:
             return (
                 all(self.old.is_whole(path, key) for path, key in self.keys.items())
-                and holds(place, self.keys)
-                and (place / MARKER).read_bytes() == marker(self.keys)
+                and manifest.holds(place, self.keys)
+                and (place / MARKER).read_bytes() == manifest.marker(self.keys)
             )
         except OSError:
             return False
@@ -276,11 +247,10 @@ class NewSite(Struct, frozen=True):
             facts = [FileFacts(path, e.digest, e.size) for path, e in sorted(entries.items())]
             path = self.file_list.path
             entries[path] = self._write(slot, OutputFile(path, self.file_list.make(facts)))
-        _write_file(f"{slot}/{MARKER}", marker(entries))
+        _write_file(f"{slot}/{MARKER}", manifest.marker(entries))
         return entries, new_paths
 
     def _link(self, path: str, entry: ManifestEntry, slot: Path) -> bool:
-        """Link a file of the old site into the slot, if it has not changed."""
         target = f"{slot}/{path}"
         try:
             os.link(f"{self.old.place}/{path}", target, follow_symlinks=False)
@@ -300,7 +270,6 @@ class NewSite(Struct, frozen=True):
 
 
 def _write_file(path: str, data: bytes) -> str:
-    """Write a new file; return the hash of its bytes."""
     with open(path, "xb") as file:  # noqa: PTH123 - thousands of them
         file.write(data)
         os.fchmod(file.fileno(), 0o644)  # whatever the umask is
@@ -308,11 +277,7 @@ def _write_file(path: str, data: bytes) -> str:
 
 
 def new_site(old: Manifest, files: Iterable[SiteFile], file_list: FileList | None) -> NewSite:
-    """The site of these files, to be published over the one of a manifest.
-
-    Raises:
-        ValueError: a path is not valid in a site, or two files have the same.
-    """
+    """The site of these files over the one of a manifest; a `ValueError` where a path is bad."""
     by_path: dict[str, SiteFile] = {}
     keys: dict[str, str] = {}
     for file in files:
@@ -356,7 +321,7 @@ def put_away(root: Path, slot: Path) -> None:
 
 
 def _spare(root: Path) -> Path:
-    return Path(find_store(str(root))[0], KIND, "spare")
+    return Path(find_store(str(root))[0], manifest.KIND, "spare")
 
 
 def _remove_stale(
@@ -364,11 +329,8 @@ def _remove_stale(
 ) -> dict[str, ManifestEntry]:
     """Remove everything from a folder but intact files and needed folders; return these files.
 
-    Args:
-        folder: its path, with a slash behind it.
-        prefix: its path in the site, likewise.
-        old_entries: the entries of the files that may stay, by path.
-        folders: the folders that may stay.
+    `folder` and `prefix`, its path in the site, end with a slash. `old_entries` are those of the
+    files that may stay, `folders` the folders.
     """
     intact: dict[str, ManifestEntry] = {}
     with os.scandir(folder) as entries:

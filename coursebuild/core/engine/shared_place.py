@@ -1,7 +1,4 @@
-"""The place where a store shares results with other machines: a folder, or what fsspec reaches.
-
-Entry point: `shared_place(address, key)` returns the `SharedPlace` that a `Store` uses.
-"""
+"""The place where a store shares results with other machines: a folder, or what fsspec reaches."""
 
 from __future__ import annotations
 

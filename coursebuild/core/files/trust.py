@@ -1,8 +1,5 @@
 """What the tool believes of its own: data that this user's tool wrote, and nothing else.
 
-Entry points: `find_store`, the folder in which what is made for a course is kept; `make_store`;
-`seal` and `unseal`; `state_folder`.
-
 1. A key lies in the user's own state folder, never in a course. It is made when it is first needed.
    With `COURSEBUILD_STORE_KEY` in the environment it is made of that secret, so that a store can
    travel from machine to machine.
@@ -102,14 +99,12 @@ def _make_key(path: str) -> bytes:
         os.close(descriptor)
     try:
         os.link(new, path)  # unlike a rename it never replaces the key of another process
-    except FileExistsError:
-        if not _read_key(path):  # cut, or another user's
+    except OSError as error:
+        # The key that is there is cut, or another user's; or the file system has no links.
+        if not isinstance(error, FileExistsError) or not _read_key(path):
             os.replace(new, path)
-            return _read_key(path)
-    except OSError:  # a file system without links
-        os.replace(new, path)
-        return _read_key(path)
-    os.unlink(new)
+    if os.path.lexists(new):
+        os.unlink(new)
     return _read_key(path)
 
 
@@ -138,11 +133,8 @@ def find_store(root: str) -> tuple[str, str]:
     folder = os.path.join(root, FOLDER)
     key = store_key(root)
     if not key:
-        reason = (
-            "needs a key of its user's own, and there is nowhere to keep it: "
-            f"set HOME, XDG_STATE_HOME or {_SECRET}"
-        )
-        return _NOWHERE, reason
+        reason = "needs a key of its user's own, and there is nowhere to keep it"
+        return _NOWHERE, f"{reason}: set HOME, XDG_STATE_HOME or {_SECRET}"
     reason = _strangeness(root, folder, key)
     if not reason:
         return folder, ""
@@ -176,11 +168,7 @@ def _strangeness(root: str, folder: str, key: bytes) -> str:
 
 
 def make_store(folder: str, root: str) -> None:
-    """Make the folder that `find_store` has found, with the mark of its owner.
-
-    Raises:
-        OSError: it cannot be made.
-    """
+    """Make the folder that `find_store` has found, with the mark of its owner."""
     os.makedirs(folder, exist_ok=True)
     for name, data in ((_OWNER, seal(_OWNER, b"", store_key(root))), (".gitignore", b"*\n")):
         path = os.path.join(folder, name)

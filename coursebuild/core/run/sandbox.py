@@ -1,7 +1,5 @@
 """A sandbox for scripts of strangers, made by Bubblewrap (`bwrap`).
 
-Entry points: `find_sandbox` and `examine_sandbox`, which try to start one; `Sandbox`.
-
 A supervisor runs in namespaces of its own, and only one script (see `script_server`), so that a
 script that takes over its supervisor can falsify only its own result:
 
@@ -20,13 +18,12 @@ script that takes over its supervisor can falsify only its own result:
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
 import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from msgspec import Struct
@@ -82,11 +79,7 @@ class SandboxPart(Struct, frozen=True):
 
 
 def find_sandbox(root: Path) -> Sandbox:
-    """The sandbox of this machine, after a trial start for the course in a folder.
-
-    Raises:
-        EffectError: a part of it is not to be had.
-    """
+    """The sandbox of this machine, after a trial start; an `EffectError` says what it lacks."""
     sandbox, parts = examine_sandbox(root)
     for part in parts:
         if part.problem:
@@ -128,14 +121,8 @@ def _find_scope() -> tuple[str, ...]:
     if program is None or not systemd.is_dir() or not unified.exists():
         return ()
     manager = "--system" if os.geteuid() == 0 else "--user"
-    scope = (
-        program,
-        manager,
-        "--scope",
-        "--quiet",
-        "--collect",
-        f"--property=TasksMax={16 * PROCESSES}",
-    )
+    limit = f"--property=TasksMax={16 * PROCESSES}"
+    scope = (program, manager, "--scope", "--quiet", "--collect", limit)
     trial = [*scope, "--property=MemoryMax=1G", "--", "true"]
     with contextlib.suppress(OSError, subprocess.SubprocessError):
         subprocess.run(trial, capture_output=True, check=True, timeout=10.0)
@@ -259,25 +246,17 @@ def special_files(sources: Mapping[str, str], copies: Iterable[tuple[str, str]])
     What is read-only can be neither changed nor made, but anybody may talk into it. In folders of
     the system nobody but root can have made one, for all to use.
     """
-    find = functools.cache(lambda source: tuple(_find_special_files(source)))
-    places = {**sources, **{place: path for path, place in copies}}
-    return {
-        place + path.removeprefix(source): path
-        for place, source in places.items()
-        if source not in _SYSTEM
-        for path in find(source)
-    }
-
-
-def _find_special_files(folder: str) -> Iterator[str]:
-    folders = [folder]
-    while folders:
-        with contextlib.suppress(OSError), os.scandir(folders.pop()) as entries:
-            for entry in entries:
-                if entry.is_dir(follow_symlinks=False):
-                    folders.append(entry.path)
-                elif not entry.is_file(follow_symlinks=False) and not entry.is_symlink():
-                    yield entry.path
+    files: dict[str, str] = {}
+    for place, source in {**sources, **{place: path for path, place in copies}}.items():
+        folders = [] if source in _SYSTEM else [source]
+        while folders:
+            with contextlib.suppress(OSError), os.scandir(folders.pop()) as entries:
+                for entry in entries:
+                    if entry.is_dir(follow_symlinks=False):
+                        folders.append(entry.path)
+                    elif not entry.is_file(follow_symlinks=False) and not entry.is_symlink():
+                        files[place + entry.path.removeprefix(source)] = entry.path
+    return files
 
 
 def copied_folders(root: str, jobs: Iterable[ScriptJob], scratch: str) -> list[tuple[str, str]]:
