@@ -1,7 +1,4 @@
-"""What scripts do with another version of MuJoCo: values, and as text and JSON.
-
-Entry points: `ComparisonReport`, `comparison_text`, `comparison_json`.
-"""
+"""What scripts do with another version of MuJoCo: values, and as text and JSON."""
 
 from __future__ import annotations
 

@@ -1,13 +1,7 @@
 """Diagnostics as text for people: message, place, the line with the wrong part marked, help.
 
-Entry points: `to_text(report, style)`, `diagnostic_paragraphs(diagnostics, style)`,
-`diagnostic_text(diagnostic, style)`; `sensitivity_text`; for any text `Style`, `visible`, `clip`,
-`Column`, `table`.
-
-1. The frame shows the first line of the span; carets mark the part of it that is wrong.
-2. Columns are those of a terminal: tabs are expanded, wide characters take two cells, control
-   characters are shown.
-3. A line too long for the screen is cut around the marked part.
+Columns are those of a terminal: tabs are expanded, wide characters take two cells, control
+characters are shown. A line too long for the screen is cut around the marked part.
 """
 
 from __future__ import annotations

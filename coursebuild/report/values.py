@@ -1,7 +1,4 @@
-"""What a report holds, and values as JSON.
-
-Entry points: `Report`; `summary_line(report)`, its last line as text; `plain`, `json_text`.
-"""
+"""What a report holds, and values as JSON."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """Layouts of directed acyclic graphs in layers, with predecessors above.
 
-Entry points: `layered_layout(count, edges, passing)`, `transitive_reduction(nodes, edges)`.
-
 The method is that of Sugiyama, Tagawa and Toda (IEEE Trans. Syst., Man, Cybern. 11(2), 1981):
 
 1. A node is one layer below the lowest of its predecessors; one without any is just above the

@@ -1,9 +1,4 @@
-"""The scales of axes: the places of ticks, and their texts; text in drawings.
-
-Entry points: `Scale`, from values to places; `ticks`, `tick_texts` (linear); `log_ticks`, `log`
-(logarithmic); `number_text`, `typeset_number`; `markup_text`, what markup can hold of a text;
-`text_width`, `shorten_to_width`; `separate_labels`.
-"""
+"""The scales of axes: the places of ticks, and their texts; text in drawings."""
 
 from __future__ import annotations
 

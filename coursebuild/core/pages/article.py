@@ -1,7 +1,4 @@
-"""Drawing a page: its inputs and its document through the templates.
-
-Entry points: `draw(inputs, document, renderer)`; `article`, the text of a document on its page.
-"""
+"""Drawing a page: its inputs and its document through the templates."""
 
 from __future__ import annotations
 
@@ -9,21 +6,7 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import (
-    Block,
-    Document,
-    FeatureBlock,
-    Heading,
-    HtmlBlock,
-    Mjcf,
-    Paragraph,
-    Recording,
-    Script,
-    Table,
-    main_and_further,
-    plain_text,
-    without_links,
-)
+from coursebuild.core import model
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.graph import drawings
@@ -49,13 +32,13 @@ class ContentsEntry(Struct, frozen=True):
     children: tuple[ContentsEntry, ...] = ()
 
 
-def article(page: PageContext, document: Document) -> Markup:
+def article(page: PageContext, document: model.Document) -> Markup:
     """The text of a document. A docked block is placed beside the paragraphs around it.
 
     A section that goes further is folded under its heading.
     """
     parts: list[Markup] = []
-    for further, blocks in main_and_further(document.blocks):
+    for further, blocks in model.main_and_further(document.blocks):
         heading = page.blocks(blocks[:1]) if further else None
         texts: list[Markup] = []
         for group in _groups(blocks[1:] if further else blocks):
@@ -77,26 +60,30 @@ def article(page: PageContext, document: Document) -> Markup:
 class _Group(Struct, frozen=True):
     """Consecutive blocks; with a docked one, those before and after it."""
 
-    before: tuple[Block, ...]
-    docked: FeatureBlock | None = None
-    after: tuple[Block, ...] = ()
+    before: tuple[model.Block, ...]
+    docked: model.FeatureBlock | None = None
+    after: tuple[model.Block, ...] = ()
 
 
-_WIDE = (Script, Recording, Mjcf, Table, HtmlBlock)
+_WIDE = (model.Script, model.Recording, model.Mjcf, model.Table, model.HtmlBlock)
 
 
-def _is_wide(block: Block) -> bool:
+def _is_wide(block: model.Block) -> bool:
     """Whether a block takes the whole width, so that nothing can be beside it."""
-    if isinstance(block, FeatureBlock):
+    if isinstance(block, model.FeatureBlock):
         return kind_of_block(block).wide
     return isinstance(block, _WIDE)
 
 
-def _docked(block: Block) -> FeatureBlock | None:
-    return block if isinstance(block, FeatureBlock) and kind_of_block(block).docked(block) else None
+def _docked(block: model.Block) -> model.FeatureBlock | None:
+    return (
+        block
+        if isinstance(block, model.FeatureBlock) and kind_of_block(block).docked(block)
+        else None
+    )
 
 
-def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
+def _groups(blocks: tuple[model.Block, ...]) -> tuple[_Group, ...]:
     """Group the blocks of a text around its docked blocks.
 
     Each of those takes the blocks up to the next heading or wide block on both sides.
@@ -108,9 +95,9 @@ def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
         start, end = at, at + 1
         while start and not _is_wide(rest[start - 1]):
             start -= 1
-            if isinstance(rest[start], Heading):
+            if isinstance(rest[start], model.Heading):
                 break
-        while end < len(rest) and not (_is_wide(rest[end]) or isinstance(rest[end], Heading)):
+        while end < len(rest) and not (_is_wide(rest[end]) or isinstance(rest[end], model.Heading)):
             end += 1
         if start:
             groups.append(_Group(rest[:start]))
@@ -119,13 +106,13 @@ def _groups(blocks: tuple[Block, ...]) -> tuple[_Group, ...]:
     return (*groups, _Group(rest)) if rest else tuple(groups)
 
 
-def contents(page: PageContext, document: Document) -> tuple[ContentsEntry, ...]:
+def contents(page: PageContext, document: model.Document) -> tuple[ContentsEntry, ...]:
     """The table of contents: headings of level 2, with those of level 3 below them."""
     entries: list[ContentsEntry] = []
     for block in document.blocks:
-        if not isinstance(block, Heading) or block.level > 3:
+        if not isinstance(block, model.Heading) or block.level > 3:
             continue
-        title = page.inlines(without_links(block.children, page.reference))
+        title = page.inlines(model.without_links(block.children, page.reference))
         entry = ContentsEntry(block.anchor, title, block.goes_further)
         if block.level == 3 and entries:
             entries[-1] = replace(entries[-1], children=(*entries[-1].children, entry))
@@ -135,7 +122,7 @@ def contents(page: PageContext, document: Document) -> tuple[ContentsEntry, ...]
 
 
 def draw(
-    inputs: PageInputs, document: Document | None, renderer: Renderer
+    inputs: PageInputs, document: model.Document | None, renderer: Renderer
 ) -> tuple[PageHead, Markup, PageContext | None]:
     """Draw a page: return its head, its body and the context of its document.
 
@@ -150,9 +137,9 @@ def draw(
         values["article"] = article(page, document)
         values["title_anchor"] = document.title_anchor
         if head.kind == "page":
-            first = next((b for b in document.blocks if isinstance(b, Paragraph)), None)
-            inlines = () if first is None else without_links(first.children, page.reference)
-            text = " ".join(plain_text(inlines).split())
+            first = next((b for b in document.blocks if isinstance(b, model.Paragraph)), None)
+            inlines = () if first is None else model.without_links(first.children, page.reference)
+            text = " ".join(model.plain_text(inlines).split())
             text = text if len(text) <= 200 else text[:200].rsplit(" ", 1)[0] + " …"
             head = replace(head, description=text)
     kind = page_kind(head.kind)

@@ -1,15 +1,8 @@
 """The tool's own files: templates, interface texts, and the bundled files for browsers.
 
-Entry points: `Assets`, a value made by who reads the disk; `Names`; `hashed_name`.
-
-1. `templates` holds every file of `templates/` as text, `dist` every file of the bundle as bytes,
-   by path relative to their folder.
-2. A file that a page refers to is published under a name with a hash of its content, so that a
-   browser may keep it for ever.
-3. Each asset of a compressible kind gets `NAME.br` and `NAME.gz` (`compressed_files`). A server
-   configured for it (nginx's `brotli_static` and `gzip_static`, Caddy's `precompressed`) sends the
-   one that the browser accepts. Pages change with every build, and small files gain little, so
-   compressing these is left to the server. The same bytes give the same copies, which hold no time.
+A file that a page refers to is published under a name with a hash of its content, so that a browser
+may keep it for ever. Each one of a compressible kind gets `NAME.br` and `NAME.gz`, which a server
+configured for it sends; pages change with every build, and are left to the server to compress.
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
 """The files that every page refers to: fonts, the style sheet, the page's script, the icon.
 
-Entry points: `common_files`, with `needed_fonts`; `common_characters(library)`, the characters that
-fonts must have besides those of pages (`record.page_characters`).
-
 The fonts are cut down to the characters that the pages use, and the style sheet holds the fonts'
 names and the styles taken out of single elements. A changed page therefore changes these files only
 if it is the first or the last one with some character or style.

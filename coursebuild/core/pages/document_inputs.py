@@ -1,9 +1,4 @@
-"""What the page of a document looks up in the course and in its results.
-
-Entry points: `document_inputs(library, place, document)`; `lesson_inputs`, with a lesson's place in
-the course, its prerequisites and neighbours, and for a planned lesson `stub_inputs`; `owner_link`,
-`owner_links` and `added_page`, links to lessons and pages.
-"""
+"""What the page of a document looks up in the course and in its results."""
 
 from __future__ import annotations
 

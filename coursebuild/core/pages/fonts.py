@@ -1,8 +1,5 @@
 """Fonts cut down to the characters that a site uses, and fallbacks with the same metrics.
 
-Entry points: `read_faces`; `font_jobs`, which fonts to cut to which characters; `subset_font`,
-which does one job, bytes to bytes; `face_rules`, the `@font-face` rules.
-
 1. A face is a font of the bundle with its family, style, range of weights and characters.
    `site/prepare_fonts.py` has done what does not depend on a course: it has left only the weights
    that the style sheet uses, and decompressed the font.
@@ -10,11 +7,8 @@ which does one job, bytes to bytes; `face_rules`, the `@font-face` rules.
    only these, whose fonts are cut when the tool is bundled, and few edits change a font. A face
    without used characters is left out. HarfBuzz chooses the glyphs (for mathematics with all
    variants and pieces of brackets), and fontTools compresses them.
-3. While a font loads, text is set in a local one, scaled so that lines break in the same places:
-   see `FALLBACKS`.
+3. While a font loads, text is set in a local one, scaled so that lines break in the same places.
 4. The course's own fonts come first: the tool's are used only for the characters that they lack.
-
-A job's `key` identifies its result, so that callers can keep results by it.
 """
 
 from __future__ import annotations

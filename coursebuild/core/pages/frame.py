@@ -1,12 +1,8 @@
 """The frame of pages: head, site navigation, foot; and what search engines read.
 
-Entry points: `FrameInputs`, what frames show of a course; `PageFrame`, whose `render` puts the
-frame around the body of a page; `course_data` and `lesson_data`, structured data; `sitemap`,
-`versions`, `robots`. Whatever needs the site's full address is left out if the course does not give
-that.
-
-Pages are drawn in two steps because a page's head refers to the style sheet by a hash of its
-content, and the style sheet names the fonts, which depend on the characters of all pages.
+Whatever needs the site's full address is left out if the course does not give that. Pages are drawn
+in two steps because a page's head refers to the style sheet by a hash of its content, and the style
+sheet names the fonts, which depend on the characters of all pages.
 """
 
 from __future__ import annotations

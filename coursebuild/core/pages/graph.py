@@ -1,9 +1,5 @@
 """Graphs of lessons that build on each other, as small drawings whose nodes are links.
 
-Entry points: `neighbourhood(library, place, lesson)`, the lessons around one; `level_graph`, the
-lessons of a level with their prerequisites; `drawings(graph, words)`, one for wide and one for
-narrow screens.
-
 A drawing is never the only source: the page also lists the lessons with their titles. Arrows that a
 longer path implies are left out, and so are nodes beyond a limit.
 """

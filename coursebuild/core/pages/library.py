@@ -1,7 +1,4 @@
-"""The library: a course, its results, words and templates, arranged for pages to look up.
-
-Entry point: `Library`, made once for a site (`materials.make_library`) and only read afterwards.
-"""
+"""A course, its results, words and templates, arranged for pages to look up."""
 
 from __future__ import annotations
 

@@ -1,14 +1,9 @@
 """Code as pages show it: as HTML, and which parts of it a reader sees at first.
 
-Entry points: `highlight_lines(language, code)`; `fold(code)`; `find_imports(code)`, the modules
-that it imports.
-
 1. tree-sitter reads Python, the language of most code, eight times as fast as Pygments, which reads
    the other languages. It also reads code that does not parse, such as a fragment or a mistake that
-   a lesson makes on purpose. Pygments distinguishes more kinds of tokens than a page should show;
-   they are mapped to few classes, and a token of none gets no element.
-2. Characters that HTML forbids (control characters, non-characters) are replaced by symbols.
-3. A fold begins and ends between top-level statements. The head (docstring, imports, constants) is
+   a lesson makes on purpose. The many kinds of tokens are mapped to few classes.
+2. A fold begins and ends between top-level statements. The head (docstring, imports, constants) is
    folded if it is long: the page around the script has said what it is for. The rest is shown up to
    `SHOWN_LINES` lines and then folded, except for the `__main__` guard at the end, which says what
    the script does.

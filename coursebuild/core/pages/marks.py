@@ -1,8 +1,4 @@
-"""Writing Markdown: links, fences, tables, escapes.
-
-Entry points: `escape_marks`, `escape_line`, `guard_lines`; `escape_text`, for readers of Markdown
-that are not ours; `link`, `picture`, `code_span`, `fence`, `table`, `block_quote`, `hang`.
-"""
+"""Writing Markdown: links, fences, tables, escapes."""
 
 from __future__ import annotations
 

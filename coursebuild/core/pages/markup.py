@@ -1,7 +1,5 @@
 """Writing blocks and inlines as HTML.
 
-Entry points: `HtmlWriter`; `SpecialBlock`, the blocks beyond Markdown.
-
 What depends on the course (the address of a lesson, the look of a formula or a lab) is a method of
 the writer that `PageContext` overrides; as it is here, text is written that is on no page.
 """

@@ -1,8 +1,4 @@
-"""What the pages of a course are drawn with, made of what the tool and its features bring.
-
-Entry points: `make_library`, a course with its results, words and templates; `renderer_for`,
-`strings_for` and `words_for`, for a language alone.
-"""
+"""What the pages of a course are drawn with, made of what the tool and its features bring."""
 
 from __future__ import annotations
 

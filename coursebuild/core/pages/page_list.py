@@ -1,8 +1,5 @@
 """The list of all pages of a site, in order, and the inputs of those that are no lesson.
 
-Entry points: `page_list(library)`; `home_inputs`, `level_inputs`, `model_inputs`, `page_inputs`,
-`not_found_inputs`.
-
 An entry works with any library of the same course: edits change documents, but the pages stay the
 same as long as the course map does.
 """

@@ -1,8 +1,5 @@
 """Numbers and their units in running text.
 
-Entry points: `text_html(text, direction)`; its steps `join_units` and `split_quantities`;
-`unit_length`; `isolate_ltr(html)`; `number(value)`.
-
 1. A no-break space replaces each space between a number and its unit, and inside a unit (`kg m²`).
 2. In text from the right, a sign or a unit would end up on the wrong side of its number, since
    neither has a direction of its own. Such quantities are isolated as text from the left.

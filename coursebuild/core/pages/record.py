@@ -1,15 +1,8 @@
 """Records of drawn pages: what the rest of the site must know of a page.
 
-Entry point: `record(head, body, base_url, page)`; `style_rules`, the rules of the classes that
-stand for inline styles.
-
-1. Formulas are glued to punctuation and units (`formulas.glue_formulas`), and forbidden characters
-   are made visible (`characters.visible`).
-2. Inline styles become classes of the style sheet (`hoist_styles`), since the
-   Content-Security-Policy forbids them. Formulas have some (the padding of a matrix's columns), and
-   so may an author's HTML; each distinct declaration gets a class named after a hash.
-3. The record has the characters, anchors and addresses of the result, the parts that have scripts,
-   and the ids that stand there twice, whoever has drawn them.
+Inline styles become classes of the style sheet, since the Content-Security-Policy forbids them.
+Formulas have some (the padding of a matrix's columns), and so may an author's HTML; each distinct
+declaration gets a class named after a hash.
 """
 
 from __future__ import annotations

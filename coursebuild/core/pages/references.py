@@ -1,12 +1,7 @@
 """Checking that every internal link, anchor, image and script of the built pages leads somewhere.
 
-Entry points: `check_links(files, base_url)`, which returns broken links sorted by page;
-`ids_and_addresses`, `references` and `has_anchor`, which check without reading all pages.
-
-1. Each page is parsed once, for its ids and the addresses in it.
-2. Each address is resolved from its page, as a browser would; other hosts are left alone.
-3. It must be a file of the site, and its fragment an id of that page; otherwise the nearest one is
-   suggested.
+Each address is resolved from its page, as a browser would; other hosts are left alone. It must be a
+file of the site, and its fragment an id of that page; otherwise the nearest one is suggested.
 """
 
 from __future__ import annotations

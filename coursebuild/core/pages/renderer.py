@@ -1,14 +1,8 @@
 """The renderer of pages: words, templates in Jinja's language, formulas.
 
-Entry points: `Renderer`; `known_mathml`; `templates_of`; `compile_templates`, for bundling the
-tool; `TemplateFailure`.
-
-1. Values that are not `Markup` are escaped.
-2. An undefined name or attribute is an error.
-3. Templates that the tool was bundled with are loaded as the Python they were compiled to then.
-   Others, in a source tree, are compiled on use.
-4. A course may replace templates by its own. Errors in these are its author's, and are reported
-   with their place.
+Templates that the tool was bundled with are loaded as the Python they were compiled to then; those
+of a source tree are compiled on use. A course may replace templates by its own. Errors in these are
+its author's, and are reported with their place.
 """
 
 from __future__ import annotations

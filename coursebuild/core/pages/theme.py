@@ -1,9 +1,4 @@
-"""A course's own look in the files that all pages share, and drawings for dark pages.
-
-Entry points: `course_face`, a font of the course's own, and `measure_font`; `theme_faces`, all its
-fonts; `theme_style`, the end of the style sheet; `picture_size`; `dark_drawing`, made from a light
-one; `dark_colours`, the dark colours that a style sheet pairs with light ones.
-"""
+"""What a course changes of the looks of its pages: fonts, accent, drawings on dark pages."""
 
 from __future__ import annotations
 

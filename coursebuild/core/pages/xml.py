@@ -1,8 +1,4 @@
-"""XML: elements, files from templates, valid names.
-
-Entry points: `element`; `render_xml`, a file from a template, in which `markup` inserts elements;
-`identifier`, a name made from any text.
-"""
+"""XML: elements, files from templates, valid names."""
 
 from __future__ import annotations
 

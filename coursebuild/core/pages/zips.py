@@ -1,11 +1,8 @@
 """Archives of scripts that run elsewhere, with models, `mjcourse` and exact requirements.
 
-Entry points: `make_archives`; `foreign_modules`, the modules of packages whose versions the caller
-should provide. What scripts import of `mjcourse` and of the course's own packages is put beside
-them, where Python looks first.
-
-The bytes depend on the content only: entries are sorted by path, with one fixed date and one fixed
-compression.
+What scripts import of `mjcourse` and of the course's own packages is put beside them, where Python
+looks first. The bytes depend on the content only: entries are sorted by path, with one fixed date
+and one fixed compression.
 """
 
 from __future__ import annotations

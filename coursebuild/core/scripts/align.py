@@ -1,8 +1,5 @@
 """Which recorded line corresponds to which printed line.
 
-Entry points: `same_lines` (do they match?), `align` (where do they differ?); `pair`, which also
-aligns the words of a line and the rows of a table.
-
 1. A line of only `...` stands for any number of lines, or none. The recorded lines between two of
    them must be printed without a gap: the first block at the start, the last one at the end, each
    other one at its first place.

@@ -1,25 +1,18 @@
 """Edits that put a new output, or an edited script, into the lesson.
 
-Entry points: `update_body` (one recorded output), `adopt_file` (an extracted file that was edited),
-`apply_edits`.
-
 1. A recording that matches the run stays as it is. A volatile one takes the text of the run if
    that differs in more than its numbers.
 2. The new lines of a fence are those of the run. Lines with `...`, and lines that match only after
    a filter, stay as the author wrote them. Line ends and what stands before each line (`> `,
    indentation) are those of the lesson.
-3. The new text is compared with the run: an output that the lesson's text cannot hold is refused
-   with the reason.
+3. A table is brought up to date number by number, in place; under `digits` a number keeps as many
+   decimals as the author showed. A row that fits no line is refused: which line it was meant to
+   show cannot be known.
+4. The new text is compared with the run: an output that the lesson's text cannot hold is refused.
 
-A table is brought up to date number by number. Where a row fits a line except for its numbers,
-these are replaced in place; a U+2212 minus stays.
-Under `digits` a number keeps as many decimals as the author showed. A row that fits no line is
-refused: which line it was meant to show cannot be known.
-
-`check_source_parts`: code that lessons show from the project's files is what these hold, or gets
-the edit that makes it so; `shown_files` are these files. A part is a function, a class or a method,
-with its decorators, or the whole file. Indentation and white space at the ends of lines do not
-count.
+Code that lessons show from the project's files is what these hold, or gets the edit that makes it
+so. A part is a function, a class or a method with its decorators, or the whole file; indentation
+and white space at the ends of lines do not count.
 """
 
 from __future__ import annotations
@@ -33,17 +26,7 @@ from itertools import groupby, zip_longest
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import (
-    Comparison,
-    Course,
-    Mode,
-    PlainCode,
-    Recording,
-    Script,
-    SourcePart,
-    Table,
-    find_blocks,
-)
+from coursebuild.core import model
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.core.scripts.failures import without_indentation
 from coursebuild.core.scripts.lines import (
@@ -80,7 +63,7 @@ def apply_edits(text: str, edits: Iterable[Edit]) -> str:
 
 
 def update_body(
-    recording: Recording, comparison: Comparison, stdout: str
+    recording: model.Recording, comparison: model.Comparison, stdout: str
 ) -> Edit | Diagnostic | None:
     """What to write into a recording whose script printed this.
 
@@ -88,10 +71,10 @@ def update_body(
     """
     if not stdout.strip():
         return refusal(recording.caption_span, "the script printed nothing to record", "")
-    if isinstance(recording.body, Table):
+    if isinstance(recording.body, model.Table):
         return _update_table(recording.body, comparison, stdout)
     body, filters = recording.body, comparison.filters
-    if comparison.mode is Mode.VOLATILE:
+    if comparison.mode is model.Mode.VOLATILE:
         before, now = Side.of(body.text).lines, Side.of(stdout).lines
         alike = LineMatcher(comparison).alike
         if len(before) == len(now) and all(map(alike, before, now)):
@@ -187,7 +170,7 @@ def _put_numbers(step: Step, recorded: Side, printed: Side, matcher: LineMatcher
 # ---------------------------------------------------------------------------------------- fences
 
 
-def _fence_edit(recording: Recording, lines: Sequence[str]) -> Edit | Diagnostic:
+def _fence_edit(recording: model.Recording, lines: Sequence[str]) -> Edit | Diagnostic:
     """Replace the lines between the fences; refused where a fence cannot hold them."""
     fence = _opening_fence(recording.body_span)
     for number, line in enumerate(lines, start=1):
@@ -208,7 +191,7 @@ def _fence_edit(recording: Recording, lines: Sequence[str]) -> Edit | Diagnostic
     return whole_lines(recording.body_span, recording.prefix, lines)
 
 
-def adopt_file(script: Script, data: bytes) -> Edit | Diagnostic:
+def adopt_file(script: model.Script, data: bytes) -> Edit | Diagnostic:
     """What to write into the block so that it extracts to `data`; a diagnostic where that fails.
 
     The lesson's line ends and what stands before each line of the block are kept.
@@ -270,12 +253,14 @@ MINUS = "\u2212"
 _BY_HAND = "bring the row up to date by hand"
 
 
-def _update_table(table: Table, comparison: Comparison, stdout: str) -> Edit | Diagnostic | None:
+def _update_table(
+    table: model.Table, comparison: model.Comparison, stdout: str
+) -> Edit | Diagnostic | None:
     """What to write into a recorded table; see `edit.update_body`."""
     filters = comparison.filters
     printed = Side.of(stdout, filters)
-    if comparison.mode is Mode.VOLATILE:
-        comparison = Comparison()
+    if comparison.mode is model.Mode.VOLATILE:
+        comparison = model.Comparison()
     matches = TableMatcher(table_rows(table, filters), printed, comparison).match()
     rows: list[tuple[RowCell, ...]] = []
     edits: list[Edit] = []
@@ -291,7 +276,7 @@ def _update_table(table: Table, comparison: Comparison, stdout: str) -> Edit | D
             if span.text.replace(MINUS, "-") != old.text:
                 reason = "a number written with an entity or an escape cannot be replaced"
                 return _refuse(span, reason)
-            if comparison.mode is Mode.DIGITS and old.is_inexact and new.place < old.place:
+            if comparison.mode is model.Mode.DIGITS and old.is_inexact and new.place < old.place:
                 text = round_like(old, new.value) or text
             places[id(cell)].append((old.start, old.end, text))
             edits.append(Edit(span, _with_signs_of(span.text, text)))
@@ -322,12 +307,12 @@ ReadText = Callable[[str], str | None]
 """The text of a file of the project; `None` where there is none."""
 
 
-def shown_files(course: Course) -> frozenset[str]:
+def shown_files(course: model.Course) -> frozenset[str]:
     """The files of which lessons show parts."""
     return frozenset(source.path for _, source in _source_parts(course))
 
 
-def check_source_parts(course: Course, read: ReadText) -> Iterator[Diagnostic]:
+def check_source_parts(course: model.Course, read: ReadText) -> Iterator[Diagnostic]:
     """A diagnostic, with an edit, for each part that differs from its file."""
     for block, source in _source_parts(course):
         text = read(source.path)
@@ -357,9 +342,9 @@ def check_source_parts(course: Course, read: ReadText) -> Iterator[Diagnostic]:
             yield diagnose("source-part", span, message, label=label, help=help)
 
 
-def _source_parts(course: Course) -> Iterator[tuple[PlainCode, SourcePart]]:
+def _source_parts(course: model.Course) -> Iterator[tuple[model.PlainCode, model.SourcePart]]:
     for document in course.documents:
-        for code in find_blocks(document, PlainCode):
+        for code in model.find_blocks(document, model.PlainCode):
             if code.source is not None:
                 yield code, code.source
 

@@ -1,7 +1,5 @@
 """The scripts of a course: what is extracted to which path, and which lesson line each line is.
 
-Entry points: `extract` (a course's scripts and what is wrong with their paths), `jobs`.
-
 Two paths clash when they are equal, when they differ only in upper and lower case, or when one is a
 folder on the way to the other. The first in the order of the course stays.
 """

@@ -1,9 +1,4 @@
-"""Everything that running the scripts of a course shows to be wrong.
-
-Entry points: `script_findings` (scripts that failed, and all of the next), `output_findings`
-(recorded outputs that differ from what was printed, bound numbers that no output bears out);
-`collect_evidence` (the lines by which bound numbers hold); `drift_diagnostic`; `count_unproven`.
-"""
+"""Everything that running the scripts of a course shows to be wrong."""
 
 from __future__ import annotations
 

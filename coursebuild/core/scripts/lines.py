@@ -1,18 +1,11 @@
 """Texts to compare, and whether a recorded line matches a printed line.
 
-Entry points: `apply_filters`, `Side.of`, `plain_text`; `LineMatcher`.
-
 1. A `MappedText` knows where each character came from: a copied one from its own place, one that a
    filter wrote from all that the filter replaced.
-2. `apply_filters` removes insignificant white space, then applies the course's filters one after
-   the other, each to the whole text (`^` and `$` match at lines).
-3. A `Side` is one side of a comparison: its lines without trailing white space, and without
-   trailing empty lines.
-4. `canonicalize` replaces each number of a line by a mark and folds the white space around it,
+2. `canonicalize` replaces each number of a line by a mark and folds the white space around it,
    because columns shift when a number gets wider. Two lines are alike when these skeletons are
-   equal.
-5. Lines that are alike match when each pair of numbers does, by the rules of the comparison's mode.
-6. With `ellipsis`, a recorded line is cut at its `...`; its parts must stand in the printed line,
+   equal, and match when each pair of numbers does, by the rules of the comparison's mode.
+3. With `ellipsis`, a recorded line is cut at its `...`; its parts must stand in the printed line,
    in order, the first at the start and the last at the end. A part has a fixed length in the
    skeleton, so taking each at its first place finds a match whenever there is one.
 """

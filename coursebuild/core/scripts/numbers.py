@@ -1,8 +1,5 @@
 """Numbers in text: where they stand and their exact values.
 
-Entry points: `scan` (numbers of a line of output), `scan_prose` (also `3.9 × 10⁻¹¹`),
-`within_half_unit`, `within_tolerance`, `relative_error`, `agreeing_digits`, `round_like`.
-
 1. One regular expression walks the text. Its first alternatives match what only looks like a
    number: words with digits in them (`x1`, `v3.14.0`, `UTF-8`), versions, dates, times of day,
    hexadecimal literals, hashes. They stay text, as do powers (`m^2`). No alternative can start

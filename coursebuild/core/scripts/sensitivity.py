@@ -1,10 +1,7 @@
 """Which printed digits repeat when initial states are moved by 1e-12, and which are converged.
 
-Entry points: `sensitivity` (a script), `noise_warnings`.
-
 1. What the runs with moved states print is compared with the recorded output, by the comparison
-   that verifies it but exactly: so each number is found at its place in the lesson, in text and in
-   tables, past ellipses and filters.
+   that verifies it but exactly: so each number is found at its place in the lesson.
 2. The spread of a number is how far the values printed in its place are from the one that the
    script prints unmoved. It repeats to the first place of which the spread is no more than half a
    unit. A number that is printed alike by all runs repeats in all its digits.

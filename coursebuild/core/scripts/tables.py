@@ -1,11 +1,9 @@
 """Recorded tables: does each row stand in a line of the output?
 
-Entry points: `compare_table`, `table_rows`, `TableMatcher`.
-
 1. A body row's cells, as plain text, must stand in order in one printed line, white space folded;
    each row in a line further down than the row before. The header row and all other lines are free.
-2. Cells match whole words and whole numbers only: `4` not in `14`, `implicit` not in
-   `implicitfast`. Numbers match by the comparison's mode.
+2. Cells match whole words and whole numbers only: `4` not in `14`. Numbers match by the
+   comparison's mode.
 3. Where a row has no such line, rows and lines are aligned; a row that fits a line except for its
    numbers has drifted, and each of its numbers is compared with the nearest printed one.
 """
