@@ -106,10 +106,7 @@ def _script_value(script: ScriptComparison) -> dict[str, object]:
 
 
 def comparison_text(report: ComparisonReport, style: Style, *, quiet: bool = False) -> str:
-    """As text: what changed first, number by number, then the rest and the sums.
-
-    `quiet`: without the scripts that do the same.
-    """
+    """As text: what changed first, then the rest, unless `quiet` and the same, and the sums."""
     differing = [s for s in report.scripts if s.changes or s.diff or s.failure is not None]
     parts = ["\n".join(_script(s, report.version, style)) + "\n" for s in differing]
     lines = [
@@ -194,6 +191,5 @@ def _summary(report: ComparisonReport, lost: int) -> str:
 
 
 def _count(scripts: Iterable[ScriptComparison]) -> dict[str, int]:
-    """How many scripts have each status."""
     counts = Counter(script.status for script in scripts)
     return {status: counts[status] for status in _STATUSES}

@@ -101,10 +101,7 @@ class Column(Struct, frozen=True):
 
 
 def table(columns: Sequence[Column], width: int | None = None) -> list[str]:
-    """Return the titles and the rows as lines, no wider than `width` where that is possible.
-
-    Columns without any text are left out.
-    """
+    """The titles and rows of columns with text as lines, no wider than `width` where possible."""
     filled_columns = [
         (column, [column.title, *map(visible, column.cells)])
         for column in columns

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TypeAlias
+
 from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
@@ -33,23 +36,17 @@ class ContentsEntry(Struct, frozen=True):
 
 
 def article(page: PageContext, document: model.Document) -> Markup:
-    """The text of a document. A docked block is placed beside the paragraphs around it.
-
-    A section that goes further is folded under its heading.
-    """
+    """The text of a document; a docked block is placed beside the paragraphs around it."""
     parts: list[Markup] = []
     for further, blocks in model.main_and_further(document.blocks):
         heading = page.blocks(blocks[:1]) if further else None
         texts: list[Markup] = []
-        for group in _groups(blocks[1:] if further else blocks):
-            if group.docked is None:
-                texts.append(page.blocks(group.before))
-            else:
-                before, after = page.blocks(group.before), page.blocks(group.after)
-                docked = page.block(group.docked)
-                texts.append(
-                    page.template("partials/dock.html", before=before, docked=docked, after=after)
-                )
+        for before, docked, after in _groups(blocks[1:] if further else blocks):
+            html = page.blocks(before)
+            if docked is not None:
+                values = {"before": html, "docked": page.block(docked), "after": page.blocks(after)}
+                html = page.template("partials/dock.html", **values)
+            texts.append(html)
         text = Markup("\n").join(texts)
         parts.append(
             page.template("partials/further.html", heading=heading, text=text) if further else text
@@ -57,19 +54,10 @@ def article(page: PageContext, document: model.Document) -> Markup:
     return Markup("\n").join(filter(None, (*parts, page.footnotes(), page.references())))
 
 
-class _Group(Struct, frozen=True):
-    """Consecutive blocks; with a docked one, those before and after it."""
-
-    before: tuple[model.Block, ...]
-    docked: model.FeatureBlock | None = None
-    after: tuple[model.Block, ...] = ()
-
-
 _WIDE = (model.Script, model.Recording, model.Mjcf, model.Table, model.HtmlBlock)
 
 
 def _is_wide(block: model.Block) -> bool:
-    """Whether a block takes the whole width, so that nothing can be beside it."""
     if isinstance(block, model.FeatureBlock):
         return kind_of_block(block).wide
     return isinstance(block, _WIDE)
@@ -83,12 +71,11 @@ def _docked(block: model.Block) -> model.FeatureBlock | None:
     )
 
 
-def _groups(blocks: tuple[model.Block, ...]) -> tuple[_Group, ...]:
-    """Group the blocks of a text around its docked blocks.
+_Blocks: TypeAlias = tuple[model.Block, ...]
 
-    Each of those takes the blocks up to the next heading or wide block on both sides.
-    """
-    groups: list[_Group] = []
+
+def _groups(blocks: _Blocks) -> Iterator[tuple[_Blocks, model.FeatureBlock | None, _Blocks]]:
+    """Blocks, a docked one if any, and those after it; headings and wide blocks end a group."""
     rest = blocks
     while (at := next((i for i, b in enumerate(rest) if _docked(b)), None)) is not None:
         docked = _docked(rest[at])
@@ -100,10 +87,11 @@ def _groups(blocks: tuple[model.Block, ...]) -> tuple[_Group, ...]:
         while end < len(rest) and not (_is_wide(rest[end]) or isinstance(rest[end], model.Heading)):
             end += 1
         if start:
-            groups.append(_Group(rest[:start]))
-        groups.append(_Group(rest[start:at], docked, rest[at + 1 : end]))
+            yield rest[:start], None, ()
+        yield rest[start:at], docked, rest[at + 1 : end]
         rest = rest[end:]
-    return (*groups, _Group(rest)) if rest else tuple(groups)
+    if rest:
+        yield rest, None, ()
 
 
 def contents(page: PageContext, document: model.Document) -> tuple[ContentsEntry, ...]:
@@ -124,10 +112,7 @@ def contents(page: PageContext, document: model.Document) -> tuple[ContentsEntry
 def draw(
     inputs: PageInputs, document: model.Document | None, renderer: Renderer
 ) -> tuple[PageHead, Markup, PageContext | None]:
-    """Draw a page: return its head, its body and the context of its document.
-
-    The same values give the same page.
-    """
+    """Draw a page: return its head, its body and the context of its document."""
     page: PageContext | None = None
     values = {name: _draw_value(value, renderer) for name, value in inputs.values.items()}
     head = inputs.head

@@ -105,6 +105,8 @@ Keep = Callable[[str, Callable[[], bytes]], bytes]
 
 def compressed_files(files: Iterable[SiteFile], keep: Keep) -> tuple[CachedFile, ...]:
     """The copies of all assets among the files that are worth compressing."""
+    import brotli  # needed only by a build
+
     copies: list[CachedFile] = []
     for file in files:
         if not file.path.startswith("assets/") or not file.path.endswith(_SUFFIXES):
@@ -115,7 +117,7 @@ def compressed_files(files: Iterable[SiteFile], keep: Keep) -> tuple[CachedFile,
         # Quality 11 would save two percent more of small files in twice the time.
         quality = 9 if len(data) >= _LARGE else 10
         compressors = {
-            "br": functools.partial(_brotli, data, quality),
+            "br": functools.partial(brotli.compress, data, quality=quality),
             "gz": functools.partial(gzip.compress, data, 9, mtime=0),
         }
         for suffix, compress in compressors.items():
@@ -123,10 +125,3 @@ def compressed_files(files: Iterable[SiteFile], keep: Keep) -> tuple[CachedFile,
             make = functools.partial(keep, key, compress)
             copies.append(CachedFile(f"{file.path}.{suffix}", key, make))
     return tuple(copies)
-
-
-def _brotli(data: bytes, quality: int) -> bytes:
-    import brotli  # needed only by a build with a new asset
-
-    packed: bytes = brotli.compress(data, quality=quality)
-    return packed

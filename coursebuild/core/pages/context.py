@@ -59,7 +59,6 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
 
     @cached_property
     def _names(self) -> Mapping[str, str]:
-        """The names of numbered items by their ids."""
         prefix = self.inputs.number_prefix
         items = self.numbered_items.values()
         return {item.id: item_name(item, prefix, self.words) for item in items}
@@ -120,10 +119,7 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
         return self.inputs.code_links.get(code.span.start, "")
 
     def find_repetition(self, name: str) -> Span:
-        """The place of the second block that draws an element with this id.
-
-        It is that of the only one if the page itself has the id, too.
-        """
+        """The place of the second block that draws an element with this id, or of the only one."""
 
         def has_id(block: model.Block) -> bool:
             return name in ids_and_addresses(str(self.blocks((block,))))[0]

@@ -29,10 +29,7 @@ from coursebuild.core.text.characters import visible
 def document_inputs(
     library: Library, place: urls.Place, document: model.Document, number_prefix: str = ""
 ) -> DocumentInputs:
-    """Everything that the document's page shows besides the document itself.
-
-    The summary of the document is enough. Numbers of a lesson have a prefix.
-    """
+    """Everything that a document's page shows besides its text; a summary of it is enough."""
     path = document.source.path
     blocks = tuple(model.document_blocks(document))
     feature_blocks = [block for block in blocks if isinstance(block, model.FeatureBlock)]
@@ -287,11 +284,7 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
 
 
 def edit_address(library: Library, path: str) -> str | None:
-    """The address where a file of the course can be edited.
-
-    `{path}` in the repository's address stands for the file; without it, the address is that of a
-    repository on a host with the usual paths.
-    """
+    """The address where a file can be edited; `{path}` in the repository's stands for it."""
     repository = library.course.repository
     if not repository:
         return None

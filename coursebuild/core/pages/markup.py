@@ -30,10 +30,7 @@ SpecialBlock: TypeAlias = (
 
 
 def escape(text: str) -> str:
-    """Text as HTML, also for attributes in double quotes.
-
-    Usually there is nothing to escape, and then nothing is copied.
-    """
+    """Text as HTML, also for attributes in double quotes."""
     text = str.replace(text, "&", "&amp;").replace("<", "&lt;")
     return text.replace(">", "&gt;").replace('"', "&quot;")
 

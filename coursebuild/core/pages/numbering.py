@@ -62,10 +62,7 @@ def items_of(document: model.Document, mathml: Mathml) -> tuple[model.NumberedIt
 
 
 def item_name(item: model.NumberedItem, prefix: str, words: Strings) -> str:
-    """The name of an item, such as "(3)" or "Figure 4.2.3"; empty without a number.
-
-    `prefix` is what stands before the numbers of its lesson: `4.2.`.
-    """
+    """The name of an item, such as "(3)" or "Figure 4.2.3"; empty without a number."""
     if not item.number or item.kind == "eq":
         return item.number and f"({item.number})"
     return words(f"number.{item.kind}", number=prefix + item.number)
@@ -99,14 +96,11 @@ def name_outside(library: Library, owner: model.Owner, target: model.Target) -> 
 
 
 def name_elsewhere(library: Library, path: str, target: model.Target) -> str:
-    """The name of a numbered item of another page, for the document at a path.
-
-    Empty for a target of another kind.
-    """
+    """The name of a numbered item of another page, for the document at a path; else empty."""
     target = model.resolve(target, library.course, path)
-    if not isinstance(target, model.LessonTarget | model.PageTarget) or not target.anchor:
+    if not isinstance(target, model.LessonTarget | model.PageTarget):
         return ""
-    if target.anchor.partition(":")[0] not in model.LABEL_KINDS:
+    if target.anchor is None or target.anchor.partition(":")[0] not in model.LABEL_KINDS:
         return ""
     lesson = isinstance(target, model.LessonTarget)
     owner = library.lessons[target.id] if lesson else library.pages[target.id]

@@ -172,10 +172,7 @@ class ModelCard(Struct, frozen=True):
 
 
 def home_inputs(library: Library, document: Document | None) -> PageInputs:
-    """The inputs of the home page: what can be read, and the whole plan.
-
-    The document of the page `home` opens it, if there is one; its summary is enough.
-    """
+    """The inputs of the home page: what can be read, and the whole plan, opened by its document."""
     course = library.course
     place = urls.Place(urls.HOME)
     written_lessons = [lesson for lesson in library.order if lesson.document is not None]

@@ -255,8 +255,7 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
 def numbered_lines(lines: Iterable[Markup], path: str, first: int = 1) -> Markup:
     """Number lines of a file, from its line `first` on, so that each can be linked to.
 
-    No highlighted token crosses the end of a line, so each line can be an element. Its number is in
-    its anchor only, not in the text, so that it is neither copied nor read out.
+    The number is in the anchor only, not in the text, so that it is neither copied nor read out.
     """
     start, _, _ = model.line_anchor(path, first).rpartition(str(first))
     before = f'<span id="{escape(start)}'

@@ -69,10 +69,7 @@ def unit_length(text: str) -> int:
 
 
 def split_quantities(text: str) -> Iterator[tuple[str, bool]]:
-    """Split a text into pieces, each with whether it is a quantity to isolate.
-
-    A number after a word in Latin letters is in order already.
-    """
+    """Split a text into pieces, each with whether it is a quantity to isolate."""
     position = 0
     for match in re.finditer(_QUANTITY, text):
         if _LATIN_BEFORE.search(text, position, match.start()):

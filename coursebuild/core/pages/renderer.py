@@ -40,10 +40,7 @@ Texts: TypeAlias = tuple[tuple[str, str], ...]
 def templates_of(
     texts: Texts, folder: Path | None = None, course_templates: Texts = ()
 ) -> Environment:
-    """The templates among the tool's files; `folder` holds compiled ones.
-
-    `course_templates` are those of the course, which come first.
-    """
+    """The templates among the tool's files, or compiled in `folder`, after those of the course."""
     compiled_folder = None if folder is None else folder / compiled_name(texts)
     loaders: list[BaseLoader] = [DictLoader(_pages(texts))]
     if compiled_folder is not None and compiled_folder.is_dir():
@@ -129,10 +126,7 @@ class Renderer(Struct, frozen=True):
     formulas: Mapping[Formula, str | MathError] = field(default_factory=dict)
 
     def render(self, template: str, **values: object) -> Markup:
-        """A filled-in template, without its last line end.
-
-        Templates can use `t`, the interface texts, and `authored`, see `text`.
-        """
+        """A filled-in template; it can use `t`, the interface texts, and `authored`, see `text`."""
         variables = {"t": self.words, "authored": self.text, **values}
         try:
             return Markup(self.templates.get_template(template).render(variables).rstrip("\n"))

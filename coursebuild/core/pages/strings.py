@@ -41,15 +41,12 @@ class Strings(Struct, frozen=True):
         """The text of a key, with values inserted."""
         text = self.texts.get(key)
         if text is None and "n" in values:
-            text = self._form(key, values["n"])
+            n = values["n"]
+            form = "other" if isinstance(n, str) else category(self.language, n)
+            text = self.texts.get(f"{key}.{form}", self.texts.get(f"{key}.other"))
         if text is None:
             raise KeyError(f"no interface text {key!r}")
         return text.format_map(values) if values else text
-
-    def _form(self, key: str, n: str | int | float) -> str | None:
-        """The form of a text that goes with a number."""
-        name = "other" if isinstance(n, str) else category(self.language, n)
-        return self.texts.get(f"{key}.{name}", self.texts.get(f"{key}.other"))
 
     def prefer(self, prefix: str) -> Strings:
         """The texts in which one of the key `prefix` + KEY replaces that of KEY."""
@@ -91,10 +88,7 @@ def _flatten(table: dict[str, object], prefix: str) -> Iterator[tuple[str, str]]
 
 
 def category(language: str, n: float) -> Category:
-    """The form of a text that goes with a number; one with decimals takes `other`.
-
-    A language without interface texts follows English, whose texts it shows.
-    """
+    """The plural form that goes with a number; a language without texts follows English."""
     if n != int(n):
         return "other"
     n = abs(int(n))

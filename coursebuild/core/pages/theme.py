@@ -128,10 +128,7 @@ def dark_colours(css: str) -> dict[str, str]:
 
 
 def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
-    """An SVG in the colours of a dark page.
-
-    A colour without a pair keeps its hue, but its lightness is inverted.
-    """
+    """An SVG in dark colours; one without a pair keeps its hue, with its lightness inverted."""
 
     def dark(match: re.Match[str]) -> str:
         value = match["value"]
@@ -144,7 +141,10 @@ def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
         inverted = bytes(min(max(channel + shift, 0), 255) for channel in (red, green, blue))
         return f"{match['name']}{match['is']}{paired_colours.get(light) or f'#{inverted.hex()}'}"
 
-    return _COLOUR.sub(dark, _ROOT.sub(_with_fill, svg, count=1))
+    root = _ROOT.search(svg)
+    if root is not None and " fill=" not in root[0]:  # the default colour of shapes
+        svg = svg.replace("<svg", '<svg fill="#000000"', 1)
+    return _COLOUR.sub(dark, svg)
 
 
 def _channels(colour: str) -> tuple[int, int, int] | None:
@@ -166,8 +166,3 @@ def _channels(colour: str) -> tuple[int, int, int] | None:
     except ValueError:
         return None
     return round(255 * a), round(255 * b), round(255 * c)
-
-
-def _with_fill(root: re.Match[str]) -> str:
-    """The root element, with the default colour of shapes made explicit."""
-    return root[0] if " fill=" in root[0] else f'<svg fill="#000000"{root[0][4:]}'

@@ -75,10 +75,7 @@ def owner_path(owner: Owner) -> str:
 
 
 def file_path(path: str) -> str:
-    """`files/lessons/sketch.svg`: a file of the course that pages show or link to.
-
-    A file that a model includes is beside the model, as in the course.
-    """
+    """`files/lessons/sketch.svg`: a file of the course; what a model includes stays beside it."""
     return path if path.startswith("models/") else "files/" + path.removeprefix("content/")
 
 

@@ -86,10 +86,7 @@ def same_lines(recorded: Side, printed: Side, comparison: Comparison) -> bool:
 
 
 def count_alike(text: Side, printed: Side, matcher: LineMatcher) -> int:
-    """How many lines of a text have a printed one, in order, with half of their words or more.
-
-    Numbers count as alike, whatever their values.
-    """
+    """How many lines of a text have a printed one, in order, with half of their words or more."""
     return len(_line_pairs(text, range(len(text.lines)), printed, matcher))
 
 

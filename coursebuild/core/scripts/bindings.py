@@ -281,10 +281,7 @@ _QUOTIENT = Context(prec=34)
 def _mismatch(
     binding: model.NumberBinding, path: str, lines: Sequence[PrintedLine], before: Sequence[str]
 ) -> Diagnostic:
-    """The diagnostic of a binding that none of these lines bears out.
-
-    `before` are the lines by which it held when it was last checked, if that is known.
-    """
+    """The diagnostic of a binding that none of these lines bears out; `before` as in `_check`."""
     bound_text = BoundText.of(binding.text)
     stray, label = bound_text.stray, ""
     if not bound_text.numbers:
@@ -346,10 +343,7 @@ def _successor(
 
 
 def _line_keys(lines: Sequence[PrintedLine]) -> tuple[list[Hashable], list[Hashable]]:
-    """Two keys of each line: its heading and words; these and the number that it begins with.
-
-    The number counts only in lines with several.
-    """
+    """Two keys of each line: its heading and words; these and, of several, its first number."""
     heading = ""
     words: list[Hashable] = []
     rows: list[Hashable] = []

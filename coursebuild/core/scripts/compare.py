@@ -112,7 +112,6 @@ class _ChangeFinder(Struct, frozen=True):
                     pass
 
     def _line(self, step: Step) -> Iterator[Change]:
-        """The changes inside one line."""
         recorded, printed = self.recorded.lines[step.recorded], self.printed.lines[step.printed]
         for d in find_differences(recorded, printed, self.matcher):
             start, end = self.recorded.origin(step.recorded, d.start, d.end)
@@ -191,10 +190,7 @@ def _describe_end(run: ScriptRun) -> str:
 def instability_diagnostic(
     recording: model.Recording, first: Side, second: Side, comparison: model.Comparison
 ) -> Diagnostic:
-    """Say which lines differ between two runs.
-
-    `first` is the recorded or new text that matches the first run.
-    """
+    """Say which lines differ between two runs, of which the first is recorded."""
     steps = align(first, second, LineMatcher(comparison))
     different_steps = [step for step in steps if step.kind in _DIFFERENT]
     notes = []
@@ -310,11 +306,8 @@ def judge(
 ) -> Judgement:
     """Judge a script that prints what is recorded here, but not with the other MuJoCo.
 
-    Args:
-        standing: its run with the other version of MuJoCo.
-        control: with this version, in a fresh environment; `None` where there is none.
-        repeated: with the other version once more.
-        engine: this version.
+    `control` is its run with this version, `engine`, in a fresh environment, if there is one;
+    `standing` and `repeated` are those with the other version.
     """
     if (standing.run.outcome, standing.run.stdout) != (repeated.run.outcome, repeated.run.stdout):
         return "unclear", "two runs of it there differed"

@@ -201,10 +201,7 @@ def text_diff(before: str, now: str) -> str:
 
 
 def diff_rows(verdict: Verdict, stdout: str) -> tuple[DiffRow, ...]:
-    """The rows of a recording that a run differs from.
-
-    Of a table only the cells that changed are shown, as one row each.
-    """
+    """The rows of a recording that a run differs from; of a table the changed cells only."""
     body = verdict.recording.body
     if isinstance(body, Table):
         cells: list[DiffRow] = []

@@ -46,11 +46,7 @@ _FENCE = re.compile(r"`{3,}|~{3,}")
 
 
 def apply_edits(text: str, edits: Iterable[Edit]) -> str:
-    """The text with edits applied by offset.
-
-    Raises `ValueError` for edits that overlap, stand at the same place, or belong to another text:
-    each is a bug of the caller.
-    """
+    """The text with edits applied by offset; `ValueError` for edits that overlap."""
     places: list[tuple[int, int, str]] = []
     for edit in sorted(edits, key=lambda edit: (edit.span.start, edit.span.end)):
         start, end = edit.span.start, edit.span.end
@@ -65,10 +61,7 @@ def apply_edits(text: str, edits: Iterable[Edit]) -> str:
 def update_body(
     recording: model.Recording, comparison: model.Comparison, stdout: str
 ) -> Edit | Diagnostic | None:
-    """What to write into a recording whose script printed this.
-
-    `None` where it matches already; a diagnostic where it cannot be brought up to date.
-    """
+    """What to write into a recording whose script printed this; `None` where it matches already."""
     if not stdout.strip():
         return refusal(recording.caption_span, "the script printed nothing to record", "")
     if isinstance(recording.body, model.Table):
@@ -192,10 +185,7 @@ def _fence_edit(recording: model.Recording, lines: Sequence[str]) -> Edit | Diag
 
 
 def adopt_file(script: model.Script, data: bytes) -> Edit | Diagnostic:
-    """What to write into the block so that it extracts to `data`; a diagnostic where that fails.
-
-    The lesson's line ends and what stands before each line of the block are kept.
-    """
+    """What to write into the block so that it extracts to `data`; a diagnostic where that fails."""
 
     def refuse(reason: str) -> Diagnostic:
         message = f"{script.path} cannot be brought into the lesson: {reason}"
@@ -215,10 +205,7 @@ def adopt_file(script: model.Script, data: bytes) -> Edit | Diagnostic:
 
 
 def block_text(data: bytes) -> str | None:
-    """A file as a block can hold it; `None` where it is not UTF-8.
-
-    Without a byte order mark, with LF line ends, and one at the end.
-    """
+    """A file as a block can hold it: no byte order mark, LF; `None` where it is not UTF-8."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -256,7 +243,6 @@ _BY_HAND = "bring the row up to date by hand"
 def _update_table(
     table: model.Table, comparison: model.Comparison, stdout: str
 ) -> Edit | Diagnostic | None:
-    """What to write into a recorded table; see `edit.update_body`."""
     filters = comparison.filters
     printed = Side.of(stdout, filters)
     if comparison.mode is model.Mode.VOLATILE:

@@ -98,10 +98,7 @@ def without_indentation(span: Span) -> Span:
 def failure_diagnostic(
     extraction: Extraction, run: ScriptRun, scripts: Scripts, find_module: FindModule = lambda _: ""
 ) -> Diagnostic | None:
-    """What is wrong with a run; `None` where it ended well or the script was not run.
-
-    `find_module` knows the files of modules in folders that scripts do not import from.
-    """
+    """What is wrong with a run, if anything; `find_module` knows modules in other folders."""
     wording = _failure_wording(extraction, run)
     if wording is None:
         return None
@@ -325,14 +322,12 @@ def _incident_diagnostic(
 
 
 def _place(incident: Divergence | Effect, scripts: Scripts) -> Span | None:
-    """The lesson's line where an incident was noticed."""
     extraction = scripts.get(incident.path)
     span = None if extraction is None else extraction.line_span(incident.line)
     return None if span is None else without_indentation(span)
 
 
 def _describe_incident(incident: Divergence | Effect) -> str:
-    """An incident in words."""
     if isinstance(incident, Effect):
         return f"`{incident.target}`"
     of = f" of model `{incident.model}`" if incident.model else ""

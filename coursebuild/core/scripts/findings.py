@@ -61,8 +61,7 @@ def script_findings(
         evidence: see `check_bindings`.
         all_extractions: all scripts of the course, if known.
         other_runs: earlier runs of the same scripts, by path, where there are any.
-        broken: files of models that do not compile; a script that reads one is not reported, since
-            its failure is nothing new.
+        broken: files of models that do not compile; no script that reads one is reported.
         find_module: see `failure_diagnostic`.
     """
     by_path = {run.path: run for run in runs}
@@ -89,10 +88,7 @@ def output_findings(
     evidence: BindingEvidence | None = None,
     other_runs: Mapping[str, ScriptRun] | None = None,
 ) -> Iterator[Diagnostic]:
-    """What is wrong with the recorded outputs and bound numbers of some documents.
-
-    For the arguments see `script_findings`.
-    """
+    """What is wrong with the recorded outputs and bound numbers of some documents."""
     for owner, document in documents:
         for verdict in outputs.of_document(document):
             recording = verdict.recording
@@ -221,11 +217,7 @@ def count_unproven(
 def drift_diagnostic(
     verdict: Verdict, owner: str, dependents: Sequence[DependentBinding] = ()
 ) -> Diagnostic:
-    """A recorded output that differs from this run; `owner` is the id of the lesson or page.
-
-    It points at the first place that differs; notes name the next ones, and every bound number of
-    the prose that depends on a value that changed.
-    """
+    """A recorded output of a lesson or page, `owner`, that differs from this run."""
     recording, update = verdict.recording, f"`coursebuild update {owner}`"
     if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
         message = f"no output of `{recording.script}` is recorded yet"
@@ -294,7 +286,6 @@ def _is_same_value(change: Change) -> bool:
 
 
 def _single_number(text: str) -> Number | None:
-    """The number of a text that has one."""
     numbers = scan(text)
     return numbers[0] if len(numbers) == 1 else None
 
@@ -323,7 +314,6 @@ def _describe_difference(change: Change) -> str:
 
 
 def _describe_dependence(dependent: DependentBinding) -> str:
-    """What a change means for a bound number of the prose."""
     change = dependent.change
     lead = f"`{dependent.binding.text}` depends on "
     recorded, printed = _single_number(change.recorded), _single_number(change.printed)

@@ -58,11 +58,7 @@ class MappedText(Struct, frozen=True):
 
     @classmethod
     def of_output(cls, text: str) -> MappedText:
-        """An output without insignificant white space.
-
-        Line ends are LF, the last line has one too, no line ends in white space, no empty lines
-        stand at the end.
-        """
+        """An output with LF line ends, without white space at ends of lines and at its end."""
         return cls.copy(text).substitute(_END_OF_LINE, "\n").substitute(_EMPTY_LINES, "")
 
     def origin(self, start: int, end: int) -> tuple[int, int]:

@@ -188,7 +188,6 @@ def is_worth_moving(course: Course, recordings: Iterable[Recording], base: Scrip
 def _compared_recordings(
     course: Course, recordings: Iterable[Recording]
 ) -> list[tuple[Recording, Comparison]]:
-    """The recorded outputs that are compared, and how."""
     pairs = ((recording, course.comparison_of(recording)) for recording in recordings)
     return [(r, comparison) for r, comparison in pairs if comparison.mode is not Mode.VOLATILE]
 
@@ -335,10 +334,7 @@ def _count_repeating(number: Number, spread: Decimal) -> int:
 
 
 def _round_to(number: Number, digits: int) -> str:
-    """A printed number with so many significant digits; empty for no digits, and for a count.
-
-    In its own notation where possible; a large number with few digits gets an exponent.
-    """
+    """A printed number with so many significant digits; empty for no digits, and for a count."""
     if digits < 1 or number.is_integer or not number.is_finite:
         return ""
     decimals = digits - 1 - number.value.adjusted()

@@ -193,10 +193,7 @@ def _stands_in(row: Sequence[RowCell], line: CanonicalText, numbers_match: SameN
 def _nearest_places(
     row: Sequence[RowCell], line: CanonicalText, numbers_match: SameNumber
 ) -> list[int]:
-    """Places of the cells in order such that their numbers are nearest to the line's.
-
-    The row is known to stand in the line except for its numbers.
-    """
+    """Places in order for cells that fit the line, such that their numbers are nearest to its."""
     # For each place of the last cell: the cost so far, the places, the offset where it ends.
     best: list[tuple[float, list[int], int]] = [(0.0, [], 0)]
     for cell in row:
