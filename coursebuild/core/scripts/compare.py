@@ -150,7 +150,18 @@ def repeat_findings(
     by_path = {extraction.path: extraction for extraction in extractions}
     diagnostics: list[Diagnostic] = []
     for before, now in differing_runs:
-        if now.path not in by_path or _may_differ(course, before, now):
+        recordings = [
+            recording
+            for document in course.documents
+            for recording in model.find_blocks(document, model.Recording)
+            if recording.script == now.path and recording.readable
+        ]
+        may_differ = {before.outcome, now.outcome} == {Outcome.OK} and all(
+            compare(r, course.comparison_of(r), run.stdout).status != "drift"
+            for r in recordings
+            for run in (before, now)
+        )
+        if now.path not in by_path or (recordings and may_differ):
             continue
         notes = []
         if (before.outcome, before.status) != (now.outcome, now.status):
@@ -165,22 +176,6 @@ def repeat_findings(
         place = by_path[now.path].script.span.first_line()
         diagnostics.append(diagnose("script-unrepeatable", place, message, help=help, notes=notes))
     return tuple(diagnostics)
-
-
-def _may_differ(course: model.Course, before: ScriptRun, now: ScriptRun) -> bool:
-    if before.outcome is not Outcome.OK or now.outcome is not Outcome.OK:
-        return False
-    recordings = [
-        recording
-        for document in course.documents
-        for recording in model.find_blocks(document, model.Recording)
-        if recording.script == now.path and recording.readable
-    ]
-    return bool(recordings) and all(
-        compare(r, course.comparison_of(r), run.stdout).status != "drift"
-        for r in recordings
-        for run in (before, now)
-    )
 
 
 def _describe_end(run: ScriptRun) -> str:

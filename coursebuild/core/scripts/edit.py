@@ -27,7 +27,7 @@ from itertools import groupby, zip_longest
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
+from coursebuild.core.scripts.align import StepKind, align, same_lines
 from coursebuild.core.scripts.failures import without_indentation
 from coursebuild.core.scripts.lines import (
     ELLIPSIS,
@@ -94,9 +94,11 @@ def update_body(
     )
 
 
-def refusal(span: Span, message: str, help_text: str, label: str = "") -> Diagnostic:
+def refusal(
+    span: Span, message: str, help: str = "bring the row up to date by hand", label: str = ""
+) -> Diagnostic:
     """An output that cannot be brought up to date."""
-    return diagnose("output-not-updatable", span, message, label=label, help=help_text)
+    return diagnose("output-not-updatable", span, message, label=label, help=help)
 
 
 # ------------------------------------------------------------------------------------ new lines
@@ -120,16 +122,23 @@ def _update_lines(
     ):
         steps = tuple(group)
         for step in steps:
+            text = recorded.lines[step.recorded] if step.recorded < len(recorded.lines) else ""
             match step.kind:
                 case StepKind.MISSING if any(s.kind is StepKind.ELIDED for s in steps):
                     return refuse(step.recorded, "this line was not printed where `...` is")
-                case StepKind.DIFFERS if matcher.elides(recorded.lines[step.recorded]):
-                    line = _put_numbers(step, recorded, printed, matcher)
-                    if line is None:
+                case StepKind.DIFFERS if matcher.elides(text):
+                    pairs = matcher.pairs(text, printed.lines[step.printed])
+                    if pairs is None or recorded.raw_lines(step.recorded) != (text,):
                         label = "this line no longer fits what the script prints"
                         return refuse(step.recorded, label)
-                    lines.append(line)
-                case StepKind.SAME if _is_intended(step, recorded, printed, matcher):
+                    changed = [pair for pair in pairs if not matcher.numbers_match(*pair)]
+                    places = ((old.start, old.end, new.text) for old, new in changed)
+                    lines.append(replace_ranges(text, places))
+                case StepKind.SAME if (
+                    matcher.elides(text)  # it matches by an ellipsis or a filter
+                    or recorded.raw_lines(step.recorded) != (text,)
+                    or printed.raw_lines(step.printed) != (printed.lines[step.printed],)
+                ):
                     lines += recorded.raw_lines(step.recorded)
                 case StepKind.ELLIPSIS:
                     lines += recorded.raw_lines(step.recorded)
@@ -138,26 +147,6 @@ def _update_lines(
                 case StepKind.MISSING | StepKind.ELIDED:
                     pass
     return lines
-
-
-def _is_intended(step: Step, recorded: Side, printed: Side, matcher: LineMatcher) -> bool:
-    """Whether a line that matches does so by an ellipsis or a filter."""
-    text = recorded.lines[step.recorded]
-    return (
-        matcher.elides(text)
-        or recorded.raw_lines(step.recorded) != (text,)
-        or printed.raw_lines(step.printed) != (printed.lines[step.printed],)
-    )
-
-
-def _put_numbers(step: Step, recorded: Side, printed: Side, matcher: LineMatcher) -> str | None:
-    """A line with `...` that fits except for its numbers, with the numbers of the run."""
-    text = recorded.lines[step.recorded]
-    pairs = matcher.pairs(text, printed.lines[step.printed])
-    if pairs is None or recorded.raw_lines(step.recorded) != (text,):
-        return None
-    changes = ((a.start, a.end, b.text) for a, b in pairs if not matcher.numbers_match(a, b))
-    return replace_ranges(text, changes)
 
 
 # ---------------------------------------------------------------------------------------- fences
@@ -237,7 +226,6 @@ def whole_lines(body: Span, prefix: str, lines: Sequence[str]) -> Edit:
 
 
 MINUS = "\u2212"
-_BY_HAND = "bring the row up to date by hand"
 
 
 def _update_table(
@@ -253,7 +241,7 @@ def _update_table(
     for match in matches:
         if match.line < 0:
             span = match.row[0].cell.span.to(match.row[-1].cell.span)
-            return _refuse(span, "no line of this run has the cells of this row in order")
+            return refusal(span, "no line of this run has the cells of this row in order")
         places: dict[int, list[tuple[int, int, str]]] = {id(cell): [] for cell in match.row}
         for cell, old, new in match.pairs:
             if same_number(old, new, comparison):
@@ -261,32 +249,26 @@ def _update_table(
             span, text = cell.span(old), new.text
             if span.text.replace(MINUS, "-") != old.text:
                 reason = "a number written with an entity or an escape cannot be replaced"
-                return _refuse(span, reason)
+                return refusal(span, reason)
             if comparison.mode is model.Mode.DIGITS and old.is_inexact and new.place < old.place:
                 text = round_like(old, new.value) or text
             places[id(cell)].append((old.start, old.end, text))
-            edits.append(Edit(span, _with_signs_of(span.text, text)))
+            # The minus signs of the old number stay: before it, and in its exponent.
+            halves = (re.split("(?=[eE])", half) for half in (span.text, text))
+            parts = zip_longest(*halves, fillvalue="")
+            signed = (part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
+            edits.append(Edit(span, "".join(signed)))
         texts = ((cell, replace_ranges(cell.mapped.text, places[id(cell)])) for cell in match.row)
         rows.append(tuple(replace(cell, canonical=canonicalize(text)) for cell, text in texts))
     if TableMatcher(rows, printed, comparison).find_matching_lines() is None:
         span = table.span if not edits else edits[0].span
-        return _refuse(span, "the table cannot be made to match what the script prints")
+        return refusal(span, "the table cannot be made to match what the script prints")
     if not edits:
         return None
     whole = edits[0].span.to(edits[-1].span)
     at = whole.start
     ranges = ((edit.span.start - at, edit.span.end - at, edit.text) for edit in edits)
     return Edit(whole, replace_ranges(whole.text, ranges))
-
-
-def _with_signs_of(old: str, new: str) -> str:
-    """The new number with the minus signs of the old one: before it, and in its exponent."""
-    parts = zip_longest(*(re.split("(?=[eE])", text) for text in (old, new)), fillvalue="")
-    return "".join(part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
-
-
-def _refuse(span: Span, message: str) -> Diagnostic:
-    return diagnose("output-not-updatable", span, message, help=_BY_HAND)
 
 
 ReadText = Callable[[str], str | None]

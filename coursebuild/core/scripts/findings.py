@@ -31,7 +31,7 @@ from coursebuild.core.scripts.failures import (
     silence_diagnostic,
 )
 from coursebuild.core.scripts.lines import LineMatcher, Side
-from coursebuild.core.scripts.numbers import Number, scan
+from coursebuild.core.scripts.numbers import Number, only_number, scan
 from coursebuild.core.scripts.tables import TableMatcher, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.source import Excerpt
@@ -278,11 +278,8 @@ def _label(change: Change) -> str:
 
 
 def _is_same_value(change: Change) -> bool:
-    recorded, printed = _single_number(change.recorded), _single_number(change.printed)
-    if recorded is None or printed is None:
-        return False
-    whole = recorded.text == change.recorded and printed.text == change.printed
-    return whole and recorded.value == printed.value
+    recorded, printed = only_number(change.recorded), only_number(change.printed)
+    return recorded is not None and printed is not None and recorded.value == printed.value
 
 
 def _single_number(text: str) -> Number | None:

@@ -186,19 +186,18 @@ def canonicalize(text: str, offset: int = 0) -> CanonicalText:
     """The skeleton and the numbers of a text that stands at `offset` of its line."""
     numbers = scan(text)
     places = ((number.start, number.end, MARK) for number in numbers)
-    skeleton = _SPACE.sub(_fold_space, replace_ranges(text.replace(MARK, "\ufffd"), places))
+
+    def fold_space(match: re.Match[str]) -> str:
+        line, start, end = match.string, *match.span()
+        before, after = line[max(start - 1, 0) : start], line[end : end + 1]
+        if before == MARK:
+            return " " if after and after not in _CLOSING else ""
+        return " " if before.isalnum() else ""
+
+    skeleton = _SPACE.sub(fold_space, replace_ranges(text.replace(MARK, "\ufffd"), places))
     if offset:
         numbers = tuple(replace(n, start=n.start + offset, end=n.end + offset) for n in numbers)
     return CanonicalText(skeleton, numbers)
-
-
-def _fold_space(match: re.Match[str]) -> str:
-    """What stays of white space beside a number: one space, or none."""
-    text, start, end = match.string, *match.span()
-    before, after = text[max(start - 1, 0) : start], text[end : end + 1]
-    if before == MARK:
-        return " " if after and after not in _CLOSING else ""
-    return " " if before.isalnum() else ""
 
 
 def same_number(recorded: Number, printed: Number, comparison: Comparison) -> bool:

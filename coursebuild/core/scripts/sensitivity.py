@@ -36,7 +36,7 @@ from coursebuild.core.scripts.bound_numbers import printed_lines
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import quote
 from coursebuild.core.scripts.lines import same_number
-from coursebuild.core.scripts.numbers import Number, difference, round_like, scan, unit
+from coursebuild.core.scripts.numbers import Number, difference, only_number, round_like, unit
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 
@@ -260,8 +260,8 @@ def _judge_number(
     `finer` with half and with a quarter of the timestep.
     """
     recorded, printed = texts
-    recorded_number, number = _only_number(recorded), _only_number(printed)
-    numbers = [n for value in values if (n := _only_number(value)) is not None]
+    recorded_number, number = only_number(recorded), only_number(printed)
+    numbers = [n for value in values if (n := only_number(value)) is not None]
     other_value = next((value for value in values if value != printed), None)
     if number is None or recorded_number is None or len(numbers) < len(values):
         if other_value is not None:
@@ -298,7 +298,7 @@ def _judge_number(
 
 def _count_converged(number: Number, finer: Sequence[str]) -> int:
     """How many digits runs with half and with a quarter of the timestep bear out."""
-    numbers = [number, *(n for text in finer if (n := _only_number(text)) is not None)]
+    numbers = [number, *(n for text in finer if (n := only_number(text)) is not None)]
     if len(numbers) < 3 or not all(n.is_finite for n in numbers):
         return 0
     first, second = (difference(a.value, b.value) for a, b in pairwise(numbers))
@@ -306,12 +306,6 @@ def _count_converged(number: Number, finer: Sequence[str]) -> int:
     if second > _SHRINKING * first and second > unit(number.place):
         error = 10 * max(first, second)
     return _count_repeating(number, error) if error else _digits(number)
-
-
-def _only_number(text: str) -> Number | None:
-    """The number that makes up the whole text, if one does."""
-    numbers = scan(text.strip())
-    return numbers[0] if len(numbers) == 1 and numbers[0].text == text.strip() else None
 
 
 def _digits(number: Number) -> int:
@@ -354,30 +348,26 @@ def _round_to(number: Number, digits: int) -> str:
 
 def amplification(moved_runs: Sequence[ScriptRun]) -> float | None:
     """The largest factor by which states are farther apart at the end than at the beginning."""
-    ends = [_end_states(run) for run in moved_runs]
+    # By run and `MjData`: final positions and velocities, each with the size to compare by
+    ends: list[dict[int, list[tuple[float, list[float]]]]] = []
+    for run in moved_runs:
+        ends.append({})
+        for state in () if run.trace is None else run.trace.states:
+            number, length, *words = state.split()
+            position, velocity, *end = map(float.fromhex, words)
+            at = int(length)
+            ends[-1][int(number)] = [(position, end[:at]), (velocity, end[at:])]
     factors: list[float] = []
     for pair, (first, second) in enumerate(zip(ends[::2], ends[1::2], strict=True)):
         initial_gap = 2 * PERTURBATION * 0.5**pair
-        for number in first.keys() & second.keys():
-            pairs = zip(first[number], second[number], strict=True)
+        for data in first.keys() & second.keys():
+            pairs = zip(first[data], second[data], strict=True)
             for (size, mine), (other_size, theirs) in pairs:
                 if mine and len(mine) == len(theirs):
                     gap = max(abs(a - b) for a, b in zip(mine, theirs, strict=True))
                     growth = gap / (max(size, other_size, *map(abs, mine)) or 1.0)
                     factors.append(growth / initial_gap if math.isfinite(growth) else math.inf)
     return max(factors, default=None)
-
-
-def _end_states(run: ScriptRun) -> dict[int, list[tuple[float, list[float]]]]:
-    """For each `MjData`: its final positions and velocities, each with the size to compare by."""
-    states = () if run.trace is None else run.trace.states
-    end_states: dict[int, list[tuple[float, list[float]]]] = {}
-    for state in states:
-        number, length, *words = state.split()
-        position, velocity, *end = map(float.fromhex, words)
-        at = int(length)
-        end_states[int(number)] = [(position, end[:at]), (velocity, end[at:])]
-    return end_states
 
 
 # --- warnings
@@ -392,7 +382,7 @@ def noise_warnings(sensitivity: Sensitivity) -> Iterator[Diagnostic]:
         text = "no digit repeats"
         if doubt.repeat:
             text = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
-            number = _only_number(doubt.printed)
+            number = only_number(doubt.printed)
             instead = "" if number is None else _round_to(number, doubt.repeat)
             text += f", print {instead}" if instead else ""
         warnings.append((doubt.span, f"{text}: printed from {doubt.least} to {doubt.most}"))

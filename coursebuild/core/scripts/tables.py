@@ -228,41 +228,36 @@ def _cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
     Marks of Markdown are gone, minus signs are hyphens, runs of white space are one space. A
     stretch that Markdown changed (entities, escapes) stands for all of itself.
     """
-    stretches = [
-        MappedText.copy(text, span.start)
-        if span.text == text
-        else MappedText.substitute_for(span.start, span.end, text)
-        for text, span in _text_stretches(cell.children)
-    ]
-    mapped = apply_filters(MappedText.join(stretches), filters)
-    folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
-    return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)
-
-
-def _text_stretches(inlines: Iterable[model.Inline]) -> Iterator[tuple[str, Span]]:
-    for inline in model.walk_inlines(inlines):
+    stretches: list[MappedText] = []
+    for inline in model.walk_inlines(cell.children):
+        span = inline.span
         match inline:
             case model.Text():
-                yield inline.text, inline.span
+                text = inline.text
             case model.CodeSpan():
                 # Between the backticks, without padding
-                markdown, text = inline.span.text, inline.text
+                markdown, text = span.text, inline.text
                 edge = len(markdown) - len(markdown.lstrip("`"))
                 if len(markdown) - 2 * edge == len(text) + 2:
                     edge += 1
-                yield (
-                    text,
-                    Span(inline.span.source, inline.span.start + edge, inline.span.end - edge),
-                )
+                span = Span(span.source, span.start + edge, span.end - edge)
             case model.NumberBinding():
-                yield inline.text, inline.text_span
+                text, span = inline.text, inline.text_span
             case model.Math():
-                yield inline.tex.text, inline.tex.span()
+                text, span = inline.tex.text, inline.tex.span()
             case model.Image():
-                yield inline.alt, inline.span
+                text = inline.alt
             case model.SoftBreak() | model.HardBreak():
-                yield " ", inline.span
+                text = " "
             case model.RawInline():
-                yield (" " if inline.html.startswith("<br") else ""), inline.span
+                text = " " if inline.html.startswith("<br") else ""
             case _:
-                pass
+                continue
+        stretches.append(
+            MappedText.copy(text, span.start)
+            if span.text == text
+            else MappedText.substitute_for(span.start, span.end, text)
+        )
+    mapped = apply_filters(MappedText.join(stretches), filters)
+    folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
+    return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)
