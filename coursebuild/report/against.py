@@ -125,7 +125,19 @@ def comparison_text(report: ComparisonReport, style: Style, *, quiet: bool = Fal
     ]
     if lines:
         parts.append("".join(f"{line}\n" for line in lines))
-    parts.append(_summary(report, len(lost)) + "\n")
+    counts = (
+        f"{count} {_STATUSES[status].format(report.version)}"
+        for status, count in _count(report.scripts).items()
+        if count
+    )
+    sums = ", ".join(counts) or "nothing to compare"
+    total = f"{plural(len(report.scripts), 'script')}: {sums}"
+    if report.models:
+        texts = plural(len(report.models), "MJCF text")
+        verb = "compiles" if len(report.models) == 1 else "compile"
+        total += f"; {len(report.models) - len(lost)} of {texts} {verb} there"
+    head = f"MuJoCo {report.version} against {report.engine}, Python {report.python}"
+    parts.append(f"{head}: {total}\n")
     return "\n".join(parts)
 
 
@@ -172,21 +184,6 @@ def _change(change: Change, engine: str) -> str:
         case DriftKind.EXTRA:
             lines = change.printed.count("\n") + 1
             return f"{engine} printed {plural(lines, 'more line')} here: `{printed}`"
-
-
-def _summary(report: ComparisonReport, lost: int) -> str:
-    parts = [
-        f"{count} {_STATUSES[status].format(report.version)}"
-        for status, count in _count(report.scripts).items()
-        if count
-    ]
-    lines = f"{plural(len(report.scripts), 'script')}: {', '.join(parts) or 'nothing to compare'}"
-    if report.models:
-        texts = plural(len(report.models), "MJCF text")
-        verb = "compiles" if len(report.models) == 1 else "compile"
-        lines += f"; {len(report.models) - lost} of {texts} {verb} there"
-    head = f"MuJoCo {report.version} against {report.engine}, Python {report.python}"
-    return f"{head}: {lines}"
 
 
 def _count(scripts: Iterable[ScriptComparison]) -> dict[str, int]:

@@ -10,17 +10,10 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.pages import urls
+from coursebuild.core.pages import page_inputs, urls
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.graph import drawings
 from coursebuild.core.pages.listings import highlight_lines
-from coursebuild.core.pages.page_inputs import (
-    AddedParts,
-    HighlightedFile,
-    LessonGraph,
-    PageHead,
-    PageInputs,
-)
 from coursebuild.core.pages.page_writer import PageWriter, numbered_lines
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.registry import kind_of_block, model_parts, page_kind
@@ -110,8 +103,8 @@ def contents(page: PageContext, document: model.Document) -> tuple[ContentsEntry
 
 
 def draw(
-    inputs: PageInputs, document: model.Document | None, renderer: Renderer
-) -> tuple[PageHead, Markup, PageContext | None]:
+    inputs: page_inputs.PageInputs, document: model.Document | None, renderer: Renderer
+) -> tuple[page_inputs.PageHead, Markup, PageContext | None]:
     """Draw a page: return its head, its body and the context of its document."""
     page: PageContext | None = None
     values = {name: _draw_value(value, renderer) for name, value in inputs.values.items()}
@@ -135,11 +128,11 @@ def draw(
 
 def _draw_value(value: object, renderer: Renderer) -> object:
     match value:
-        case HighlightedFile():
+        case page_inputs.HighlightedFile():
             return numbered_lines(highlight_lines(value.language, value.text), value.path)
-        case LessonGraph():
+        case page_inputs.LessonGraph():
             return drawings(value, renderer.words)
-        case AddedParts():
+        case page_inputs.AddedParts():
             parts = model_parts()
             html = (parts[name].draw(renderer, values) for name, values in value.values.items())
             return Markup("").join(html)

@@ -1,7 +1,5 @@
 """Numbers in prose that must be what a script printed: `` `+6.6 %`{out} ``.
 
-Entry points: `check_bindings` (a document), `dependent_bindings` (those that a change affects).
-
 1. A binding depends on the nearest recorded output above it, or on the script that `{out=…}` names:
    on its recorded outputs anywhere in the course, or else on what it printed in this run.
 2. The numbers of a binding must be numbers of one printed line, one after the other, each rounded

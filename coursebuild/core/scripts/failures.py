@@ -1,9 +1,5 @@
 """Diagnostics of a script that did not run to its end, lost a simulation, or reached too far.
 
-Entry points: `failure_diagnostic` (a run), `silence_diagnostic` (an output is recorded and nothing
-was printed), `divergence_diagnostics` (simulations), `is_lost`, `effect_diagnostics` (what it wrote
-elsewhere, or asked of the network).
-
 1. A traceback's frames are read out of the standard error. Each line of an extracted file is the
    line of a lesson; the diagnostic points at the innermost such line. A script that does not parse
    gets none: the check of its lesson has reported it.
