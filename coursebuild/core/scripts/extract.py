@@ -77,16 +77,16 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
                     folders.setdefault(folder, extraction)
                 extractions.append(extraction)
                 continue
-            path, other = script.path, first.path
-            note = f"`{other}` is written here"
-            if other == path:
+            path, first_path = script.path, first.path
+            note = f"`{first_path}` is written here"
+            if first_path == path:
                 message, note = f"`{path}` is the file of two blocks", "the first one is here"
             elif key in files:
-                message = f"`{path}` and `{other}` are one file where case does not count"
+                message = f"`{path}` and `{first_path}` are one file where case does not count"
             elif key in folders:
-                message = f"`{path}` is a file here and a folder of `{other}`"
+                message = f"`{path}` is a file here and a folder of `{first_path}`"
             else:
-                message = f"`{other}` is a file and cannot be a folder of `{path}`"
+                message = f"`{first_path}` is a file and cannot be a folder of `{path}`"
             help, notes = "give one of them another path", [Note(note, first.script.path_span)]
             diagnostics.append(
                 diagnose("script-repeated", script.path_span, message, help=help, notes=notes)

@@ -17,7 +17,10 @@ from coursebuild.core.scripts.sensitivity import (
     noise_warnings,
     sensitivity,
 )
+from support.fixture_cases import fixture_tables
 from support.sample_lessons import DIGITS, EXACT, course, describe, document, recording, tolerance
+
+CASES = fixture_tables("sensitivity")
 
 TRACE = Trace((), (), (), ("mujoco",), "")
 
@@ -72,31 +75,13 @@ def warnings(result: Sensitivity) -> list[str]:
 # --- numbers
 
 
-@pytest.mark.parametrize(
-    ("recorded", "moved_output", "expected"),
-    [
-        ("1.23456", ["1.23461", "1.23451"], ("1.23456", 6, 5, "1.2346")),
-        ("1.23456", ["1.23462"], ("1.23456", 6, 4, "1.235")),
-        ("1.23456", ["1.3"], ("1.23456", 6, 1, "1")),
-        ("1.23456", ["4.2"], ("1.23456", 6, 0, "")),
-        ("+6.641", ["+6.645"], ("+6.641", 4, 3, "+6.64")),
-        ("\u22126.641", ["\u22126.645"], ("\u22126.641", 4, 3, "\u22126.64")),
-        ("1.2345e-03", ["1.2349e-03"], ("1.2345e-03", 5, 4, "1.234e-03")),
-        ("1.2345E+7", ["1.2445E+7"], ("1.2345E+7", 5, 2, "1.2E+7")),
-        ("6e-17", ["-2e-17"], ("6e-17", 1, 0, "")),
-        ("12345.6", ["12395.6"], ("12345.6", 6, 3, "1.23e+04")),
-        ("9.9996", ["9.9999"], ("9.9996", 5, 4, "10.000")),
-        ("0.000", ["0.001"], ("0.000", 4, 0, "")),
-        ("26", ["27"], ("26", 2, 1, "")),
-        ("1.5", ["nan"], ("1.5", 2, 0, "")),
-    ],
-)
+@pytest.mark.parametrize(("recorded", "moved_output", "expected"), CASES["digits"])
 def test_digits_that_hold(
     recorded: str, moved_output: list[str], expected: tuple[str, int, int, str]
 ) -> None:
     text = "value {} m"
     result = measure(text.format(recorded), *(text.format(value) for value in moved_output))
-    assert digits(result) == [expected]
+    assert digits(result) == [tuple(expected)]
 
 
 def test_what_a_filter_takes_out_does_not_count() -> None:
