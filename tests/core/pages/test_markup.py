@@ -189,19 +189,7 @@ def test_an_output_in_the_next_list_item_stays_apart_from_the_script(make: Make)
     assert make(text).html().count("<figure") == 2
 
 
-@pytest.mark.parametrize(
-    ("keys", "status", "expected"),
-    [
-        (" atol=1e-12", "verified", "verified: Verified with MuJoCo 3.14.0, Python 3.11.7: "
-         "every number to within 1e-12."),
-        (' volatile="[0-9.]+ s"', "verified",
-         "verified: Verified with MuJoCo 3.14.0, Python 3.11.7: the same text, character by "
-         "character; what matches [0-9.]+ s varies from run to run and is not compared."),
-        ("", "unchecked", "unverified: Not verified: the script did not run to completion."),
-        ("", "drift", "unverified: Not verified: with MuJoCo 3.14.0, Python 3.11.7 the script "
-         "prints something else."),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("keys", "status", "expected"), CASES["receipts"])  # fmt: skip
 def test_the_receipt_of_an_output_says_how_it_was_compared(
     make: Make, keys: str, status: str, expected: str
 ) -> None:

@@ -25,15 +25,14 @@ def texts(text: str) -> list[str]:
     return [number.text for number in scan(text)]
 
 
-@pytest.mark.parametrize(("text", "expected"), [*CASES["numbers"], ("9" * 1000, ["9" * 1000])])
-def test_numbers_are_found(text: str, expected: list[str]) -> None:
-    assert texts(text) == expected
-    assert [number.text for number in scan_prose(text)] == expected
+def test_numbers_are_found() -> None:
+    for text, expected in [*CASES["numbers"], ("9" * 1000, ["9" * 1000])]:
+        assert texts(text) == expected
+        assert [number.text for number in scan_prose(text)] == expected
 
 
-@pytest.mark.parametrize("text", [*CASES["text"], "9" * 1001])
-def test_text_stays_text(text: str) -> None:
-    assert texts(text) == []
+def test_text_stays_text() -> None:
+    assert {text: texts(text) for text in [*CASES["text"], "9" * 1001] if texts(text)} == {}
 
 
 @pytest.mark.parametrize(

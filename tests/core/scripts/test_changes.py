@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison
-from coursebuild.core.model.results import DriftKind, ScriptRun
+from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.scripts.bindings import BindingEvidence, PrintedOutputs, check_bindings
 from coursebuild.core.scripts.compare import compare, verify
 from coursebuild.core.scripts.diff import diff_rows
@@ -47,28 +47,10 @@ def test_places_in_nested_fences(prefix: str, eol: str) -> None:
     assert (change.span.line, change.span.column) == (9, 44 + len(prefix))
 
 
-@pytest.mark.parametrize(
-    ("recorded", "printed", "kind"),
-    [
-        ("6.641", "6.642", DriftKind.ROUNDING),
-        ("6.641", "6.640", DriftKind.ROUNDING),
-        ("6.641", "6.643", DriftKind.NUMERIC),
-        ("6.641", "6.6421", DriftKind.NUMERIC),
-        ("6.641", "6.6414", DriftKind.ROUNDING),
-        ("6.999", "7.000", DriftKind.ROUNDING),
-        ("-0.000", "0.001", DriftKind.ROUNDING),
-        ("1.5e-3", "1.6e-3", DriftKind.ROUNDING),
-        ("1.5e-3", "1.6e-2", DriftKind.NUMERIC),
-        ("4", "5", DriftKind.NUMERIC),
-        ("0.5", "0.50", DriftKind.TEXT),
-        ("-0.000", "0.000", DriftKind.TEXT),
-        ("nan", "0.5", DriftKind.NUMERIC),
-        ("inf", "-inf", DriftKind.NUMERIC),
-    ],
-)
-def test_classes_of_numbers(recorded: str, printed: str, kind: DriftKind) -> None:
-    result = verdict(f"E {recorded} J", f"E {printed} J")
-    assert [(c.kind, c.recorded, c.printed) for c in result.changes] == [(kind, recorded, printed)]
+def test_classes_of_numbers() -> None:
+    for recorded, printed, kind in CASES["classes"]:
+        result = verdict(f"E {recorded} J", f"E {printed} J")
+        assert [change_values(c) for c in result.changes] == [(kind, recorded, printed)]
 
 
 def test_enormous_errors_stay_finite() -> None:
@@ -123,9 +105,9 @@ def drift(recorded: str, printed: str, comparison: Comparison = EXACT) -> Diagno
     return drift_diagnostic(compare(recording(recorded), comparison, printed), "4.2")
 
 
-@pytest.mark.parametrize(("recorded", "printed", "label"), CASES["labels"])
-def test_labels(recorded: str, printed: str, label: str) -> None:
-    assert drift(recorded, printed).label == label
+def test_labels() -> None:
+    for recorded, printed, label in CASES["labels"]:
+        assert drift(recorded, printed).label == label
 
 
 def test_a_drift_is_reported_in_ten_lines() -> None:
@@ -151,9 +133,9 @@ def rows(recorded: str, printed: str) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize(("recorded", "printed", "expected"), CASES["rows"])
-def test_rows(recorded: str, printed: str, expected: list[str]) -> None:
-    assert rows(recorded, printed) == expected
+def test_rows() -> None:
+    for recorded, printed, expected in CASES["rows"]:
+        assert rows(recorded, printed) == expected
 
 
 def test_rows_of_a_table_are_the_cells_that_changed() -> None:
@@ -244,33 +226,10 @@ def test_the_number_in_the_same_place_is_proposed(
     assert diagnostic.help == (help_text and f"write `{help_text}`")
 
 
-@pytest.mark.parametrize(
-    ("before", "now", "successor"),
-    [
-        # headings tell lines that are alike apart, wherever they stand
-        ("Euler:\nerr 2.5\nRK4:\nerr 1", "RK4:\nerr 2.4\nEuler:\nerr 7.5", "7.5"),
-        ("Euler:\nerr 2.5\nRK4:\nerr 1", "Euler:\nerr 7.5\nMid:\nerr 2.4\nRK4:\nerr 1", "7.5"),
-        ("Euler:\nerr 2.5\nRK4:\nerr 1", "Euler:\nerr 7.5", "7.5"),
-        # one that is gone may have been what the number was about
-        ("Euler:\nerr 2.5\nRK4:\nerr 1", "Midpoint:\nerr 7.5\nRK4:\nerr 1", None),
-        ("Euler:\nerr 2.5", "Euler:\nsteps\nerr 7.5", None),
-        ("Euler:\nerr 2.5\nRK4:\nE 1", "Euler:\nE 1\nRK4:\nerr 7.5", None),
-        # rows are known by the number that they begin with
-        ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.05 2\n0.1 7.5\n0.2 9", "7.5"),
-        ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.05 2\n0.1 7.5", "7.5"),
-        ("n err\n0 10 3.5\n0 20 2.5", "n err\n0 10 8\n0 20 7.5", None),
-        ("n err\n10 3.5\n20 2.5\n40 4.5", "n err\n10 3.1\n30 2.1\n40 4.1", None),
-        ("1 0 2.5\n2 1 9", "2 0 8\n1 1 7.5", "7.5"),
-        ("dt 0.1\nerr 2.5\ndt 0.2\nerr 9", "dt 0.05\nerr 2.4\ndt 0.1\nerr 7.5", None),
-        ("err 2.5", "err 2.6\nerr 2.7", None),
-        # another wording is another quantity
-        ("period 2.5 s", "frequency 2.6 s", None),
-        ("period 2.5 s", "period 2.6 ms", None),
-    ],
-)  # fmt: skip
-def test_which_line_is_the_same(before: str, now: str, successor: str | None) -> None:
+@pytest.mark.parametrize(("before", "now", "successor"), CASES["successors"])
+def test_which_line_is_the_same(before: str, now: str, successor: str) -> None:
     diagnostic = mismatch_after("2.5", before + "\n", now + "\n")
-    if successor is None:
+    if not successor:
         assert diagnostic.label.startswith(
             "it is not certain what is printed in place of 2.5 now; the "
         )
