@@ -40,7 +40,6 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Names, compressed_files
-from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
 from coursebuild.core.pages.context import NotedPage, SiteContext
 from coursebuild.core.pages.frame import (
     FrameInputs,
@@ -52,7 +51,12 @@ from coursebuild.core.pages.frame import (
 )
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
-from coursebuild.core.pages.record import PageRecord
+from coursebuild.core.pages.record import (
+    PageFacts,
+    PageRecord,
+    common_characters,
+    common_files,
+)
 from coursebuild.core.pages.references import Reference, has_anchor
 from coursebuild.core.registry import features
 from coursebuild.core.syntax.document import parse_document

@@ -1,7 +1,4 @@
-"""What a report holds, and values as JSON.
-
-Entry points: `Report`; `summary_line(report)`, its last line as text; `plain`, `json_text`.
-"""
+"""What a report holds, and values as JSON."""
 
 from __future__ import annotations
 
@@ -142,10 +139,9 @@ def json_text(value: object) -> str:
 
 
 def plain(value: object, **names: str) -> Any:
-    """Convert a value to dictionaries, lists, texts and numbers; infinities and NaN to `None`.
+    """Convert a value to what JSON holds; infinities and NaN to `None`.
 
-    A struct becomes an object of its fields, some under other `names`. In the place of its `span`
-    stand the path, the lines and the columns.
+    A struct becomes an object of its fields, some under other `names`; its `span` becomes a place.
     """
     match value:
         case Diagnostic():

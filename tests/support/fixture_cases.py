@@ -1,16 +1,16 @@
 """Fixture files: cases of `title / . / input / . / expected / .`, with empty lines between them.
 
-Entry points: `check_cases(path, render)`; `read_cases(path)`, and `rewrite(path, cases)`, which
-writes them again. Lines before a title that are empty or begin with `#` are for readers of the
-file. `check_text(path, text)` is for a file that only holds an expected text, `fixture_text` for
-one that only holds an input, such as a whole lesson.
+Lines before a title that are empty or begin with `#` are for readers of the file. Short cases, of a
+line each, are rows of tables (`fixture_tables`).
 """
 
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -98,3 +98,8 @@ def fixture_text(name: str) -> str:
 def text_lines(text: str) -> list[str]:
     """Split at LF alone: a form feed in a lesson is no line end."""
     return _LINE.findall(text)
+
+
+def fixture_tables(name: str) -> dict[str, Any]:
+    """The tables of cases in a file of `tests/fixtures/tables`, by their names."""
+    return tomllib.loads(fixture_text(f"tables/{name}.toml"))

@@ -11,17 +11,8 @@ from types import MappingProxyType
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core import model
 from coursebuild.core.engine.store import Store
-from coursebuild.core.model import (
-    Course,
-    Math,
-    MathBlock,
-    MjcfModel,
-    Recording,
-    Script,
-    document_blocks,
-    document_inlines,
-)
 from coursebuild.core.model.results import (
     CompileResult,
     FileFacts,
@@ -78,7 +69,7 @@ def read_assets() -> Assets:
 class RenderedCourse(Struct, frozen=True):
     """A course, prepared results of running it, and the tool's own files."""
 
-    course: Course
+    course: model.Course
     results: Results
     assets: Assets
 
@@ -149,7 +140,9 @@ class Make(Struct, frozen=True):
         texts = {"0.1": text, "1.1": "Text.", "about": "About it.", **texts}
         documents = documents_of(map_result.value, texts)
         rendered = with_documents(map_result.value, documents)
-        rendered = replace(rendered, models=(MjcfModel("box", Source("models/box.xml", BOX)),))
+        rendered = replace(
+            rendered, models=(model.MjcfModel("box", Source("models/box.xml", BOX)),)
+        )
         results = results_of(rendered, runs or {}, status)
         typeset = known_mathml(dict(results.formulas))
         summarized = {
@@ -159,22 +152,22 @@ class Make(Struct, frozen=True):
         return RenderedCourse(with_documents(rendered, summarized), results, self.assets)
 
 
-def results_of(course: Course, runs: Mapping[str, ScriptRun], status: str) -> Results:
+def results_of(course: model.Course, runs: Mapping[str, ScriptRun], status: str) -> Results:
     """Scripts that are not in `runs` printed `one`, `two`; a formula is rendered as its TeX."""
     script_runs: list[ScriptRun] = []
     verdicts: list[Verdict] = []
     formulas: dict[Formula, str] = {}
     for document in course.documents:
-        for block in document_blocks(document):
-            if isinstance(block, Script):
+        for block in model.document_blocks(document):
+            if isinstance(block, model.Script):
                 default_run = ScriptRun(block.path, Outcome.OK, 0, "one\ntwo\n", "", 0.1)
                 script_runs.append(runs.get(block.path, default_run))
-            elif isinstance(block, Recording):
+            elif isinstance(block, model.Recording):
                 verdicts.append(Verdict(block, course.comparison_of(block), status))
-            elif isinstance(block, MathBlock):
+            elif isinstance(block, model.MathBlock):
                 formulas[Formula(block.tex.text, True)] = mathml(block.tex.text, "display")
-        for inline in document_inlines(document):
-            if isinstance(inline, Math):
+        for inline in model.document_inlines(document):
+            if isinstance(inline, model.Math):
                 formulas[Formula(inline.tex.text, inline.display)] = mathml(
                     inline.tex.text, "inline"
                 )

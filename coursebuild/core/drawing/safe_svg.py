@@ -1,7 +1,5 @@
 """SVG that draws, and does nothing else.
 
-Entry point: `read_svg`.
-
 1. A drawing may hold the elements, attributes and styles listed here. They are judged as browsers
    read them: by namespace, with references and escapes decoded.
 2. It refers to parts of itself, and to pixels that it holds, and to nothing else.

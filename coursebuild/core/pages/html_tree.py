@@ -1,8 +1,5 @@
 """HTML as a tree, parsed as a browser does, however malformed.
 
-Entry points: `parse_html`, and `to_html` and `to_xml`, which write a tree; `elements_with`, which
-finds elements by their attributes.
-
 The parser is Lexbor: it adds what HTML allows a writer to omit, and repairs what is misplaced.
 Comments are left out.
 """

@@ -1,11 +1,8 @@
 """The inputs of a page: everything that it shows except the text of its document, as a value.
 
-Entry point: `PageInputs`, with its `PageHead`.
-
 A page is drawn from its inputs, its document, and the tool's templates and words, and from nothing
-else, so it is drawn again only when one of these changes. Inputs are plain values (texts, numbers,
-tuples, mappings and structs of them). What a page needs from the course (where a link leads, what a
-script printed) has been looked up already.
+else, so it is drawn again only when one of these changes. What a page needs from the course (where
+a link leads, what a script printed) has been looked up already.
 """
 
 from __future__ import annotations

@@ -1,8 +1,5 @@
 """The list of all pages of a site, in order, and the inputs of those that are no lesson.
 
-Entry points: `page_list(library)`; `home_inputs`, `level_inputs`, `model_inputs`, `page_inputs`,
-`not_found_inputs`.
-
 An entry works with any library of the same course: edits change documents, but the pages stay the
 same as long as the course map does.
 """
@@ -175,10 +172,7 @@ class ModelCard(Struct, frozen=True):
 
 
 def home_inputs(library: Library, document: Document | None) -> PageInputs:
-    """The inputs of the home page: what can be read, and the whole plan.
-
-    The document of the page `home` opens it, if there is one; its summary is enough.
-    """
+    """The inputs of the home page: what can be read, and the whole plan, opened by its document."""
     course = library.course
     place = urls.Place(urls.HOME)
     written_lessons = [lesson for lesson in library.order if lesson.document is not None]

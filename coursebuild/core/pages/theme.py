@@ -1,9 +1,4 @@
-"""A course's own look in the files that all pages share, and drawings for dark pages.
-
-Entry points: `course_face`, a font of the course's own, and `measure_font`; `theme_faces`, all its
-fonts; `theme_style`, the end of the style sheet; `picture_size`; `dark_drawing`, made from a light
-one; `dark_colours`, the dark colours that a style sheet pairs with light ones.
-"""
+"""What a course changes of the looks of its pages: fonts, accent, drawings on dark pages."""
 
 from __future__ import annotations
 
@@ -133,10 +128,7 @@ def dark_colours(css: str) -> dict[str, str]:
 
 
 def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
-    """An SVG in the colours of a dark page.
-
-    A colour without a pair keeps its hue, but its lightness is inverted.
-    """
+    """An SVG in dark colours; one without a pair keeps its hue, with its lightness inverted."""
 
     def dark(match: re.Match[str]) -> str:
         value = match["value"]
@@ -149,7 +141,10 @@ def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
         inverted = bytes(min(max(channel + shift, 0), 255) for channel in (red, green, blue))
         return f"{match['name']}{match['is']}{paired_colours.get(light) or f'#{inverted.hex()}'}"
 
-    return _COLOUR.sub(dark, _ROOT.sub(_with_fill, svg, count=1))
+    root = _ROOT.search(svg)
+    if root is not None and " fill=" not in root[0]:  # the default colour of shapes
+        svg = svg.replace("<svg", '<svg fill="#000000"', 1)
+    return _COLOUR.sub(dark, svg)
 
 
 def _channels(colour: str) -> tuple[int, int, int] | None:
@@ -171,8 +166,3 @@ def _channels(colour: str) -> tuple[int, int, int] | None:
     except ValueError:
         return None
     return round(255 * a), round(255 * b), round(255 * c)
-
-
-def _with_fill(root: re.Match[str]) -> str:
-    """The root element, with the default colour of shapes made explicit."""
-    return root[0] if " fill=" in root[0] else f'<svg fill="#000000"{root[0][4:]}'

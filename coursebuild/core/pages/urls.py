@@ -1,13 +1,9 @@
 """The paths of pages and files in the site, and addresses from one page to another.
 
-Entry points: `lesson_path` and its siblings (site paths: POSIX, relative to the site's root), and
-`Place`, from which a page refers to others.
-
-1. A site path is plain text, the name of the file on disk; it is percent-encoded only as part of an
-   address.
-2. Every address is relative, so that the site works in any folder, from a disk and under any base.
-   The page for missing addresses is served at every depth, so its addresses begin with the path of
-   the course's base address instead.
+A site path is plain text, POSIX, relative to the site's root; it is percent-encoded only as part of
+an address. Every address is relative, so that the site works in any folder, from a disk and under
+any base; the page for missing addresses is served at every depth, so its addresses begin with the
+path of the course's base address instead.
 """
 
 from __future__ import annotations
@@ -79,10 +75,7 @@ def owner_path(owner: Owner) -> str:
 
 
 def file_path(path: str) -> str:
-    """`files/lessons/sketch.svg`: a file of the course that pages show or link to.
-
-    A file that a model includes is beside the model, as in the course.
-    """
+    """`files/lessons/sketch.svg`: a file of the course; what a model includes stays beside it."""
     return path if path.startswith("models/") else "files/" + path.removeprefix("content/")
 
 

@@ -1,8 +1,4 @@
-"""The printed lines with their numbers, and which of these a bound number may mean.
-
-Entry points: `printed_lines` (a recorded output), `lines_of_run` (the output of a run);
-`BoundText.of`, `shows`, `text_places`.
-"""
+"""The printed lines with their numbers, and which of these a bound number may mean."""
 
 from __future__ import annotations
 

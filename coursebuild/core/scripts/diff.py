@@ -1,16 +1,10 @@
 """How a recorded output differs from what its script prints now: inside a line, and line by line.
 
-Entry points: `find_differences` (inside one line), `number_kind`; `diff_rows`; `text_diff`,
-`shorten`, `quote`; `varying_times`.
-
 1. Lines that differ in their numbers only: each pair of numbers that does not match.
 2. Other lines are cut into numbers, words, signs and white space, and these are aligned: paired
    numbers are compared, the rest is text. White space that differs is reported only where nothing
    else does, because columns shift when a number gets wider.
 3. A recorded line with an ellipsis that does not fit differs as a whole.
-
-Lines that match under the comparison's mode count as recorded, even where their characters differ;
-lines that a `...` stands for are left out. A row marks the parts of its line that changed.
 
 Of two runs of a script, `varying_times` gives the pattern that says on the fence which times vary:
 
@@ -207,10 +201,7 @@ def text_diff(before: str, now: str) -> str:
 
 
 def diff_rows(verdict: Verdict, stdout: str) -> tuple[DiffRow, ...]:
-    """The rows of a recording that a run differs from.
-
-    Of a table only the cells that changed are shown, as one row each.
-    """
+    """The rows of a recording that a run differs from; of a table the changed cells only."""
     body = verdict.recording.body
     if isinstance(body, Table):
         cells: list[DiffRow] = []

@@ -18,7 +18,10 @@ from coursebuild.core.pages.html_tree import HtmlElement, parse_html, to_html, t
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.record import PageRecord, class_name, hoist_styles, record
 from coursebuild.core.pages.theme import dark_colours, dark_drawing
+from support.fixture_cases import fixture_tables
 from support.hostile_html import PAGES
+
+CASES = fixture_tables("styles")
 
 
 @pytest.mark.parametrize(
@@ -83,17 +86,7 @@ def test_a_style_becomes_a_class(html: str, expected: str | None) -> None:
     assert len(declarations) == ("padding" in html or "background" in html)
 
 
-@pytest.mark.parametrize(
-    "html",
-    [
-        '<!-- <b style="padding: 0"> -->',
-        "<script>\"<b style='padding: 0'>\"</script>",
-        "<p>style=\"padding: 0\" &lt;b style='x'></p>",
-        '<b title="style=x" data-style="y">',
-        '<textarea><b style="padding: 0"></textarea>',
-        "<b title='<i style=\"padding: 0\">'>",
-    ],
-)
+@pytest.mark.parametrize("html", CASES["unlike"])
 def test_what_only_looks_like_a_style_stays(html: str) -> None:
     assert hoist_styles(html) == (html, frozenset())
 

@@ -14,6 +14,7 @@ from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
+from support.fixture_cases import fixture_tables
 from support.sample_lessons import (
     DIGITS,
     DIGITS_ELLIPSIS,
@@ -26,6 +27,8 @@ from support.sample_lessons import (
     tolerance,
     update,
 )
+
+CASES = fixture_tables("updates")
 
 SECONDS = Comparison(volatile="[0-9.]+ s")
 
@@ -94,21 +97,7 @@ def test_what_cannot_be_recorded_is_refused() -> None:
 # -------------------------------------------------------------------------------------- ellipsis
 
 
-@pytest.mark.parametrize(
-    ("recorded", "printed", "expected"),
-    [
-        ("a 1\n...\nb 2", "a 3\nx\ny\nb 4", "a 3\n...\nb 4\n"),
-        ("a 1\n...\nb 2", "a 3\nb 2", "a 3\n...\nb 2\n"),
-        ("t=... s\na 1", "t=0.3 s\na 2", "t=... s\na 2\n"),
-        ("t=... s, E=1.5 J", "t=0.3 s, E=2.5 J", "t=... s, E=2.5 J\n"),
-        ("E 1.5 at t=...", "E 2.5 at t=0.3", "E 2.5 at t=...\n"),
-        ("a\n...\n...\nb 1", "a\nb 2", "a\n...\n...\nb 2\n"),
-        ("...\nb 1\nc", "x\nb 2\nc", "...\nb 2\nc\n"),
-        ("a 1\n...", "a 2", "a 2\n...\n"),
-        ("a\nb\nc\n...\nd", "a\nc\nx\nd", "a\nc\n...\nd\n"),
-        ("a x\nb\n...\nz 1", "a x\nnew\nb\nw\nz 1", "a x\nnew\nb\n...\nz 1\n"),
-    ],
-)
+@pytest.mark.parametrize(("recorded", "printed", "expected"), CASES["ellipses"])
 @pytest.mark.parametrize("comparison", [ELLIPSIS, DIGITS_ELLIPSIS], ids=["exact", "digits"])
 def test_ellipses_are_kept(
     recorded: str, printed: str, expected: str, comparison: Comparison

@@ -17,7 +17,10 @@ from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
+from support.fixture_cases import fixture_tables
 from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, tolerance, update
+
+CASES = fixture_tables("tables")
 
 OUTPUT = """\
 integrators
@@ -51,18 +54,7 @@ def test_rows_stand_in_lines() -> None:
     assert verdict("| | | |").status == "verified"
 
 
-@pytest.mark.parametrize(
-    "row",
-    [
-        "| implicit | 3.9e-11 | |",
-        "| RK4 | 0.000 % | |",
-        "| Euler | 6.641 % | |",
-        "| Euler | +6.64 % | |",
-        "| Eul | +6.641 % | |",
-        "| Euler | +6.641 | 6.9 |",
-        "| K4 | | |",
-    ],
-)
+@pytest.mark.parametrize("row", CASES["drift"])
 def test_words_and_numbers_stand_whole(row: str) -> None:
     assert verdict(row).status == "drift"
 
