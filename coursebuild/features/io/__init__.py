@@ -1,8 +1,4 @@
-"""Io cards: three lines that say what a script takes, does and gives.
-
-A line that begins with `INPUT:`, `PROCESS:` or `OUTPUT:` starts a part; the lines after it continue
-it. All three must be there, once, in this order.
-"""
+"""Io cards: three parts, each after its label, that say what a script takes, does and gives."""
 
 from __future__ import annotations
 
@@ -51,8 +47,6 @@ class Io(FeatureBlock, frozen=True):
 
 
 class _Part(Struct, frozen=True):
-    """The lines that stand under a label."""
-
     label: str
     span: Span
     lines: list[Excerpt]
@@ -109,7 +103,6 @@ def _split_at_labels(body: Excerpt) -> list[_Part]:
 def _diagnose_missing(
     label: str, parts: Mapping[str, _Part], all_parts: Iterable[_Part], fence: Fence
 ) -> Diagnostic:
-    """Say that a part is missing or empty, and point at lines whose label looks misspelt."""
     if label in parts:
         return diagnose("io-missing", parts[label].span, f"nothing follows `{label}:`")
     notes, fix = [], Fix("")

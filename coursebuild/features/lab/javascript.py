@@ -1,8 +1,4 @@
-"""Parses the JavaScript of labs, with tree-sitter.
-
-Entry points: `parse(code)`; `parse_statements(code)` and `parse_expression(code)`, for code that is
-to be translated; to read nodes, `walk`, `field`, `children`, `text_of`, `string_value`,
-`template_parts`, `dotted_name`.
+"""The JavaScript of labs as trees of `tree_sitter`.
 
 V8 has parsed the code before, so mistakes in the JavaScript need no explanation here.
 """

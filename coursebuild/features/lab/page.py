@@ -1,10 +1,8 @@
-"""Labs as a page shows them before they run: their subject, controls, displays and recording.
+"""Labs as pages and copies show them before they run: subject, controls, displays and recording.
 
-Entry points: `draw_lab(page, block)`, `index_lab`; `lab_markdown`, the same as plain Markdown;
-`page_view` and `lab_view`, the values of the template; `gallery_labs(course)`, the labs made for
-models that no text shows; `model_view`, `draw_model`, `model_picture`, of the first lab of a model
-in a text, or of the one made for it. No control is drawn, as none would work yet: the page's script
-puts the live instrument into `data-lab` when it starts, and reads its configuration there.
+No control is drawn, as none would work yet: the page's script puts the live instrument into
+`data-lab` when it starts, and reads its configuration there. A model that no lab of a text shows
+gets a lab of its own.
 """
 
 from __future__ import annotations
@@ -187,7 +185,6 @@ def index_lab(reader: IndexReader, lab: Lab) -> None:
 def _recorded_view(
     words: Strings, place: Place, title: str, live: PublishedLab | None
 ) -> RecordedView | None:
-    """Describe what the trial recorded; `None` if it did not come to its end."""
     record = live.record if live is not None else None
     if live is None or record is None:
         return None
@@ -211,7 +208,6 @@ def _recorded_view(
 
 
 def _values(words: Strings, control: Control) -> str:
-    """Say what a control can be set to, and its initial value."""
     match control:
         case Slider():
             ends = words("lab.between", min=number(control.min), max=number(control.max))
@@ -263,7 +259,6 @@ def _labs_by_model(document: Document) -> dict[str, Lab]:
 
 
 def _gallery_lab(model: MjcfModel) -> Lab:
-    """Make a lab in which a model starts from its first keyframe and is left to itself."""
     place = model.source.span(0, 0)
     fields = SimLab(model=model.name, title=model.name, toggles=_TOGGLES, setup=START)
     return Lab(place, SIMLAB, place, "", fields)

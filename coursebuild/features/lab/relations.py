@@ -1,8 +1,4 @@
-"""Checks how the fields of a `simlab` fit together, and labs with their course.
-
-Entry points: `check_lab(node, structs)`, and its parts for labs of other kinds, `check_controls`,
-`check_axes`; `check_steps`, for a field that presses and sets controls; `check_labs`, their kind
-and model exist; `check_model_names`, once models are compiled.
+"""Checks how the fields of a lab fit together, and labs with their course.
 
 Every part whose own fields are right is checked, so that a misspelt field does not hide what is
 wrong elsewhere.

@@ -1,10 +1,4 @@
-"""The reply of a trial as diagnostics at the entries of the lab.
-
-Entry points: `failure_diagnostics` and `remark_diagnostics` of a lab and its trial;
-`code_diagnostic`; `references(lab)`, names in its code, of which `name_diagnostics` reports those
-that the engine has not found (`site/js/lab/trial/names.js`), such as `data.qps`, `math.sin` or
-`data.qpos[5]`.
-"""
+"""The reply of a trial as diagnostics at the entries of the lab, and names that do not exist."""
 
 from __future__ import annotations
 
@@ -164,7 +158,6 @@ def remark_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
 
 def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
-    """Whether the simulation diverges there, and the lab claims that it does."""
     if failure.kind != "diverged":
         return False
     claims = [claim for claim in lab.fields.expect if claim.diverges]
@@ -228,7 +221,6 @@ def _make_diagnostic(lab: Lab, failure: TrialFailure) -> Diagnostic:
 
 
 def _check_reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report a reset after the main run that did not lead back to the start."""
     difference = trial.main["resetDiffers"] if trial.main is not None else None
     if difference is None:
         return

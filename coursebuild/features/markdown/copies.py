@@ -1,14 +1,10 @@
-"""Writes pages as plain Markdown, for people, feeds and language models, and the list `llms.txt`.
+"""Pages as plain Markdown, for people, feeds and language models, and the list `llms.txt`.
 
-Entry points: `note_markdown`, the text of a page; `markdown_files`, the files of all pages; `head`
-and `markdown_href`, parts of them; `write_llms(library)`.
+A lesson or page of the course is written from its document; all others (home, levels, models,
+measured figures) from their HTML, so that both say the same.
 
-A lesson or page of the course is written from its document. All other pages (home, levels, models,
-measured figures) are written from their HTML, so that both say the same.
-
-`llms.txt` (<https://llmstxt.org>) leads language models to these copies. There is no
-`llms-full.txt`: for thousands of lessons it would have tens of megabytes, more than any model
-reads, and every edit would write it again.
+There is no `llms-full.txt` (<https://llmstxt.org>): for thousands of lessons it would have tens of
+megabytes, more than any model reads, and every edit would write it again.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 """The site as a package of ADL SCORM 1.2, for learning platforms.
 
 A platform opens `sco/LESSON.html`, which shows the page of the lesson in a frame and speaks to the
-platform for it (`site/js/scorm.js`). So one visit lasts while the learner follows links from page
-to page, and the pages are those of the site, byte for byte. Each written lesson is a SCO, and the
-files that belong to no single lesson are one asset on which the SCOs depend (SCORM 1.2 Content
-Aggregation Model, section 2.3). A planned lesson has nothing to open, and is no SCO.
+platform for it (`site/js/scorm.js`). So one visit lasts while the learner follows links, and the
+pages are those of the site, byte for byte. Each written lesson is a SCO; the files that belong to
+no single lesson are one asset on which the SCOs depend (Content Aggregation Model, section 2.3).
 """
 
 from __future__ import annotations
@@ -61,7 +60,6 @@ def _start_path(lesson: Lesson) -> str:
 
 
 def _manifest(course: Course, paths: Iterable[str]) -> bytes:
-    """Write the manifest: the lessons, and the files of each, within the lengths IMS allows."""
     lesson_files = {
         f"lessons/{x.id}-{x.slug}": (x, [_start_path(x)]) for x in course.written_lessons
     }

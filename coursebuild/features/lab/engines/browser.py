@@ -1,10 +1,7 @@
 """The browser's MuJoCo in this process: V8 runs the same WebAssembly file and the same lab code.
 
-Entry points: `LabEngine.trial`, `LabEngine.check_code`. `site/js/lab/trial/trial.js` describes
-requests and replies.
-
-The engine starts when it is first needed, and again after a trial that ran too long or took too
-much memory, so that such a trial fails alone.
+`site/js/lab/trial/trial.js` describes requests and replies. The engine starts when it is first
+needed, and again after a trial that had to be ended, so that such a trial fails alone.
 """
 
 from __future__ import annotations
@@ -110,7 +107,6 @@ class LabEngine:
         return reply
 
     def _end(self, isolate: Isolate, kind: str, message: str) -> dict[str, Any]:
-        """End the engine, and make the reply of the trial that it ran."""
         entry: list[str | int] = []
         with contextlib.suppress(LimitError, ScriptError):
             progress = json.loads(isolate.call("trying", "", _START_SECONDS))

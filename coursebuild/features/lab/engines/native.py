@@ -1,9 +1,5 @@
 """Native MuJoCo for labs: saves models as MJB files, and repeats runs of the browser's engine.
 
-Entry points: `NativeEngine`, a context manager around a child process; `LAB_ENGINE`, the version of
-MuJoCo in the browser; `wasm_path`, `script_path`, `engine_digest`, `lab_digest`: files that a trial
-runs, whose digests can be had without V8.
-
 Only the version that wrote an MJB file can read it. Where another MuJoCo is installed than that of
 the browser, the child runs in an environment with that one, in the user's state folder.
 """

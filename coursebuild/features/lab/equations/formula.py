@@ -1,7 +1,5 @@
 """Expressions of labs without an engine: text → a program that Python and the page both run.
 
-Entry points: `compile_formula(text, names)`; `compile_condition`, for an event.
-
 An expression is written as in Python, so that it can go from a script into a lab and back. Python's
 own parser reads it; what it may hold is decided here, and nothing is ever evaluated as code. A
 program is in postfix order, as JSON has it: a number is pushed; `[slot]` pushes a value of the
@@ -44,8 +42,6 @@ _HELP: dict[type[ast.AST], str] = {
 
 
 class _MistakeError(Exception):
-    """What is wrong with a part of an expression."""
-
     def __init__(self, node: ast.expr, message: str, help: str = "", rule: str = "lab-code"):
         super().__init__(message)
         self.node, self.message, self.help, self.rule = node, message, help, rule
@@ -92,7 +88,6 @@ def compile_condition(
 
 
 def _parse(text: Excerpt) -> ast.expr | Diagnostic:
-    """Parse an expression, which may take several lines."""
     if len(text.text) > LONGEST:
         message = f"the expression has {len(text.text)} characters, {LONGEST} at most can be read"
         return diagnose("lab-code", text.span(), message, help="name parts of it in `where`")

@@ -1,13 +1,9 @@
 """A lab as a Python script that does natively what the lab does in the page, and its trial.
 
-Entry points: `export_script(lab, metadata)`; `fill_in_values`, for the values of its controls;
-`export_lab(…)`, which runs the script and compares it with the lab's trial; `record_for_export`,
-which records of a trial what is compared.
-
-The template `script.jinja` puts the translated pieces of the lab's code together in the order in
-which the lab runs them (docs/explanation/how-labs-run.md). In the text `{{control:N}}` stands for
-the value of control N, which the page fills in. A script is not offered if its result differs from
-the lab's, or if it fails for any value that the page may fill in.
+`script.jinja` puts the translated pieces together in the order in which the lab runs them
+(docs/explanation/how-labs-run.md). `{{control:N}}` in the text stands for the value of control N,
+which the page fills in. A script is not offered if its result differs from the lab's, or if it
+fails for any value that the page may fill in.
 """
 
 from __future__ import annotations
@@ -171,7 +167,6 @@ def _template() -> Template:
 
 
 def _names(controls: Sequence[Control]) -> list[str]:
-    """Name the controls in the script: constants, in capitals, and functions for buttons."""
     names: list[str] = []
     for control in controls:
         is_button = isinstance(control, Button)
@@ -185,14 +180,12 @@ def _names(controls: Sequence[Control]) -> list[str]:
 
 
 def _setter(control: Slider | Select) -> str:
-    """Return the code that a control runs with its `value`."""
     if control.set is not None:
         return f"({control.set}\n) = value"
     return control.apply or f"ctx.{control.param} = value"
 
 
 def _keyframe(key: int | str | None) -> str:
-    """Write the line that resets the data to the lab's keyframe."""
     if key is None:
         return "mujoco.mj_resetData(model, data)"
     number = str(key) if isinstance(key, int) else f"model.key({json.dumps(key)}).id"
@@ -231,13 +224,11 @@ def _option(label: str, value: float | str) -> str:
 
 
 def _one_line(text: str) -> str:
-    """Put a text of the author on one line, for a comment."""
     printable = "".join(c if c.isprintable() else " " for c in text)
     return " ".join(printable.replace("\\", "/").replace('"', "'").split())
 
 
 def _long_text(text: str) -> str:
-    """Write a text of several lines as a literal of Python."""
     is_unprintable = any(not c.isprintable() and c != "\n" for c in text)
     if "\\" in text or '"""' in text or is_unprintable or text.endswith('"'):
         return repr(text)
