@@ -51,7 +51,7 @@ def inputs_of(lab: Lab, module: LabModule) -> Inputs:
     conditions = (
         ("MuJoCo", native.LAB_ENGINE),
         ("how a lab is repeated natively", native.lab_digest("engines/native_worker.py")[:12]),
-        ("the browser's engine and its trial", native.engine_digest()[:12]),
+        ("the browser's engine and its trial", native.asset_digest(native.WASM, native.TRIAL)[:12]),
     )
     return Inputs(f"lab {module.name}", text, (), LIMITS.lab, (), conditions)
 
@@ -61,7 +61,7 @@ def equation_inputs(lab: Lab, name: str) -> Inputs:
     conditions = (
         ("SciPy", package_version("scipy")),
         ("how a lab without an engine is tried", native.lab_digest("equations")[:12]),
-        ("the page's own code", native.equation_script_digest()[:12]),
+        ("the page's own code", native.asset_digest(native.EQUATION_TRIAL)[:12]),
     )
     return Inputs(f"lab {name}", key_of(lab.config), (), LIMITS.lab, (), conditions)
 

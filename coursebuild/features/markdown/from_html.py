@@ -56,7 +56,11 @@ class _Converter:
         elif name in ("ul", "ol"):
             yield self._list(node)
         elif name == "pre":
-            yield marks.fence(_language(node), node.text)
+            names = (
+                n for code in node.nearest("code") for n in code.attributes.get("class", "").split()
+            )
+            languages = (n.removeprefix("language-") for n in names if n.startswith("language-"))
+            yield marks.fence(next(languages, ""), node.text)
         elif name == "table":
             yield self._table(node)
         elif name == "dl":
@@ -149,11 +153,3 @@ class _Converter:
                 return f" {inner} "
             case _:
                 return inner
-
-
-def _language(node: HtmlElement) -> str:
-    for code in node.nearest("code"):
-        for name in code.attributes.get("class", "").split():
-            if name.startswith("language-"):
-                return name.removeprefix("language-")
-    return ""

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TypeGuard
 from urllib.parse import urlsplit
 
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
@@ -105,7 +104,9 @@ class Flow:
             if node.attributes.get("start", "1") != "1" or "reversed" in node.attributes:
                 self.lose("a numbered list counts from 1")
             items = [
-                self._container("li", child if _is_item(child) else HtmlElement("li", {}, [child]))
+                self._container("li", child)
+                if isinstance(child, HtmlElement) and child.name == "li"
+                else self._container("li", HtmlElement("li", {}, [child]))
                 for child in node.children
                 if not isinstance(child, str) or child.strip()
             ]
@@ -264,10 +265,6 @@ def _unwrap_spans(content: Iterable[HtmlContent]) -> Iterator[HtmlContent]:
             yield from _unwrap_spans(child.children)
         else:
             yield child
-
-
-def _is_item(content: HtmlContent) -> TypeGuard[HtmlElement]:
-    return isinstance(content, HtmlElement) and content.name == "li"
 
 
 def _is_inline_math(node: HtmlElement) -> bool:

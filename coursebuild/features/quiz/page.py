@@ -106,15 +106,10 @@ def _grading_attributes(
 
 
 def _comparison_rule(page: PageContext, script: str) -> str:
-    for recording in model.find_blocks(page.document, model.Recording):
-        if recording.script == script:
-            verdict = page.inputs.verdicts.get(recording.span.start)
-            if verdict is not None:
-                return _format_rule(verdict.comparison)
-    return _format_rule(model.Comparison(model.Mode.DIGITS))
-
-
-def _format_rule(comparison: model.Comparison) -> str:
+    recordings = model.find_blocks(page.document, model.Recording)
+    starts = (recording.span.start for recording in recordings if recording.script == script)
+    verdict = next(filter(None, map(page.inputs.verdicts.get, starts)), None)
+    comparison = model.Comparison(model.Mode.DIGITS) if verdict is None else verdict.comparison
     match comparison.mode:
         case model.Mode.EXACT:
             return "exact"

@@ -21,7 +21,8 @@ from coursebuild.core.files.errors import require
 from coursebuild.core.model import Course, Recording, find_blocks
 from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedError
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.features.lab.engines.native import equation_script_path
+from coursebuild.features.lab.engines.browser import V8Engine
+from coursebuild.features.lab.engines.native import EQUATION_TRIAL, asset_path
 from coursebuild.features.lab.equations import reference
 from coursebuild.features.lab.model import PLOT, Entry, Lab
 
@@ -83,37 +84,15 @@ class EquationReply(Struct, frozen=True):
         return f"{library} agrees to {self.difference:.0e}" if self.start is not None else ""
 
 
-class EquationEngine:
-    """The page's code in V8, started when it is first needed."""
-
-    def __init__(self, memory: int) -> None:
-        """`memory`: MiB of JavaScript objects."""
-        self._memory = memory << 20
-        self._isolate: Isolate | None = None
-        self._stopped = False
-
-    def close(self) -> None:
-        """Free V8's memory; the engine can be used again."""
-        if self._isolate is not None:
-            self._isolate.close()
-            self._isolate = None
-
-    def stop(self) -> None:
-        """End what runs, and what comes after, by a `StoppedError`; called from another thread."""
-        self._stopped = True
-        if (isolate := self._isolate) is not None:
-            isolate.stop()
+class EquationEngine(V8Engine):
+    """The page's code for labs without an engine."""
 
     def run(self, request: dict[str, Any], seconds: float) -> list[reference.CurveRun]:
-        """Run the attempts of a lab.
-
-        Raises:
-            LimitError, ScriptError: they do not come to their end.
-        """
+        """Run the attempts of a lab; those that do not end raise `LimitError` or `ScriptError`."""
         if self._stopped:
             raise StoppedError
         if self._isolate is None:
-            script = equation_script_path().read_text(encoding="utf-8")
+            script = asset_path(EQUATION_TRIAL).read_text(encoding="utf-8")
             self._isolate = Isolate(script, memory=self._memory)
         try:
             text = self._isolate.call("tryCurves", json.dumps(request), seconds)
@@ -280,7 +259,21 @@ def _check_run(
         if value is None and "nan" not in readout["value"]:
             message = f"the readout `{readout['label']}` is no finite number"
             yield CurveFinding("lab-value", ("readouts", i, "expr"), message, help=_NAN_HELP)
-    yield from _check_claims(config, attempt, run)
+    for i, value in zip(attempt.claims, run.claims, strict=False):
+        claim = config["expect"][i]
+        at = _place(config, claim["at"])
+        message = ""
+        if claim["value"] is None:
+            if run.failure is None or run.end > claim["at"]:
+                message = f"the solution goes on after {at}"
+        elif value is None:
+            message = f"the claim has no finite value at {at}"
+        elif claim["min"] is not None and value < claim["min"]:
+            message = f"the claim does not hold: {value:.6g} at {at}, not at least {claim['min']:g}"
+        elif claim["max"] is not None and value > claim["max"]:
+            message = f"the claim does not hold: {value:.6g} at {at}, not at most {claim['max']:g}"
+        if message:
+            yield CurveFinding("lab-expect", ("expect", i), message)
     goal = config["goal"]
     if goal is None:
         return
@@ -295,26 +288,6 @@ def _check_run(
 
 
 _NAN_HELP = "say where there is no value: `1/x if x != 0 else nan`"
-
-
-def _check_claims(
-    config: Mapping[str, Any], attempt: _Attempt, run: reference.CurveRun
-) -> Iterator[CurveFinding]:
-    for i, value in zip(attempt.claims, run.claims, strict=False):
-        claim = config["expect"][i]
-        at = _place(config, claim["at"])
-        entry: Entry = ("expect", i)
-        if claim["value"] is None:
-            if run.failure is None or run.end > claim["at"]:
-                yield CurveFinding("lab-expect", entry, f"the solution goes on after {at}")
-        elif value is None:
-            yield CurveFinding("lab-expect", entry, f"the claim has no finite value at {at}")
-        elif claim["min"] is not None and value < claim["min"]:
-            message = f"the claim does not hold: {value:.6g} at {at}, not at least {claim['min']:g}"
-            yield CurveFinding("lab-expect", entry, message)
-        elif claim["max"] is not None and value > claim["max"]:
-            message = f"the claim does not hold: {value:.6g} at {at}, not at most {claim['max']:g}"
-            yield CurveFinding("lab-expect", entry, message)
 
 
 def _is_claimed(config: Mapping[str, Any], attempt: _Attempt, run: reference.CurveRun) -> bool:

@@ -106,7 +106,9 @@ class Expressions:
                 return self.member(node)
             case "subscript_expression":
                 text = self.element(node)
-                is_single = engine_field(js.dotted_name(js.field(node, "object"))) == "single"
+                is_single = (
+                    engine_fields().get(js.dotted_name(js.field(node, "object"))) == "single"
+                )
                 return f"float({text})" if is_single else text
             case "call_expression":
                 return self.call(node)
@@ -172,7 +174,7 @@ class Expressions:
                 return f"mujoco.{enumeration}.{member}.value"
             case _:
                 pass
-        kind = engine_field(path)
+        kind = engine_fields().get(path)
         if kind is not None:
             return ".".join(path) + (_FLAT if kind in ("rows", "single") else "")
         if name == "length":
@@ -238,7 +240,8 @@ class Expressions:
 
 
 @functools.cache
-def _engine_fields() -> Mapping[tuple[str, ...], EngineField]:
+def engine_fields() -> Mapping[tuple[str, ...], EngineField]:
+    """Map paths such as `("model", "opt", "gravity")` to what numbers stand there."""
     mujoco = _mujoco()
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
     owners: dict[tuple[str, ...], Any] = {
@@ -247,24 +250,16 @@ def _engine_fields() -> Mapping[tuple[str, ...], EngineField]:
         ("model", "opt"): model.opt,
         ("model", "stat"): model.stat,
     }
-    return {
-        (*owner, name): kind
-        for owner, values in owners.items()
-        for name in dir(values)
-        if not name.startswith("_") and (kind := _kind(getattr(values, name))) is not None
-    }
-
-
-def engine_field(path: tuple[str, ...]) -> EngineField | None:
-    """Say what `("model", "opt", "gravity")` is; `None` if it holds no numbers."""
-    return _engine_fields().get(path)
-
-
-def _kind(value: object) -> EngineField | None:
-    if isinstance(value, np.ndarray):
-        is_single = value.dtype == np.float32
-        return "single" if is_single else "rows" if value.ndim > 1 else "array"
-    return "number" if isinstance(value, int | float) else None
+    fields: dict[tuple[str, ...], EngineField] = {}
+    for owner, values in owners.items():
+        for name in dir(values):
+            value = None if name.startswith("_") else getattr(values, name)
+            if isinstance(value, np.ndarray):
+                kind: EngineField = "rows" if value.ndim > 1 else "array"
+                fields[*owner, name] = "single" if value.dtype == np.float32 else kind
+            elif isinstance(value, int | float):
+                fields[*owner, name] = "number"
+    return fields
 
 
 def _mujoco() -> Any:

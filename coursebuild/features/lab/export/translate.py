@@ -26,20 +26,13 @@ def translate_statements(
     """Translate statements into lines; `value` is the expression that `value` stands for.
 
     In the code of a `button`, calls that only concern the page's clock are left out.
-
-    Raises:
-        UntranslatableError: they cannot be translated.
     """
     lines = _Statements(fields, value, button).block(js.parse_statements(code))
     return ast.unparse(ast.parse("\n".join(lines))).splitlines()
 
 
 def translate_expression(code: str, fields: Collection[str]) -> str:
-    """Translate an expression.
-
-    Raises:
-        UntranslatableError: it cannot be translated.
-    """
+    """Translate an expression."""
     text = _Statements(fields, None, button=False).expression(js.parse_expression(code))
     return ast.unparse(ast.parse(text))
 
@@ -173,7 +166,7 @@ class _Statements(expressions.Expressions):
                 return self.element(node)
             case "member_expression":
                 path = js.dotted_name(node)
-                if path[:1] == ("ctx",) or expressions.engine_field(path) == "number":
+                if path[:1] == ("ctx",) or expressions.engine_fields().get(path) == "number":
                     return self.member(node)
             case _:
                 pass

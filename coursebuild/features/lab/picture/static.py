@@ -301,17 +301,14 @@ def _reference(frame: _Frame, y: float, label: str) -> str:
 
 def _line(frame: _Frame, points: Sequence[tuple[float, float | None]], n: int, dash: str) -> str:
     path: list[str] = []
-    for run in _runs(points):
-        path += _path_commands(frame, run)
+    # Values that are not finite end a run of points.
+    for finite, group in groupby(points, key=lambda point: _is_finite(point[1])):
+        if finite:
+            run = [(t, min(max(v, -_LARGEST), _LARGEST)) for t, v in group if v is not None]
+            path += _path_commands(frame, run)
     style = f' stroke-dasharray="{dash}"' if dash else ""
     style += ' stroke-linecap="round"' if "h0" in path else ""
     return f'<path class="lab-trace lab-trace-{n % 7 + 1}"{style} d="{"".join(path)}"/>'
-
-
-def _runs(points: Sequence[tuple[float, float | None]]) -> Iterator[list[tuple[float, float]]]:
-    for finite, run in groupby(points, key=lambda point: _is_finite(point[1])):
-        if finite:
-            yield [(t, min(max(v, -_LARGEST), _LARGEST)) for t, v in run if v is not None]
 
 
 def _is_finite(value: float | None) -> TypeGuard[float]:
