@@ -54,9 +54,15 @@ def slides_file(context: ExportContext) -> OutputFile:
     text = chapters.lesson_text(context, path)
     for lab in (element for element in _elements(text) if "data-config" in element.attributes):
         _embed_lab(context, place, lab, files)
+
+    def address(target: str, anchor: str) -> str:
+        if target == path:
+            return f"#{urls.quote_anchor(anchor or '_slide-1')}"
+        return chapters.site_address(context, target, anchor)
+
     rules = chapters.RewriteRules(
         place,
-        functools.partial(_address, context, path),
+        address,
         functools.cache(functools.partial(chapters.data_address, context)),
         lambda id: f"_{id}" if _OWN_ID.match(id) else id,
         live=True,
@@ -95,12 +101,6 @@ def slides_file(context: ExportContext) -> OutputFile:
         ],
     )
     return OutputFile("slides.html", visible(html).encode())
-
-
-def _address(context: ExportContext, own_path: str, path: str, anchor: str) -> str:
-    if path == own_path:
-        return f"#{urls.quote_anchor(anchor or '_slide-1')}"
-    return chapters.site_address(context, path, anchor)
 
 
 def _elements(content: Iterable[HtmlContent]) -> Iterator[HtmlElement]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter
 from coursebuild.core.model import FeatureBlock, Inline
+from coursebuild.core.pages.context import PageContext
 from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import (
@@ -116,10 +116,6 @@ def _diagnose_missing(
             fix = Fix(f"write `{label}:`", edits=(Edit(place, label),), safe=is_safe)
     message = f"the io block has no line `{label}:`"
     return diagnose("io-missing", fence.head, message, help=fix, notes=notes)
-
-
-if TYPE_CHECKING:
-    from coursebuild.core.pages.context import PageContext
 
 
 def draw(page: PageContext, card: Io) -> Markup:

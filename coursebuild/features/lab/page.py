@@ -8,14 +8,13 @@ gets a lab of its own.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from markupsafe import Markup, escape
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.features import IndexReader, Picture
+from coursebuild.core.features import IndexReader, MarkdownWriter, Picture
 from coursebuild.core.model import (
     Course,
     Document,
@@ -25,6 +24,7 @@ from coursebuild.core.model import (
     find_blocks,
 )
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.library import BY_LAB, Library
 from coursebuild.core.pages.marks import (
     code_span,
@@ -43,9 +43,6 @@ from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
 from coursebuild.features.lab.reply import LabRecord, PublishedLab
 from coursebuild.features.lab.schema import Control, Overlay, Plot, Select, SimLab, Slider
-
-if TYPE_CHECKING:
-    from coursebuild.core.pages.context import PageContext
 
 
 class RecordedView(Struct, frozen=True):
@@ -313,10 +310,6 @@ def qr_svg(text: str, label: str) -> Markup:
         return Markup()
     svg = code.svg_inline(omitsize=True, svgclass="qr", lineclass=None)
     return Markup(svg.replace("<svg", f'<svg role="img" aria-label="{escape(label)}"', 1))
-
-
-if TYPE_CHECKING:
-    from coursebuild.core.features import MarkdownWriter
 
 
 def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:

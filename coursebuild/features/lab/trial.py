@@ -262,6 +262,10 @@ class _LabTrial(Struct, frozen=True):
             seconds=reply.seconds,
             timestamp=reply.timestamp,
         )
+        parity = None if reply.main is None else reply.main["parity"]
+        parity_text = "" if parity is None else parity.describe()
+        if parity is not None and parity.unrepeated and export.script is not None:
+            parity_text = "compared with native MuJoCo as its Python export"
         line = TrialLine(
             name=module.name,
             title=lab.fields.title,
@@ -270,7 +274,7 @@ class _LabTrial(Struct, frozen=True):
             seconds=reply.seconds,
             steps_per_second=reply.steps_per_second,
             tried=len(reply.attempts),
-            parity=_parity_text(reply, export),
+            parity=parity_text,
             fill=None if reply.main is None else reply.main["fill"],
             cached=cached_evaluation is not None,
             unexported=export.reason,
@@ -388,12 +392,3 @@ class _LabTrial(Struct, frozen=True):
 
 def _is_lasting(reply: TrialReply) -> bool:
     return all(failure.kind not in _TRANSIENT for failure in reply.failures)
-
-
-def _parity_text(reply: TrialReply, export: LabExport) -> str:
-    parity = reply.main["parity"] if reply.main is not None else None
-    if parity is None:
-        return ""
-    if parity.unrepeated and export.script is not None:
-        return "compared with native MuJoCo as its Python export"
-    return parity.describe()

@@ -50,7 +50,10 @@ def note_cells(inputs: PageInputs, page: PageContext | None, body: str) -> bytes
     if page is None or inputs.head.kind != "lesson":
         return b""
     words, address = page.renderer.words, page.inputs.address
-    locate = functools.partial(_make_absolute, address)
+
+    def locate(href: str) -> str:
+        return urljoin(address, href) if address and not urlsplit(href).scheme else href
+
     page_address = locate(page.place.href(inputs.head.path))
     writer = DocumentWriter(page, locate, page_address, notebook=True)
     parts = head(inputs, words, locate)
@@ -86,10 +89,6 @@ def code_cell(name: str, text: str, output: str | None = None, *, hidden: bool =
 def _lines(text: str, end: str = "") -> list[str]:
     lines = text.rstrip("\n").split("\n")
     return [*[f"{line}\n" for line in lines[:-1]], f"{lines[-1]}{end}"]
-
-
-def _make_absolute(address: str, href: str) -> str:
-    return urljoin(address, href) if address and not urlsplit(href).scheme else href
 
 
 def _block_cells(writer: DocumentWriter, blocks: Iterable[model.Block]) -> Iterator[Cell]:

@@ -12,18 +12,16 @@ import functools
 import hashlib
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, assert_never
+from typing import assert_never
 
 from markupsafe import Markup, escape
 
 from coursebuild.core import model
-from coursebuild.core.features import IndexReader
+from coursebuild.core.features import IndexReader, MarkdownWriter
 from coursebuild.core.model.results import Outcome
+from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.marks import escape_marks, fence, hang
 from coursebuild.features.quiz import model as quizzes
-
-if TYPE_CHECKING:
-    from coursebuild.core.pages.context import PageContext
 
 
 def quiz(page: PageContext, block: quizzes.Quiz) -> Markup:
@@ -155,10 +153,6 @@ def shuffle(count: int, key: str) -> tuple[int, ...]:
     if count > 1 and order == list(range(count)):
         order = [*order[1:], order[0]]
     return tuple(order)
-
-
-if TYPE_CHECKING:
-    from coursebuild.core.features import MarkdownWriter
 
 
 def quiz_markdown(writer: MarkdownWriter, block: quizzes.Quiz) -> str:

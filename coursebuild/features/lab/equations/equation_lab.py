@@ -181,7 +181,8 @@ class _Compiler:
         axis_name = "x" if isinstance(fields, declared.PlotLab) else "t"
         axis = fields.x if isinstance(fields, declared.PlotLab) else fields.t  # type: ignore[attr-defined]
         axis_data = self.axis(node.object(axis_name), axis, axis_name)
-        axis_label = _axis_label(axis, axis_name)
+        axis_label = axis.label or axis.name or axis_name
+        axis_label += f" ({axis.unit})" if axis.unit else ""
         state_nodes = node.object("states").members
         for member in state_nodes.values():
             self.declare(member.key.value, member.key.span)
@@ -372,11 +373,6 @@ class _Compiler:
 
 def _slots(program: Program) -> set[int]:
     return {item[0] for item in program if isinstance(item, list)}
-
-
-def _axis_label(axis: declared.Axis, name: str) -> str:
-    label = axis.label or axis.name or name
-    return f"{label} ({axis.unit})" if axis.unit else label
 
 
 def _values(controls: list[dict[str, Any]], after: Mapping[str, Any]) -> list[Any]:

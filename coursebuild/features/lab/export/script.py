@@ -212,15 +212,12 @@ def _comment(control: Slider | Select) -> list[str]:
     unit = f" ({_one_line(control.unit)})" if control.unit else ""
     text = f"The control “{_one_line(control.label)}”{unit}"
     if isinstance(control, Select):
-        text += ", one of " + ", ".join(_option(*option) for option in control.options)
+        pairs = ((_one_line(label), _literal(value)) for label, value in control.options)
+        texts = (value if label == value else f"{value} ({label})" for label, value in pairs)
+        text += f", one of {', '.join(texts)}"
     else:
         text += f", from {control.min:g} to {control.max:g}"
     return [f"# {line}" for line in textwrap.wrap(text, _WIDTH)]
-
-
-def _option(label: str, value: float | str) -> str:
-    literal = _literal(value)
-    return literal if _one_line(label) == literal else f"{literal} ({_one_line(label)})"
 
 
 def _one_line(text: str) -> str:
@@ -369,7 +366,11 @@ def _difference(main: MainRun, run: dict[str, Any], rtol: float) -> str | None:
     assert record is not None, "without a record no script is tried"
     if run["steps"] != record["steps"]:
         return f"it makes {run['steps']} steps, and the lab {record['steps']}"
-    difference = _relative_difference(run["state"], record["state"])
+    state, lab_state, difference = run["state"], record["state"], math.inf
+    if len(state) == len(lab_state):
+        largest = max([1.0, *map(abs, lab_state)])
+        pairs = zip(state, lab_state, strict=True)
+        difference = max([0.0, *(abs(a - b) / largest for a, b in pairs)])
     if not difference <= rtol:
         return f"its state after {record['near']} steps is apart from the lab's by {difference:.1e}"
     first, last = main["pictures"][0], main["pictures"][-1]
@@ -377,13 +378,6 @@ def _difference(main: MainRun, run: dict[str, Any], rtol: float) -> str | None:
     if reason is None and run["last"] == record["last"]:
         reason = _compare_readouts(last["readouts"], run["end"], "end")
     return reason
-
-
-def _relative_difference(state: Sequence[float], lab_state: Sequence[float]) -> float:
-    if len(state) != len(lab_state):
-        return math.inf
-    largest = max([1.0, *(abs(x) for x in lab_state)])
-    return max([0.0, *(abs(a - b) / largest for a, b in zip(state, lab_state, strict=True))])
 
 
 def _compare_readouts(lab_values: Any, readouts: list[list[Any]], moment: str) -> str | None:
