@@ -1,8 +1,7 @@
-"""Takes lessons from the pages of a site: with other ids and links, and nothing for scripts.
+"""Lessons from the pages of a site, with other ids and links, and the whole course on one page.
 
-Entry points: `render_lesson`; `rewrite(content, rules)`; `page_file(context)`, the whole course on
-one page, to be read without a network and to be printed. That page contains its style sheet, fonts
-and pictures. It loads nothing and runs nothing, as its security policy says.
+That page contains its style sheet, fonts and pictures; it loads nothing and runs nothing, as its
+security policy says.
 """
 
 from __future__ import annotations
@@ -102,7 +101,6 @@ def _rewrite_element(element: HtmlElement, rules: RewriteRules) -> HtmlContent:
 def _rewrite_attribute(
     element: HtmlElement, name: str, value: str, rules: RewriteRules
 ) -> str | None:
-    """Return the new value of an attribute; `None` if it is left out."""
     if name in _LEFT_OUT or name.startswith("on"):
         return None
     if name == "tabindex" or name.startswith("data-"):

@@ -1,8 +1,4 @@
-"""`coursebuild diff`: say what a change does to the course, as Markdown for those who review it.
-
-Entry points besides the command's: `CourseState`, `report(base, old, new)`, of two states of a
-course; `weight_section(old, new)`, of two sites.
-"""
+"""`coursebuild diff`: say what a change does to the course, as Markdown for those who review it."""
 
 from __future__ import annotations
 
@@ -194,7 +190,6 @@ def _text(recording: Recording | None) -> str:
 
 
 def _figures(state: CourseState) -> dict[str, tuple[str, bytes]]:
-    """Return the paths and bytes of recorded figures and their data, by path."""
     documents = state.course.documents
     paths = (figure.path for document in documents for figure in recorded_figures(document))
     return {path: (path, data) for path in paths if (data := state.read(path)) is not None}
@@ -205,7 +200,6 @@ def _describe_figure_change(before: tuple[str, bytes], now: tuple[str, bytes]) -
 
 
 def _labs(course: Course) -> dict[tuple[str, str], LabState]:
-    """Return the labs in texts, by the id of the lesson or page, and their title or name."""
     texts = {model.name: model.source.text for model in course.models}
     labs: dict[tuple[str, str], LabState] = {}
     for _, trial in feature_trials(course).values():
@@ -224,7 +218,6 @@ def _labs(course: Course) -> dict[tuple[str, str], LabState]:
 
 
 def _describe_lab_change(before: LabState, now: LabState) -> str:
-    """List the fields of a lab that differ, with their values if short, and the models."""
     parts = []
     for name in dict.fromkeys((*before.data, *now.data)):
         values = [json.dumps(lab.data.get(name), ensure_ascii=False) for lab in (before, now)]
@@ -343,7 +336,6 @@ def _load_state(root: Path) -> CourseState:
 
 @contextlib.contextmanager
 def _open_base(root: Path, name: str) -> Iterator[tuple[str, Path]]:
-    """Provide the earlier state: its name in Markdown, and its folder."""
     if (Path(name) / MAP).is_file():
         yield f"`{name}`", Path(name).resolve()
         return

@@ -1,8 +1,4 @@
-"""The terms of a course: how documents define each, and a page that lists all.
-
-`terms` finds the terms of a document, each with two sentences of its paragraph, and collects those
-of all documents.
-"""
+"""The terms of a course: how documents define each, and a page that lists all."""
 
 from coursebuild.core.features import Feature, PageKind
 from coursebuild.features.glossary.terms import document_terms, glossary_values

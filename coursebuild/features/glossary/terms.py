@@ -1,11 +1,9 @@
 """The terms of a document with their definitions, and the page of all terms of the course.
 
-Entry points: `document_terms`; `definition_of(inlines, term)`; `glossary_values`, for the page.
-
 A definition is the sentence with the term and the next one, as HTML. If they continue in a
 displayed formula, the formula is part of it. Links lose their addresses, since the glossary is
-another page; those without a text become the names of what they lead to, such as "Figure 4.2.3".
-These depend on other documents and are filled in when the page is drawn.
+another page; those without a text become the names of what they lead to, such as "Figure 4.2.3",
+which depend on other documents and are filled in when the page is drawn.
 
 A sentence ends at a full stop, a question or exclamation mark, with closing marks, before white
 space; not after an initial or a usual abbreviation, and not before a small letter. The marks of
@@ -24,30 +22,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model import (
-    Block,
-    Document,
-    Inline,
-    Math,
-    MathBlock,
-    Owner,
-    Paragraph,
-    Target,
-    Term,
-    TermTarget,
-    sibling_groups,
-    walk_inlines,
-    without_links,
-)
 from coursebuild.core.model.results import Mathml
-from coursebuild.core.pages import formulas, urls
-from coursebuild.core.pages.document_inputs import (
-    OwnerLink,
-    OwnerLinks,
-    added_page,
-    owner_link,
-    owner_links,
-)
+from coursebuild.core.pages import document_inputs, formulas, urls
 from coursebuild.core.pages.library import Library, links
 from coursebuild.core.pages.markup import HtmlWriter
 from coursebuild.core.pages.numbering import UNNAMED, fill_in, name_outside
@@ -69,7 +45,7 @@ class DefinedTerm(Struct, frozen=True):
     title: Markup
     """The name as HTML."""
     definition: tuple[DefinitionPart, ...]
-    targets: tuple[Target, ...] = ()
+    targets: tuple[model.Target, ...] = ()
     """Where links without a text lead, in their order; each is `UNNAMED` there."""
 
 
@@ -79,15 +55,13 @@ class DocumentTerms(Struct, frozen=True):
     terms: tuple[DefinedTerm, ...]
 
 
-def document_terms(document: Document, mathml: Mathml) -> Parsed[DocumentTerms | None]:
+def document_terms(document: model.Document, mathml: Mathml) -> Parsed[DocumentTerms | None]:
     """Return the terms of a document; a formula that is not typeset remains TeX."""
     terms = tuple(_find_terms(document, mathml)) if "]{" in document.source.text else ()
     return Parsed(DocumentTerms(terms) if terms else None)
 
 
 class _ExcerptWriter(HtmlWriter):
-    """Writes a sentence that is shown on another page."""
-
     def __init__(self, mathml: Mathml) -> None:
         self._mathml = mathml
 
@@ -99,23 +73,23 @@ class _ExcerptWriter(HtmlWriter):
         return Markup(self._mathml(tex, True)) or super().display(tex, start)
 
 
-def _find_terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
+def _find_terms(document: model.Document, mathml: Mathml) -> Iterator[DefinedTerm]:
     writer = _ExcerptWriter(mathml)
-    targets: list[Target] = []
+    targets: list[model.Target] = []
 
-    def reference(target: Target) -> str:
+    def reference(target: model.Target) -> str:
         targets.append(target)
         return UNNAMED
 
-    def html(inlines: tuple[Inline, ...]) -> Markup:
-        return writer.inlines(without_links(inlines, reference))
+    def html(inlines: tuple[model.Inline, ...]) -> Markup:
+        return writer.inlines(model.without_links(inlines, reference))
 
-    for siblings in sibling_groups(document):
+    for siblings in model.sibling_groups(document):
         for number, block in enumerate(siblings):
-            if not isinstance(block, Paragraph):
+            if not isinstance(block, model.Paragraph):
                 continue
-            for term in walk_inlines(block.children):
-                if not isinstance(term, Term):
+            for term in model.walk_inlines(block.children):
+                if not isinstance(term, model.Term):
                     continue
                 targets.clear()
                 following = siblings[number + 1] if number + 1 < len(siblings) else None
@@ -126,15 +100,14 @@ def _find_terms(document: Document, mathml: Mathml) -> Iterator[DefinedTerm]:
 
 
 def _split_definition(
-    definition: tuple[Inline, ...],
-    following: Block | None,
-    html: Callable[[tuple[Inline, ...]], Markup],
+    definition: tuple[model.Inline, ...],
+    following: model.Block | None,
+    html: Callable[[tuple[model.Inline, ...]], Markup],
     writer: _ExcerptWriter,
 ) -> Iterator[DefinitionPart]:
-    """Split a definition at its displayed formulas."""
-    line: list[Inline] = []
+    line: list[model.Inline] = []
     for inline in definition:
-        if isinstance(inline, Math) and inline.display:
+        if isinstance(inline, model.Math) and inline.display:
             yield DefinitionPart(html(tuple(line)).strip())
             yield DefinitionPart(writer.display(inline.tex.text, 0), display=True)
             line = []
@@ -142,7 +115,7 @@ def _split_definition(
             line.append(inline)
     if line:
         yield DefinitionPart(html(tuple(line)).strip())
-    if isinstance(following, MathBlock) and following.tex.text and runs_on(definition):
+    if isinstance(following, model.MathBlock) and following.tex.text and runs_on(definition):
         yield DefinitionPart(writer.display(following.tex.text, 0), display=True)
 
 
@@ -225,19 +198,19 @@ class TermEntry(Struct, frozen=True):
     """An entry of the glossary."""
 
     term: DefinedTerm
-    place: OwnerLink
+    place: document_inputs.OwnerLink
     """The lesson or page that defines it."""
-    uses: OwnerLinks
+    uses: document_inputs.OwnerLinks
     """The other lessons and pages that link to it, in the order of the course."""
 
 
 def glossary_values(library: Library) -> dict[str, object]:
     """Return the values for the template: the entries, grouped by letters."""
     place = urls.Place("glossary/index.html")
-    users: dict[str, list[Owner]] = {}
+    users: dict[str, list[model.Owner]] = {}
     for owner, document in library.course.owned_documents:
         targets = links(library.course, document)
-        for id in {target.id for target in targets if isinstance(target, TermTarget)}:
+        for id in {target.id for target in targets if isinstance(target, model.TermTarget)}:
             users.setdefault(id, []).append(owner)
     entries: dict[str, TermEntry] = {}  # of a term, for its first definition
     for owner, document_terms in library.summaries("glossary"):
@@ -248,13 +221,15 @@ def glossary_values(library: Library) -> dict[str, object]:
                 pieces = tuple(replace(p, html=fill_in(p.html, names)) for p in term.definition)
                 term = replace(term, title=title, definition=pieces, targets=())
                 term_users = [user for user in users.get(term.id, ()) if user is not owner]
-                link = owner_link(place, owner, f"term:{term.id}")
-                entries[term.id] = TermEntry(term, link, owner_links(place, term_users))
+                link = document_inputs.owner_link(place, owner, f"term:{term.id}")
+                entries[term.id] = TermEntry(
+                    term, link, document_inputs.owner_links(place, term_users)
+                )
     sorted_entries = sorted(entries.values(), key=lambda entry: sort_key(entry.term.name))
     groups = groupby(sorted_entries, key=lambda entry: initial(entry.term.name))
     return {
         "letters": tuple((letter, tuple(group)) for letter, group in groups),
-        "symbols": added_page(library, place, "symbols"),
+        "symbols": document_inputs.added_page(library, place, "symbols"),
     }
 
 
@@ -273,7 +248,6 @@ def initial(name: str) -> str:
 
 
 def _without_accents(name: str) -> str:
-    """Return a name in lower case, without accents and leading signs."""
     parts = unicodedata.normalize("NFKD", name.casefold())
     letters = "".join(char for char in parts if not unicodedata.combining(char))
     return letters.lstrip("$\\{[(\"'“‘ ")

@@ -1,7 +1,4 @@
-"""A lab as a value.
-
-Entry points: `Lab`; `values_in`, the values of its JSON or TOML with their paths.
-"""
+"""A lab as a value."""
 
 from __future__ import annotations
 

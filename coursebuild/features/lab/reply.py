@@ -1,7 +1,4 @@
-"""The reply of the browser's engine to the trial of a lab, and what is published of a trial.
-
-Entry points: `read_reply`, `reply_bytes`; `Parity`; `unpack_arrays`, for arrays in base64;
-`publish_labs(results, assets)`. `site/js/lab/trial/trial.js` says what a reply means.
+"""The reply of the browser's engine to a trial (see `trial.js`), and what is published of a trial.
 
 Every published file has a hash of its content in its name, so that a browser may cache it for ever.
 Addresses inside a lab's configuration are relative to it: all of its files lie in one folder.

@@ -1,14 +1,9 @@
 """The site without a network, and the page about it, which is also shown for missing pages.
 
-Entry point: `offline_files(site)`: the manifest, its icons and the service worker; and the list of
-all files, which the worker reads.
-
-1. The worker is the same in every build of the same tool: what changes with a course is in the
-   list. So an edit of a page changes that page and its line in the list.
-2. The list has three groups. `shell` is what every page needs, `text` what pages show, `rest` what
-   is large or rarely needed: the engine and the data of labs, models, scripts. Copies of the course
-   in other forms (archives, books) are in no group.
-3. The list has the first digits of each file's hash, unless its name contains one.
+The service worker is the same in every build of the same tool: what changes with a course is in the
+list of files, each with the first digits of its hash unless its name has one. Of its groups,
+`shell` is what every page needs, `text` what pages show, `rest` what is large or rarely needed: the
+engine and the data of labs, models, scripts. Archives and books are in no group.
 """
 
 from __future__ import annotations
@@ -84,7 +79,6 @@ def offline_files(site: SiteContext) -> Iterator[OutputFile | FileList]:
 
 
 def _entry(path: str, file: ThemeFile | None) -> dict[str, str]:
-    """Return an icon's entry in the manifest; the tool's own icon is an SVG."""
     if file is None or file.ending == "svg":
         return {"src": path, "type": "image/svg+xml", "sizes": "any"}
     width, height = picture_size(file) or (0, 0)

@@ -1,8 +1,4 @@
-"""Quizzes: questions that a learner answers in the page, and whose answers the build checks.
-
-A `quiz` fence holds JSON (`schema`). `parse` makes a `Quiz` of it (`model`), `checks` compares it
-with the course and with what scripts printed, `page` shows it.
-"""
+"""Quizzes: questions that a learner answers in the page, and whose answers the build checks."""
 
 from coursebuild.core.features import Feature, FenceKind, PagePart
 from coursebuild.features.quiz.checks import check_output_lines, check_predictions, check_quizzes

@@ -1,8 +1,4 @@
-"""Quizzes across the course: ids are unique, questions name scripts and labs that there are.
-
-Entry points: `check_quizzes`; `check_predictions`, in the text of a document; `check_output_lines`,
-once the scripts have run.
-"""
+"""Quizzes across the course: ids are unique, questions name scripts and labs that there are."""
 
 from __future__ import annotations
 

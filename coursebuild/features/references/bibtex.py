@@ -1,7 +1,7 @@
-"""Reads a list of sources in BibTeX, each with its place.
+"""A list of sources in BibTeX, each with its place.
 
-Entry point: `read_works`. `bibtexparser` reads the text; LaTeX in it becomes plain text. Nothing in
-it is HTML: whatever is shown of a source is escaped where it is drawn.
+LaTeX in it becomes plain text. Nothing in it is HTML: what is shown of a source is escaped where it
+is drawn.
 """
 
 from __future__ import annotations

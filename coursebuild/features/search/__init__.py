@@ -1,10 +1,4 @@
-"""Search over the whole course: a page with a form, and the index that browsers load.
-
-1. `page` splits a page into sections of text, code and formulas, and packs the text for the
-   reader's browser, and the terms for the index.
-2. `words` makes these terms, by the rules that `site/js/search/words.js` has for queries.
-3. `index` sorts the terms of all pages into small files; a query loads a few of them.
-"""
+"""Search over the whole course: a page with a form, and the index that browsers load."""
 
 from coursebuild.core.features import Feature, PageKind, PagePart
 from coursebuild.features.search.index import search_files

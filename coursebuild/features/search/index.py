@@ -1,18 +1,12 @@
 """The index of a course: terms and the pages that have them, in many small files.
 
-Entry point: `search_files(site)`: the list of pages, the shards of the index, the text of each
-page.
-
 A query loads only the file of each of its words. Terms that begin alike are in one file, so that
-the beginning of a word finds it. A third kind of file has terms only: they serve to correct
-misspelt words.
+the beginning of a word finds it; a third kind of file has terms only, to correct misspelt words.
 
-1. A page's text has a file, as it is long; of pages that are found by title and summary only, some
-   share one.
+1. A page's text has a file; of pages that are found by title and summary only, some share one.
 2. The terms of a few consecutive pages are sorted into the shards of the index; the part for one
    shard is a slice. Slices are cached from build to build.
-3. A shard is joined from its slices and named by a hash of them. After an edit a few pages are
-   sorted again, and the shards with a changed slice are written.
+3. A shard is joined from its slices and named by a hash of them, so an edit writes few of them.
 4. `search/index.js` lists the pages and the names of shards. Its own name never changes, so that
    pages need not change with the index.
 """

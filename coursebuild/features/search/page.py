@@ -1,12 +1,8 @@
 """What the search needs of a page: its text for the reader's browser, its terms for the index.
 
-Entry points: `note_page(inputs, document, body)`, both as bytes, and `text_and_terms`, which
-separates them; `script` and `as_json`, which write a file of the index.
-
-1. The blocks of a document, or its HTML where a page shows none, are walked in order, those in
-   containers too; a heading begins a section, which is what is searched.
-2. Formulas become lines of plain text (`tex`); the section is also found by their commands.
-3. Answers and explanations of quizzes are left out: a search must not give them away.
+The blocks of a document, or its HTML where a page shows none, are walked in order; a heading begins
+a section, which is what is searched. Formulas become lines of plain text, and are also found by
+their commands. Answers of quizzes are left out: a search must not give them away.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""The symbols of a course: what documents declare of each, and a page that lists all.
-
-`uses` finds the symbols of a formula, those of a document, what it declares of them, and those of
-all lessons.
-"""
+"""The symbols of a course: what documents declare of each, and a page that lists all."""
 
 from coursebuild.core.features import Feature, PageKind
 from coursebuild.features.symbols.uses import document_symbols, symbols_values, used_symbols

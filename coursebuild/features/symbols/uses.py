@@ -1,16 +1,12 @@
 """The symbols in the formulas of a document, what it declares of them, and the index of all.
 
-Entry points: `document_symbols`; `symbols_values`, for the page; `used_symbols`. Of a formula,
-`symbols(mathml)`; `only_symbol(mathml)`, where it has a single one; `declared_symbol(mathml)`;
-`sort_key(symbol)`. In the index those come first whose meaning a lesson declares; for the others
-only their places are listed.
-
-A symbol is a letter with all that belongs to it: accents (`q̇`), a subscript of letters, numbers and
-words (`I_zz`), and superscripts that are primes, stars, signs or words. Other superscripts are
+A symbol is a letter with all that belongs to it: accents (`q̇`), a subscript of letters, numbers
+and words (`I_zz`), and superscripts that are primes, stars, signs or words. Other superscripts are
 operations: powers, transposition, inversion. Only quantities have symbols: numbers, operators,
 names of functions, upright Latin letters (units and differentials) and the like are none.
 
-A symbol is given as MathML in its shortest form, so that symbols that look the same are equal.
+A symbol is given as MathML in its shortest form, so that symbols that look the same are equal. In
+the index those come first whose meaning a lesson declares.
 """
 
 from __future__ import annotations
@@ -95,7 +91,6 @@ def _children(element: Element) -> list[Element]:
 
 
 def _unwrap(element: Element) -> Element:
-    """Return the element inside wrappers that have a single child."""
     while element.tag in _WRAPPERS:
         children = _children(element)
         if len(children) != 1:
@@ -279,7 +274,6 @@ def _formulas(
 def _check_declaration(
     formula: _Formula, symbol: str | None, first_declarations: dict[str, _Formula]
 ) -> Iterator[Diagnostic]:
-    """Report a declaration of no symbol, or of one declared before."""
     if symbol is None:
         message = f"`${formula.tex.text}$` is declared as a symbol, but is not a single one"
         help = "declare one letter with its accents and indices"

@@ -13,7 +13,7 @@ from coursebuild.core.features import Trial
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.features.lab.compile import LabCode, compile_lab
-from coursebuild.features.lab.engines.native import engine_digest
+from coursebuild.features.lab.engines.native import TRIAL, WASM, asset_digest
 from coursebuild.features.lab.inputs import trial_inputs
 from support.lab_values import Bench, lab_of, make_lab
 
@@ -238,4 +238,5 @@ def test_an_edit_counts_exactly_where_a_trial_depends_on_it() -> None:
     assert effective_edits == EDITS
     conditions = dict(before.conditions)
     assert conditions["MuJoCo"] == engine_version()
-    assert engine_digest().startswith(conditions["the browser's engine and its trial"])
+    digest = asset_digest(WASM, TRIAL)
+    assert digest.startswith(conditions["the browser's engine and its trial"])

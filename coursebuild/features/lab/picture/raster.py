@@ -1,10 +1,7 @@
 """Rasterizes triangles: finds the nearest surface at each sample, and its attributes there.
 
-Entry points: `GBuffer(eye).add(index, surface, position, rotation)`; `nearest_depth`, without
-attributes; `Floor.paint`, a floor with a grid and shadows, and `draw_edges` around bodies, which
-match the live view (`studio.js` of the page); `texture_of(record)`, from the record of a trial,
-`TextureMapping.texels` and `sky`. Texture coordinates are those of the live view (`geometry.js` and
-`materials.js` of the page), but computed at every point that is drawn.
+Floor and edges match the live view (`studio.js` of the page), and so do texture coordinates
+(`geometry.js` and `materials.js`), but computed at every point that is drawn.
 """
 
 from __future__ import annotations
@@ -135,7 +132,6 @@ def _clip(triangles: Array, near: float) -> Array:
 
 
 def _project(eye: Eye, triangles: Array) -> Fragments:
-    """Yield the samples that triangles beyond the near plane cover."""
     width, height = eye.size
     scale = eye.focal / triangles[..., 2]
     px = width / 2 + scale * triangles[..., 0]
@@ -282,7 +278,6 @@ def _lines(place: Array) -> Array:
 
 
 def _mix(colour: Array, grey: float, alpha: Array) -> None:
-    """Lay a grey over premultiplied colours."""
     cover = alpha[..., None]
     colour[:] = cover * np.array((grey, grey, grey, 1.0)) + (1 - cover) * colour
 
@@ -364,7 +359,6 @@ class TextureMapping(Struct, frozen=True):
         return colours
 
     def _direction(self, places: Array, half: Array) -> Array:
-        """Return the directions in which a cube texture is looked up."""
         if self.uniform or self.kind in ("mesh", "sdf", "hfield"):
             return places
         unit = places / half
@@ -385,7 +379,6 @@ class TextureMapping(Struct, frozen=True):
         return coordinates
 
     def _unrepeated_coordinates(self, unit: Array, places: Array, normals: Array) -> Array:
-        """Return the coordinates of a texture that covers the geom once."""
         x, y, z = unit.T
         angle = np.mod(np.arctan2(y, x) / (2 * np.pi), 1.0)
         match self.kind:
@@ -429,7 +422,6 @@ def _cube(direction: Array) -> tuple[NDArray[np.int64], Array, Array]:
 
 
 def _interpolate(level: Array, face: NDArray[np.int64], s: Array, t: Array, cube: bool) -> Array:
-    """Interpolate the colours at coordinates between the texels of a level."""
     _, height, width, _ = level.shape
     x, y = s * width - 0.5, t * height - 0.5
     left, top = np.floor(x), np.floor(y)

@@ -1,7 +1,4 @@
-"""The solids of a lab's static picture, made from the record of its trial.
-
-Entry point: `scene_solids(scene, frame)`.
-"""
+"""The solids of a lab's static picture, made from the record of its trial."""
 
 from __future__ import annotations
 
@@ -61,8 +58,6 @@ def scene_solids(scene: dict[str, Any], frame: Array) -> Iterator[Solid]:
 
 
 class _Scene:
-    """A scene, with the data that its geoms share."""
-
     def __init__(self, scene: dict[str, Any], frame: Array) -> None:
         self.scene, self.frame, self.layout = scene, frame, scene["layout"]
         self.meshes = [_mesh(mesh) for mesh in scene["meshes"]]
@@ -70,7 +65,6 @@ class _Scene:
         self.textures = [texture_of(texture) for texture in scene["textures"]]
 
     def solids(self) -> Iterator[Solid]:
-        """Make all solids."""
         solids: list[Solid | None] = []
         for part in ("geoms", "sites"):
             for i, item in enumerate(self.scene[part]):
@@ -247,7 +241,6 @@ def _height_field(field: dict[str, Any]) -> Surface:
 
 
 def _coil(a: Array, b: Array, radius: float) -> Solid:
-    """Make a spring between two points."""
     z = unit(b - a)
     x = unit(np.array((-z[1], z[0], 0.0)) if abs(z[2]) < 0.9 else np.array((0.0, -z[2], z[1])))
     t = np.linspace(0.0, 1.0, _TURNS * _ROUND + 1)[:, None]
@@ -260,7 +253,6 @@ def _coil(a: Array, b: Array, radius: float) -> Solid:
 
 
 def _pin(position: Array, axis: Array, distance: float) -> Solid:
-    """Make the pin of a hinge, for a camera at a distance."""
     half = 2.2 * _PIN * distance * axis
     surface = ropes(
         np.stack((position - half, position + half)), np.array([[0, 1]]), _PIN * distance
