@@ -110,31 +110,17 @@ def verify(
         known_runs=known_runs,
         only_recorded=not is_preview,
     )
-    trial_runs = RunStore(options.root, options.store)  # another thread uses it
-    context = TrialContext(
-        options.root,
-        course,
-        dict(models),
-        trial_runs,
-        model_diagnostics,
-        static,
-        options.progress.say,
-    )
+    root, say = options.root, options.progress.say
+    trial_runs = RunStore(root, options.store)  # another thread uses it
+    context = TrialContext(root, course, dict(models), trial_runs, model_diagnostics, static, say)
     runs, (trial_results, trial_diagnostics) = _run_with_trials(
         run_scripts, trials, context, options.progress
     )
 
-    def judge_runs() -> tuple[tuple[Verdict, ...], list[Diagnostic], tuple[ScriptLine, ...]]:
-        verdicts, read = compare_all(course, runs), functools.partial(read_recorded, options.root)
-        figure_diagnostics = list(figure_findings(course, runs, read))
-        drifted_figures = [diagnostic.span for diagnostic in figure_diagnostics]
-        lines = script_lines(extractions, runs, verdicts, course, drifted_figures)
-        return verdicts, figure_diagnostics, lines
-
-    verdicts, figure_diagnostics, lines = judge_runs()
+    judged = _judge(course, extractions, runs, options)
     if not is_preview:
         doubtful_paths = {
-            line.path for line in lines if _is_doubtful(line, run_store, repeat=repeat)
+            line.path for line in judged.lines if _is_doubtful(line, run_store, repeat=repeat)
         }
         scripts = [e for e in extractions if e.path in doubtful_paths and not e.script.once]
         other_runs = {run.path: run for run in runs if run.path in doubtful_paths}
@@ -142,7 +128,7 @@ def verify(
             fresh_store = options.run_store(fresh=True)
             again = run(course, scripts, options, "running scripts again", fresh_store)
             runs = tuple({run.path: run for run in (*runs, *again)}.values())
-            verdicts, figure_diagnostics, lines = judge_runs()
+            judged = _judge(course, extractions, runs, options)
     diagnostics = (
         *extracted_scripts.diagnostics,
         *model_diagnostics,
@@ -152,7 +138,7 @@ def verify(
             course,
             extractions,
             runs,
-            verdicts,
+            judged.verdicts,
             evidence,
             extracted_scripts.extractions,
             other_runs,
@@ -162,14 +148,36 @@ def verify(
         *repeat_findings(course, extractions, run_store.differing_runs),
         *check_runs(course, runs),
         *_diagnose_nothing(course, () if shard is not None else runs),
-        *figure_diagnostics,
+        *judged.figure_diagnostics,
         *check_drawings(course, options),
     )
     interpreter = options.interpreter
     python = python_version() if interpreter is None else interpreter.version
     engine = engine_version() if interpreter is None else interpreter.engine
-    results = Results(runs, verdicts, (), models, python, engine, trial_results)
-    return Verification(results, diagnostics, lines)
+    results = Results(runs, judged.verdicts, (), models, python, engine, trial_results)
+    return Verification(results, diagnostics, judged.lines)
+
+
+class _Judgement(Struct, frozen=True):
+    """What runs say of what is recorded."""
+
+    verdicts: tuple[Verdict, ...]
+    figure_diagnostics: list[Diagnostic]
+    lines: tuple[ScriptLine, ...]
+
+
+def _judge(
+    course: Course,
+    extractions: Sequence[Extraction],
+    runs: tuple[ScriptRun, ...],
+    options: Options,
+) -> _Judgement:
+    """Compare outputs and figures with runs."""
+    verdicts, read = compare_all(course, runs), functools.partial(read_recorded, options.root)
+    figure_diagnostics = list(figure_findings(course, runs, read))
+    drifted_figures = [diagnostic.span for diagnostic in figure_diagnostics]
+    lines = script_lines(extractions, runs, verdicts, course, drifted_figures)
+    return _Judgement(verdicts, figure_diagnostics, lines)
 
 
 def _run_with_trials(
