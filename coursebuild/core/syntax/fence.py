@@ -222,7 +222,6 @@ class Fence(Struct, frozen=True):
 
     @property
     def kind(self) -> str:
-        """The first word of the info string."""
         return kind_of(self.info).text
 
     def keys(
