@@ -18,7 +18,6 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import UsageError
@@ -88,16 +87,7 @@ def figures() -> Iterator[bytes]:
         yield path.read_bytes()[:3000]
     for case in read_cases(FIXTURES / "rules/figure-unreadable.md"):
         yield from (text.encode() for text in re.findall(r"<svg.*?</svg>", case.input, re.DOTALL))
-    inner = (
-        b"<style>a{fill:url(#b)}</style><g id='b'/><use href='#b'/>",
-        b"<defs><clipPath id='c'><rect width='1'/></clipPath></defs><g clip-path='url(#c)'/>",
-        b"<image href='data:image/png;base64,AA=='/><metadata><a/></metadata><!-- a -->",
-        b"<a href='java&#115;cript:1'/>",
-        b"<style>@im\\70ort 'x';</style><rect style='fill:u\\72l(//x)' onclick='1'/>",
-        b"<animate attributeName='href' to='//x'/><text x='1e999 -.5' dy='nan'>a</text>",
-        b"<g>" * 60 + b"</g>" * 60,
-    )
-    for part in inner:
+    for part in (*seed_texts("figure"), b"<g>" * 60 + b"</g>" * 60):
         yield _DRAWING.replace(b"</svg>", part + b"</svg>")
     yield b"<?xml version='1.0' encoding='utf-16'?><!DOCTYPE svg [<!ENTITY a 'b'>]>" + _DRAWING
     yield _DRAWING.decode().encode("utf-16")
@@ -313,58 +303,9 @@ def messages(data: bytes) -> None:
 
 
 def conversations() -> Iterator[bytes]:
-    def message(method: str, id: int | None = None, **params: Any) -> bytes:
-        value = {"jsonrpc": "2.0", "method": f"textDocument/{method}", "params": params}
-        return json.dumps(value if id is None else {**value, "id": id}).encode()
-
+    """Messages about files of several kinds: `FILE` is the file, `"TEXT"` what is in it."""
+    _, *seeds = seed_texts("messages")
     for path in (PATH, "content/course.toml", "content/none.md", "../x", "models/a.xml"):
-        uri = _URI.decode() + path
-        document = {"uri": uri}
-        item = {**document, "languageId": "markdown", "version": 1}
-        start, far = {"line": 0, "character": 0}, {"line": 2**31 - 1, "character": 2**31 - 1}
-        place = {"line": 2, "character": 5}
-        opening = message(
-            "didOpen", textDocument={**item, "text": _LESSON if path == PATH else MAP}
-        )
-        changed = {**document, "version": 2}
-        typed = '## A\n\n[x](lesson:\n\n```quiz\n{"q'
-        change = message("didChange", textDocument=changed, contentChanges=[{"text": typed}])
-        requests = [
-            message(method, number, textDocument=document, position=position)
-            for number, (method, position) in enumerate(
-                (method, position)
-                for method in ("hover", "definition", "completion", "prepareRename")
-                for position in (place, far)
-            )
-        ]
-        whole = [
-            message(method, 9, textDocument=document, **params)
-            for method, params in (
-                ("rename", {"position": place, "newName": "a b{"}),
-                (
-                    "codeAction",
-                    {"range": {"start": far, "end": start}, "context": {"diagnostics": []}},
-                ),
-                ("formatting", {"options": {"tabSize": 2, "insertSpaces": True}}),
-                ("documentSymbol", {}),
-                ("foldingRange", {}),
-            )
-        ]
-        closing = message("didClose", textDocument=document)
-        yield b"\n".join((opening, *requests[:4]))
-        yield b"\n".join((opening, change, *requests[4:], closing))
-        yield b"\n".join((*whole, opening, *whole))
-        part = {"range": {"start": place, "end": far}, "text": "x"}
-        yield b"\n".join(
-            (
-                change,
-                message("didChange", textDocument=changed, contentChanges=[part]),
-                message("didChange", textDocument=changed, contentChanges=[]),
-                closing,
-                *requests[:2],
-            )
-        )
-    yield b'{"jsonrpc":"2.0","id":1,"method":"initialize","params":{"capabilities":{"general":{' + (
-        b'"positionEncodings":["utf-8"]}}}}\n{"jsonrpc":"2.0","method":"initialized","params":{}}\n'
-    )
-    yield b'[]\n{"jsonrpc":"2.0","id":1,"result":null}\n{"jsonrpc":"1.0"}\n7\nnull'
+        text = json.dumps(_LESSON if path == PATH else MAP).encode()
+        for seed in seeds:
+            yield seed.replace(b"FILE", _URI + path.encode()).replace(b'"TEXT"', text)

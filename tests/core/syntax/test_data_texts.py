@@ -10,6 +10,7 @@ import datetime
 import json
 import tomllib
 from collections.abc import Callable
+from decimal import Decimal
 from typing import Any
 
 import pytest
@@ -18,6 +19,7 @@ from hypothesis import strategies as st
 from msgspec import NODEFAULT, Struct
 from msgspec.structs import fields
 
+from coursebuild.core.model import Comparison, Mode
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.syntax.json_text import parse_json
@@ -373,6 +375,25 @@ def test_values_of_right_texts(name: str, rewriting: bool) -> None:
         return first
 
     check_cases(VALUE_FOLDER / f"{name}.md", render, rewriting=rewriting)
+
+
+@pytest.mark.parametrize(
+    ("verify", "expected"),
+    [
+        ("", Comparison()),
+        ('compare = "exact"', Comparison()),
+        ('compare = "digits"', Comparison(Mode.DIGITS)),
+        ('compare = "rtol"\nrtol = 0.001', Comparison(Mode.TOLERANCE, Decimal("0.001"))),
+        ("rtol = 1e-3", Comparison(Mode.TOLERANCE, Decimal("0.001"))),
+        ("atol = 1_000.5", Comparison(Mode.TOLERANCE, Decimal(0), Decimal("1000.5"))),
+        ("atol = 0x10", Comparison(Mode.TOLERANCE, Decimal(0), Decimal(16))),
+        ("ellipsis = true", Comparison(ellipsis=True)),
+    ],
+)
+def test_how_outputs_are_compared(verify: str, expected: Comparison) -> None:
+    text = f'[course]\ntitle = "T"\n[verify]\n{verify}\n'
+    course = parse_course_map(Source("content/course.toml", text)).value
+    assert course is not None and course.comparison == expected
 
 
 @settings(max_examples=150)
