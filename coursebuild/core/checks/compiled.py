@@ -24,7 +24,7 @@ from coursebuild.core.model import (
     find_blocks,
 )
 from coursebuild.core.model.results import CompileResult, ModelFacts
-from coursebuild.core.model.scenarios import DURATION, MOST_STEPS, DeclaredSweep
+from coursebuild.core.model.scenarios import DURATION, MOST_STEPS, DeclaredSweep, is_multiple
 from coursebuild.core.registry import features, kind_of_block
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -312,7 +312,13 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
                 help = did_you_mean(measure.name, [name for name in model_names if name])
                 yield diagnose(_RULE, scenario.place("measure"), message, help=help)
         yield from _check_horizon_error(scenario, facts.sizes)
-        yield from _check_timestep(scenario, facts)
+        step, lengths = facts.timestep, ("sample", "hold", "duration")
+        name = next((n for n in lengths if getattr(scenario, n) is not None), "")
+        length = getattr(scenario, name, step)
+        if not is_multiple(length, step):
+            message = f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
+            help = f"a multiple near it is {max(round(length / step), 1) * step:.12g}"
+            yield diagnose(_RULE, scenario.place(name), message, help=help)
     for sweep in declarations.sweeps:
         yield from _check_sweep(sweep, declarations.scenarios, facts)
 
@@ -338,24 +344,6 @@ def _check_horizon_error(
             )
             help = f"state one from {least} to {most}"
             yield diagnose(_RULE, place, message, help=help)
-
-
-def _check_timestep(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
-    step = facts.timestep
-    lengths = (
-        ("sample", scenario.sample),
-        ("hold", scenario.hold),
-        ("duration", scenario.duration),
-    )
-    for name, length in lengths:
-        if length is not None:
-            count = round(length / step)
-            if abs(count * step - length) > 1e-9 * length:
-                message = f"the model's timestep, {step:g} s, does not divide `{name}`"
-                message += f" ({length:g} s)"
-                help = f"a multiple near it is {max(count, 1) * step:.12g}"
-                yield diagnose(_RULE, scenario.place(name), message, help=help)
-            return
 
 
 MAX_SWEEP_STEPS = 2_000_000

@@ -166,7 +166,6 @@ class RecordedFigure(Struct, frozen=True):
 
     @property
     def has_dark(self) -> bool:
-        """Whether there is also a drawing for dark pages."""
         return self.name.endswith(".svg")
 
 

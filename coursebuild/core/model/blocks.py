@@ -340,7 +340,6 @@ class NumberedItem(Struct, frozen=True):
 
     @property
     def kind(self) -> str:
-        """One of `LABEL_KINDS`."""
         return self.id.partition(":")[0]
 
 

@@ -26,7 +26,6 @@ class ThemeFile(Struct, frozen=True):
 
     @property
     def ending(self) -> str:
-        """`svg`."""
         return self.path.rpartition(".")[2]
 
     @property
@@ -63,7 +62,6 @@ class Theme(Struct, frozen=True):
 
     @property
     def template_texts(self) -> tuple[tuple[str, str], ...]:
-        """The names and texts of its templates."""
         return tuple(
             (source.path.removeprefix(TEMPLATES), source.text) for source in self.templates
         )
@@ -124,7 +122,6 @@ class Lesson(LessonTable, frozen=True, kw_only=True):
 
     @property
     def path(self) -> str:
-        """The path of its file, whether written or not."""
         return f"content/lessons/{self.id}-{self.slug}.md"
 
 
@@ -333,7 +330,6 @@ class Course(Struct, frozen=True):
 
     @property
     def lessons(self) -> tuple[Lesson, ...]:
-        """All lessons in the order of the map."""
         return tuple(lesson for level in self.levels for lesson in level.lessons)
 
     @property
@@ -352,7 +348,6 @@ class Course(Struct, frozen=True):
 
     @property
     def written_lessons(self) -> tuple[Lesson, ...]:
-        """All written lessons in the order of the map."""
         return tuple(lesson for lesson in self.lessons if lesson.document is not None)
 
     @property
@@ -362,7 +357,6 @@ class Course(Struct, frozen=True):
 
     @property
     def owned_documents(self) -> tuple[tuple[Owner, Document], ...]:
-        """Every parsed document, with its owner."""
         return tuple((o, o.document) for o in self.owners if o.document is not None)
 
     @property

@@ -153,7 +153,6 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def observable(self) -> Measured | None:
-        """The quantity that `measure` names."""
         match (self.measure or "").split(":", 1):
             case ["body" | "site" | "sensor" as kind, name]:
                 return Measured(kind, name)

@@ -32,8 +32,6 @@ from coursebuild.core.text.diagnostics import (
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
 
-Report = Callable[[Diagnostic], None]
-
 TERM = re.compile(r"(\{\s*(?:term|terms|therm|tern|trem|tem|ter)\b[^{}]{0,400}\}?)", re.I)
 SYMBOL = re.compile(
     r"(\{\s*(?:s[iy]m\w{0,6}|meaning|unit|units|value|given)\b[^{}]{0,400}\}?)", re.I
@@ -85,22 +83,21 @@ def read_pairs(
     return values
 
 
-def read_term(braces: Excerpt, report: Report) -> str | None:
+def read_term(braces: Excerpt, report: Callable[[Diagnostic], None]) -> str | None:
     """The name given to a term; empty if that is the term's own text, `None` after a mistake."""
     values = read_pairs(braces, ("term",), "term-attribute", _TERM_HELP)
-    if isinstance(values, Diagnostic):
-        report(values)
-        return None
-    name = values.get("term")
-    if name is not None and not name.text.strip():
+    if not isinstance(values, Diagnostic):
+        name = values.get("term")
+        if name is None or name.text.strip():
+            return value_text(name)
         message = "the name of the term is empty"
-        report(diagnose("term-attribute", braces.span(), message, help=_TERM_HELP))
-        return None
-    return value_text(name)
+        values = diagnose("term-attribute", braces.span(), message, help=_TERM_HELP)
+    report(values)
+    return None
 
 
 def read_meaning(
-    braces: Excerpt, report: Report
+    braces: Excerpt, report: Callable[[Diagnostic], None]
 ) -> tuple[Meaning | None, str | None, NumberBinding | None]:
     """The meaning of a symbol, the source of given numbers, and its value, if they are there."""
     keys = ("symbol", "unit", "value", "given", "out")
@@ -109,12 +106,10 @@ def read_meaning(
         report(values)
         return None, None, None
     source = value_text(values["given"]) if "given" in values else None
-    value = values.get("value")
-    number: NumberBinding | None = None
+    value, number = values.get("value"), None
     if value is not None and _NUMBER.fullmatch(value.text) and not {"out", "given"} <= {*values}:
-        is_bound = "out" in values
         script = value_text(values.get("out")) or None
-        origin = None if is_bound else source or ""
+        origin = None if "out" in values else source or ""
         number = NumberBinding(braces.span(), value.text, value.span(), script, origin)
     elif "value" in values or "out" in values:
         text = "" if value is None else value.text
@@ -202,18 +197,14 @@ def _reject(title: Excerpt, place: Excerpt, message: str, help: str = _HELP) -> 
     return Parsed(Attributes(title), (diagnostic,))
 
 
-def slug(text: str) -> str:
+def slug(text: str, default: str = "section") -> str:
     """The anchor of a text: letters and digits of any script in lower case, hyphens for spaces."""
-    return _join_words(text) or "section"
-
-
-def _join_words(text: str) -> str:
-    return _SPACE.sub("-", _NO_SLUG.sub("", text.strip().lower())).strip("-")
+    return _SPACE.sub("-", _NO_SLUG.sub("", text.strip().lower())).strip("-") or default
 
 
 def term_id(name: str) -> str:
     """The id of a term in links; empty for a name without letters and digits."""
-    return _join_words(normalize("NFC", name))
+    return slug(normalize("NFC", name), "")
 
 
 class Anchors(Struct):

@@ -97,10 +97,9 @@ def _build_script(
         if "is not below" in mistake and not fence.nested:
             help = Fix(help, f"examples/{path.rpartition('/')[2]}", path)
         diagnostics.append(diagnose("script-path", file.value_span, mistake, help=help))
-    text = fence.body.text.rstrip("\n")  # with exactly one line end at its end
-    code = Excerpt(fence.body.source, text + "\n", fence.body.pieces)
-    if len(text) < len(fence.body.text):
-        code = fence.body.slice(0, len(text) + 1)
+    code = fence.body.slice(0, len(fence.body.text.rstrip("\n")) + 1)  # with one line end
+    if not code.text.endswith("\n"):
+        code = Excerpt(code.source, code.text + "\n", code.pieces)
     timeout, word = DEFAULT_TIMEOUT, keys.get("timeout")
     if word is not None and word.value is not None:
         timeout = float(word.value) if _NUMBER.fullmatch(word.value) else 0.0

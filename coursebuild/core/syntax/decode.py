@@ -162,7 +162,11 @@ class _Decoder:
     def decode_number(
         self, node: NumberNode, type: inspect.IntType | inspect.FloatType, name: str
     ) -> object:
-        double, problem = _to_double(node.value), ""
+        problem = ""
+        try:
+            double = float(node.value)
+        except OverflowError:
+            double = math.inf
         value = node.value if isinstance(type, inspect.IntType) else double
         if node.raw.strip("+-") in ("inf", "nan"):
             problem = f"must be a finite number, not {node.raw}"
@@ -326,13 +330,6 @@ _BOUNDS = (
     ("le", "at most", operator.le),
     ("lt", "less than", operator.lt),
 )
-
-
-def _to_double(value: float) -> float:
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf if value > 0 else -math.inf
 
 
 def has_value(node: ObjectNode, name: str) -> bool:

@@ -147,8 +147,20 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
             place = info.span(equals, equals + 1)
             diagnostics.append(diagnose("fence-info", place, message, help=help))
         elif end < len(text) and not text[end].isspace():
-            diagnostic, end = _diagnose_malformed(info, at, end)
-            diagnostics.append(diagnostic)
+            start, rest = at, _REST.match(text, end)
+            advice: str
+            if text[end] == '"' and text.count('"', end) == 1:
+                start, end, message = end, len(text), "a quoted value is never closed"
+                place = info.span(start, end)
+                edit = Edit(Span(place.source, place.end, place.end), '"')
+                advice = Fix('close it with `"`', edits=(edit,))
+            else:
+                end = rest.end() if rest else end
+                message = f"`{text[at:end]}` cannot be read"
+                advice = 'write `key=value`, `key="value with spaces"` or a flag, '
+                advice += "with spaces between them"
+            place = info.span(start, end)
+            diagnostics.append(diagnose("fence-info", place, message, help=advice))
         elif not match[1]:
             message = f"`{match[0]}` has no key before the `=`"
             diagnostics.append(diagnose("fence-info", info.span(at, end), message))
@@ -160,21 +172,6 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
             words.append(Word(span, match[1], key, value))
         at = end
     return Parsed(tuple(words), tuple(diagnostics))
-
-
-def _diagnose_malformed(info: Excerpt, at: int, end: int) -> tuple[Diagnostic, int]:
-    """The diagnostic of a word that cannot be read, and where to go on."""
-    text = info.text
-    if text[end] == '"' and text.count('"', end) == 1:
-        span = info.span(end, len(text))
-        edit = Edit(Span(span.source, span.end, span.end), '"')
-        fix = Fix('close it with `"`', edits=(edit,))
-        return diagnose("fence-info", span, "a quoted value is never closed", help=fix), len(text)
-    rest = _REST.match(text, end)
-    word_end = rest.end() if rest else end
-    message = f"`{text[at:word_end]}` cannot be read"
-    help = 'write `key=value`, `key="value with spaces"` or a flag, with spaces between them'
-    return diagnose("fence-info", info.span(at, word_end), message, help=help), word_end
 
 
 def _unescape(value: Excerpt) -> Excerpt:
@@ -222,7 +219,6 @@ class Fence(Struct, frozen=True):
 
     @property
     def kind(self) -> str:
-        """The first word of the info string."""
         return kind_of(self.info).text
 
     def keys(

@@ -31,14 +31,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.inlines import LABEL_KINDS
 from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.syntax.attributes import term_id
-from coursebuild.core.text.diagnostics import (
-    Diagnostic,
-    Fix,
-    diagnose,
-    misspelt,
-    nearest,
-    propose,
-)
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, misspelt, nearest, propose
 from coursebuild.core.text.source import Excerpt, Span
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")

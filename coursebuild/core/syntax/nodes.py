@@ -28,7 +28,6 @@ class _PositionedNode(Struct, eq=False):
 
     @property
     def span(self) -> Span:
-        """The whole node in the source."""
         return self.body.span(self.start, self.end)
 
     @property
@@ -253,7 +252,6 @@ def _union_members(type: inspect.Type) -> list[inspect.Type]:
 
 
 def _describe_type(type: inspect.Type) -> tuple[str, str]:
-    """A type in words: for one value, and for several."""
     singulars, plurals = [], []
     for member in _union_members(type):
         singular, plural, _ = _TYPES[member.__class__]

@@ -8,7 +8,6 @@ from __future__ import annotations
 import posixpath
 import re
 from decimal import Decimal
-from functools import lru_cache
 
 from coursebuild.core import model
 from coursebuild.core.model.blocks import volatile_pattern
@@ -45,17 +44,17 @@ ILLUSTRATION = "illustration"
 
 def is_caption(inlines: tuple[model.Inline, ...], words: Words) -> bool:
     """Whether a paragraph begins with a word for "output" and ends with a colon."""
-    return _caption(words.output).fullmatch(model.plain_text(inlines)) is not None
+    return _match_caption(inlines, words) is not None
 
 
 def _is_bare(caption: tuple[model.Inline, ...], words: Words) -> bool:
-    match = _caption(words.output).fullmatch(model.plain_text(caption))
+    match = _match_caption(caption, words)
     return match is not None and not match[1].strip()
 
 
-@lru_cache(maxsize=8)
-def _caption(names: tuple[str, ...]) -> re.Pattern[str]:
-    return re.compile(rf"\s*(?:{'|'.join(map(re.escape, names))})\b(.*):\s*", re.DOTALL)
+def _match_caption(caption: tuple[model.Inline, ...], words: Words) -> re.Match[str] | None:
+    names = "|".join(map(re.escape, words.output))
+    return re.fullmatch(rf"\s*(?:{names})\b(.*):\s*", model.plain_text(caption), re.DOTALL)
 
 
 def find_misspelt_caption(

@@ -70,11 +70,11 @@ class TextReader:
                 label, at = token.content, token.start + 2
                 label_span = self.base.span(at, at + len(label))
                 read = partial(self._read_footnote, i + 1)
-                self.state.notes.add(FootnoteText(label, label_span, self._span(token), read))
+                self.state.notes.add(FootnoteText(label, label_span, self.span(token), read))
         deep_token = next((token for token in self.tokens if token.info == TOO_DEEP), None)
         if deep_token is not None:
             message = "quotations, lists or footnotes are nested too deeply here"
-            place = self._span(deep_token).first_line()
+            place = self.span(deep_token).first_line()
             self.state.report(diagnose("nesting-deep", place, message))
 
     def _read_footnote(self, at: int) -> tuple[model.Block, ...]:
@@ -104,7 +104,8 @@ class TextReader:
         self.balance.leave()
         return tuple(blocks)
 
-    def _span(self, token: PositionedToken) -> Span:
+    def span(self, token: PositionedToken) -> Span:
+        """Where a token stands."""
         return self.base.span(token.start, token.end)
 
     # -- leaves
@@ -194,7 +195,7 @@ class TextReader:
 
     def _read_heading(self, token: PositionedToken) -> model.Heading:
         self.index += 2
-        span = self._span(token)
+        span = self.span(token)
         attributes = read_attributes(trim(token.text))
         self.state.diagnostics += attributes.diagnostics
         children = self.inlines(attributes.value.title, mentions=False)
@@ -218,7 +219,7 @@ class TextReader:
         if isinstance(block, model.Script) and not block.norun:
             info = self._peek_info() or ""
             if info.split() == ["text"]:  # with keys, these are reported instead
-                place = self._span(self.tokens[self.index])
+                place = self.span(self.tokens[self.index])
                 self.state.report(diagnose_missing_caption(place, self.state.words))
         return block
 
@@ -226,7 +227,7 @@ class TextReader:
         code = token.text
         check_indented_fence(code, self.state)
         return model.CodeBlock(
-            self._span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
+            self.span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
         )
 
     def _read_html(self, token: PositionedToken) -> model.HtmlBlock | model.HtmlFlow:
@@ -250,10 +251,7 @@ class TextReader:
             texts.append((end, html.text[end:]))
             self.state.diagnostics += check_unread_markup(html, texts, html=True)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
-        return model.HtmlBlock(self._span(token), text, find_media(html), find_forbidden(html))
-
-    def _read_thematic_break(self, token: PositionedToken) -> model.ThematicBreak:
-        return model.ThematicBreak(self._span(token))
+        return model.HtmlBlock(self.span(token), text, find_media(html), find_forbidden(html))
 
     def _read_math(self, token: PositionedToken) -> model.MathBlock:
         text = token.text
@@ -266,15 +264,15 @@ class TextReader:
             place, message = text.span(start - 2, start), "display math is never closed"
             self.state.report(diagnose("math-unclosed", place, message, help=help))
         elif not tex.text:
-            self.state.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
+            self.state.report(diagnose("math-syntax", self.span(token), "the formula is empty"))
         braces = LABEL.match(text.text, end + 2)
         label = self.state.take_label(text.slice(*braces.span(1)) if braces else None, "eq")
-        return model.MathBlock(self._span(token), tex, label=label)
+        return model.MathBlock(self.span(token), tex, label=label)
 
     # -- containers
 
     def _read_quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
-        span, first_token = self._span(token), self.tokens[self.index]
+        span, first_token = self.span(token), self.tokens[self.index]
         self.state.diagnostics += check_quotation(span)
         if first_token.type == "paragraph_open":
             head = read_head(trim(first_token.text), self.state.callouts)
@@ -304,7 +302,7 @@ class TextReader:
         if ordered:
             self.state.diagnostics += check_numbers([item.span for item in items])
         return model.ListBlock(
-            self._span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
+            self.span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
         )
 
     def _read_table(self, token: PositionedToken) -> model.Table:
@@ -336,10 +334,10 @@ class TextReader:
                 self.index += recording is not None
                 return recording
             case PositionedToken(type="code_block") as token:
-                place = self._span(token).first_line()
+                place = self.span(token).first_line()
                 self.state.report(diagnose_wrong_body(place, "an indented block"))
             case token:
-                following = None if token is None else self._span(token)
+                following = None if token is None else self.span(token)
                 state = self.state
                 state.diagnostics += check_missing_body(caption, span, state.words, following)
         return None
@@ -358,7 +356,7 @@ _READERS: dict[str, Callable[[TextReader, PositionedToken], model.Block | None]]
     "fence": TextReader._read_fence,
     "code_block": TextReader._read_code,
     "html_block": TextReader._read_html,
-    "hr": TextReader._read_thematic_break,
+    "hr": lambda reader, token: model.ThematicBreak(reader.span(token)),
     "math_block": TextReader._read_math,
     "blockquote_open": TextReader._read_quote,
     "bullet_list_open": TextReader._read_list,

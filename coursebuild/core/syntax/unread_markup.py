@@ -37,14 +37,7 @@ from coursebuild.core.syntax.markup_kinds import (
 )
 from coursebuild.core.syntax.nodes import shorten
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.text.diagnostics import (
-    Diagnostic,
-    Fix,
-    diagnose,
-    misspelt,
-    nearest,
-    propose,
-)
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, misspelt, nearest, propose
 from coursebuild.core.text.source import Excerpt, Span
 
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")

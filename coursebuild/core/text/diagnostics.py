@@ -250,12 +250,9 @@ def is_one_edit(word: str, name: str) -> bool:
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     """The fix that writes the nearest known name, or a help that lists them if few; or nothing."""
     names = sorted(set(known_names))
-    likely = nearest(name, names)
-    if likely is not None:
+    if (likely := nearest(name, names)) is not None:
         return propose(name, likely, names)
-    if names and len(names) <= 12:
-        return "known: " + ", ".join(f"`{n}`" for n in names)
-    return ""
+    return "known: " + ", ".join(f"`{n}`" for n in names) if 0 < len(names) <= 12 else ""
 
 
 _IDS = re.compile(r"\d+|(?<![^\W_])[^\W\d_](?![^\W_])")

@@ -230,12 +230,6 @@ def check_block_text(block: model.Block, text: str) -> None:
         assert block.prefix.strip("> \t") == ""
 
 
-@given(st.binary(max_size=200))
-def test_decoded_bytes_never_raise(data: bytes) -> None:
-    parse_any(data.decode("utf-8", "replace"))
-    parse_any(data.decode("latin-1"))
-
-
 def check_within(inner: Span, outer: Span) -> None:
     assert outer.start <= inner.start <= inner.end <= outer.end
 
@@ -336,17 +330,12 @@ def mistakes(path: str, text: str) -> list[str]:
 
 
 def test_mistakes_are_reported_at_their_places(rewriting: bool) -> None:
-    def render(case_text: str) -> str:
-        return "".join(f"{line}\n" for line in mistakes("content/lessons/1.1-x.md", case_text))
+    def render(case: Case) -> str:
+        lines = mistakes("content/lessons/1.1-x.md", case.input)
+        assert lines, f"{case.title} is silent"
+        return "".join(f"{line}\n" for line in lines)
 
-    check_cases(MARKUP_FOLDER / "mistakes.md", lambda case: render(case.input), rewriting=rewriting)
-
-
-def test_every_mistake_is_reported() -> None:
-    cases = read_cases(MARKUP_FOLDER / "mistakes.md")
-    silent = [case.title for case in cases if not case.expected]
-    assert len(cases) >= 100
-    assert silent == []
+    check_cases(MARKUP_FOLDER / "mistakes.md", render, rewriting=rewriting)
 
 
 def test_ordinary_prose_and_escaped_markup_are_no_mistakes() -> None:
