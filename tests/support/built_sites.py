@@ -1,8 +1,4 @@
-"""Courses that are built once for all processes of a test run, and sites of them on a host.
-
-The pages of a site are listed from its files, so that a new kind of page is tested as soon as there
-is one.
-"""
+"""Courses that are built once for all processes of a test run, and sites of them on a host."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Exact answers to sixty digits, and errors in units of the last place.
 
 Every reference takes doubles, reads them as the exact numbers that they are, and follows the
-textbook formula; with mpmath's unbounded exponents none of the cases that are hard in doubles is
-hard here.
+textbook formula.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,9 +1,7 @@
-"""SVG files that nobody should publish, but somebody tries to.
+"""SVG files that nobody should publish, but somebody tries to; most stand in `hostile_svg.toml`.
 
-`HOSTILE`: name and bytes of each; `fixtures/hostile_svg.toml` has what stands in most of them.
 Every one tries to run something, or to ask `FAR`, when it is opened at its own address, clicked, or
 read by a tool; or it takes time, memory or the stack. `HARMLESS` are files that only look so.
-`mutants` makes others from both.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Courses made from texts, without files, and the diagnostics of checks as short lines.
-
-Entry points: `make_course`; `rules_and_texts`, the rule of each diagnostic and its source text.
-"""
+"""Courses made from texts, without files, and the diagnostics of checks as short lines."""
 
 from __future__ import annotations
 

@@ -1,6 +1,5 @@
 """Reading the documents of the repository: fences with their info strings, and links.
 
-Entry points: `PAGES`; `fences`, `code_spans`, `links` and `anchors` of a path; `write_files`.
 markdown-it reads them, with none of coursebuild's rules, so that the tests do not rely on what they
 test.
 """

@@ -1,4 +1,4 @@
-"""Random texts made of what lessons are made of: `markdown()`, a strategy; `KINDS` of callouts."""
+"""Random texts made of what lessons are made of."""
 
 from __future__ import annotations
 

@@ -1,9 +1,6 @@
-"""What a hostile script tries in the sandbox, and how that must end.
+"""What a hostile script tries in the sandbox, and how that must end: see `fixtures/sandbox.toml`.
 
-Entry points: `ATTEMPTS`, expressions of which one script tries all; `EXCESSES`, scripts that take
-too much; `surroundings`, what they would find outside; `attempts_script`, `answers`.
-
-The cases are `fixtures/sandbox.toml`. Used by the tests and by `benchmarks/attacks.py`.
+`ATTEMPTS` are expressions of which one script tries all, `EXCESSES` scripts that take too much.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""A document as text: one line per node with its span, then the diagnostics.
-
-Spans are `line:column-line:column`, from 1, the end exclusive.
-"""
+"""A document as text: a line per node with its span, `line:column-line:column`; diagnostics."""
 
 from __future__ import annotations
 

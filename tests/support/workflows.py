@@ -1,8 +1,7 @@
 """Workflows of GitHub, run step by step on this machine.
 
-Entry points: `Runner`; `git` and `commit`. What the actions of others do is done here in a few
-lines; `pip`, `npx`, `rsync` and `sudo` are programs that only note how they were called. An action
-or an expression that is not known fails the test.
+What the actions of others do is done here in a few lines; `pip`, `npx`, `rsync` and `sudo` are
+programs that only note how they were called. An action or an expression that is not known fails.
 """
 
 from __future__ import annotations
