@@ -97,7 +97,6 @@ class Sites(dict[str, Site]):
 
 
 def course_copy(name: str, root: Path, stores: Path) -> Folder:
-    """Copy a course in `tests/courses`, for a test that changes it."""
     folder = Folder(Path(shutil.copytree(ROOT / "tests/courses" / name / "course", root)))
     folder.borrow(stores)
     return folder

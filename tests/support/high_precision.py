@@ -66,7 +66,6 @@ def log(q: Sequence[mpmath.mpf]) -> Vector:
 
 
 def matrix(q: Sequence[mpmath.mpf]) -> Vector:
-    """The rotation matrix, row by row."""
     w, x, y, z = unit(q)
     return [
         1 - 2 * (y * y + z * z),
@@ -97,7 +96,6 @@ def rotate(q: Sequence[mpmath.mpf], vector: Sequence[mpmath.mpf]) -> Vector:
 
 
 def ulps_of(size: mpmath.mpf, actual: ArrayLike, expected: Iterable[mpmath.mpf]) -> float:
-    """The largest error, in ulp of one common size."""
     pairs = zip(exact(actual), expected, strict=True)
     return _largest(abs(g - w) / (ULP * size) for g, w in pairs)
 

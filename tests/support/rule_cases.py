@@ -89,7 +89,6 @@ class Layout:
                 raise ValueError(f"no kind of file {unknown!r}")
 
     def write(self, root: Path) -> None:
-        """Put all but the later files into a folder, which is made."""
         root.mkdir(parents=True, exist_ok=True)
         for folder in self.folders:
             (root / folder).mkdir(parents=True)
@@ -110,7 +109,6 @@ def write_file(path: Path, data: bytes) -> None:
 
 
 def parts(text: str) -> Iterator[tuple[str, str, str]]:
-    """The kind, the path and the body of each file."""
     if not _HEADER.match(text):
         yield "", FIRST, text
         return

@@ -71,7 +71,6 @@ def wait_for(path: Path) -> int:
 
 
 def wait_until_ended(pid: int) -> bool:
-    """Wait until a process has ended."""
     wait_until(lambda: not is_alive(pid), f"the end of process {pid}")
     return True
 

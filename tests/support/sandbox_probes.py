@@ -76,10 +76,7 @@ EXCESSES = msgspec.convert(_CASES["excesses"], dict[str, Excess])
 
 @contextlib.contextmanager
 def surroundings(root: Path, home: Path) -> Iterator[Mapping[str, object]]:
-    """What scripts would find outside; the values of the names in `ATTEMPTS`.
-
-    Nobody talked to the sockets and pipes in the end.
-    """
+    """What scripts would find outside, by the names in `ATTEMPTS`, and what nobody may touch."""
     (home / "secret").write_text(SECRET)
     (root / "lesson.md").write_text("as it was")
     abstract = f"\0coursebuild-{os.getpid()}"

@@ -80,7 +80,6 @@ def _node(node: Block | Inline | ListItem, depth: int) -> Iterator[str]:
 
 
 def _value(name: str, value: object) -> str:
-    """The text that a field adds to its node's line."""
     if isinstance(value, Span):
         return f"{name}={format_span(value)}"
     if isinstance(value, Excerpt):

@@ -79,7 +79,6 @@ class Runner:
         return steps_by_job
 
     def action(self, place: Path, steps: list[dict[str, Any]], **inputs: str) -> list[Step]:
-        """Run the steps of an action in a folder."""
         values = {f"inputs.{name}": value for name, value in inputs.items()}
         return [self._command(place, step, values) for step in steps if "run" in step]
 
@@ -194,7 +193,6 @@ def git(place: Path, *arguments: str) -> str:
 
 
 def commit(place: Path) -> None:
-    """Commit all changes."""
     git(place, "add", "-A")
     git(place, "commit", "-q", "-m", "a change")
 
