@@ -13,22 +13,14 @@ import numpy as np
 from playwright.sync_api import BrowserContext, Locator, Page, Request, Route, expect
 
 from support.chromium import SLOW
+from support.fixture_cases import fixture_text
 
 PAGE = "lessons/1.1-one.html"
 """The page of the course in `tests/courses/labs`."""
 SWING, AUTO, ALL, TWINS, EDITED_LAB = 0, 1, 2, 3, 4
 """The index of each lab on the page."""
 
-MOUNT = """async (number) => {
-  const place = document.querySelectorAll('.lab')[number]
-  const copy = place.cloneNode(true)
-  place.replaceWith(copy)
-  copy.id = 'tried'
-  const script = new URL(copy.dataset.script, document.baseURI).href
-  const { mountLab } = await import(script)
-  window.made = await mountLab(copy, (key) => key)
-  copy.querySelector('.lab-view').scrollIntoView({ block: 'center' })
-}"""
+MOUNT = fixture_text("scripts/mount_lab.js")
 """Mounts a lab in a copy of its element that the page's own script does not know, and stores it as
 `window.made`, so that a test can inspect more than its picture."""
 
@@ -92,15 +84,7 @@ def reach(page: Page, number: int, state: str) -> None:
     )
 
 
-NOTE_CHANGES = """element => {
-  const noted = element.noted = new Set()
-  const note = (changes) => {
-    changes.forEach(({ oldValue }) => noted.add(oldValue))
-    noted.add(element.dataset.state ?? element.textContent)
-  }
-  const states = { attributeFilter: ['data-state'], attributeOldValue: true }
-  new MutationObserver(note).observe(element, { ...states, childList: true })
-}"""
+NOTE_CHANGES = fixture_text("scripts/note_changes.js")
 
 
 def note_changes(element: Locator) -> None:
