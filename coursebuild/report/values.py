@@ -6,17 +6,15 @@ import json
 import math
 from collections.abc import Mapping
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import TrialLine
+from coursebuild.core.scripts.sensitivity import Sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Span
-
-if TYPE_CHECKING:
-    from coursebuild.core.scripts.sensitivity import Sensitivity
 
 
 class ScriptLine(Struct, frozen=True):

@@ -43,7 +43,7 @@ READY = (
     "coursebuild.pipeline.site",
     "coursebuild.pipeline.outputs",
     "coursebuild.core.syntax.document",
-    "coursebuild.core.pages.article",
+    "coursebuild.core.pages.page_writer",
     "coursebuild.core.pages.document_inputs",
     "coursebuild.core.pages.page_list",
     "coursebuild.features.authoring.commands.rename",
