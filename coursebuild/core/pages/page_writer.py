@@ -39,10 +39,8 @@ class CodePart(Struct, frozen=True):
 
     html: Markup
     first: int
-    """The number of its first line."""
     folded: bool
     label: str
-    """What is in a fold, in words."""
 
 
 class Receipt(Struct, frozen=True):

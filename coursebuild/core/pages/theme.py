@@ -16,7 +16,6 @@ from coursebuild.core.pages.fonts import COURSE, Face, unicode_range
 
 PER_MILLE = "183 103 75 65 62 57 57 53 50 50 33 33 23 22 20 20 17 16 15 14 13 8 6 1 1 1 1"
 FREQUENCY = dict(zip(" etaoinsrhldcumfwgpybvkxjqz", map(int, PER_MILLE.split()), strict=True))
-"""The frequency of characters in English text, per thousand."""
 
 
 @functools.lru_cache(maxsize=16)
@@ -58,9 +57,7 @@ def measure_font(font: Any) -> tuple[float, float, float, float] | None:
 
 
 _ACCENT = "#17487a", "#9fc6ef"
-"""The accent of the style sheet, on light and dark pages."""
 _BOLD = 600
-"""The weight of headings."""
 _SIDE = re.compile(r"\s*+(\d+(?:\.\d*)?|\.\d+)")
 
 
