@@ -326,7 +326,7 @@ class Reader:
 
     def draw_page(self, request: PageRequest) -> DrawnPage:
         """Draw a page here, and store it."""
-        from coursebuild.core.pages.article import draw
+        from coursebuild.core.pages.page_writer import draw
 
         with self._lock:
             whole = None if request.text is None else self._whole_document(request.text)
@@ -410,7 +410,7 @@ _UNPACKABLE = (pickle.PicklingError, AttributeError, TypeError, ValueError, Recu
 
 _HEAVY = (
     "coursebuild.core.run.v8",
-    "coursebuild.core.pages.article",
+    "coursebuild.core.pages.page_writer",
     "coursebuild.core.pages.listings",
     "coursebuild.core.pages.document_inputs",
     "coursebuild.core.pages.page_list",

@@ -44,7 +44,6 @@ class ScriptComparison(Struct, frozen=True):
 
     path: str
     lesson: str
-    """Id of its lesson or page."""
     status: str
     """`same`, `changed`, `fails` (both by MuJoCo), `unclear`, `drifted` or `uncompared`."""
     reason: str = ""
@@ -52,7 +51,6 @@ class ScriptComparison(Struct, frozen=True):
     changes: tuple[Change, ...] = ()
     diff: str = ""
     failure: Diagnostic | None = None
-    """How it failed with the other version."""
 
 
 class ModelLine(Struct, frozen=True):
@@ -68,9 +66,7 @@ class ComparisonReport(Struct, frozen=True):
     """What scripts and models do with the other version."""
 
     engine: str
-    """The version of MuJoCo here."""
     version: str
-    """The other version."""
     python: str
     scripts: tuple[ScriptComparison, ...]
     models: tuple[ModelLine, ...]

@@ -128,7 +128,6 @@ def table(columns: Sequence[Column], width: int | None = None) -> list[str]:
 
 
 _MOST_OF_A_RULE = 20
-"""Diagnostics of one rule in one file that are shown."""
 
 
 def to_text(report: Report, style: Style) -> str:

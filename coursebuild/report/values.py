@@ -6,17 +6,15 @@ import json
 import math
 from collections.abc import Mapping
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import TrialLine
+from coursebuild.core.scripts.sensitivity import Sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Span
-
-if TYPE_CHECKING:
-    from coursebuild.core.scripts.sensitivity import Sensitivity
 
 
 class ScriptLine(Struct, frozen=True):
@@ -30,11 +28,9 @@ class ScriptLine(Struct, frozen=True):
     seconds: float
     cached: bool
     missing: tuple[str, ...] = ()
-    """The modules that a skipped script lacks."""
     unproven_outputs: int = 0
     """Outputs and figures that are recorded of a script that was not run."""
     unproven_numbers: int = 0
-    """Numbers bound to these outputs."""
     unrepeated: bool = False
     """Whether what is recorded of it was recorded from its only run."""
 
@@ -73,7 +69,6 @@ class Report(Struct, frozen=True):
     scripts: tuple[ScriptLine, ...]
     summary: Summary
     remarks: tuple[str, ...] = ()
-    """What was done, such as the files written; a line for each."""
     labs: tuple[TrialLine, ...] = ()
     depends: tuple[str, ...] | None = None
     """Files outside the course's own folders that the report depends on, absolute or relative to

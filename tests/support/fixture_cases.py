@@ -32,7 +32,6 @@ class Case(Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """The case in the format of the file."""
         parts = (f"{self.title}\n", self.input, self.expected)
         return self.remarks + "".join(f"{part}.\n" for part in parts)
 
@@ -49,11 +48,7 @@ def check_cases(path: Path, render: Callable[[Case], str], *, rewriting: bool) -
 
 
 def read_cases(path: Path) -> list[Case]:
-    """The cases of a fixture file.
-
-    Raises:
-        ValueError: the file ends inside a case, or two cases have the same title.
-    """
+    """The cases of a fixture file; `ValueError` for a case without an end, or a title twice."""
     lines = text_lines(path.read_text(encoding="utf-8"))
     cases: list[Case] = []
     at = 0
@@ -78,13 +73,11 @@ def read_cases(path: Path) -> list[Case]:
 
 
 def rewrite(path: Path, cases: Iterable[Case]) -> None:
-    """Write a fixture file anew."""
     text = "".join(case.text for case in cases)
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def check_text(path: Path, text: str, *, rewriting: bool) -> None:
-    """Compare a text with that of a file, or rewrite the file."""
     if rewriting:
         path.write_text(text, encoding="utf-8", newline="\n")
     assert text == path.read_text(encoding="utf-8"), path.name

@@ -76,7 +76,6 @@ def diet(*findings: Finding) -> DietReport:
 
 
 def run(**overrides: object) -> ErrorLine:
-    """A run of a hard case that is well."""
     fields: dict[str, object] = {
         "integrator": "Euler",
         "timestep": 0.01,
@@ -143,7 +142,6 @@ def case(name: str = "spring", number: int = 5, **overrides: object) -> CaseRepo
 
 
 def reports() -> Reports:
-    """All of it."""
     kept_finding = finding(
         "geom-far", kept="it is the horizon", proof="", label="equal within tolerance"
     )

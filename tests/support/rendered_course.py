@@ -49,7 +49,6 @@ BOX = '<mujoco model="box">\n  <worldbody/>\n</mujoco>\n'
 
 
 def read_assets() -> Assets:
-    """The templates of this checkout and its bundle."""
     templates, dist = ROOT / "templates", ROOT / "site" / "dist"
     assert (dist / "fonts" / "fonts.json").is_file(), "no bundle: run `python site/bundle.py`"
     return Assets(
@@ -74,11 +73,9 @@ class RenderedCourse(Struct, frozen=True):
     assets: Assets
 
     def library(self, reports: Reports | None = None) -> Library:
-        """The course as its pages look it up."""
         return make_library(self.course, self.results, self.assets, reports or Reports())
 
     def page(self, lesson: str = "0.1") -> PageContext:
-        """The context of a lesson's page."""
         library = self.library()
         entry = library.lessons[lesson]
         assert entry.document is not None
@@ -87,7 +84,6 @@ class RenderedCourse(Struct, frozen=True):
         return PageWriter(library.renderer, inputs, place, entry.document)
 
     def html(self, lesson: str = "0.1") -> str:
-        """The text of a lesson as HTML."""
         page = self.page(lesson)
         return f"{page.blocks(page.document.blocks)}\n{page.footnotes()}"
 

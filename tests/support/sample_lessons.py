@@ -14,20 +14,13 @@ from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source, Span
-from support.made_courses import with_documents
+from support.made_courses import LESSON, with_documents
 
 EXACT = model.Comparison()
 DIGITS = model.Comparison(model.Mode.DIGITS)
 VOLATILE = model.Comparison(model.Mode.VOLATILE)
 ELLIPSIS = model.Comparison(ellipsis=True)
 DIGITS_ELLIPSIS = model.Comparison(model.Mode.DIGITS, ellipsis=True)
-LESSON = """
-[[level.lesson]]
-id = "{}"
-slug = "{}"
-title = "T"
-status = "complete"
-"""
 
 
 def tolerance(rtol: str = "0", atol: str = "0") -> model.Comparison:
@@ -56,7 +49,6 @@ def recording(
 
 
 def table(rows: str) -> model.Recording:
-    """A lesson with one script and one recorded table."""
     text = f"```python file=examples/a.py\nprint(1)\n```\n\nOutput:\n\n{rows}\n\nAfter.\n"
     return recordings(document(text))[0]
 
@@ -70,7 +62,7 @@ def course(
     text = '[course]\ntitle = "T"\n[[level]]\nid = "1"\ntitle = "One"\n'
     for document in documents:
         id, _, slug = document.source.path.rpartition("/")[2].removesuffix(".md").partition("-")
-        text += LESSON.format(id, slug)
+        text += LESSON.format(id, slug, "complete")
     course_map = parse_course_map(Source("content/course.toml", text)).value
     assert course_map is not None
     pairs = zip(course_map.lessons, documents, strict=True)
@@ -90,8 +82,6 @@ def make_run(
 
 
 def describe(diagnostic: Diagnostic) -> str:
-    """The whole text of a diagnostic, with its places."""
-
     def place(span: Span | None) -> str:
         return "" if span is None else f" at {span.line}:{span.column} `{span.first_line().text}`"
 
@@ -164,7 +154,6 @@ def body(
     filters: tuple[model.Filter, ...] = (),
     **lesson: str,
 ) -> str:
-    """The text of a recorded output after its update."""
     return update(recording(recorded, **lesson), printed, comparison, filters).body_span.text
 
 

@@ -1,9 +1,6 @@
-"""What a hostile script tries in the sandbox, and how that must end.
+"""What a hostile script tries in the sandbox, and how that must end: see `fixtures/sandbox.toml`.
 
-Entry points: `ATTEMPTS`, expressions of which one script tries all; `EXCESSES`, scripts that take
-too much; `surroundings`, what they would find outside; `attempts_script`, `answers`.
-
-The cases are `fixtures/sandbox.toml`. Used by the tests and by `benchmarks/attacks.py`.
+`ATTEMPTS` are expressions of which one script tries all, `EXCESSES` scripts that take too much.
 """
 
 from __future__ import annotations
@@ -79,10 +76,7 @@ EXCESSES = msgspec.convert(_CASES["excesses"], dict[str, Excess])
 
 @contextlib.contextmanager
 def surroundings(root: Path, home: Path) -> Iterator[Mapping[str, object]]:
-    """What scripts would find outside; the values of the names in `ATTEMPTS`.
-
-    Nobody talked to the sockets and pipes in the end.
-    """
+    """What scripts would find outside, by the names in `ATTEMPTS`, and what nobody may touch."""
     (home / "secret").write_text(SECRET)
     (root / "lesson.md").write_text("as it was")
     abstract = f"\0coursebuild-{os.getpid()}"

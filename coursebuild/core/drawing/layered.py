@@ -25,7 +25,6 @@ from typing import TypeAlias
 from msgspec import Struct
 
 _Point: TypeAlias = int | tuple[int, int, int]
-"""A node, or an edge where it crosses a layer."""
 
 _SWEEPS = 12
 _PASSES = 40

@@ -97,7 +97,6 @@ _PROPERTIES = frozenset(
     "ascent-override descent-override font-display line-gap-override size-adjust src "
     "unicode-range".split()
 )
-"""Properties of CSS, also as attributes."""
 _VENDOR = re.compile(r"^-(?:webkit|moz|ms|o|inkscape)-")
 _AT_RULES = {"@media": True, "@supports": True, "@keyframes": True, "@font-face": False}
 """Whether they hold rules, or declarations."""

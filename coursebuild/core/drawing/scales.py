@@ -12,7 +12,6 @@ from itertools import pairwise
 from msgspec import Struct
 
 _LARGEST = 290.0
-"""Greater powers of ten are drawn as this one."""
 
 
 class Scale(Struct, frozen=True):
@@ -147,7 +146,6 @@ def _scaled(mantissa: int, exponent: int) -> str:
 
 
 _CACHE_SIZE = 1024
-"""How many texts are remembered: drawings share many, in several sizes."""
 _NO_MARKUP = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 """Includes lone surrogates, which stand for bytes that are not text."""
 _NARROW = frozenset("ijl.,:;'|!()[] ·ft")

@@ -153,14 +153,12 @@ class NotedPage(Struct, frozen=True):
     """A page that a feature has made a note of."""
 
     path: str
-    """Its site path."""
     kind: str
     """See `PageHead`."""
     id: str
     """The id of its lesson, level, model or page."""
     title: str
     digest: str
-    """The digest of the note."""
 
 
 class SiteContext(Struct, frozen=True):
@@ -173,13 +171,9 @@ class SiteContext(Struct, frozen=True):
     pages: tuple[NotedPage, ...]
     """The pages with a note of this feature, in the order of the site."""
     note: Callable[[str], bytes]
-    """Returns the note of a page, by its site path."""
     get_or_make: Callable[[str, Callable[[], bytes]], bytes]
-    """Returns what was made under a key before, or makes it."""
     archives: Mapping[str, Archive]
-    """Archives of scripts by site path."""
     imports: Callable[[str], frozenset[str]]
-    """Returns the modules that a Python text imports."""
 
 
 class ExportContext(Struct, frozen=True):
@@ -193,7 +187,6 @@ class ExportContext(Struct, frozen=True):
     page: Callable[[model.Document], PageContext]
     """A document with its whole text on its page, ready to be drawn."""
     read: Callable[[str], bytes]
-    """A file of the course, by its path."""
     lesson: model.Lesson | None = None
     """The lesson that an `Exporter` of a lesson writes."""
 

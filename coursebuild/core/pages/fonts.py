@@ -26,7 +26,6 @@ TEXT, CODE, MATH = "Source Serif 4 Variable", "Source Code Pro Variable", "STIX 
 COURSE = {"text": "Course Text", "interface": "Course Interface", "code": "Course Code"}
 """The families of a course's own fonts in the style sheet, by use."""
 _COURSE_FAMILIES = {TEXT: COURSE["text"], CODE: COURSE["code"]}
-"""The course's families that come before families of the bundle."""
 
 BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·¹½×éöü–—‘’“”…•−")
 """Characters of text that every site keeps."""

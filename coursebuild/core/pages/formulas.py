@@ -26,7 +26,6 @@ FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
 """A formula of any kind; splitting a page by it gives texts and formulas in turn."""
 
 _CACHE_SIZE = 256
-"""How many formulas are remembered: texts repeat them."""
 
 _ROW = re.compile(r"<(/?)mrow\b[^>]*>")
 _WHOLE = re.compile(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)

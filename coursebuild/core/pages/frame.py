@@ -43,10 +43,8 @@ PAGE_WORDS = (
     "search.open",
     "search.failed",
 )
-"""Interface texts that the page's script shows."""
 
 FRAME_IDS = frozenset(("_words",))
-"""The ids in `base.html`."""
 
 LOGO_HEIGHT = 28
 """Pixels, as in the style sheet."""
@@ -110,7 +108,6 @@ class FrameInputs(Struct, frozen=True):
     title: str
     """Of the course."""
     course_key: str
-    """See `Course.key`."""
     base_url: str
     licence: str
     source: str
@@ -118,16 +115,11 @@ class FrameInputs(Struct, frozen=True):
     menu: tuple[tuple[str, str], ...]
     """Site paths and titles of the pages in the menu of every page, besides the home page."""
     added_pages: tuple[tuple[str, str], ...]
-    """Those of the pages that features add."""
     engine: str
-    """Version of MuJoCo that ran the scripts."""
     python: str
     templates: Texts
-    """The course's own."""
     version: str
-    """See `Course.version`."""
     is_manual: bool
-    """See `Course.is_manual`."""
     names: Names
 
     @classmethod

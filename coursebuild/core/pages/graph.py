@@ -35,14 +35,12 @@ class _Look(Struct, frozen=True):
     height: float
     gap: float
     step: float
-    """From one layer to the next."""
     titles: bool
 
 
 _WIDE = _Look(132, 56, 12, 92, True)
 _NARROW = _Look(50, 30, 5, 58, False)
 _SIZE = 12.0
-"""The font size."""
 _LINE = 15.0
 _CROSSING_WIDTH = 0.2
 """Room for an arrow that crosses a layer, in widths of nodes."""

@@ -17,7 +17,6 @@ from selectolax.lexbor import LexborHTMLParser, LexborNode
 from coursebuild.core.text.characters import clean_xml
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
-"""Elements without content and end tag."""
 _RAW = frozenset("script style xmp iframe noembed noframes plaintext".split())
 """Elements whose text is not escaped."""
 _MAX_DEPTH = 200
@@ -60,7 +59,6 @@ class HtmlElement(Struct):
 
 
 HtmlContent: TypeAlias = HtmlElement | str
-"""An element, or a text without markup."""
 
 
 def parse_html(html: str) -> list[HtmlContent]:

@@ -48,11 +48,9 @@ class Library(Struct, frozen=True, dict=True):
     assets: Assets
     renderer: Renderer
     reports: Reports = Reports()
-    """The reports on models and hard cases that fit the course."""
     trial_values: Mapping[tuple[str, int], Struct] = {}
     """What pages show of the trials of blocks, by the path and offset of the block."""
     trial_files: tuple[OutputFile, ...] = ()
-    """The files of the site that trials have made."""
 
     # --- the course
 

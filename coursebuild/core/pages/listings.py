@@ -79,7 +79,6 @@ def _python() -> tuple[Parser, Query]:
 
 
 Run: TypeAlias = tuple[str, str]
-"""A class, perhaps empty, and the text that has it."""
 
 _CLASSES: tuple[tuple[_TokenType, str], ...] = (
     (Comment, "c"),
@@ -187,11 +186,8 @@ class Part(Struct, frozen=True):
     last: int
     folded: bool
     docstring: bool = False
-    """Whether it holds the script's docstring."""
     imports: bool = False
-    """Whether it holds imports."""
     names: tuple[str, ...] = ()
-    """Names that it defines."""
 
 
 def fold(code: str) -> tuple[Part, ...]:

@@ -26,7 +26,6 @@ SpecialBlock: TypeAlias = (
     | model.Recording
     | model.Script
 )
-"""The blocks beyond Markdown."""
 
 
 def escape(text: str) -> str:
@@ -36,7 +35,6 @@ def escape(text: str) -> str:
 
 
 _SIMPLE = re.compile('[^0-9&<>"]*+')
-"""Text without quantities, and with nothing to escape."""
 
 
 def raw_html(node: model.HtmlBlock | model.RawInline, url: Callable[[str], str]) -> str:

@@ -46,7 +46,6 @@ class PageEntry(Struct, frozen=True):
     """A page of a site."""
 
     path: str
-    """Its site path."""
     kind: str
     """One of `CORE_PAGES`, or the name of a `PageKind`."""
     id: str = ""
@@ -168,7 +167,6 @@ class ModelCard(Struct, frozen=True):
     href: str
     picture: PictureLink | None
     lessons: tuple[LessonLink, ...]
-    """The lessons that use it."""
 
 
 def home_inputs(library: Library, document: Document | None) -> PageInputs:

@@ -47,24 +47,19 @@ class PageFacts(Struct, frozen=True):
     mathematics: frozenset[str]
     """Characters of its formulas outside ASCII; and a blank if it has a formula."""
     declarations: frozenset[str]
-    """Styles taken out of its elements."""
     parts: frozenset[str]
-    """See `parts_of`."""
 
 
 class PageRecord(Struct, frozen=True, array_like=True):
     """What the site must know of a page, without its body."""
 
     kind: str
-    """See `PageHead`."""
     title: str
     indexed: bool
-    """Whether search engines should list it."""
     text: str
     """Characters of its text, as in `PageFacts`, sorted, like those of formulas."""
     mathematics: str
     declarations: tuple[str, ...]
-    """Styles taken out of its elements, sorted."""
     ids: tuple[str, ...]
     """Anchors, sorted; see `references.merge_line_ids`."""
     references: tuple[Reference, ...]
@@ -73,7 +68,6 @@ class PageRecord(Struct, frozen=True, array_like=True):
     """Ids that several elements have, sorted; each with the start and end of its place in the
     page's document (`PageContext.find_repetition`), or zeros."""
     parts: tuple[str, ...] = ()
-    """See `parts_of`."""
     notes: tuple[tuple[str, str], ...] = ()
     """The features' notes of the page: a feature's name and a digest; see `SiteContext`."""
 

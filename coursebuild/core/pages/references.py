@@ -35,10 +35,8 @@ _ADDRESSES = {
     "use": ("href",),
     "video": ("src", "poster"),
 }
-"""Attributes that hold addresses, by element."""
 
 _LINK_ATTRIBUTES = ("id", "name", *sorted({name for n in _ADDRESSES.values() for name in n}))
-"""Attributes that may hold an id or an address."""
 
 _ORIGIN = "https://site.invalid"
 """Stands for the host that serves the site."""
@@ -53,13 +51,10 @@ class BrokenLink(Struct, frozen=True):
     """An address of a page that leads nowhere."""
 
     page: str
-    """Site path of the page."""
     url: str
-    """The address as written there."""
     reason: str
     """What is wrong, lower case, no full stop."""
     suggestion: str | None
-    """The nearest existing file or id."""
 
 
 def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[BrokenLink, ...]:

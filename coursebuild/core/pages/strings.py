@@ -33,9 +33,7 @@ class Strings(Struct, frozen=True):
     """The interface texts in one language."""
 
     texts: Mapping[str, str]
-    """By dotted key, sorted."""
     language: str = DEFAULT_LANGUAGE
-    """The language of the course."""
 
     def __call__(self, key: str, **values: str | int | float) -> str:
         """The text of a key, with values inserted."""
@@ -112,7 +110,6 @@ _FROM_THE_RIGHT = frozenset(
     " narb nbat nkoo orkh ougr palm phli phlp phnx prti rohg samr sarb sogd sogo syrc syre syrj"
     " syrn thaa todr yezi".split()
 )
-"""Scripts, as tags name them."""
 
 _LANGUAGES = frozenset(
     # of Arabic script

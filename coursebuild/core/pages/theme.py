@@ -7,19 +7,15 @@ import functools
 import io
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, RECOMMENDED_CONTRAST, legible
 from coursebuild.core.drawing.safe_svg import read_svg
 from coursebuild.core.model.course import Theme, ThemeFile
 from coursebuild.core.pages.fonts import COURSE, Face, unicode_range
 
-if TYPE_CHECKING:
-    from fontTools.ttLib import TTFont
-
 PER_MILLE = "183 103 75 65 62 57 57 53 50 50 33 33 23 22 20 20 17 16 15 14 13 8 6 1 1 1 1"
 FREQUENCY = dict(zip(" etaoinsrhldcumfwgpybvkxjqz", map(int, PER_MILLE.split()), strict=True))
-"""The frequency of characters in English text, per thousand."""
 
 
 @functools.lru_cache(maxsize=16)
@@ -46,7 +42,7 @@ def course_face(use: str, name: str, data: bytes) -> tuple[Face, bytes] | str:
     return face, whole.getvalue()
 
 
-def measure_font(font: TTFont) -> tuple[float, float, float, float] | None:
+def measure_font(font: Any) -> tuple[float, float, float, float] | None:
     """Mean advance width, weighted by `FREQUENCY`, ascent, descent and line gap of a font, in em.
 
     `None` for a font without the letters of `FREQUENCY`.
@@ -61,9 +57,7 @@ def measure_font(font: TTFont) -> tuple[float, float, float, float] | None:
 
 
 _ACCENT = "#17487a", "#9fc6ef"
-"""The accent of the style sheet, on light and dark pages."""
 _BOLD = 600
-"""The weight of headings."""
 _SIDE = re.compile(r"\s*+(\d+(?:\.\d*)?|\.\d+)")
 
 

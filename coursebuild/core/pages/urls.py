@@ -31,7 +31,6 @@ replaced by that of all."""
 WORKER = "service-worker.js"
 """In the root, since a worker serves its own folder."""
 FILES = "files.json"
-"""The list of files that the worker may keep."""
 
 
 def lesson_path(lesson: Lesson) -> str:
@@ -98,7 +97,6 @@ def base_path(base_url: str) -> str:
 
 
 _UNRESERVED = re.compile("[A-Za-z0-9/~._+@,-]*+")
-"""Paths that need no encoding in an address."""
 
 
 def encode(path: str) -> str:
@@ -115,7 +113,6 @@ class Place(Struct, frozen=True):
     """A page that addresses are relative to."""
 
     path: str
-    """Its site path."""
     root: str | None = None
     """The prefix of every address; `None` to make addresses relative to `path`."""
 

@@ -50,14 +50,12 @@ class Surroundings(Struct, frozen=True):
     style: tuple[OutputFile, ...] = ()
     """The course's `matplotlibrc`, if it has one: the style of all figures."""
     imports: Callable[[str], frozenset[str]] = find_imports
-    """Returns what a Python text imports; the caller may know it already."""
 
 
 class Archive(Struct, frozen=True):
     """An archive before it is packed."""
 
     path: str
-    """Site path."""
     parts: Mapping[str, bytes | Excerpt]
     """Its content by path: code or bytes."""
 

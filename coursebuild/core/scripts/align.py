@@ -38,7 +38,6 @@ class StepKind(enum.Enum):
     MISSING = "missing"
     EXTRA = "extra"
     ELLIPSIS = "ellipsis"
-    """A recorded `...` line."""
     ELIDED = "elided"
     """A printed line that a `...` line stands for."""
 
@@ -159,7 +158,6 @@ MATCH = 8
 """The weight of a pair that matches; smaller ones are for items that are alike, 0 for no pair."""
 
 _CELLS = 250_000
-"""The most cells that a table of dynamic programming may have."""
 
 
 def pair(

@@ -245,7 +245,6 @@ class RunStanding(Struct, frozen=True):
 
     run: ScriptRun
     is_compared: bool
-    """Whether there was anything to compare it with."""
     changes: tuple[Change, ...] = ()
     diff: str = ""
     """The difference between the outputs, where nothing is recorded."""

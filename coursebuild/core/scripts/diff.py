@@ -57,29 +57,26 @@ class Difference(Struct, frozen=True):
     """Recorded and printed, where both are a number."""
 
 
-def number_kind(recorded: Number, printed: Number) -> DriftKind:
-    """The class of a difference between two numbers.
+def number_change(
+    span: Span, recorded: str, printed: str, numbers: tuple[Number, Number]
+) -> Change:
+    """The change of a number that stands at `span` in the lesson.
 
     It is rounding where a number with a point or an exponent is off by at most one unit of its last
     recorded place; a count that is off by one is not. The same value in another notation is text.
     """
-    if not (recorded.is_finite and printed.is_finite):
-        return DriftKind.NUMERIC
-    gap = difference(recorded.value, printed.value)
-    if gap == 0:
-        return DriftKind.TEXT
-    is_rounding = recorded.is_inexact and gap <= unit(recorded.place)
-    return DriftKind.ROUNDING if is_rounding else DriftKind.NUMERIC
-
-
-def number_change(
-    span: Span, recorded: str, printed: str, numbers: tuple[Number, Number]
-) -> Change:
-    """The change of a number that stands at `span` in the lesson."""
-    error = relative_error(numbers[0].value, numbers[1].value)
+    old, new = numbers
+    kind = DriftKind.NUMERIC
+    if old.is_finite and new.is_finite:
+        gap = difference(old.value, new.value)
+        if gap == 0:
+            kind = DriftKind.TEXT
+        elif old.is_inexact and gap <= unit(old.place):
+            kind = DriftKind.ROUNDING
+    error = relative_error(old.value, new.value)
     size = None if error is None else float(error)
     return Change(
-        number_kind(*numbers),
+        kind,
         span,
         recorded,
         printed,

@@ -272,7 +272,6 @@ def _update_table(
 
 
 ReadText = Callable[[str], str | None]
-"""The text of a file of the project; `None` where there is none."""
 
 
 def shown_files(course: model.Course) -> frozenset[str]:

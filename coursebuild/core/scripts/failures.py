@@ -61,7 +61,6 @@ _HELPS = (
         "no window opens while a course is checked: leave it out, or say `norun` on its fence",
     ),
 )
-"""A pattern for the exception's line, and the help."""
 
 _TAIL_LINES = 30
 _TAIL_CHARACTERS = 4000
@@ -213,7 +212,6 @@ def _stderr_notes(outcome: Outcome, text: str, scripts: Scripts) -> list[Note]:
 # --- simulations
 
 _MAX_INCIDENTS = 4
-"""The most further incidents that notes name."""
 _DIVERGES = (
     "try a smaller timestep or another integrator; if that is intended, put `diverges` on its fence"
 )
@@ -234,7 +232,6 @@ _EFFECTS = {
         "keep the data in the course, where it does not change",
     ),
 }
-"""The rule, the end of the message, and the help."""
 
 
 def is_lost(extraction: Extraction, run: ScriptRun) -> bool:

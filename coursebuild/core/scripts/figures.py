@@ -31,9 +31,7 @@ PIXEL_TOLERANCE = 1.0
 """How much pixels may differ: root mean square over all channels, of 255 steps."""
 
 MAX_PIXELS = 25_000_000
-"""Pixels that a PNG may have."""
 MAX_TABLE = 4 << 20
-"""Bytes that data may have."""
 SVG_HELP = "an SVG may contain only what draws a still picture, and refer only to its own parts"
 
 _NUMBER = re.compile(r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?")
@@ -46,7 +44,6 @@ _PNG_PARTS = frozenset(b"IHDR PLTE IDAT IEND tRNS bKGD cHRM cICP gAMA iCCP pHYs 
 """The chunks of a PNG that say what is drawn."""
 
 ReadFile = Callable[[str], bytes | None]
-"""A file of the course by its path; `None` where there is none."""
 
 
 def figure_findings(

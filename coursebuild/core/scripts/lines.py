@@ -118,7 +118,6 @@ class Side(Struct, frozen=True):
     """Before the filters, its line ends as they came."""
     mapped: MappedText
     lines: tuple[str, ...]
-    """Without trailing white space."""
     starts: tuple[int, ...]
     """Where the lines begin in the mapped text."""
 
@@ -163,7 +162,6 @@ MARK = "\x00"
 ELLIPSIS = "..."
 
 _SPACE = re.compile(rf"(?<={MARK})\s++|(?<!\s)\s++(?={MARK})")
-"""White space after a number, or before one."""
 _CLOSING = frozenset(")]},;|")
 
 SameNumber = Callable[[Number, Number], bool]

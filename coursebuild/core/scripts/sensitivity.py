@@ -41,7 +41,6 @@ from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 
 PERTURBATION = 1e-12
-"""How far initial states are moved, relative."""
 RUNS = 4
 """Runs with moved states of each script: two pairs in opposite directions, the second pair half as
 far away."""
@@ -58,7 +57,6 @@ class Standing(enum.Enum):
 
     MEASURED = "measured"
     NO_MUJOCO = "without-mujoco"
-    """It does not import MuJoCo."""
     NOT_MOVED = "not-moved"
     """No initial state in it could be moved."""
     UNRECORDED = "unrecorded"
@@ -66,7 +64,6 @@ class Standing(enum.Enum):
     DRIFTED = "drifted"
     """It prints something other than recorded, or does not run to its end."""
     FAILED = "failed"
-    """It did not run to its end with moved states."""
 
 
 class Doubt(Struct, frozen=True):
@@ -75,9 +72,7 @@ class Doubt(Struct, frozen=True):
     span: Span
     printed: str
     digits: int
-    """Significant digits printed."""
     repeat: int
-    """How many of them stay the same when initial states are moved."""
     converged: int | None
     """How many of them are those of ever smaller timesteps; `None` where not known."""
     least: str
@@ -86,11 +81,9 @@ class Doubt(Struct, frozen=True):
     halved: str
     """The text printed in its place with half the timestep; empty where not known."""
     quartered: str
-    """The same with a quarter of the timestep."""
     instead: str
     """The number with only the digits that repeat and converge; empty if none does, or a count."""
     compared: bool
-    """Whether verification would report the difference as drift."""
 
 
 class Flip(Struct, frozen=True):
@@ -110,7 +103,6 @@ class Sensitivity(Struct, frozen=True):
     """Id of the lesson or page that it is extracted from."""
     standing: Standing
     numbers: int = 0
-    """How many recorded numbers were examined."""
     amplification: float | None = None
     """The largest growth of the distance between states from beginning to end; `None` where no
     final state is known."""

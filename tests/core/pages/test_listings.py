@@ -197,31 +197,9 @@ def highlight(language: str, code: str) -> str:
 
 
 def test_python_gets_classes_for_what_a_reader_looks_for() -> None:
-    code = 'def spin(rate: float) -> str:\n    return f"{rate:.3f} rad/s"  # <slow>\n'
-    assert highlight("python", code) == (
-        '<span class="k">def</span> <span class="f">spin</span>(rate: float) -&gt; str:\n'
-        '    <span class="k">return</span> <span class="s">f"</span><span class="i">{</span>rate'
-        '<span class="i">:</span><span class="s">.3f</span><span class="i">}</span>'
-        ' <span class="s">rad/s"</span>  <span class="c"># &lt;slow&gt;</span>\n'
-    )
-
-
-def test_a_docstring_a_decorator_and_nested_fields_have_their_classes() -> None:
-    code = '"""Doc."""\n@cache\ndef f():\n    return f"{x!r:>{w}}"\n'
-    assert highlight("python", code) == (
-        '<span class="d">"""Doc."""</span>\n<span class="a">@cache</span>\n'
-        '<span class="k">def</span> <span class="f">f</span>():\n'
-        '    <span class="k">return</span> <span class="s">f"</span><span class="i">{</span>x'
-        '<span class="i">!r:</span><span class="s">&gt;</span><span class="i">{</span>w'
-        '<span class="i">}}</span><span class="s">"</span>\n'
-    )
-
-
-def test_python_that_does_not_parse_is_marked_as_far_as_it_can_be_read() -> None:
-    assert highlight("python", "def (:\n    x = 1  # ν\n") == (
-        '<span class="k">def</span> (:\n    x = <span class="n">1</span>'
-        '  <span class="c"># ν</span>\n'
-    )
+    """Also where it does not parse, as far as it can be read."""
+    for code, html in CASES["python"]:
+        assert highlight("python", code) == html
 
 
 def test_a_very_long_script_is_marked_too() -> None:

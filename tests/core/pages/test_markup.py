@@ -78,26 +78,6 @@ def test_the_html_of_blocks_and_inlines(text: str, expected: str) -> None:
     assert html(text) == expected
 
 
-def test_a_table_is_framed_and_aligned() -> None:
-    assert html("| a | b | c |\n| - | -: | :-: |\n| *1* | 2 |\n") == (
-        '<div class="table" role="group" aria-label="Table" tabindex="0">\n'
-        '<table>\n<thead>\n<tr>\n<th scope="col">a</th>\n'
-        '<th scope="col" class="align-right">b</th>\n'
-        '<th scope="col" class="align-center">c</th>\n</tr>\n</thead>\n<tbody>\n<tr>\n'
-        '<td><em>1</em></td>\n<td class="align-right">2</td>\n<td class="align-center"></td>\n'
-        "</tr>\n</tbody>\n</table>\n</div>\n"
-    )
-
-
-def test_a_task_list_has_labelled_boxes() -> None:
-    assert html("- [ ] a\n- [x] b\n- c\n") == (
-        '<ul class="task-list">\n'
-        '<li><input type="checkbox" disabled aria-label="Not done"> a</li>\n'
-        '<li><input type="checkbox" disabled checked aria-label="Done"> b</li>\n'
-        "<li>c</li>\n</ul>\n"
-    )
-
-
 def test_footnotes_and_their_references_link_to_each_other() -> None:
     document = parse("a[^x] b[^y] c[^x]\n\n[^x]: *One*.\n[^y]: - item\n")
     assert str(Writer().render_blocks(document.blocks)) == (

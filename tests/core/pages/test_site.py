@@ -21,41 +21,10 @@ from coursebuild.core.model import local_file
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.references import check_links
 from coursebuild.core.pages.urls import Place, dark_path, file_path
+from support.fixture_cases import fixture_text
 from support.rendered_course import MAP, Make
 
-LESSON = """## First part
-
-See lesson 1.1, level 1, lesson 1.2, [the page](page:about), [the box](model:box),
-[the script](examples/a.py), [a file](data.csv) and ![a sketch](../img/s.svg).[^n]
-
-$$x = 1$$
-
-```python file=examples/a.py
-from mjcourse import model_path
-import numpy as np
-print(model_path("box"))
-```
-
-Output:
-
-```text
-one
-```
-
-### Detail {#detail}
-
-Back to [the part](#first-part).
-
-## Second part
-
-```lab simlab
-{"model": "box", "dock": true, "title": "Docked"}
-```
-
-After.
-
-[^n]: A note.
-"""
+LESSON = fixture_text("documents/site.md")
 
 FILES = {
     "content/lessons/data.csv": b"1,2\n",
