@@ -1,9 +1,5 @@
 """Measure a hard case: errors and orders, largest stable timesteps, known quantities.
 
-Entry points: `measure_case(problem, machine, clock)`; `measure(problem, integrator, timestep)`, one
-run of it; `floor(problem)`, how well its motion is known; `closed_motion(model, scene, …)`, a
-closed form as the motion of a model that begins like the hard case.
-
 A run is judged first: the error of a run that was lost is not given.
 """
 
@@ -72,11 +68,7 @@ class DisagreementError(ArithmeticError):
 
 
 def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport:
-    """Measure everything on a problem.
-
-    Raises:
-        DisagreementError: its two references differ by more than they may.
-    """
+    """Measure everything on a problem; a `DisagreementError` if its references differ too much."""
     first, second = problem.reference, _second_reference(problem)
     model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     drivers = problem.search and driving_force(model, problem.scenario)
@@ -125,11 +117,7 @@ def _costs(
 
 
 def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorLine:
-    """Run a problem and compare it with its reference.
-
-    Raises:
-        ValueError: the timestep (s) does not divide the sampling interval.
-    """
+    """Run a problem with a timestep (s) that divides the sample; its errors and drifts."""
     model = compile_model(problem.mjcf, integrator, timestep)
     run = simulate(problem, model)
     run_errors = Errors(None, None, None)
@@ -203,8 +191,7 @@ def closed_motion(
 ) -> tuple[Problem, Motion]:
     """The hard case that a scenario names, and its motion from where the scene begins.
 
-    Raises:
-        SceneError: the scene begins otherwise than the hard case, but for the place of free bodies.
+    A `SceneError` where that differs from where the case begins, but for places of free bodies.
     """
     problem, place = all_problems()[declaration.closed_form], declaration.place("reference")
     case_model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)

@@ -1,8 +1,5 @@
 """The references that a scene's motion is measured against, and how well they are known.
 
-Entry points: `find_reference(model, pilot)`, the reference of a scene; `find_references(model,
-pilot)`, by cone where something touches; `find_conserved(…)`.
-
 1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; DOP853 does it
    again. Their difference bounds the error of the reference. Both take the same accelerations, so
    the engine in ever smaller steps must tend to the same motion.
@@ -113,11 +110,7 @@ class KnownMotion(Struct, frozen=True):
 
 
 def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMotion:
-    """The reference of a scene.
-
-    Raises:
-        SceneError: the scenario names a closed form that is not this scene's.
-    """
+    """The reference of a scene; a `SceneError` where a closed form is not this scene's."""
     reference = _find_computed(model, pilot, quick=quick)
     declaration = pilot.scene.declaration
     if declaration.closed_form:
@@ -169,11 +162,7 @@ def find_nearby(
 
 
 def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
-    """The reference without closed forms: an integration, or the engine in small steps.
-
-    Raises:
-        SceneError: the scenario wants an integration, and there is none.
-    """
+    """The reference without closed forms: an integration, or the engine in small steps."""
     declaration = pilot.scene.declaration
     reference, note = None, ""
     if pilot.smooth and declaration.reference != "self":
@@ -204,11 +193,7 @@ def _check_exact(
     *,
     quick: bool,
 ) -> Sizes:
-    """How well a course's exact motion, given with its name, is known where no integration says it.
-
-    Raises:
-        SceneError: it is not the motion of the scene.
-    """
+    """How well a course's exact motion, with its name, is known where no integration says it."""
     exact, name = named_exact
     subject, gap = f"{name} is not this scene's motion", _gap(model, states, second.states)
     precision = pilot.scene.declaration.precision or PRECISION
@@ -280,7 +265,6 @@ def _no_integration(reason: str, declaration: DeclaredScenario) -> SceneError:
 
 
 def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
-    """Integrate the engine's accelerations by two methods."""
     times = pilot.setup.scenario.times
     times = times[times <= pilot.horizon * (1 + 1e-9)]
     variant = with_integrator(model, Integrator.EULER, _STEP)
@@ -322,7 +306,6 @@ def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
 
 
 def _with_duration(setup: Setup, duration: float) -> Setup:
-    """The same with another duration (s), a multiple of the sample."""
     return replace(setup, scenario=replace(setup.scenario, duration=duration))
 
 
@@ -422,9 +405,8 @@ def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[st
 def find_conserved(model: Any, pilot: Pilot, reference: KnownMotion) -> tuple[float | None, bool]:
     """What the author says is conserved, or else what the reference conserves.
 
-    Returns:
-        The scale for changes of energy, J, or `None` where energy is not conserved; whether the
-        angular momentum about the centre of mass is.
+    The scale for changes of energy, J, or `None` where energy is not conserved; and whether the
+    angular momentum about the centre of mass is.
     """
     scenario = pilot.scene.scenario
     conserved = pilot.scene.declaration.conserved

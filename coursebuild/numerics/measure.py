@@ -1,10 +1,5 @@
 """The errors of a motion against its reference, the orders that they show, drifts, and contacts.
 
-Entry points: `errors`, `largest_errors`, `fit_orders`; `energy_drift`, `momentum_drift`,
-`mean_energy`; from the states of a scene `visible_error(model, scene, states, exact)`,
-`find_sticks` and `measure_slip`; `quantity_name`, `quantity_values`, of what a scenario declares to
-be measured.
-
 1. Errors of position, attitude and velocity stand apart, each at its largest and at the end: RK4 is
    of fourth order in velocity and of second in attitude.
 2. No error is given below ten times the floor, by which the reference itself may be off.
@@ -13,9 +8,8 @@ be measured.
    those errors lie on a line, in a logarithmic plot. Where slopes still tend somewhere, the
    interval holds that limit too.
 4. In the reference, two geoms stick to each other between two samples where a point in which they
-   touch hardly moves along the surface, at both of them. A body that rolls sticks too.
-5. In another run the speed of that point along the surface, added up over the same time, is creep:
-   by the solver, by soft contact, or by the timestep.
+   touch hardly moves along the surface, at both of them. A body that rolls sticks too. In another
+   run the speed of that point along the surface, added up over the same time, is creep.
 """
 
 from __future__ import annotations
@@ -98,17 +92,11 @@ def largest_errors(motion_errors: Errors) -> Sizes:
 def fit_order(
     timesteps: Sequence[float], errors: Sequence[float], floor: float, extent: float = 1.0
 ) -> FittedOrder | None:
-    """The order that errors at timesteps (s) show.
+    """The order that errors at timesteps (s), in any order, show.
 
-    Args:
-        timesteps: in any order.
-        errors: one for each timestep.
-        floor: how far the reference may be off, in the unit of the errors.
-        extent: how much the motion changes, to know which errors are small.
-
-    Returns:
-        `None` where fewer than four errors are between a hundred floors and a tenth of 1 and of the
-        extent, or where they do not lie on a line: there is no order to be told then.
+    `floor` is how far the reference may be off, and `extent` how much the motion changes, in the
+    unit of the errors. `None` where fewer than four errors are between a hundred floors and a tenth
+    of 1 and of the extent, or where they do not lie on a line: there is no order to be told then.
     """
     from scipy.special import stdtrit
 
@@ -139,10 +127,7 @@ def fit_orders(
     floor: Sizes,
     extent: Sizes = _UNIT_SIZES,
 ) -> OrderRow:
-    """Orders of an integrator, from its timesteps (s) and errors there; lost runs do not count.
-
-    `floor` and `extent` as for `fit_order`.
-    """
+    """Orders of an integrator, from its timesteps (s) and errors there; lost runs do not count."""
 
     def fit(part: str) -> FittedOrder | None:
         pairs = [
@@ -163,10 +148,7 @@ def fit_scene_orders(
     states: EngineStates,
     floor: Sizes,
 ) -> tuple[OrderRow, ...]:
-    """The orders of all integrators in a scene, under the solver of its own setting.
-
-    `states` and `floor` are those of the reference.
-    """
+    """The orders of all integrators in a scene, under the solver of its own setting."""
     motion = motion_of(model, states)
     angles = angular_distance(motion.attitude[:1], motion.attitude)
     extent = Sizes(
@@ -182,9 +164,9 @@ def fit_scene_orders(
 
 
 def energy_drift(energy: Array, scale: float | None = None) -> float | None:
-    """The largest change of potential and kinetic energy together, with its sign.
+    """The largest change of potential and kinetic energy (n, 2), J, together, with its sign.
 
-    `energy`: both (n, 2), J. Relative to `scale`, J; without one to `energy_scale`.
+    It is relative to `scale`, J, or else to `energy_scale`.
     """
     whole = energy.sum(axis=1)
     if scale is None:

@@ -1,8 +1,5 @@
 """A first run of a scene in small steps: what acts in it, its bounds, and the settings to measure.
 
-Entry points: `run_pilot(model, scene)`; `settings(model, pilot)`, which are measured in a scene,
-`own_setting`, `apply`; `nudges`, of starts nearby.
-
 1. Every step is observed: a contact, a limit that is reached or dry friction makes accelerations
    jump, so that errors follow no power of the timestep and no smooth integration applies.
 2. Eight twins begin 1e-10 away, in four directions, to both sides. Where the first of them is off
@@ -86,11 +83,7 @@ class Pilot(Struct, frozen=True):
 
 
 def run_pilot(model: Any, scene: Scene) -> Pilot:
-    """Run a scene at its shortest timestep under its own integrator.
-
-    Raises:
-        SceneError: it diverges even there.
-    """
+    """Run a scene at its shortest timestep; a `SceneError` says that it diverges even there."""
     step, scenario = min(scene.timesteps), scene.scenario
     variant = without_sleep(with_integrator(model, integrator_of(model), step))
     variant.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
@@ -190,7 +183,6 @@ class _Observer:
         self._limited, self._range = _limited_activations(model)
 
     def __call__(self, data: Any) -> None:
-        """Note what acts in this state."""
         if data.nefc:
             self.constrained = True
             self.limit = self.limit or data.nl > 0
@@ -227,10 +219,7 @@ def _limited_activations(model: Any) -> tuple[Any, Array]:
 
 
 def _twins(model: Any, scenario: Scenario, units: Array) -> tuple[list[Any], list[float]]:
-    """Copies of the beginning, nudged in positions and velocities, always in the same ways.
-
-    Also how far each is off, in `units`.
-    """
+    """Copies of the beginning, nudged always in the same ways; how far each is off, in `units`."""
     twins, distances = [], []
     for position, velocity in nudges(model, 2 * _DIRECTIONS, NUDGE):
         twin = initial_data(scenario, model)

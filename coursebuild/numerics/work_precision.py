@@ -1,16 +1,9 @@
 """Speed against error of a model in its scenarios.
 
-Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
-
-1. A first run in small steps shows what acts in a scenario and how long its motion can be
-   predicted (`pilot`).
-2. The reference is computed twice, in two ways (`known_motion`).
-3. Every setting is run, judged and compared, then timed beside the model's own (`costs`). The
-   error of a lost run is not given; no other is below ten floors of the reference. Errors count to
-   the horizon, and what should be conserved is watched to the end. Errors are also given as a
-   learner sees them: how far bodies are displaced or turned in a picture, where 1 is just visible.
-4. Orders are fitted, stability limits looked for, the front drawn. What a verdict says has to hold
-   from starts nearby.
+Every setting is run, judged and compared, then timed beside the model's own. The error of a lost
+run is not given; no other is below ten floors of the reference. Errors count to the horizon, and
+what should be conserved is watched to the end. Errors are also given as a learner sees them: how
+far bodies are displaced or turned in a picture, where 1 is just visible.
 """
 
 from __future__ import annotations
@@ -124,15 +117,9 @@ def measure_scenario(
 ) -> ScenarioReport:
     """Measure a model (`mjModel`) in one of its scenarios.
 
-    Args:
-        model: compiled; it is not changed.
-        scene: the scenario.
-        quick: fewer timesteps, fewer repeats.
-        clock: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
-        tell: gets a line about each stage.
-
-    Raises:
-        SceneError: the scenario does not fit the model, or diverges at every timestep.
+    `clock`: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
+    `tell` gets a line about each stage. A `SceneError` where the scenario does not fit the model,
+    or diverges at every timestep.
     """
     tell(f"{scene.name}: a first run")
     pilot = run_pilot(model, scene)
@@ -200,7 +187,7 @@ def measure_scenario(
 def _measure_settings(
     basis: Basis, choices: Sequence[MeasuredSetting], tell: Callable[[str], None]
 ) -> list[tuple[WorkPrecisionRow, bool | None]]:
-    """The rows of settings in their order, and what is noticed of each.
+    """The rows of settings, and what is noticed of each.
 
     What changes no bit at the own timestep is not crossed with others.
     """
@@ -284,7 +271,6 @@ def _notes(
     cost_of: MeasuredSetting | None,
     compared_quantity: Quantity,
 ) -> tuple[str, ...]:
-    """Remarks for reading the figures."""
     model, pilot, reference = basis.model, basis.pilot, basis.reference
     notes = [reference.note]
     if cost_of is not None:
@@ -400,7 +386,6 @@ def _measure_setting(
 def _with_errors(
     basis: Basis, row: WorkPrecisionRow, run: Run
 ) -> tuple[WorkPrecisionRow, bool | None]:
-    """Add the errors of a run that went well."""
     model, scene, cone = basis.model, basis.pilot.scene, basis.cones[row.setting.cone]
     reference = cone.reference
     states = run.states.head(len(reference.states.times))

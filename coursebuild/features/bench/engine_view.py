@@ -1,7 +1,4 @@
-"""The report on a model in other engines as pages show it.
-
-Entry points: `engine_view(words, scenario, report)`; `engine_plots(name, scenario)`.
-"""
+"""The report on a model in other engines as pages show it."""
 
 from __future__ import annotations
 

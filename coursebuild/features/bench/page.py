@@ -1,11 +1,6 @@
 """Recorded reports as pages show them: on the page of a model, and in a text.
 
-Entry points: `measurements_view(library, place, model)`, `draw_measurements`, `measurement_facts`;
-of a block `bench_view`, the values that a page needs, `draw_bench`, `bench_markdown`,
-`index_bench`.
-
-A block shows the same as the page of the model. For what is missing, or does not fit the course,
-the page shows the command that measures it.
+For what is missing, or does not fit the course, a block shows the command that measures it.
 """
 
 from __future__ import annotations

@@ -1,9 +1,4 @@
-"""The report on a scenario as pages show it: the page of a model, and a lesson's `bench`.
-
-Entry points: `scenario_view(words, report, anchor)`, `plots`; `orders_table`, and
-`integrator_table`, of what else is known of integrators; `stable_title`, `stable_cells` and
-`stable_again`, for largest stable timesteps; `lost_runs`.
-"""
+"""The report on a scenario as pages show it: the page of a model, and a lesson's `bench`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The values for the page of the hard cases.
-
-Entry points: `numerics_values(library)`; `case_view`, of one case.
-"""
+"""The values for the page of the hard cases."""
 
 from __future__ import annotations
 
@@ -116,10 +113,7 @@ def numerics_values(library: Library) -> dict[str, object]:
 
 
 def _tables(groups: Sequence[CaseGroup]) -> Iterator[tuple[str, int, list[list[CaseView]]]]:
-    """The tables of all cases: a name, the column of `matrix`, and by group the cases with cells.
-
-    A table without a case is none.
-    """
+    """The tables of all cases: name, column of `matrix`, and by group the cases with cells."""
     for column, name in enumerate(("order", "largest", "cost")):
         bodies = [[case for case in group.cases if any(case.matrix[column])] for group in groups]
         if any(bodies):

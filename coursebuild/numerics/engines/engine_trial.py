@@ -1,14 +1,10 @@
 """What an engine is asked in a child process: one motion, and what a step of many worlds costs.
 
-Entry points: `Engine`, the table that an engine's module fills in; `Variant`, `EngineTrial`;
-`begin(engine, …)`, then `run_motion(batch, trial)` and `run_costs(batch, trial, clock)`.
-
-1. The motion begins as the scenario does, in one world, and is looked at where the reference is.
-2. The worlds of a batch begin a little apart, so that they do not all take the same branches.
-3. Steps are timed beside MuJoCo's own, in the same process and in turn: what slows the machine for
+1. The worlds of a batch begin a little apart, so that they do not all take the same branches.
+2. Steps are timed beside MuJoCo's own, in the same process and in turn: what slows the machine for
    a while slows both, and their ratio holds. Time is that of the wall, since engines use threads or
    another device.
-4. The first step compiles; how much longer it takes than the second one is told apart.
+3. The first step compiles; how much longer it takes than the second one is told apart.
 """
 
 from __future__ import annotations
@@ -167,11 +163,7 @@ def _finite(table: Array) -> list[list[float | None]]:
 
 
 def run_costs(batch: Batch, trial: EngineTrial, clock: Clock) -> EngineCost:
-    """What a step of one world costs among those of a batch.
-
-    Raises:
-        RefusalError: it takes too long to be timed.
-    """
+    """What a step of one world costs among a batch; a `RefusalError` where it takes too long."""
     model, worlds, count = batch.model, batch.worlds, batch.count
     until = trial.scenario.holds()[0][1]  # until the command changes
     most = round(until / float(model.opt.timestep))

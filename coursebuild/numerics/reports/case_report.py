@@ -1,9 +1,4 @@
-"""The report on a hard case, and its plots.
-
-Entry points: `CaseReport`; `case_quantities(report)`, the errors to draw, and `case_svgs(report,
-quantity, name)`; `course_cases(report)`, the hard cases of a course's own: scenarios of
-models whose exact motion stands in `exact_file`.
-"""
+"""The report on a hard case, or on a scenario of the course whose exact motion is known."""
 
 from __future__ import annotations
 
@@ -103,8 +98,7 @@ class CaseReport(Record, frozen=True):
     def cost_to(self, integrator: str, error: float) -> float | None:
         """The same for the timestep with a given error, m or rad; `None` where no run is as good.
 
-        Between two runs the cost follows a power of the error. Beyond the longest timestep nothing
-        is extrapolated.
+        Between two runs the cost follows a power of the error. Nothing is extrapolated.
         """
         runs = sorted(
             (cost.value, max(pair[0] for pair in places))
@@ -183,10 +177,7 @@ def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:
 
 
 def case_svgs(report: CaseReport, quantity: Quantity, name: str) -> tuple[str, ...]:
-    """The plots of an error against processor time, where it was measured, and evaluations.
-
-    As `svg` elements; `name` is unique among the plots on the page.
-    """
+    """The plots of an error against processor time, where it was measured, and evaluations."""
     svgs = (
         _case_svg(report, quantity, work, f"{name}{suffix}")
         for work, suffix in (("processor time", ""), (EVALUATION_LABEL, "-evaluations"))

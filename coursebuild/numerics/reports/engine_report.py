@@ -1,7 +1,4 @@
-"""The report on a model in other engines: error, drift, and cost of a step by the number of worlds.
-
-Entry points: `EngineReport`; `row_name(row)`; `engine_chart(report)`, the plot of costs.
-"""
+"""The report on a model in other engines: error, drift, and cost of a step by number of worlds."""
 
 from __future__ import annotations
 

@@ -1,19 +1,13 @@
 """Reports as files of the course, `content/reports/…`, and how a new measurement differs from them.
 
-Entry points: `BENCH`, `ENGINES`, `DIET` and `STABILITY`, each a `ReportKind` that encodes and
-decodes its files; `RecordError`, for files that are no report; `scene_departures(record,
-measurement, bench)` and `case_departures`, the figures that left their band about the recorded
-ones.
-
-1. A file begins with its kind and the version of its format: `{"holds": …, "form": …, …}`.
-2. Keys are sorted, and every measured row is a line, so that a difference between two versions of a
+1. Keys are sorted, and every measured row is a line, so that a difference between two versions of a
    file says what changed. The same report gives the same bytes.
-3. Reading is strict: a file that lacks a field, has one more, or points at a row that is not there
+2. Reading is strict: a file that lacks a field, has one more, or points at a row that is not there
    was not written by this tool.
-4. Figures of accuracy are compared; times, and what follows from them, never are. An error has left
+3. Figures of accuracy are compared; times, and what follows from them, never are. An error has left
    its band when it differs from the recorded one by more than the band's share of it and ten floors
    of the reference: smaller differences come from the reference, or rounding.
-5. Drifts, depths and slips are those of the whole scenario. Where it is chaotic, they are not
+4. Drifts, depths and slips are those of the whole scenario. Where it is chaotic, they are not
    compared: rounding alone changes them. Words and flags must be as they were.
 """
 
@@ -92,11 +86,7 @@ class ReportKind(Struct, Generic[_T], frozen=True):
         return (_text(msgspec.to_builtins(value, order="sorted"), 0, 0) + "\n").encode()
 
     def decode(self, data: bytes, model: str = "") -> _T:
-        """Read a file; the report must be about this model, if one is named.
-
-        Raises:
-            RecordError: it holds no such report.
-        """
+        """Read a file; a `RecordError` where it holds no such report, of this model if any."""
         fields = [("holds", str), ("form", int), (self.field, self.type)]
         file = msgspec.defstruct("File", fields, forbid_unknown_fields=True)
         report: _T = getattr(_decode(data, f"coursebuild {self.name}", file), self.field)
@@ -174,7 +164,6 @@ def _text(value: Any, indent: int, lists: int) -> str:
 
 
 def _is_row(value: dict[str, Any], lists: int) -> bool:
-    """Whether an object is a line of a table."""
     if lists >= 2:
         return True
     return not any(isinstance(item, dict | list | tuple) and item for item in value.values()) and (
@@ -339,10 +328,9 @@ def _error(name: str, error: tuple[float, float] | None, share: float, least: fl
 def _run(
     run: MeasuredRun, share: float, place: float, speed: float, *, predictable: bool
 ) -> _Figures:
-    """The figures of a run.
+    """The figures of a run, with the floors of errors of places and velocities.
 
-    `place`, `speed`: the floors of errors of places and velocities. `predictable`: whether the
-    reference reaches the end.
+    `predictable`: whether the reference reaches the end.
     """
     figures = {"status": _Figure(status_text(run.status)), "refsafe": _Figure(run.refsafe)}
     for part, least in zip(_PARTS, (place, place, speed), strict=True):

@@ -1,10 +1,7 @@
 """The child process in which an engine runs: a crash or a hang takes nothing else along.
 
-Entry point: run as a file by `engines`, in a temporary folder, where engines leave what they
-compile.
-
-The protocol: JSON lines. First this process says that it is ready. A request is a module of engines
-with the name of one, and what to do; the reply has the result, or says why there is none.
+It is run as a file in a temporary folder, where engines leave what they compile. The protocol is
+JSON lines: first this process says that it is ready, then it replies to each request.
 """
 
 from __future__ import annotations

@@ -1,14 +1,8 @@
 """`coursebuild bench --engines`: the course's models in other engines.
 
-Entry points: `run_engines(arguments)`; `chosen_engines(text)`, of the option;
-`bench_engines(options, names, engines, …)`; `engines_text(reports, style)`.
-
-1. Without names, all engines whose packages are installed are measured, and what is missing is
-   said.
-2. An engine runs in a process of its own for each of its variants. If that dies or takes too long,
-   its row says so, and the others go on.
-3. An engine that refuses a model has a row with its own words.
-4. Four thousand worlds are not tried where 64 say that they would take too long.
+An engine runs in a process of its own for each of its variants: if that dies, takes too long or
+refuses the model, its row says so, and the others go on. Four thousand worlds are not tried where
+64 say that they would take too long.
 """
 
 from __future__ import annotations
@@ -116,11 +110,8 @@ def chosen_engines(
 ) -> tuple[tuple[ChosenEngine, ...], tuple[str, ...]]:
     """The engines that an option names; if it is empty, all that are installed.
 
-    The second is a remark about each that is not installed, where none was named.
-
-    Raises:
-        UsageError: there is no such engine.
-        EffectError: its package is not installed.
+    The second is a remark about each that is not installed, where none was named. An `EffectError`
+    where the package of one that was named is missing.
     """
     engines = {
         name: ChosenEngine(name, module, engine)
@@ -160,13 +151,7 @@ def bench_engines(
     record: bool = False,
     seconds: float = SECONDS,
 ) -> Measurement[EngineReport]:
-    """Measure the models that the names mean in other engines; without names, all.
-
-    `record`: each model's report is also written into the course.
-
-    Raises:
-        UsageError: no model is called so, or only a part is to be recorded.
-    """
+    """Measure the models that the names mean in other engines; with `record` into the course."""
     if record:
         forbid_quick("--record", quick=quick)
     scenes = find_scenes(options.root, names)

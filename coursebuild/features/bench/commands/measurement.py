@@ -1,10 +1,4 @@
-"""How `bench`, `stability` and `diet` measure, and what they print and record.
-
-Entry points: `add_report_options`, `run_measurement`, of their arguments; `MeasuringRun`, which
-makes a `Measurement`, `CannotMeasureError`, `write_records`; `measurement_text`,
-`measurement_json`, `failure_text`, `format_checks`; for what pages show of reports `english`,
-`plain_text`, `grid_lines`.
-"""
+"""How `bench`, `stability` and `diet` measure, and what they print and record."""
 
 from __future__ import annotations
 
@@ -273,7 +267,7 @@ class MeasuringRun:
 
 
 def read_task(data: bytes, *, timed: bool = True) -> tuple[tuple[Any, ...], Machine] | None:
-    """The task that another process has sent, and its machine, of which times have to be true.
+    """The task that another process has sent, and its machine.
 
     `None` if it is to be timed, and this is another machine than that.
     """
@@ -287,11 +281,7 @@ def read_task(data: bytes, *, timed: bool = True) -> tuple[tuple[Any, ...], Mach
 
 
 def forbid_quick(option: str, *, quick: bool) -> None:
-    """Forbid `--quick` with an option for full measurements.
-
-    Raises:
-        UsageError: `quick` is set.
-    """
+    """Forbid `--quick` with an option for full measurements, by a `UsageError`."""
     if quick:
         raise UsageError(
             f"{option} cannot be combined with --quick: recorded measurements are complete"
@@ -311,7 +301,6 @@ def write_records(
 
 
 def _write_record(root: Path, path: str, data: bytes) -> str | ReportFailure:
-    """Write a report, and say what was done, or why it cannot be done."""
     try:
         target = resolve_inside(root, path)
         before = target.read_bytes() if target.exists() else None
