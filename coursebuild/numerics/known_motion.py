@@ -29,15 +29,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.core.text.source import Span
+from coursebuild.numerics import integrate
 from coursebuild.numerics.cases import closed_motion, floor
-from coursebuild.numerics.integrate import (
-    Method,
-    NoConvergenceError,
-    bulirsch_stoer,
-    dop853,
-    forward_states,
-    tends_to,
-)
 from coursebuild.numerics.measure import (
     Sticks,
     energy_drift,
@@ -168,12 +161,12 @@ def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
     if pilot.smooth and declaration.reference != "self":
         try:
             reference = _integrate(model, pilot, quick)
-        except NoConvergenceError as error:
+        except integrate.NoConvergenceError as error:
             note = f"no integration: {error}"
         if reference is not None:
             setup = _with_duration(pilot.setup, float(reference.states.times[-1]))
             states, step = reference.states, min(pilot.scene.timesteps)
-            if not tends_to(model, setup, states, step, PARTING_DISTANCE):
+            if not integrate.tends_to(model, setup, states, step, PARTING_DISTANCE):
                 reference, note = None, f"no integration: {_TENDS_ELSEWHERE}"
         if reference is None and note.endswith(_TENDS_ELSEWHERE) and declaration.reference == "ode":
             raise _no_integration(_TENDS_ELSEWHERE, declaration)
@@ -274,12 +267,14 @@ def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
     variant.actuator_actearly[:] = 0  # it looks ahead by a timestep, which tends to nothing
     most = QUICK_EVALUATIONS if quick else EVALUATIONS
 
-    def run(method: Method) -> EngineStates:
-        return forward_states(variant, pilot.scene.scenario, times, method, evaluations=most)
+    def run(method: integrate.Method) -> EngineStates:
+        return integrate.forward_states(
+            variant, pilot.scene.scenario, times, method, evaluations=most
+        )
 
-    states = run(partial(bulirsch_stoer, tolerance=1e-13))
+    states = run(partial(integrate.bulirsch_stoer, tolerance=1e-13))
     source = "Bulirsch–Stoer over mj_forward"
-    second_states, second = run(dop853), "DOP853 over mj_forward"
+    second_states, second = run(integrate.dop853), "DOP853 over mj_forward"
     return _combine(model, "ode", source, states, second, second_states)
 
 

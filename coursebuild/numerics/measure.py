@@ -24,14 +24,7 @@ import numpy as np
 
 from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.problem import STANDARD, Array, Integrator, Motion, Reference, Sizes
-from coursebuild.numerics.reports.scene_report import (
-    FLOORS,
-    Errors,
-    FittedOrder,
-    MeasuredSetting,
-    OrderRow,
-    WorkPrecisionRow,
-)
+from coursebuild.numerics.reports import scene_report
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.simulation import (
     EngineStates,
@@ -62,7 +55,7 @@ def reference_motion(reference: Reference, times: tuple[float, ...]) -> Motion:
     return reference.solution.motion(np.array(times))
 
 
-def errors(motion: Motion, exact: Motion, floor: Sizes = _ZERO_SIZES) -> Errors:
+def errors(motion: Motion, exact: Motion, floor: Sizes = _ZERO_SIZES) -> scene_report.Errors:
     """The errors of a motion against an exact one at the same times; none is below ten floors."""
     displacements, speed_differences = (
         motion.position - exact.position,
@@ -71,10 +64,10 @@ def errors(motion: Motion, exact: Motion, floor: Sizes = _ZERO_SIZES) -> Errors:
     angles = angular_distance(exact.attitude, motion.attitude)
 
     def pair(distances: Array, floor: float) -> tuple[float, float]:
-        least = FLOORS * floor
+        least = scene_report.FLOORS * floor
         return max(float(np.max(distances)), least), max(float(distances[-1]), least)
 
-    return Errors(
+    return scene_report.Errors(
         pair(np.linalg.norm(displacements, axis=1), floor.position) if displacements.size else None,
         pair(np.max(angles, axis=1), floor.attitude) if angles.size else None,
         pair(np.linalg.norm(speed_differences, axis=1), floor.velocity)
@@ -83,7 +76,7 @@ def errors(motion: Motion, exact: Motion, floor: Sizes = _ZERO_SIZES) -> Errors:
     )
 
 
-def largest_errors(motion_errors: Errors) -> Sizes:
+def largest_errors(motion_errors: scene_report.Errors) -> Sizes:
     """The largest error of each part; 0 for a part that is missing."""
     parts = (motion_errors.position, motion_errors.attitude, motion_errors.velocity)
     return Sizes(*(0.0 if part is None else part[0] for part in parts))
@@ -91,7 +84,7 @@ def largest_errors(motion_errors: Errors) -> Sizes:
 
 def fit_order(
     timesteps: Sequence[float], errors: Sequence[float], floor: float, extent: float = 1.0
-) -> FittedOrder | None:
+) -> scene_report.FittedOrder | None:
     """The order that errors at timesteps (s), in any order, show.
 
     `floor` is how far the reference may be off, and `extent` how much the motion changes, in the
@@ -117,19 +110,19 @@ def fit_order(
     finest, finer, fine = slopes[:3].tolist()
     if (finer - finest) * (fine - finer) > 0:  # not noise: they tend to a slope beyond the finest
         uncertainty = max(uncertainty, abs(slope - finest) + _BEYOND * abs(finer - finest))
-    fit = FittedOrder(slope, uncertainty, float(np.ptp(slopes)))
+    fit = scene_report.FittedOrder(slope, uncertainty, float(np.ptp(slopes)))
     return fit if fit.uncertainty <= _UNCERTAIN and fit.bend <= _BENT else None
 
 
 def fit_orders(
     integrator: str,
-    runs: Sequence[tuple[float, Errors]],
+    runs: Sequence[tuple[float, scene_report.Errors]],
     floor: Sizes,
     extent: Sizes = _UNIT_SIZES,
-) -> OrderRow:
+) -> scene_report.OrderRow:
     """Orders of an integrator, from its timesteps (s) and errors there; lost runs do not count."""
 
-    def fit(part: str) -> FittedOrder | None:
+    def fit(part: str) -> scene_report.FittedOrder | None:
         pairs = [
             (h, pair[0])
             for h, run_errors in runs
@@ -138,16 +131,16 @@ def fit_orders(
         steps, errors = [h for h, _ in pairs], [error for _, error in pairs]
         return fit_order(steps, errors, getattr(floor, part), getattr(extent, part))
 
-    return OrderRow(integrator, fit("position"), fit("attitude"), fit("velocity"))
+    return scene_report.OrderRow(integrator, fit("position"), fit("attitude"), fit("velocity"))
 
 
 def fit_scene_orders(
     model: Any,
-    rows: Iterable[WorkPrecisionRow],
-    baseline: MeasuredSetting,
+    rows: Iterable[scene_report.WorkPrecisionRow],
+    baseline: scene_report.MeasuredSetting,
     states: EngineStates,
     floor: Sizes,
-) -> tuple[OrderRow, ...]:
+) -> tuple[scene_report.OrderRow, ...]:
     """The orders of all integrators in a scene, under the solver of its own setting."""
     motion = motion_of(model, states)
     angles = angular_distance(motion.attitude[:1], motion.attitude)
@@ -156,7 +149,7 @@ def fit_scene_orders(
         float(angles.max(initial=0.0)),
         float(np.linalg.norm(np.ptp(motion.velocity, axis=0))),
     )
-    runs: dict[str, list[tuple[float, Errors]]] = {name.value: [] for name in STANDARD}
+    runs: dict[str, list[tuple[float, scene_report.Errors]]] = {name.value: [] for name in STANDARD}
     for row in rows:
         if row.setting.solver_settings == baseline.solver_settings:
             runs[row.setting.integrator].append((row.setting.timestep, row))
@@ -308,10 +301,12 @@ def least_known(
     model: Any, scene: Scene, states: EngineStates, second_states: EngineStates
 ) -> tuple[float, float]:
     """Below which two references know nothing of what is seen, and of the declared quantity."""
-    least_seen = FLOORS * visible_error(model, scene, states, second_states)
+    least_seen = scene_report.FLOORS * visible_error(model, scene, states, second_states)
     if not quantity_name(model, scene):
         return least_seen, 0.0
-    return least_seen, FLOORS * float(quantity_errors(model, scene, states, second_states).max())
+    return least_seen, scene_report.FLOORS * float(
+        quantity_errors(model, scene, states, second_states).max()
+    )
 
 
 Pair: TypeAlias = tuple[int, int]

@@ -284,7 +284,7 @@ def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
         lines = [style.paint(report.name, BOLD) + f"  {number}{report.title}"]
         for text in (*view.sentences, *view.notes):
             lines += style.wrap(plain_text(text), "  ")
-        for block in (*(grid_lines(grid, style) for grid in view.grids), _errors(report)):
+        for block in (*(grid_lines(grid, style) for grid in view.tables), _errors(report)):
             lines += ["", *(f"  {line}".rstrip() for line in block)] if block else []
         texts.append("\n".join(lines) + "\n")
     return "\n".join(texts)

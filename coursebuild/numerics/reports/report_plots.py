@@ -1,4 +1,4 @@
-"""The plots of reports on models as SVG: error against work, of a scenario, and sweeps.
+"""The plots of reports on models as SVG: error against work, of a scenario, sweeps, and engines.
 
 1. A line for each integrator goes from long timesteps to short ones, over those rows that have the
    scene's own solver, iterations and cone; the rows with others are small marks beside it. A mark
@@ -44,6 +44,7 @@ from coursebuild.numerics.reports.chart import (
     symbol,
     symbols,
 )
+from coursebuild.numerics.reports.engine_report import EngineScenario, row_name
 from coursebuild.numerics.reports.scene_report import (
     FIGURES,
     ScenarioReport,
@@ -171,17 +172,16 @@ def _find_works(report: ScenarioReport, work: str) -> list[Interval | None]:
     if work == "evaluations":
         return [Interval(n, n, n) for n in (float(row.work) for row in rows)]
     timed = [row for row in rows if row.cost is not None and row.cost.value > 0]
-    return [_cost(row, timed) for row in rows] if timed else []
-
-
-def _cost(row: WorkPrecisionRow, timed: Sequence[WorkPrecisionRow]) -> Interval:
-    """The cost of a row; estimated from its evaluations where it was not timed."""
-    if row in timed and row.cost is not None:
-        return row.cost
-    peers = [peer for peer in timed if peer.setting.integrator == row.setting.integrator] or timed
-    rates = [peer.cost.value / peer.work for peer in peers if peer.cost is not None]
-    value = row.work * statistics.median(rates)
-    return Interval(value, value, value)
+    works: list[Interval | None] = []
+    for row in rows if timed else ():
+        x = row.cost
+        if x is None or not x.value:  # its evaluations say about how much it would be
+            alike = [peer for peer in timed if peer.setting.integrator == row.setting.integrator]
+            rates = [peer.cost.value / peer.work for peer in alike or timed if peer.cost]
+            value = row.work * statistics.median(rates)
+            x = Interval(value, value, value)
+        works.append(x)
+    return works
 
 
 def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
@@ -369,3 +369,31 @@ def _describe_sweep(sweep: SweepReport, figures: Sequence[str]) -> str:
         + "."
         for row in sweep.rows
     )
+
+
+def engine_svg(report: EngineScenario, *, name: str, narrow: bool = False) -> str:
+    """The time of a step by the number of worlds; empty where nothing was timed."""
+    lines = []
+    for number, row in enumerate(report.rows):
+        points = tuple(
+            Point(
+                Interval(cost.worlds, cost.worlds, cost.worlds),
+                cost.seconds.value * 1e6,
+                f"{row_name(row)}, {cost.worlds:,} worlds: {seconds_text(cost.seconds.value, 3)}",
+            )
+            for cost in row.costs
+            if cost.seconds is not None
+        )
+        lines += [Line(row_name(row), number, points)] if points else []
+    text = " ".join(
+        f"{line.name}: {', '.join(point.title.rsplit(', ', 1)[1] for point in line.points)}."
+        for line in lines
+    )
+    chart = Chart(
+        title=f"{report.title or report.name}: time of a step by the number of worlds",
+        text=text,
+        axes=("worlds simulated at once", "time of a step over worlds (µs)"),
+        lines=tuple(lines),
+        marks=(Entry("front", "lowest of at least 8 rounds"),),
+    )
+    return chart_svg(chart, name, NARROW_SIZE if narrow else WIDE_SIZE)
