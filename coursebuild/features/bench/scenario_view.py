@@ -89,8 +89,8 @@ def scenario_view(
             (words("measured.value"), [row.value for row in report.rows]),
             *((name, [cell(row, key) for row in report.rows]) for key, name in FIGURES.items()),
         ]
-        shown = shown_figures(report)
-        minor = tuple(name for key, name in FIGURES.items() if key not in shown)
+        figures = shown_figures(report)
+        minor = tuple(name for key, name in FIGURES.items() if key not in figures)
         own_rows = tuple(n for n, row in enumerate(report.rows) if row.own)
         notes = lost_runs((f"{row.parameter} {row.value}", row) for row in report.rows)
         table = grids.grid(report.title, columns, minor=minor, highlights=own_rows)
