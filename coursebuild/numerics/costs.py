@@ -1,25 +1,16 @@
 """What settings cost, which of them are worth it, and what that says of the scene's own.
 
-Entry points: `time_jobs(jobs, baseline, clock)`; `costs(model, scene, settings, …)`, of settings of
-a scene; `scenario_job(model, scenarios, timestep)`, a model's whole scenarios as a job;
-`mark_luck(rows, …)`, rows that know whether their errors are luck; `verdict(rows, …)`.
-
 1. A job is a scenario from its beginning to its end, so that each setting is timed on its own
    states; what takes little time is repeated.
 2. A round makes every job once, forwards and backwards in turn: what slows the machine for a while
    slows all.
 3. Of the times of each job the lowest tenth counts: it forgets those that were disturbed, and does
    not hang on a single lucky one. Intervals come from rounds drawn again at random (bootstrap).
-4. Rounds go on until all ratios are known well enough, or the time for them is over.
-5. A setting is dominated where another costs no more and errs no more, and is clearly better in one
-   of the two. Costs whose intervals meet do not differ, nor do those within 3 % or errors within
-   5 %.
-6. Only an error that falls as more work is done says what a setting does: one that is smaller than
+4. Only an error that falls as more work is done says what a setting does: one that is smaller than
    that of a shorter timestep, or of more iterations, is luck, and so is one beyond the largest
    stable timestep. An advantage has to hold from starts nearby too.
 
-The clock is an argument: processor time of the thread serves best, since it stands still while
-others run.
+The clock is best the processor time of the thread, which stands still while others run.
 """
 
 from __future__ import annotations
@@ -76,7 +67,7 @@ class Timing(Struct, frozen=True):
 
     @property
     def certain(self) -> bool:
-        """Whether the ratio differs from 1 by more than the measurement's uncertainty."""
+        """Whether the ratio differs from 1 by more than 3 % and the measurement's uncertainty."""
         differs = not self.ratio.low <= 1.0 <= self.ratio.high
         return differs and abs(self.ratio.value - 1.0) > 0.03
 
@@ -108,7 +99,6 @@ def time_jobs(
 
 
 def _count_repeats(job: Job, clock: Clock) -> int:
-    """How often a job must be repeated to take long enough; caches are warm afterwards."""
     times = 1
     while _time_job(job, times, clock) < _SHORTEST and times < 1 << 12:
         times *= 2
@@ -215,12 +205,7 @@ def mark_luck(
 ) -> tuple[WorkPrecisionRow, ...]:
     """Rows that say where their errors are luck.
 
-    They are where more work errs more, and beyond the largest stable timestep.
-
-    Args:
-        rows: of a scenario.
-        limits: the largest stable timesteps (s) under the scene's own solver, by integrator.
-        quantity: the error by which they are compared.
+    `limits`: the largest stable timesteps (s) under the scene's own solver, by integrator.
     """
     own_setting = next(row.setting for row in rows if row.own)
     marked_rows = []
@@ -258,12 +243,8 @@ def verdict(
 ) -> RowVerdict:
     """The verdict on the scene's own setting.
 
-    Args:
-        rows: of a scenario; they know their place.
-        noticeable: whether a learner sees the error of a row; `None` where that is not known.
-        quantity: the error by which settings are compared.
-        holds: whether the advantage of another setting holds from starts nearby too.
-        horizon_error: the error at which predictions of a chaotic scene end, in words.
+    `noticeable`: whether a learner sees the error of each row; `None` where that is not known.
+    `holds`: whether the advantage of another setting holds from starts nearby too.
     """
     own_index = next(number for number, row in enumerate(rows) if row.own)
     row, is_noticeable = rows[own_index], noticeable[own_index]
@@ -317,7 +298,6 @@ def verdict(
 
 
 def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
-    """The verdict on a chaotic scene: how long each setting stays near the exact motion."""
     text = f"the motion is chaotic: it is {error} from the exact one at {row.parted:.3g} s"
     parted = [(r.parted, n) for n, r in enumerate(rows) if r.parted is not None]
     whole = [r for r in rows if r.status == "ok" and r.parted is None and r.seen is not None]
@@ -341,7 +321,6 @@ def _cheapest_unseen(rows: Rows, own_cost: float, *, hopeless: bool) -> str:
 
 
 def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> RowVerdict:
-    """The verdict on a scene that does not run under its own setting: what does."""
     text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
     text += "; ".join(row.reasons)
     candidates = [(p, n) for n, r in enumerate(rows) if r.front and (p := front_point(r, quantity))]

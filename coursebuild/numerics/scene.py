@@ -1,7 +1,5 @@
 """A model in one of its scenarios, with everything that its author left out filled in.
 
-Entry points: `scenes(model, declarations, quick)`, `Scene`.
-
 1. Without declarations each keyframe is a scenario; without a keyframe, the model's own state.
 2. Times are whole numbers of the model's own timestep: a sample is some of them, a hold and the
    duration are some samples.
@@ -94,10 +92,7 @@ class Scene(Struct, frozen=True):
 def scenes(model: Any, declarations: Declarations, *, quick: bool = False) -> tuple[Scene, ...]:
     """The scenarios of a model (`mjModel`); none of one in which nothing can move.
 
-    The declarations were checked: the model has what they name, and states have the right size.
-
-    Raises:
-        SceneError: one does not fit the model.
+    A `SceneError` where one does not fit, though the model has what the declarations name.
     """
     if not model.nv:
         if declarations.scenarios:
@@ -114,7 +109,6 @@ def scenes(model: Any, declarations: Declarations, *, quick: bool = False) -> tu
 
 
 def _keyframe_scenarios(model: Any, place: Span) -> tuple[DeclaredScenario, ...]:
-    """The scenarios of a model that declares none."""
     names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
     if not model.nkey:
         return (DeclaredScenario(names[0], "from the model's own state", span=place),)
@@ -168,11 +162,6 @@ def _scene(
 
 
 def _scenario_times(step: float, declaration: DeclaredScenario) -> Scenario:
-    """The times of a scenario, as whole numbers of the model's timestep.
-
-    Raises:
-        SceneError: what is given is no whole number of timesteps.
-    """
     duration, sample, hold = declaration.duration, declaration.sample, declaration.hold
     lengths = (("duration", duration), ("sample", sample), ("hold", hold))
     whole: dict[str, int] = {}
@@ -210,10 +199,7 @@ def _decimal(seconds: float) -> float:
 
 
 def _sample_steps(basis: int, total: int) -> int:
-    """The steps of a sample: a divisor of `basis`, near the usual number of looks.
-
-    Timesteps a few times as long should divide it too.
-    """
+    """A divisor of `basis` near the usual number of looks, which longer timesteps divide too."""
     small = [n for n in range(1, math.isqrt(basis) + 1) if basis % n == 0]
     divisors = {*small, *(basis // n for n in small)}
 

@@ -10,7 +10,6 @@ from coursebuild.numerics.reports.case_report import (
     BoundaryLine,
     CaseReport,
     ErrorLine,
-    FigureLine,
     ReferenceLine,
     StepCost,
 )
@@ -23,7 +22,7 @@ from coursebuild.numerics.reports.diet_report import (
     ModelPlace,
     Saving,
 )
-from coursebuild.numerics.reports.scene_report import OrderRow, SceneCard, SceneReport
+from coursebuild.numerics.reports.scene_report import FigureLine, OrderRow, SceneCard, SceneReport
 from support.bench_reports import FIRST, MACHINE, awkward, swing
 from support.bench_reports import row as row
 from support.bench_reports import scenario as scenario

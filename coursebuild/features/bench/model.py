@@ -1,12 +1,7 @@
 """A recorded report that a text shows: the `bench` fence, read and compared with the course.
 
-Entry points: `Bench`, `declared_scenarios`; `parse_bench`, of a fence; `check_benches`;
-`check_keyframes`, for models that declare no scenarios, whose keyframes are known only once the
-model is compiled.
-
 The first word of a fence is the name of the model, as in a link (`%20` is a space). Keys:
-`scenario=swing` (default: the first), `show="plot,table"` (see `PARTS`), or `sweep=softness`. What
-other engines do, `show=engines`, is a report of its own.
+`scenario=swing` (default: the first), `show="plot,table"` (see `PARTS`), or `sweep=softness`.
 """
 
 from __future__ import annotations

@@ -1,16 +1,11 @@
 """`coursebuild stability`: MuJoCo on hard cases, beside what theory says.
 
-Entry points: `stability(options, names)`, `check_stability`; `stability_text`, what the page of a
-case says, and the errors of its plots.
-
 1. A name means a problem, or a family of them (`damped-spring` is all of its damping ratios), or a
    model of the course whose exact motion it gives, or of which it knows theory: what `bench`
    measures of it is a hard case too.
-2. Measurements are cached by the machine, its versions and the code that measures. `--check`
-   measures again.
-3. All problems are recorded in one file. Where some are named, recording them leaves the others as
+2. All problems are recorded in one file. Where some are named, recording them leaves the others as
    they are, and checking them ignores the others.
-4. Where the two references of a case are further apart than they may be, it is an error, and
+3. Where the two references of a case are further apart than they may be, it is an error, and
    nothing is recorded.
 """
 
@@ -116,13 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
 def stability(
     options: Options, names: tuple[str, ...] = (), *, record: bool = False
 ) -> Measurement[CaseReport]:
-    """Measure the cases of these names, or all without names.
-
-    `record`: also write the measurements into the course.
-
-    Raises:
-        UsageError: no case is called so.
-    """
+    """Measure the cases of these names, or all without names; `record` writes them down."""
     own_models, built_in = _split(options, names)
     problems = _select_problems(built_in) if built_in or not own_models else []
     measurement: Measurement[CaseReport] = Measurement(())
@@ -136,11 +125,7 @@ def stability(
 
 
 def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The names of models of the course, and those of hard cases.
-
-    Raises:
-        UsageError: a model is named of which the course knows nothing in theory.
-    """
+    """The names of models of the course, and those of hard cases."""
     models = tuple(name for name in names if (options.root / f"models/{name}.xml").is_file())
     for scene in find_scenes(options.root, models).value if models else ():
         has_theory = any(scenario.expected for scenario in scene.declarations.scenarios)
@@ -299,7 +284,7 @@ def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
         lines = [style.paint(report.name, BOLD) + f"  {number}{report.title}"]
         for text in (*view.sentences, *view.notes):
             lines += style.wrap(plain_text(text), "  ")
-        for block in (*(grid_lines(grid, style) for grid in view.grids), _errors(report)):
+        for block in (*(grid_lines(grid, style) for grid in view.tables), _errors(report)):
             lines += ["", *(f"  {line}".rstrip() for line in block)] if block else []
         texts.append("\n".join(lines) + "\n")
     return "\n".join(texts)

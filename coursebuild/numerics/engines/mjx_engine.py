@@ -1,7 +1,4 @@
-"""MJX: MuJoCo in JAX, in 32 and in 64 bits, on the processor and on the first device of JAX.
-
-Its implementation in JAX, `impl="jax"`; that in Warp is an engine of its own.
-"""
+"""MJX: MuJoCo in JAX (`impl="jax"`), in 32 and 64 bits, on the processor and JAX's first device."""
 
 from __future__ import annotations
 

@@ -1,18 +1,12 @@
-"""The plots of reports on models as SVG: error against work, of a scenario, and sweeps.
-
-Entry points: `plot_svgs(report, …)`, of a scenario, from `work_precision(report)`;
-`sweep_svg(sweep, …)`.
+"""The plots of reports on models as SVG: error against work, of a scenario, sweeps, and engines.
 
 1. A line for each integrator goes from long timesteps to short ones, over those rows that have the
-   scene's own solver, iterations and cone; the rows with others are small marks beside it.
-2. A mark is filled where the setting is on the Pareto front, and hollow where another one is
-   better. A ring is around the scene's own setting. Bars are the intervals of the costs.
-3. Beside the cost, which is time, work is counted as it is on every machine: in evaluations of the
-   forward dynamics, and in iterations of the solver. Each has a front of its own. The cost of a row
-   that was not timed is estimated from its evaluations.
-4. A sweep has a row for each value, and for each figure a scale beside it. A dot is a figure, a bar
-   its interval; a line joins the values of one parameter, and a ring marks the model's own value. A
-   scale is logarithmic where its figures differ by much.
+   scene's own solver, iterations and cone; the rows with others are small marks beside it. A mark
+   is filled where the setting is on the Pareto front; a ring is around the scene's own.
+2. Beside the cost, which is time, work is counted as it is on every machine: in evaluations of the
+   forward dynamics, and in iterations of the solver. Each has a front of its own.
+3. A sweep has a row for each value, and for each figure a scale beside it, which is logarithmic
+   where its figures differ by much. A line joins the values of one parameter.
 """
 
 from __future__ import annotations
@@ -50,6 +44,7 @@ from coursebuild.numerics.reports.chart import (
     symbol,
     symbols,
 )
+from coursebuild.numerics.reports.engine_report import EngineScenario, row_name
 from coursebuild.numerics.reports.scene_report import (
     FIGURES,
     ScenarioReport,
@@ -76,13 +71,7 @@ from coursebuild.numerics.reports.shown_errors import (
 
 
 def plot_svgs(report: ScenarioReport, *, name: str, narrow: bool = False) -> tuple[str, ...]:
-    """The plots of `work_precision` as `svg` elements.
-
-    Args:
-        report: of the scenario.
-        name: unique on the page, as ids are made from it.
-        narrow: for narrow screens: the text has the same size there.
-    """
+    """The plots of `work_precision` as `svg` elements, with a `name` that is unique on the page."""
     sizes = [WIDE_SIZE, PAIR_SIZE, PAIR_SIZE] if not narrow else [NARROW_SIZE] * 3
     return tuple(
         svg_text
@@ -183,21 +172,19 @@ def _find_works(report: ScenarioReport, work: str) -> list[Interval | None]:
     if work == "evaluations":
         return [Interval(n, n, n) for n in (float(row.work) for row in rows)]
     timed = [row for row in rows if row.cost is not None and row.cost.value > 0]
-    return [_cost(row, timed) for row in rows] if timed else []
-
-
-def _cost(row: WorkPrecisionRow, timed: Sequence[WorkPrecisionRow]) -> Interval:
-    """The cost of a row; estimated from its evaluations where it was not timed."""
-    if row in timed and row.cost is not None:
-        return row.cost
-    peers = [peer for peer in timed if peer.setting.integrator == row.setting.integrator] or timed
-    rates = [peer.cost.value / peer.work for peer in peers if peer.cost is not None]
-    value = row.work * statistics.median(rates)
-    return Interval(value, value, value)
+    works: list[Interval | None] = []
+    for row in rows if timed else ():
+        x = row.cost
+        if x is None or not x.value:  # its evaluations say about how much it would be
+            alike = [peer for peer in timed if peer.setting.integrator == row.setting.integrator]
+            rates = [peer.cost.value / peer.work for peer in alike or timed if peer.cost]
+            value = row.work * statistics.median(rates)
+            x = Interval(value, value, value)
+        works.append(x)
+    return works
 
 
 def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
-    """The entries of the key, for the kinds of marks that occur."""
     visible = [point for line in lines for point in line.visible_points]
     if any(point.full for point in visible):
         yield Entry("front", "on the Pareto front")
@@ -248,7 +235,6 @@ def _describe(
 
 
 def _range(values: Sequence[float], digits: int, words: str) -> str:
-    """The least and the largest of values."""
     least, largest = (f"{value:.{digits}g}" for value in (min(values), max(values)))
     return words.format(least, largest) if max(values) > min(values) else least
 
@@ -292,13 +278,7 @@ _GAP = 18.0
 
 
 def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
-    """The plot as an `svg` element; empty where nothing was measured.
-
-    Args:
-        sweep: what to draw.
-        name: unique among the plots on the page, as ids are made from it.
-        narrow: for narrow screens: the scales stand below each other.
-    """
+    """The plot as an `svg` element; empty where nothing was measured."""
     figures = shown_figures(sweep)[:_MAX_FIGURES]
     width, _ = NARROW_SIZE if narrow else WIDE_SIZE
     if not figures:
@@ -389,3 +369,31 @@ def _describe_sweep(sweep: SweepReport, figures: Sequence[str]) -> str:
         + "."
         for row in sweep.rows
     )
+
+
+def engine_svg(report: EngineScenario, *, name: str, narrow: bool = False) -> str:
+    """The time of a step by the number of worlds; empty where nothing was timed."""
+    lines = []
+    for number, row in enumerate(report.rows):
+        points = tuple(
+            Point(
+                Interval(cost.worlds, cost.worlds, cost.worlds),
+                cost.seconds.value * 1e6,
+                f"{row_name(row)}, {cost.worlds:,} worlds: {seconds_text(cost.seconds.value, 3)}",
+            )
+            for cost in row.costs
+            if cost.seconds is not None
+        )
+        lines += [Line(row_name(row), number, points)] if points else []
+    text = " ".join(
+        f"{line.name}: {', '.join(point.title.rsplit(', ', 1)[1] for point in line.points)}."
+        for line in lines
+    )
+    chart = Chart(
+        title=f"{report.title or report.name}: time of a step by the number of worlds",
+        text=text,
+        axes=("worlds simulated at once", "time of a step over worlds (µs)"),
+        lines=tuple(lines),
+        marks=(Entry("front", "lowest of at least 8 rounds"),),
+    )
+    return chart_svg(chart, name, NARROW_SIZE if narrow else WIDE_SIZE)

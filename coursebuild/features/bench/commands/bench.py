@@ -1,12 +1,8 @@
 """`coursebuild bench`: speed against error of the course's models.
 
-Entry points: `bench(options, names, …)`, `check(…)`; `bench_text(scenes, style)`, the tables of the
-models' pages, on a terminal.
-
-1. Names mean models. One that does not compile is reported, and the others are measured.
-2. Each scenario's report is stored by all that it depends on, so that a run that was stopped goes
+1. Each scenario's report is stored by all that it depends on, so that a run that was stopped goes
    on where it was. Times are true of this machine only, so reports are not shared.
-3. Recording writes the reports into `content/reports/`; checking measures again, whatever is
+2. Recording writes the reports into `content/reports/`; checking measures again, whatever is
    stored, and compares figures of accuracy with what is recorded there.
 """
 
@@ -128,13 +124,9 @@ def bench(
     record: bool = False,
     measuring: Any = measuring,
 ) -> Measurement[SceneReport]:
-    """Measure the models that the names mean; without names, all.
+    """Measure the models that the names mean, without names all; with `record` into the course.
 
-    `record`: each model's report is also written into the course. `measuring`: the module that
-    measures.
-
-    Raises:
-        UsageError: no model is called so, or only a part is to be recorded.
+    `measuring` is the module that measures.
     """
     if record:
         forbid_quick("--record", quick=quick)
@@ -157,9 +149,6 @@ def check(
     """Measure again, and compare with the recorded reports.
 
     A model without a recorded report, or with one that cannot be read, is not measured.
-
-    Raises:
-        UsageError: no model is called so, or only a part is to be measured.
     """
     forbid_quick("--check", quick=quick)
     scenes = find_scenes(options.root, names)
@@ -322,7 +311,6 @@ class SceneRun(MeasuringRun):
     def _load_or_measure_part(
         self, kind: str, parts: tuple[object, ...], report_type: type[_T], measure: Callable[[], _T]
     ) -> _T:
-        """Load the report on a scenario or a sweep, or measure it now."""
         report = self.load(kind, parts, report_type)
         if report is None:
             report = measure()
@@ -351,11 +339,7 @@ def measure_part(root: Path, data: bytes) -> bytes:
 
 @lru_cache(maxsize=1)
 def _compile(root: Path, name: str, digest: str, *, quick: bool) -> measuring.CompiledScene:
-    """Compile a scene once for all its parts.
-
-    Raises:
-        LookupError: no scene has the digest, as its files have been edited meanwhile.
-    """
+    """Compile a scene once for all its parts; a `LookupError` where its files were edited."""
     by_digest = {scene.digest: scene for scene in find_scenes(root, (name,)).value}
     return measuring.compile_scene(root, by_digest[digest], quick=quick)
 
