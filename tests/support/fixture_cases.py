@@ -2,12 +2,14 @@
 
 Entry points: `check_cases(path, render)`; `read_cases(path)`, and `rewrite(path, cases)`, which
 writes them again. Lines before a title that are empty or begin with `#` are for readers of the
-file. `check_text(path, text)` is for a file that only holds an expected text, `fixture_text` for
+file. `check_lines(path, convert)` is for inputs of a line each, with what becomes of them indented
+below. `check_text(path, text)` is for a file that only holds an expected text, `fixture_text` for
 one that only holds an input, such as a whole lesson.
 """
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -46,6 +48,20 @@ def check_cases(path: Path, render: Callable[[Case], str], *, rewriting: bool) -
         return
     for case, now in zip(cases, results, strict=True):
         assert now.expected == case.expected, f"{path.name}:{case.line}: {case.title}"
+
+
+def check_lines(path: Path, convert: Callable[[str], Iterable[str]], *, rewriting: bool) -> None:
+    """Compare what becomes of each line of input; a quoted line is a literal of Python."""
+
+    def render(case: Case) -> str:
+        lines: list[str] = []
+        for line in case.input.splitlines():
+            text = ast.literal_eval(line) if line[0] in "'\"" else line
+            outputs = (r if r.isprintable() else repr(r) for r in convert(text))
+            lines += [line, *(f"  {output}".rstrip() for output in outputs)]
+        return "".join(f"{line}\n" for line in lines)
+
+    check_cases(path, render, rewriting=rewriting)
 
 
 def read_cases(path: Path) -> list[Case]:
