@@ -8,7 +8,7 @@ from pathlib import Path
 from coursebuild.core.model import Paragraph, Term, plain_text, walk_inlines
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from coursebuild.features.glossary.terms import definition_of, runs_on
+from coursebuild.features.glossary import definition_of, runs_on
 from support.fixture_cases import check_lines
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model.results import Formula
 from coursebuild.core.run.v8 import MathEngine
-from coursebuild.features.symbols.uses import only_symbol, sort_key, symbols
+from coursebuild.features.symbols import only_symbol, sort_key, symbols
 from support.fixture_cases import check_lines
 
 Typeset = Callable[[str], str]
