@@ -1,11 +1,14 @@
 """Fixture files: cases of `title / . / input / . / expected / .`, with empty lines between them.
 
-Lines before a title that are empty or begin with `#` are for readers of the file. Short cases, of a
-line each, are rows of tables (`fixture_tables`).
+Entry points: `check_cases(path, render)`, `read_cases(path)` and `rewrite(path, cases)`. Lines
+before a title that are empty or begin with `#` are for readers of the file. `check_lines(path,
+convert)` is for inputs of a line each, with what becomes of them indented below; short cases, of a
+line each, may be rows of tables (`fixture_tables`).
 """
 
 from __future__ import annotations
 
+import ast
 import re
 import tomllib
 from collections.abc import Callable, Iterable
@@ -45,6 +48,20 @@ def check_cases(path: Path, render: Callable[[Case], str], *, rewriting: bool) -
         return
     for case, now in zip(cases, results, strict=True):
         assert now.expected == case.expected, f"{path.name}:{case.line}: {case.title}"
+
+
+def check_lines(path: Path, convert: Callable[[str], Iterable[str]], *, rewriting: bool) -> None:
+    """Compare what becomes of each line of input; a quoted line is a literal of Python."""
+
+    def render(case: Case) -> str:
+        lines: list[str] = []
+        for line in case.input.splitlines():
+            text = ast.literal_eval(line) if line[0] in "'\"" else line
+            outputs = (r if r.isprintable() else repr(r) for r in convert(text))
+            lines += [line, *(f"  {output}".rstrip() for output in outputs)]
+        return "".join(f"{line}\n" for line in lines)
+
+    check_cases(path, render, rewriting=rewriting)
 
 
 def read_cases(path: Path) -> list[Case]:

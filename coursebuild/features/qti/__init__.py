@@ -1,13 +1,25 @@
 """IMS QTI 2.1: the quizzes as a package for question banks."""
 
+from collections.abc import Iterator
+
 from coursebuild.core.features import Exporter, Feature
-from coursebuild.features.qti.items import package_files
+from coursebuild.core.model.results import SiteFile
+from coursebuild.core.pages.context import ExportContext
+from coursebuild.core.text.diagnostics import Diagnostic
+
+
+def export(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
+    """Yield the files of the package; this needs the feature `quiz`, which may not be there."""
+    from coursebuild.features.qti.items import package_files
+
+    return package_files(context)
+
 
 QTI = Exporter(
     name="qti",
     summary="its quizzes as IMS QTI 2.1",
     file="quizzes-qti.zip",
     mark="imsmanifest.xml",
-    make=package_files,
+    make=export,
 )
 FEATURE = Feature(name="qti", needs=("quiz",), exporters=(QTI,))

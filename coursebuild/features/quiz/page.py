@@ -24,7 +24,7 @@ from coursebuild.core.pages.marks import escape_marks, fence, hang
 from coursebuild.features.quiz import model as quizzes
 
 
-def quiz(page: PageContext, block: quizzes.Quiz) -> Markup:
+def draw_quiz(page: PageContext, block: quizzes.Quiz) -> Markup:
     """Draw a quiz with its questions."""
     return page.template(
         "quiz/quiz.html",
