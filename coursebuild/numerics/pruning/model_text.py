@@ -25,10 +25,12 @@ from coursebuild.numerics.pruning.xml_edits import (
     Markup,
     ModelEdit,
     apply_edits,
+    merge_edits,
     parse_markup,
     set_attributes,
     splice,
 )
+from coursebuild.numerics.reports.diet_report import TextEdit
 
 _DEEPEST = 32
 
@@ -86,6 +88,17 @@ class ModelText:
             path: apply_edits(data[path], file_edits)
             for path, file_edits in _group_by_path(edits).items()
         }
+
+    def describe(self, edits: Iterable[ModelEdit]) -> tuple[TextEdit, ...]:
+        """These changes with their places and what stood there."""
+        documents, text_edits = {document.path: document for document in self.documents}, []
+        for edit in merge_edits(edits):
+            document = documents[edit.path]
+            line, column = document.position(edit.start)
+            old = document.data[edit.start : edit.end].decode("utf-8", "replace")
+            new = edit.new.decode("utf-8", "replace")
+            text_edits.append(TextEdit(edit.path, line, column, edit.start, edit.end, old, new))
+        return tuple(text_edits)
 
     def ids(self, element: Element) -> tuple[int, ...]:
         """The numbers of the things that an element becomes; empty where that is not known."""
