@@ -195,7 +195,7 @@ class _Comparison(Struct):
         with self.options.progress.stage(f"compiling models with MuJoCo {self.version}"):
             results_there = compile_all(texts_to_compile, python=interpreter.python)
         places = [(model.source.path, 1) for model in models]
-        places += [(text.block.span.path, text.block.span.line) for text in good]
+        places += [(text.place.path, text.place.line) for text in good]
         return tuple(
             ModelLine(path, line, mjcf.readable_error(result.error))
             for (path, line), result in zip(places, results_there, strict=True)

@@ -42,14 +42,43 @@ INCLUDED_ROOT = re.compile(r"\s*+(?:<(?:\?.*?\?|!--.*?--)>\s*+)*+<mujocoinclude\
 """How a file begins that is meant to be included by others."""
 
 
+_OPENING = re.compile(r"MISMATCHED_ELEMENT.*Line number=(\d+): XMLElement name=(\S+)")
+
+
 class MjcfText(Struct, frozen=True):
     """A text to compile, and where it comes from."""
 
-    block: Mjcf | FeatureBlock
+    block: Mjcf | FeatureBlock | MjcfModel
     code: Excerpt
     text: str
-    lines_before: int
+    lines_before: int = 0
     """Lines of `text` that are not the author's."""
+
+    @property
+    def subject(self) -> str:
+        """What messages call it."""
+        if isinstance(self.block, MjcfModel):
+            return f"the model `{self.block.name}`"
+        if isinstance(self.block, FeatureBlock):
+            return f"the model in this {kind_of_block(self.block).name}"
+        return "this block"
+
+    @property
+    def place(self) -> Span:
+        if isinstance(self.block, MjcfModel):
+            return self.block.source.span(0, 0)
+        return self.block.span.first_line()
+
+    def line_span(self, line: int | None) -> Span:
+        """The span of a line that MuJoCo names."""
+        return line_span(self.code, line, self.lines_before, self.place)
+
+    def diagnose(
+        self, message: str, place: Span, help: str = "", notes: Sequence[Note] = ()
+    ) -> Diagnostic:
+        """The diagnostic of what the compiler says of it."""
+        rule = "model-error" if isinstance(self.block, MjcfModel) else "mjcf-error"
+        return diagnose(rule, place, f"{self.subject} {message}", help=help, notes=notes)
 
 
 def mjcf_texts(course: Course) -> tuple[MjcfText, ...]:
@@ -67,9 +96,9 @@ def mjcf_texts(course: Course) -> tuple[MjcfText, ...]:
                 text = f"{opening}\n{block.code.text}\n{closing}"
                 texts.append(MjcfText(block, block.code, text, 1))
             elif isinstance(block, Mjcf):
-                texts.append(MjcfText(block, block.code, block.code.text, 0))
+                texts.append(MjcfText(block, block.code, block.code.text))
             elif isinstance(block, FeatureBlock) and (code := block.mjcf()) is not None:
-                texts.append(MjcfText(block, code, code.text, 0))
+                texts.append(MjcfText(block, code, code.text))
     return tuple(texts)
 
 
@@ -101,19 +130,18 @@ def check_compiled(
         if result.error and model.name not in included:
             diagnostics.append(diagnose_model(model, result, readable, course.models))
         elif not result.error:
-            subject, code = f"the model `{model.name}`", model.source.excerpt()
-            fault = _diagnose_fault("model-error", subject, code)
-            diagnostics += [] if fault is None else [fault]
+            diagnostics += _find_fault(_text_of(model))
     facts: dict[tuple[str, int], ModelFacts] = {}
     for text, result in texts:
         diagnostics += _check_text(text, result, readable, course.models)
         if result.facts is not None:
-            facts[_block_key(text.block)] = result.facts
+            facts[text.place.path, text.place.start] = result.facts
 
     def find_facts(block: FeatureBlock) -> ModelFacts | None:
         names = (*block.models(), *block.mentioned_models())
         candidates = (models[name].facts for name in names if name in models)
-        return next(candidates, None) or facts.get(_block_key(block))
+        # Features may hold another object for the same block.
+        return next(candidates, None) or facts.get((block.span.path, block.span.start))
 
     for feature in features():
         if feature.check_models is not None:
@@ -132,35 +160,46 @@ def diagnose_model(
     models: Sequence[MjcfModel] = (),
 ) -> Diagnostic:
     """The diagnostic of a model that does not compile; `models` may be included by it."""
-    span = line_span(model.source.excerpt(), result.line, 0, model.source.span(0, 0))
-    if result.timeout:
-        return _diagnose_timeout(span, f"the model `{model.name}`", result)
-    message = f"the model `{model.name}` does not compile: {readable(result.error)}"
-    notes, help = _note_opening(model.source.excerpt(), 0, result.error), ""
-    text, closing = model.source.text, "</mujoco>\n"
+    text, closing, help = model.source.text, "</mujoco>\n", ""
     if closing.rstrip() not in text:
         with contextlib.suppress(expat.ExpatError):
             closing = closing if text.endswith("\n") else f"\n{closing}"
             expat.ParserCreate().Parse(f"{text}{closing}".encode(), True)
             edit = Edit(model.source.span(len(text), len(text)), closing)
             help = Fix("end it with `</mujoco>`", edits=(edit,), safe=True)
-    span, help = _propose_name(result, Excerpt.of_span(model.source.span()), 0, models) or (
-        span,
-        help,
-    )
-    return diagnose("model-error", span, message, help=help, notes=notes)
+    return _diagnose_failure(_text_of(model), result, readable, models, help)
+
+
+def _text_of(model: MjcfModel) -> MjcfText:
+    return MjcfText(model, Excerpt.of_span(model.source.span()), model.source.text)
+
+
+def _diagnose_failure(
+    text: MjcfText,
+    result: CompileResult,
+    readable: Callable[[str], str],
+    models: Sequence[MjcfModel],
+    help: str,
+) -> Diagnostic:
+    if result.timeout:
+        help = "make it smaller, or set `models` in `[limits]` of the map: seconds for all models"
+        message = f"{text.subject} {result.error}"
+        return diagnose("model-timeout", text.line_span(result.line), message, help=help)
+    opening = _OPENING.search(result.error)
+    notes = []
+    if opening is not None:
+        notes = [Note(f"<{opening[2]}> begins here", text.line_span(int(opening[1])))]
+    place, help = _propose_name(result, text, models) or (text.line_span(result.line), help)
+    return text.diagnose(f"does not compile: {readable(result.error)}", place, help, notes)
 
 
 def _propose_name(
-    result: CompileResult, code: Excerpt, offset: int, models: Sequence[MjcfModel]
+    result: CompileResult, text: MjcfText, models: Sequence[MjcfModel]
 ) -> tuple[Span, Fix] | None:
-    """Where a name is misspelt that the compiler does not know, and the fix.
-
-    `code` begins at this offset of the text that was compiled; the name may also be in a model that
-    it includes.
-    """
+    """Where a name is misspelt that the compiler does not know, also in another model, and how."""
     if (misspelling := result.misspelling) is None:
         return None
+    code, offset = text.code, text.text.index("\n") + 1 if text.lines_before else 0
     if misspelling.path:
         sources = (m.source for m in models if m.source.path == misspelling.path)
         code, offset = next((Excerpt.of_span(s.span()) for s in sources), code), 0
@@ -176,11 +215,6 @@ def _propose_name(
     return place, fix
 
 
-def _diagnose_timeout(span: Span, subject: str, result: CompileResult) -> Diagnostic:
-    help = "make it smaller, or set `models` in `[limits]` of the map: seconds for all models"
-    return diagnose("model-timeout", span, f"{subject} {result.error}", help=help)
-
-
 def diagnose_orphan_scenarios(source: Source, models: Collection[str]) -> Diagnostic:
     """The diagnostic of a file of scenarios without its model; `models` are the paths of all."""
     model = source.path.removesuffix(".toml") + ".xml"
@@ -188,11 +222,6 @@ def diagnose_orphan_scenarios(source: Source, models: Collection[str]) -> Diagno
     help = f"is it `{likely}`?" if likely is not None else "put it beside its model"
     message = f"there is no model {model} to which these scenarios belong"
     return diagnose("scenario-model", source.span(0, 0), message, help=help)
-
-
-def _block_key(block: Mjcf | FeatureBlock) -> tuple[str, int]:
-    """A key for a block: features may hold another object for the same one."""
-    return block.span.path, block.span.start
 
 
 def line_span(code: Excerpt, line: int | None, lines_before: int, fallback: Span) -> Span:
@@ -204,10 +233,8 @@ def line_span(code: Excerpt, line: int | None, lines_before: int, fallback: Span
     return row.slice(indent, len(row.text.rstrip())).span() if row.text.strip() else row.span()
 
 
-def _diagnose_fault(
-    rule: str, subject: str, code: Excerpt, lines_before: int = 0, text: str = ""
-) -> Diagnostic | None:
-    """Where XML is broken or holds words between elements, which MuJoCo may pass over."""
+def _find_fault(text: MjcfText) -> Iterator[Diagnostic]:
+    """Report where XML is broken or holds words between elements, which MuJoCo may pass over."""
     parser = expat.ParserCreate()
     faults = list[tuple[int, str]]()
 
@@ -218,24 +245,13 @@ def _diagnose_fault(
 
     parser.CharacterDataHandler = read_words
     try:
-        parser.Parse(text or code.text, True)
+        parser.Parse(text.text, True)
     except expat.ExpatError as error:
         faults.append((error.lineno, f"broken XML: {expat.ErrorString(error.code)}"))
-    if not faults:
-        return None
-    line, fault = faults[0]
-    place = line_span(code, line, lines_before, code.span())
-    help = "write `<` before an element and `<!-- … -->` around a comment, or delete it"
-    return diagnose(rule, place, f"{subject} holds {fault}", help=help)
-
-
-def _note_opening(code: Excerpt, lines_before: int, error: str) -> tuple[Note, ...]:
-    """Where the element begins that MuJoCo says is not closed."""
-    match = re.search(r"MISMATCHED_ELEMENT.*Line number=(\d+): XMLElement name=(\S+)", error)
-    if match is None:
-        return ()
-    place = line_span(code, int(match[1]), lines_before, code.span())
-    return (Note(f"<{match[2]}> begins here", place),)
+    for line, fault in faults[:1]:
+        place = line_span(text.code, line, text.lines_before, text.code.span())
+        help = "write `<` before an element and `<!-- … -->` around a comment, or delete it"
+        yield text.diagnose(f"holds {fault}", place, help)
 
 
 def _check_text(
@@ -244,40 +260,25 @@ def _check_text(
     readable: Callable[[str], str],
     models: Sequence[MjcfModel],
 ) -> Iterator[Diagnostic]:
-    block = text.block
-    subject = "this block"
-    if isinstance(block, FeatureBlock):
-        subject = f"the model in this {kind_of_block(block).name}"
-    if result.timeout:
-        yield _diagnose_timeout(block.span.first_line(), subject, result)
-        return
-    fault = _diagnose_fault("mjcf-error", subject, text.code, text.lines_before, text.text)
-    if isinstance(block, Mjcf) and block.error is not None:
-        span = block.error_span or block.span.first_line()
-        place = line_span(text.code, result.line, text.lines_before, block.span.first_line())
+    block, help = text.block, ""
+    if isinstance(block, Mjcf) and block.error is not None and not result.timeout:
+        place = block.error_span or text.place
         if not result.error:
             message = f"this block must fail with `{block.error}`, and it compiles"
             help = "fix the block, or remove `error=`"
-            yield diagnose("mjcf-compiles", span, message, help=help)
+            yield diagnose("mjcf-compiles", place, message, help=help)
         elif " ".join(block.error.split()) not in " ".join(result.error.split()):
             message = f"the message of the compiler does not contain `{block.error}`"
-            note = Note(f"it says: {result.error}", place)
-            yield diagnose("mjcf-message", span, message, notes=[note])
-        elif fault is not None:
-            yield fault
-        return
-    if result.error:
-        span = line_span(text.code, result.line, text.lines_before, block.span.first_line())
-        help = ""
+            note = Note(f"it says: {result.error}", text.line_span(result.line))
+            yield diagnose("mjcf-message", place, message, notes=[note])
+        else:
+            yield from _find_fault(text)
+    elif result.error:
         if isinstance(block, Mjcf) and block.fragment is None and "<mujoco" not in text.text:
             help = 'if it is a part of a model say so: `fragment="worldbody"`'
-        offset = text.text.index("\n") + 1 if text.lines_before else 0
-        span, help = _propose_name(result, text.code, offset, models) or (span, help)
-        message = f"{subject} does not compile: {readable(result.error)}"
-        notes = _note_opening(text.code, text.lines_before, result.error)
-        yield diagnose("mjcf-error", span, message, help=help, notes=notes)
-    elif fault is not None:
-        yield fault
+        yield _diagnose_failure(text, result, readable, models, help)
+    else:
+        yield from _find_fault(text)
 
 
 _RULE = "scenario-model"

@@ -241,23 +241,19 @@ def _with_places(rule: BlockRule) -> BlockRule:
     return run
 
 
-def _build_parser() -> MarkdownIt:
-    md = MarkdownIt("zero", {"html": True, "tasklists": True, "maxNesting": 2 * MAX_NESTING})
-    md.block = _BlockParser()
-    rules = {rule.name: (rule.fn, rule.alt) for rule in md.block.ruler.__rules__}
-    interrupts = ["paragraph", "reference", "blockquote"]
-    rules["reference"] = (_link_definition, [])
-    ours: dict[str, tuple[BlockRule, list[str]]] = {
-        "too deep": (_deep_paragraph, []),
-        "math": (math_block, [*interrupts, "list"]),
-        "footnote": (_footnote_definition, interrupts),
-    }
-    md.block.ruler = Ruler()
-    for name, (rule, alt) in (ours | rules).items():
-        md.block.ruler.push(name, _with_places(rule), {"alt": alt})
-    # Links with dangerous schemes stay links, so that they can be reported.
-    md.validateLink = lambda url: True  # type: ignore[method-assign]
-    return md
-
-
-_MARKDOWN = _build_parser()
+_MARKDOWN = MarkdownIt("zero", {"html": True, "tasklists": True, "maxNesting": 2 * MAX_NESTING})
+# Links with dangerous schemes stay links, so that they can be reported.
+_MARKDOWN.validateLink = lambda url: True  # type: ignore[method-assign]
+_MARKDOWN.block = _BlockParser()
+_INTERRUPTS = ["paragraph", "reference", "blockquote"]
+_RULES: dict[str, tuple[BlockRule, list[str]]] = {
+    "too deep": (_deep_paragraph, []),
+    "math": (math_block, [*_INTERRUPTS, "list"]),
+    "footnote": (_footnote_definition, _INTERRUPTS),
+    **{rule.name: (rule.fn, rule.alt) for rule in _MARKDOWN.block.ruler.__rules__},
+    "reference": (_link_definition, []),
+}
+"""Our rules and those of markdown-it, each with the blocks that it may interrupt."""
+_MARKDOWN.block.ruler = Ruler()
+for _name, (_rule, _alt) in _RULES.items():
+    _MARKDOWN.block.ruler.push(_name, _with_places(_rule), {"alt": _alt})

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeAlias
 
 from msgspec import Meta, Struct
-from msgspec.structs import replace
 
 from coursebuild.core.drawing.contrast import (
     GROUNDS_DARK,
@@ -114,13 +113,6 @@ _NO_BRANCH = re.compile(
 )
 """What git-check-ref-format(1) forbids in the name of a branch."""
 _SERVICES = ("colab", "binder", "jupyterhub", "codespaces")
-
-
-def launch(fields: Launch | None, settings: CourseTable) -> Launch | None:
-    """Where notebooks can be run, with its repository."""
-    if fields is None:
-        return None
-    return replace(fields, repository=fields.repository or settings.repository)
 
 
 def check_launch(node: ObjectNode, fields: Launch, repository: str | None) -> Iterator[Diagnostic]:

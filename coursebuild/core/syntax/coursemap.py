@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from decimal import Decimal
 from itertools import pairwise
 
-from msgspec.structs import asdict
+from msgspec.structs import asdict, replace
 
 from coursebuild.core import model
 from coursebuild.core.model.course import Launch
@@ -25,7 +25,6 @@ from coursebuild.core.syntax.course_schema import (
     VerifyTable,
     check_contrast,
     check_launch,
-    launch,
     theme,
 )
 from coursebuild.core.syntax.decode import Decoding, check_unique, decode
@@ -91,6 +90,9 @@ def _build_course(
 ) -> model.Course:
     settings, verify = fields.course, fields.verify or VerifyTable()
     table, gate = root.object("course"), root.object("verify")
+    launch = fields.launch
+    if launch is not None:
+        launch = replace(launch, repository=launch.repository or settings.repository)
     kinds = {name: model.CalloutKind(name) for name in CALLOUTS}
     for name, callout in fields.callouts.items():
         texts = (callout,) if isinstance(callout, str) else (callout.label, callout.promise)
@@ -129,7 +131,7 @@ def _build_course(
         width=fields.format.width if fields.format is not None else 0,
         html=fields.security.html,
         limits=fields.limits,
-        launch=launch(fields.launch, settings),
+        launch=launch,
         theme=theme(root.object("theme"), fields.theme or ThemeTable()),
         python=model.NamedPath(verify.python, gate.place("python")) if verify.python else None,
         strict=verify.strict,

@@ -232,11 +232,20 @@ class _Decoder:
         for key, member in node.members.items():
             if key in fields:
                 values[key] = self.decode_value(member.value, fields[key].type, key)
-            elif not variants or key != type.tag_field:
+            elif type.forbid_unknown_fields and not (variants and key == type.tag_field):
                 unknown.append(member.key)
         misspelt: set[str] = set()
-        if type.forbid_unknown_fields and unknown:
-            misspelt = self.report_unknown(unknown, fields, values, type, variants or {})
+        for key_node in unknown:
+            key, help = key_node.value, ""
+            if (likely := nearest(key, set(fields) - set(values) - misspelt)) is not None:
+                misspelt.add(likely)
+                help = propose(key, likely, fields)
+            elif owners := _variants_with_field(key, variants or {}):
+                names = " and ".join(f'`"{type.tag_field}": "{owner}"`' for owner in owners)
+                help = f"it is a field of {names}"
+            else:
+                help = did_you_mean(key, fields)
+            self.report("field-unknown", key_node.span, f"unknown field {format_name(key)}", help)
         missing = [field for field in type.fields if field.required and field.name not in values]
         for absent in missing:
             if absent.name not in misspelt:  # a misspelt field is one mistake
@@ -248,56 +257,27 @@ class _Decoder:
         self.structs[node] = struct
         return struct
 
-    def report_unknown(
-        self,
-        keys: Iterable[StringNode],
-        fields: Iterable[str],
-        present: Iterable[str],
-        type: inspect.StructType,
-        variants: Mapping[str, inspect.StructType],
-    ) -> set[str]:
-        """Report unknown fields; return the fields of which they are misspellings."""
-        misspelt: set[str] = set()
-        for key in keys:
-            likely = nearest(key.value, set(fields) - set(present) - misspelt)
-            owners = _variants_with_field(key.value, variants)
-            if likely is not None:
-                misspelt.add(likely)
-                help: str = propose(key.value, likely, fields)
-            elif owners:
-                names = " and ".join(f'`"{type.tag_field}": "{owner}"`' for owner in owners)
-                help = f"it is a field of {names}"
-            else:
-                help = did_you_mean(key.value, fields)
-            self.report("field-unknown", key.span, f"unknown field {format_name(key.value)}", help)
-        return misspelt
-
     def decode_tagged(self, node: ObjectNode, variants: Mapping[str, inspect.StructType]) -> object:
-        """The struct that the tag of an object names."""
+        """The struct that the tag of an object names, or the implied one.
+
+        That is meant unless the fields are clearly those of another.
+        """
         tag = str(next(iter(variants.values())).tag_field)
         tag_node = node.get(tag)
-        if tag_node is None:
-            return self.decode_untagged(node, tag, variants)
-        if not isinstance(tag_node, StringNode):
-            return self.report_wrong_type(
-                tag_node, inspect.StrType(), tag, did_you_mean("", variants)
-            )
-        if tag_node.value in variants:
-            return self.decode_struct(node, variants[tag_node.value], variants)
-        message = f"{format_name(tag)} cannot be {format_value(tag_node)}"
-        help = did_you_mean(tag_node.value, variants)
-        return self.report("field-value", tag_node.mark, message, help)
-
-    def decode_untagged(
-        self, node: ObjectNode, tag: str, variants: Mapping[str, inspect.StructType]
-    ) -> object:
-        """The struct of the implied variant, unless the fields are clearly those of another."""
+        if isinstance(tag_node, StringNode):
+            if tag_node.value in variants:
+                return self.decode_struct(node, variants[tag_node.value], variants)
+            message = f"{format_name(tag)} cannot be {format_value(tag_node)}"
+            help = did_you_mean(tag_node.value, variants)
+            return self.report("field-value", tag_node.mark, message, help)
+        help = did_you_mean("", variants)
+        if tag_node is not None:
+            return self.report_wrong_type(tag_node, inspect.StrType(), tag, help)
         owners = {key: _variants_with_field(key, variants) for key in node.members}
         for key, member in node.members.items():
             if not owners[key] and nearest(key, [tag], cutoff=0.7):
                 message, place = f"unknown field {format_name(key)}", member.key.span
                 return self.report("field-unknown", place, message, propose(key, tag))
-        help = did_you_mean("", variants)
         implied = next((t for t, v in variants.items() if getattr(v.cls, "implied", False)), None)
         if implied is not None:
             foreign = [tags for tags in owners.values() if tags and implied not in tags]

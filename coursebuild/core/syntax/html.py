@@ -163,27 +163,20 @@ class Balance:
 
 def find_media(html: Excerpt) -> tuple[MediaAddress, ...]:
     """The addresses of files that HTML shows."""
-    text = html.text
     return tuple(
-        MediaAddress(start, end, unescape(text[start:end]), html.span(start, end))
-        for tag in tags(text)
-        if tag.name in _MEDIA_ELEMENTS
-        for attribute in _attributes(text, tag)
-        if attribute[0] in _MEDIA_ATTRIBUTES
-        for start, end in _addresses(text, *attribute)
+        MediaAddress(start, end, unescape(html.text[start:end]), html.span(start, end))
+        for element, attribute, start, end in _addresses(html.text)
+        if element in _MEDIA_ELEMENTS and attribute in _MEDIA_ATTRIBUTES
     )
 
 
 def find_address(text: str, url: str) -> tuple[int, int] | None:
     """The place where HTML first names an address in an attribute, however it is escaped there."""
-    places = (
-        place
-        for tag in tags(text)
-        for attribute in _attributes(text, tag)
-        for place in _addresses(text, *attribute)
-        if attribute[0] in _LINK_ATTRIBUTES | _MEDIA_ATTRIBUTES
-    )
-    return next((place for place in places if unescape(text[slice(*place)]) == url), None)
+    for _, attribute, start, end in _addresses(text):
+        is_address = attribute in _LINK_ATTRIBUTES | _MEDIA_ATTRIBUTES
+        if is_address and unescape(text[start:end]) == url:
+            return start, end
+    return None
 
 
 def _attributes(text: str, tag: Tag) -> Iterator[tuple[str, int, int]]:
@@ -193,12 +186,15 @@ def _attributes(text: str, tag: Tag) -> Iterator[tuple[str, int, int]]:
             yield match[1].lower(), *match.span(match.lastindex or 0)
 
 
-def _addresses(text: str, attribute: str, start: int, end: int) -> Iterator[tuple[int, int]]:
-    if attribute == "srcset":
-        for candidate in _CANDIDATE.finditer(text, start, end):
-            yield candidate.span(1)
-    elif start < end:
-        yield start, end
+def _addresses(text: str) -> Iterator[tuple[str, str, int, int]]:
+    """The element and the attribute of each address, and its place."""
+    for tag in tags(text):
+        for attribute, start, end in _attributes(text, tag):
+            if attribute == "srcset":
+                for candidate in _CANDIDATE.finditer(text, start, end):
+                    yield tag.name, attribute, *candidate.span(1)
+            elif start < end:
+                yield tag.name, attribute, start, end
 
 
 ELEMENTS = frozenset(

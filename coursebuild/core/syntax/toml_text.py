@@ -156,13 +156,14 @@ class _Reader:
         while node.type == "dotted_key":
             node, last = node.named_children
             parts.append(last)
-        return [self.read_key(part) for part in (node, *reversed(parts))]
-
-    def read_key(self, node: tree_sitter.Node) -> nodes.StringNode:
-        if node.type == "quoted_key":
-            return self.read_string(node)
-        start, end = node.byte_range
-        return nodes.StringNode(self.body, start, end, self.body.slice(start, end))
+        keys = []
+        for part in (node, *reversed(parts)):
+            if part.type == "quoted_key":
+                keys.append(self.read_string(part))
+            else:
+                place = part.byte_range
+                keys.append(nodes.StringNode(self.body, *place, self.body.slice(*place)))
+        return keys
 
     def read_value(self, node: tree_sitter.Node) -> nodes.Node:
         start, end = node.byte_range

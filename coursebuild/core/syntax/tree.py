@@ -135,7 +135,8 @@ class TextReader:
         if caption.text.startswith(TABLE) and following and following.type == "table_open":
             label = self.state.take_label(braces, "tab")
             inlines = self.inlines(trim(caption.slice(len(TABLE))))
-            table, self.index = self._table_at(self.index)
+            self.index += 1
+            table = self._read_table(following)
             return replace(table, span=span.to(table.span), label=label, caption=inlines)
         if braces is None:
             return None
@@ -306,11 +307,9 @@ class TextReader:
         )
 
     def _read_table(self, token: PositionedToken) -> model.Table:
-        table, self.index = self._table_at(self.index - 1)
+        at, report = self.index - 1, self.state.report
+        table, self.index = read_table(self.tokens, at, self.base, self.inlines, report)
         return table
-
-    def _table_at(self, at: int) -> tuple[model.Table, int]:
-        return read_table(self.tokens, at, self.base, self.inlines, self.state.report)
 
     def _skip_footnote(self, token: PositionedToken) -> None:
         depth = 1
@@ -325,9 +324,9 @@ class TextReader:
         self, caption: tuple[model.Inline, ...], span: Span
     ) -> model.Recording | None:
         match self._peek():
-            case PositionedToken(type="table_open"):
-                table, self.index = self._table_at(self.index)
-                return record_table(caption, span, table, self.state)
+            case PositionedToken(type="table_open") as token:
+                self.index += 1
+                return record_table(caption, span, self._read_table(token), self.state)
             case PositionedToken(type="fence") as token:
                 fence = read_fence(token, self.base, nested=False)
                 recording = record_fence(caption, span, fence, self.state)

@@ -140,50 +140,6 @@ def block(keys: str, *lines: str) -> Course:
     return make_course(f"```mjcf{keys}\n{body}\n```\n")
 
 
-@pytest.mark.parametrize(
-    ("keys", "text", "before"),
-    [
-        ("", "<geom/>\n", 0),
-        (" fragment=mujoco", "<mujoco>\n<geom/>\n\n</mujoco>", 1),
-        (" fragment=worldbody", "<mujoco><worldbody>\n<geom/>\n\n</worldbody></mujoco>", 1),
-        (
-            ' fragment="worldbody/body"',
-            "<mujoco><worldbody><body>\n<geom/>\n\n</body></worldbody></mujoco>",
-            1,
-        ),
-    ],
-)
-def test_a_fragment_gets_the_elements_around_it(keys: str, text: str, before: int) -> None:
-    (wrapped,) = mjcf_texts(block(keys, "<geom/>"))
-    assert (wrapped.text, wrapped.lines_before) == (text, before)
-
-
-def test_texts_of_blocks_and_labs_are_compiled_in_their_order() -> None:
-    lab = '```lab\n{"xml": "<mujoco/>"}\n```\n'
-    by_name = '```lab\n{"model": "box"}\n```\n'
-    course = make_course(f"```mjcf\n<a/>\n```\n\n{lab}", f"{by_name}\n```mjcf\n<b/>\n```\n")
-    assert [text.text for text in mjcf_texts(course)] == ["<a/>\n", "<mujoco/>", "<b/>\n"]
-
-
-@pytest.mark.parametrize(
-    ("keys", "line", "expected"),
-    [
-        ("", 2, "<world/>"),
-        ("", 1, "<mujoco>"),
-        ("", 4, ""),
-        ("", 5, "```mjcf"),
-        ("", 0, "```mjcf"),
-        ("", None, "```mjcf"),
-        (" fragment=worldbody", 3, "<world/>"),
-        (" fragment=worldbody", 1, "```mjcf fragment=worldbody"),
-    ],
-)
-def test_an_error_is_reported_at_its_line_without_indent(
-    keys: str, line: int | None, expected: str
-) -> None:
-    assert rules_and_texts(check(block(keys), failure(line))) == [f"mjcf-error: {expected}"]
-
-
 PART = "<!-- a part -->\n<mujocoinclude/>\n"
 
 
