@@ -6,6 +6,7 @@ has the state `absent`.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -102,15 +103,13 @@ class Clock:
 
     def now(self) -> int:
         """The time now, ns: every later change has this time or a later one."""
-        if self._store.set_aside:
-            return time.time_ns() - _LAG
-        try:
-            if not self._path.exists():
-                make_store(str(self._path.parent), str(self._store.root))
-            self._path.touch()
-            return self._path.stat().st_ctime_ns
-        except OSError:
-            return time.time_ns() - _LAG
+        with contextlib.suppress(OSError):
+            if not self._store.set_aside:
+                if not self._path.exists():
+                    make_store(str(self._path.parent), str(self._store.root))
+                self._path.touch()
+                return self._path.stat().st_ctime_ns
+        return time.time_ns() - _LAG
 
     def tick(self) -> None:
         """Wait until `now` gives a later time than all changes so far have."""

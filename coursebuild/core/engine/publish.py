@@ -93,7 +93,15 @@ def publish(
                 if not manifest.holds(slot, entries):
                     message = f"another process is changing what is being written to {place}"
                     raise EffectError(message)
-                _swap(slot, place)
+                slot.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o755)
+                if not os.path.lexists(place):
+                    slot.rename(place)
+                elif not exchange(slot, place):
+                    old = _sibling(place, "old")
+                    remove(old)
+                    place.rename(old)
+                    slot.rename(place)
+                    old.rename(slot)
             finally:
                 _recover(place)
                 put_away(root, slot)
@@ -101,19 +109,6 @@ def publish(
             return tuple(sorted(paths))
     except OSError as error:
         raise EffectError(f"the site cannot be written to {out}: {reason(error)}") from None
-
-
-def _swap(slot: Path, place: Path) -> None:
-    """Move the new site to the place, with the permissions of the old one, which goes the way."""
-    slot.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o755)
-    if not os.path.lexists(place):
-        slot.rename(place)
-    elif not exchange(slot, place):
-        old = _sibling(place, "old")
-        remove(old)
-        place.rename(old)
-        slot.rename(place)
-        old.rename(slot)
 
 
 # --- the place

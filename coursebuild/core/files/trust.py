@@ -76,8 +76,26 @@ def store_key(root: str) -> bytes:
     if folder is None:
         return b""
     path = os.path.join(folder, "key")
+    new = f"{path}.{os.getpid()}"
     try:
-        return _read_key(path) or _make_key(path)
+        if key := _read_key(path):
+            return key
+        os.makedirs(folder, mode=0o700, exist_ok=True)
+        descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600)
+        try:
+            os.write(descriptor, os.urandom(_SIZE))
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        try:
+            os.link(new, path)  # unlike a rename it never replaces the key of another process
+        except OSError as error:
+            # The key that is there is cut, or another user's; or the file system has no links.
+            if not isinstance(error, FileExistsError) or not _read_key(path):
+                os.replace(new, path)
+        if os.path.lexists(new):
+            os.unlink(new)
+        return _read_key(path)
     except OSError:
         return b""
 
@@ -85,27 +103,6 @@ def store_key(root: str) -> bytes:
 def _read_key(path: str) -> bytes:
     data = _read(path, _SIZE, os.geteuid())
     return data if len(data) == _SIZE else b""
-
-
-def _make_key(path: str) -> bytes:
-    """Make the key's file, unless another process does so now; return what is in it."""
-    os.makedirs(os.path.dirname(path), mode=0o700, exist_ok=True)
-    new = f"{path}.{os.getpid()}"
-    descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600)
-    try:
-        os.write(descriptor, os.urandom(_SIZE))
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-    try:
-        os.link(new, path)  # unlike a rename it never replaces the key of another process
-    except OSError as error:
-        # The key that is there is cut, or another user's; or the file system has no links.
-        if not isinstance(error, FileExistsError) or not _read_key(path):
-            os.replace(new, path)
-    if os.path.lexists(new):
-        os.unlink(new)
-    return _read_key(path)
 
 
 def _read(path: str, limit: int, user: int | None = None) -> bytes:

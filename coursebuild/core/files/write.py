@@ -63,7 +63,15 @@ def write_atomic(
             target.parent.mkdir(parents=True, exist_ok=True)
         fd, temporary = _open_temporary(target.parent)
         try:
-            _fill(fd, data, target)
+            rest = memoryview(data)
+            while rest:
+                rest = rest[os.write(fd, rest) :]
+            with contextlib.suppress(FileNotFoundError):
+                old = target.stat()
+                with contextlib.suppress(PermissionError):  # only root may give a file away
+                    if (old.st_uid, old.st_gid) != (os.geteuid(), os.getegid()):
+                        os.fchown(fd, old.st_uid, old.st_gid)
+                os.fchmod(fd, stat.S_IMODE(old.st_mode))
             if durable:
                 os.fsync(fd)
             check_unchanged(target, path, expected)
@@ -136,18 +144,6 @@ def _open_temporary(folder: Path) -> tuple[int, str]:
         if os.fstat(fd).st_nlink > 0:
             return fd, str(path)
         os.close(fd)
-
-
-def _fill(fd: int, data: bytes, target: Path) -> None:
-    rest = memoryview(data)
-    while rest:
-        rest = rest[os.write(fd, rest) :]
-    with contextlib.suppress(FileNotFoundError):
-        old = target.stat()
-        with contextlib.suppress(PermissionError):  # only root may give a file away
-            if (old.st_uid, old.st_gid) != (os.geteuid(), os.getegid()):
-                os.fchown(fd, old.st_uid, old.st_gid)
-        os.fchmod(fd, stat.S_IMODE(old.st_mode))
 
 
 def _move(temporary: str, target: Path, path: str, *, new: bool) -> None:

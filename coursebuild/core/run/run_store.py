@@ -1,12 +1,11 @@
 """The results of scripts: one runs again only if something that it depends on has changed.
 
-1. `get_runs`: what is known before a script runs determines a group of results; the one whose
-   dependencies are all unchanged is its result. Groups that this machine lacks are looked for in
-   the shared cache.
-2. `put_run`: after a run, the state of everything in its trace is read and stored with the result.
-   If something changed while it ran, the script may have seen another state, and nothing is stored.
-3. `claim`: of several processes that need the same result one runs the script, and the others get
-   its result. So `serve` and other commands can run scripts at the same time.
+1. What is known before a script runs determines a group of results; the one whose dependencies are
+   all unchanged is its result. Groups that this machine lacks are sought in the shared cache.
+2. After a run, the state of everything in its trace is read and stored with the result. If
+   something changed while it ran, the script may have seen another state, and nothing is stored.
+3. Of several processes that need the same result one runs the script, and the others get its
+   result (`claim`). So `serve` and other commands can run scripts at the same time.
 4. How a script's last run ended is noted under its path, whether it is remembered or not: for
    `explain`, and for the order in which scripts run.
 """
