@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import tempfile
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.run.script_environment import clean_environment
 from coursebuild.core.run.script_server import ScriptServer
+from support.fixture_cases import fixture_text
 from support.run_code import run_code
 from support.runners import SOURCE_TREE, TOOL, Run, both_ways, forked_or_not, job, run_hanging
 
@@ -144,22 +146,7 @@ try: open("/dev/tty")
 except OSError: print("no terminal")
 """
 """`test_forked_scripts` compares the rest with what a bare Python finds."""
-OUTER = {
-    "PYTHONPATH": "/outer",
-    "PYTHONSTARTUP": "/outer",
-    "PYTHONWARNINGS": "error",
-    "PYTHONSAFEPATH": "1",
-    "PYTHONHASHSEED": "7",
-    "PYTHONOPTIMIZE": "2",
-    "LANG": "de_DE",
-    "LC_NUMERIC": "de_DE",
-    "TZ": "Asia/Tokyo",
-    "COLUMNS": "17",
-    "OMP_NUM_THREADS": "64",
-    "SECRET_TOKEN": "x",
-    "DISPLAY": ":0",
-    "MUJOCO_GL": "egl",
-}
+OUTER = tomllib.loads(fixture_text("scripts/outer_environment.toml"))
 
 
 @both_ways
