@@ -175,7 +175,6 @@ def _sibling(place: Path, suffix: str) -> Path:
 
 # --- the slot
 
-
 _NO_PATH = re.compile(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
 """What no path may have: an empty part, `.` or `..`, a control character, a backslash."""
 _MIN_FOR_COPIES = 128

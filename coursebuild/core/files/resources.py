@@ -100,7 +100,6 @@ def _find_folder(installed: str, in_tree: str, problem: str) -> Path:
 
 # --- what is prepared when the tool is made
 
-
 PREPARED = "prepared"
 """Its name in the folder of the bundled files."""
 

@@ -181,7 +181,6 @@ def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
 
 # --- several files
 
-
 _CLOSED = frozenset({".git", ".venv", FOLDER})
 """Folders of the project in which nothing is made."""
 _NAME = "changes"

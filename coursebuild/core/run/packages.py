@@ -159,7 +159,6 @@ def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str
 
 # --- environments with other versions
 
-
 _FOLDER = "environments"
 _MAX_ENVIRONMENTS = 4
 """Environments that are kept."""

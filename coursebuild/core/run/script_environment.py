@@ -166,7 +166,6 @@ def package_version(name: str, folders: Iterable[str] | None = None) -> str:
 
 # --- the course's own environment
 
-
 _OLDEST = (3, 11)
 """The oldest Python that can run the modules of this package."""
 _SETTING = re.compile(r"^(\w+) *= *(.*?) *$", re.MULTILINE)
@@ -213,7 +212,6 @@ def _reject(named_path: NamedPath, message: str, help: str = "") -> Parsed[Inter
 
 
 # --- the machine
-
 
 _INFO = Path("/proc/cpuinfo")
 _GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
