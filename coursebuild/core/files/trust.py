@@ -215,8 +215,22 @@ def _is_tracked(root: str) -> bool:
 
 def _names(index: bytes, target: bytes) -> bool:
     """Whether an index (gitformat-index(5)) has an entry of this name, or below it."""
-    if index[4:8] == b"\0\0\0\4":
-        index = _names_of_version_4(index)
+    if index[4:8] == b"\0\0\0\4":  # where each begins with a part of the one before: spell them out
+        at, name, names = 12, b"", []
+        try:
+            for _ in range(int.from_bytes(index[8:12], "big")):
+                at += 64 if index[at + 60] & 0x40 else 62
+                dropped = index[at] & 0x7F
+                while index[at] & 0x80:
+                    at += 1
+                    dropped = (dropped + 1 << 7) + (index[at] & 0x7F)
+                end = index.index(b"\0", at + 1)
+                name = name[: len(name) - dropped] + index[at + 1 : end]
+                names.append(min(len(name), 0xFFF).to_bytes(2, "big") + name + b"\0")
+                at = end + 1
+        except (IndexError, ValueError):  # damaged, or of a repository with longer hashes
+            pass
+        index = b"".join(names)
     text = index.lower()
     at = text.find(target)
     while at >= 0:
@@ -227,22 +241,3 @@ def _names(index: bytes, target: bytes) -> bool:
             return True
         at = text.find(target, at + 1)
     return False
-
-
-def _names_of_version_4(index: bytes) -> bytes:
-    """The names of an index in which each begins with a part of the one before, as others have."""
-    at, name, names = 12, b"", []
-    try:
-        for _ in range(int.from_bytes(index[8:12], "big")):
-            at += 64 if index[at + 60] & 0x40 else 62
-            dropped = index[at] & 0x7F
-            while index[at] & 0x80:
-                at += 1
-                dropped = (dropped + 1 << 7) + (index[at] & 0x7F)
-            end = index.index(b"\0", at + 1)
-            name = name[: len(name) - dropped] + index[at + 1 : end]
-            names.append(min(len(name), 0xFFF).to_bytes(2, "big") + name + b"\0")
-            at = end + 1
-    except (IndexError, ValueError):  # damaged, or of a repository with longer hashes
-        pass
-    return b"".join(names)
