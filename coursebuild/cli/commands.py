@@ -195,7 +195,6 @@ def parser_of(command: Command) -> argparse.ArgumentParser:
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """Raise a `UsageError` that says what is wrong with the command line."""
         option = re.match("unrecognized arguments: (--[^ =]+)", message)
         if option is None:
             super().error(message)

@@ -118,15 +118,12 @@ def explanation_text(explanation: Explanation, style: Style) -> str:
 def _heading(e: Explanation) -> str:
     if e.kind in ("model", "file"):
         return visible(e.path)
-    count = sum(run.state == "would run" for run in e.runs)
     if not e.runs:
         return f"{visible(e.path)} has no scripts and no labs"
-    verdict = "none would run" if not count else f"{count} would run"
-    scripts = sum(run.kind == "script" for run in e.runs)
-    labs = len(e.runs) - scripts
-    counts = [plural(scripts, "script")] if scripts else []
-    counts += [plural(labs, "lab")] if labs else []
-    return f"{visible(e.path)}: {' and '.join(counts)}, of which {verdict}"
+    kinds = [run.kind for run in e.runs]
+    counts = [plural(kinds.count(kind), kind) for kind in ("script", "lab") if kind in kinds]
+    count = sum(run.state == "would run" for run in e.runs)
+    return f"{visible(e.path)}: {' and '.join(counts)}, of which {count or 'none'} would run"
 
 
 def _block(head: str, lines: tuple[str, ...]) -> str:
@@ -167,11 +164,8 @@ examples:
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        "name",
-        metavar="RULE|PATH",
-        help="a rule, or a script, lab, lesson, page, model, or any file of the project",
-    )
+    help = "a rule, or a script, lab, lesson, page, model, or any file of the project"
+    parser.add_argument("name", metavar="RULE|PATH", help=help)
     add_format(parser, "text", "json")
 
 
@@ -198,10 +192,8 @@ class _Explainer:
         self.course = course
         self.root = options.root
         self.run_store = options.for_course(course).run_store()
-        self.models = {
-            model.source.path: existing_files(options.root, model.source.path, model.source.text)
-            for model in course.models
-        }
+        sources = [model.source for model in course.models]
+        self.models = {s.path: existing_files(options.root, s.path, s.text) for s in sources}
         extractions = extract(course).value
         self.documents = documents_by_name(course)
         pairs = zip(extractions, jobs(extractions), strict=True)
@@ -298,9 +290,7 @@ class _Explainer:
     # --- pages
 
     def _documents_using(self, path: str) -> tuple[str, ...]:
-        return tuple(
-            document.source.path for document in self.course.documents if _uses(document, path)
-        )
+        return tuple(d.source.path for d in self.course.documents if _uses(d, path))
 
 
 def _uses(document: Document, path: str) -> bool:

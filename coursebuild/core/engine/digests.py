@@ -62,7 +62,6 @@ def _known_sha256(path: str, signature: tuple[int, ...]) -> str:
 
 def folder_state(path: str) -> str:
     """The state of what should be a folder: the names in it, and which are folders."""
-    digest = hashlib.sha256()
     try:
         with os.scandir(path) as entries:
             names = sorted((os.fsencode(e.name), e.is_dir()) for e in entries)
@@ -72,9 +71,8 @@ def folder_state(path: str) -> str:
         return ABSENT
     except OSError as error:
         return f"unreadable: {reason(error)}"
-    for name, is_folder in names:
-        digest.update(name + (b"/\0" if is_folder else b"\0"))
-    return digest.hexdigest()
+    parts = (name + (b"/\0" if is_folder else b"\0") for name, is_folder in names)
+    return hashlib.sha256(b"".join(parts)).hexdigest()
 
 
 def modules_in(folder: str, names: Iterable[str]) -> str:

@@ -58,10 +58,8 @@ def find_root(path: Path | None, start: Path) -> Path:
     root = find_course_root(str(start))
     if root is not None:
         return Path(root)
-    raise UsageError(
-        f"there is no {MAP} in this folder or one above it",
-        help="go to a course, or name one with `-C DIR`",
-    )
+    help = "go to a course, or name one with `-C DIR`"
+    raise UsageError(f"there is no {MAP} in this folder or one above it", help=help)
 
 
 def read_course(root: Path, open_texts: Mapping[str, str] = {}) -> Parsed[CourseFiles]:

@@ -174,9 +174,8 @@ def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
         raise FileChangedError(f"{path} was removed in the meantime")
     if expected is None:
         raise FileChangedError(f"{path} was created by another program in the meantime")
-    raise FileChangedError(
-        f"{path} was changed in the meantime", help="nothing was written; run the command again"
-    )
+    help = "nothing was written; run the command again"
+    raise FileChangedError(f"{path} was changed in the meantime", help=help)
 
 
 # --- several files

@@ -17,6 +17,7 @@ import math
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import assert_never
 
@@ -50,9 +51,8 @@ class States:
         self._inside = f"{str(root).rstrip('/')}/"
         self.places = places(root, os.environ, interpreter)
         self.conditions = conditions(os.environ, interpreter)
-        self._installed = InstalledPackages(
-            store, None if interpreter is None else interpreter.packages
-        )
+        folders = None if interpreter is None else interpreter.packages
+        self._installed = InstalledPackages(store, folders)
         self._states: dict[Need, str] = {}
 
     def __call__(self, need: Need) -> str:
@@ -261,8 +261,6 @@ class RunStore:
                 for key in new_keys[:_MOST_SHARED]
             )
             return [record for record in records if record is not None and _fits(record, inputs)]
-
-        from concurrent.futures import ThreadPoolExecutor
 
         with ThreadPoolExecutor(_FETCHERS, "cache") as pool:
             groups = [filter(self._holds, group) for group in pool.map(fetch, all_inputs)]

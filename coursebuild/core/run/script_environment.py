@@ -152,9 +152,8 @@ def engine_version() -> str:
     """The version of the installed MuJoCo, such as `3.14.0`; an `EffectError` without one."""
     version = package_version("mujoco")
     if version == "none":
-        raise EffectError(
-            "MuJoCo is not installed for this Python", help="run `pip install coursebuild` again"
-        )
+        message = "MuJoCo is not installed for this Python"
+        raise EffectError(message, help="run `pip install coursebuild` again")
     return version
 
 
@@ -185,10 +184,8 @@ def course_environment(root: Path, course: Course) -> Parsed[Interpreter | None]
     try:
         settings = dict(_SETTING.findall((prefix / "pyvenv.cfg").read_text("utf-8", "replace")))
     except OSError as error:
-        message = (
-            f"`{named_path.path}` is not of a virtual environment: no pyvenv.cfg, {reason(error)}"
-        )
-        return _reject(named_path, message)
+        problem = f"is not of a virtual environment: no pyvenv.cfg, {reason(error)}"
+        return _reject(named_path, f"`{named_path.path}` {problem}")
     version_text = settings.get("version") or settings.get("version_info", "")
     # Such as 3.12.1, or virtualenv's 3.12.1.final.0.
     match = re.match(r"(\d+)\.(\d+)\.\d+", version_text)
