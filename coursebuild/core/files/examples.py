@@ -133,8 +133,9 @@ class _Update:
             self._remove(path)
         _save_manifest(self.root, self.manifest)
         blocked = tuple(sorted(self.blocked, key=lambda b: b.path))
-        written, unchanged = tuple(self.written), tuple(self.unchanged)
-        return ExamplesReport(written, unchanged, tuple(self.removed), blocked)
+        return ExamplesReport(
+            tuple(self.written), tuple(self.unchanged), tuple(self.removed), blocked
+        )
 
     def _plan(self, path: str) -> None:
         new, known_hashes = self.scripts.get(path), self.known_hashes.get(path)
