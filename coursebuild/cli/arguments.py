@@ -152,9 +152,7 @@ def style_of(stream: TextIO | None) -> Style:
 
 
 def run_unless_unchanged(
-    arguments: argparse.Namespace,
-    outputs: tuple[str, ...],
-    work: Callable[[Options], Report],
+    arguments: argparse.Namespace, outputs: tuple[str, ...], work: Callable[[Options], Report]
 ) -> int:
     """Do the work; if it succeeds, the same command has nothing to do while nothing changes.
 

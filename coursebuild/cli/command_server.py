@@ -1,15 +1,11 @@
 """Does commands for other terminals, in the place of their own processes; for `coursebuild serve`.
 
-How a command comes here, see `handover`.
-
 1. The server is a copy of the preview's process, made before that has threads, with everything
-   imported that commands need. So a command begins at once.
-2. Each command runs in a process of its own, a copy of the server, with the working folder, the
-   environment, the limits and the standard streams of whoever sent it. What it does is what it
-   would do elsewhere: the course is read anew, and what was made before comes from the store.
+   imported that commands need. So a command, which comes as in `handover`, begins at once.
+2. Each runs in a copy of the server, with the working folder, the environment, the limits and the
+   standard streams of whoever sent it. It does what it would do elsewhere: the course is read anew.
 3. Beside it another copy waits for its end, and passes signals on. When the sender goes away, it
-   ends the command.
-4. If the preview ends, commands that have begun go on to their end.
+   ends the command. If the preview ends, commands that have begun go on to their end.
 
 The preview itself holds the lock of the course only while it writes, and a script that both need
 runs once (`RunStore.claim`). So the command need not wait for the preview.

@@ -114,10 +114,9 @@ def _run_command(directory: str | None, words: list[str]) -> int:
         return _choose_command(directory, words)
     except UsageError as error:
         return fail(USAGE, str(error))
-    except PublishRefusedError as error:
-        return fail(USAGE, error.message, error.help)
     except EffectError as error:
-        return fail(FAILURE, error.message, error.help)
+        status = USAGE if isinstance(error, PublishRefusedError) else FAILURE
+        return fail(status, error.message, error.help)
     except (MemoryError, OSError, RuntimeError) as error:
         lack = lacking(error)
         if lack is None:
@@ -196,7 +195,6 @@ def parser_of(command: Command) -> argparse.ArgumentParser:
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """Raise a `UsageError` that says what is wrong with the command line."""
         option = re.match("unrecognized arguments: (--[^ =]+)", message)
         if option is None:
             super().error(message)

@@ -98,18 +98,15 @@ def rule_text(rule: Rule, page: str) -> str:
 def explanation_text(explanation: Explanation, style: Style) -> str:
     """Return an explanation as text for people."""
     e = explanation
-    parts: list[str] = []
-    if e.kind in ("script", "lab"):
-        parts += ["\n".join(_full_text(run, style)) for run in e.runs]
-    else:
-        parts.append(style.paint(_heading(e), BOLD))
-        parts += ["\n".join(_short_text(run, style)) for run in e.runs]
+    is_run = e.kind in ("script", "lab")
+    parts = [] if is_run else [style.paint(_heading(e), BOLD)]
+    parts += ["\n".join(_run_lines(run, style, full=is_run)) for run in e.runs]
     if e.files:
         parts.append(_block("consists also of", e.files))
     if e.part_of:
         parts.append(_block("is a part of", e.part_of))
     if e.dependents:
-        lines = [line for run in e.dependents for line in _short_text(run, style)]
+        lines = [line for run in e.dependents for line in _run_lines(run, style)]
         parts.append("\n".join(["depending on it:", *(f"  {line}" for line in lines)]))
     elif e.kind in ("model", "file"):
         parts.append("no result of a script or lab depends on it")
@@ -121,36 +118,31 @@ def explanation_text(explanation: Explanation, style: Style) -> str:
 def _heading(e: Explanation) -> str:
     if e.kind in ("model", "file"):
         return visible(e.path)
-    count = sum(run.state == "would run" for run in e.runs)
     if not e.runs:
         return f"{visible(e.path)} has no scripts and no labs"
-    verdict = "none would run" if not count else f"{count} would run"
-    scripts = sum(run.kind == "script" for run in e.runs)
-    labs = len(e.runs) - scripts
-    counts = [plural(scripts, "script")] if scripts else []
-    counts += [plural(labs, "lab")] if labs else []
-    return f"{visible(e.path)}: {' and '.join(counts)}, of which {verdict}"
+    kinds = [run.kind for run in e.runs]
+    counts = [plural(kinds.count(kind), kind) for kind in ("script", "lab") if kind in kinds]
+    count = sum(run.state == "would run" for run in e.runs)
+    return f"{visible(e.path)}: {' and '.join(counts)}, of which {count or 'none'} would run"
 
 
 def _block(head: str, lines: tuple[str, ...]) -> str:
     return "\n".join([f"{head}:", *(f"  {visible(line)}" for line in lines)])
 
 
-def _verdict(run: RunExplanation, style: Style) -> str:
-    match run.state:
-        case "remembered":
-            return style.paint("is remembered", GREEN)
-        case "norun":
-            return "is never run: its lesson says `norun`"
-        case "would run":
-            suffix = " again" if run.made is not None else ""
-            verb = "run" if run.kind == "script" else "be tried"
-            return style.paint(f"would {verb}{suffix}", YELLOW)
-
-
-def _full_text(run: RunExplanation, style: Style) -> list[str]:
-    lines = [f"{style.paint(visible(run.name), BOLD)} {_verdict(run, style)}"]
+def _run_lines(run: RunExplanation, style: Style, *, full: bool = False) -> list[str]:
+    name = style.paint(visible(run.name), BOLD) if full else visible(run.name)
+    verb = "run" if run.kind == "script" else "be tried"
+    again = " again" if run.made is not None else ""
+    verdicts = {
+        "remembered": style.paint("is remembered", GREEN),
+        "norun": "is never run: its lesson says `norun`",
+        "would run": style.paint(f"would {verb}{again}", YELLOW),
+    }
+    lines = [f"{name} {verdicts[run.state]}"]
     lines += [f"  because {visible(reason)}" for reason in run.reasons]
+    if not full:
+        return lines
     last = "not run yet on this machine"
     if run.made is not None and run.seconds is not None:
         time_text = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(run.made))
@@ -160,11 +152,6 @@ def _full_text(run: RunExplanation, style: Style) -> list[str]:
         lines += ["", "its last result depends on:"]
         lines += [f"  {visible(line)}" for line in run.depends]
     return lines
-
-
-def _short_text(run: RunExplanation, style: Style) -> list[str]:
-    line = f"{visible(run.name)} {_verdict(run, style)}"
-    return [line, *(f"  because {visible(reason)}" for reason in run.reasons)]
 
 
 EXAMPLES = """\
@@ -177,11 +164,8 @@ examples:
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        "name",
-        metavar="RULE|PATH",
-        help="a rule, or a script, lab, lesson, page, model, or any file of the project",
-    )
+    help = "a rule, or a script, lab, lesson, page, model, or any file of the project"
+    parser.add_argument("name", metavar="RULE|PATH", help=help)
     add_format(parser, "text", "json")
 
 
@@ -208,10 +192,8 @@ class _Explainer:
         self.course = course
         self.root = options.root
         self.run_store = options.for_course(course).run_store()
-        self.models = {
-            model.source.path: existing_files(options.root, model.source.path, model.source.text)
-            for model in course.models
-        }
+        sources = [model.source for model in course.models]
+        self.models = {s.path: existing_files(options.root, s.path, s.text) for s in sources}
         extractions = extract(course).value
         self.documents = documents_by_name(course)
         pairs = zip(extractions, jobs(extractions), strict=True)
@@ -308,9 +290,7 @@ class _Explainer:
     # --- pages
 
     def _documents_using(self, path: str) -> tuple[str, ...]:
-        return tuple(
-            document.source.path for document in self.course.documents if _uses(document, path)
-        )
+        return tuple(d.source.path for d in self.course.documents if _uses(d, path))
 
 
 def _uses(document: Document, path: str) -> bool:

@@ -12,8 +12,6 @@ The other side is `command_server`.
    the command is ended.
 4. Another version of the tool, another Python or other packages would do something else. Then the
    command is done here, as without a preview.
-
-This is loaded by each command, so it imports little.
 """
 
 from __future__ import annotations
@@ -22,19 +20,19 @@ import contextlib
 import hashlib
 import json
 import os
+import resource
 import signal
+import socket
 import stat
+import struct
 import sys
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coursebuild.cli.output import FAILURE, say
 from coursebuild.cli.unchanged import tool_state
 from coursebuild.core.files.course_root import find_course_root
 from coursebuild.core.files.trust import state_folder
-
-if TYPE_CHECKING:
-    import socket
 
 COMMANDS = frozenset("build check export extract fmt new rename undo update".split())
 """Commands that work on the files of a course, as a preview does. Others read only, make another
@@ -76,9 +74,6 @@ def is_private(folder: str) -> bool:
 
 def is_own_process(connection: socket.socket) -> bool:
     """Whether the process at the other end is this user's, as far as the system says."""
-    import socket
-    import struct
-
     if not hasattr(socket, "SO_PEERCRED"):
         return True
     data = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
@@ -87,8 +82,6 @@ def is_own_process(connection: socket.socket) -> bool:
 
 def process_state() -> str | None:
     """A hash over what two processes have in common that do the same; `None` if it is unclear."""
-    import resource
-
     tool = tool_state()
     if tool is None:
         return None
@@ -102,8 +95,6 @@ def process_state() -> str | None:
 
 def limits() -> list[int]:
     """The system's limits of a process, by number."""
-    import resource
-
     return sorted({getattr(resource, name) for name in dir(resource) if name.startswith("RLIMIT_")})
 
 
@@ -124,7 +115,6 @@ def hand_over(directory: str | None, words: list[str]) -> int | None:
     with connect(root) as connection:
         if connection is None:
             return None
-        import resource
 
         streams = (sys.stdin, sys.stdout, sys.stderr)
         mask = os.umask(0o077)
@@ -175,7 +165,6 @@ def connect(root: str | None) -> Iterator[socket.socket | None]:
     if place is None or not is_private(os.path.dirname(place)) or not os.path.lexists(place):
         yield None
         return
-    import socket
 
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         connection.settimeout(_PATIENCE)
@@ -224,8 +213,6 @@ def _wait(connection: socket.socket, process: int) -> int:
 
 def send(connection: socket.socket, message: dict[str, Any], files: Sequence[int] = ()) -> None:
     """Send a message, with open files."""
-    import socket
-
     data = json.dumps(message).encode()
     head = len(data).to_bytes(4, "big")
     if files:
@@ -237,8 +224,6 @@ def send(connection: socket.socket, message: dict[str, Any], files: Sequence[int
 
 def receive(connection: socket.socket, files: list[int] | None = None) -> dict[str, Any] | None:
     """Receive a message, and add the files that come with it; `None` at the end."""
-    import socket
-
     if files is None:
         head = connection.recv(4)
     else:

@@ -84,18 +84,16 @@ class CourseTests:
     def results_of(self, session: pytest.Session, test: str) -> list[tuple[str, str]]:
         """The results of a test: JUnit's tags, with their texts."""
         if self._results is None:
-            sources = {
-                i.source for i in session.items if isinstance(i, CourseItem) and i.course is self
-            }
+            items = (item for item in session.items if isinstance(item, CourseItem))
+            sources = {item.source for item in items if item.course is self}
             checks_everything = any(_PAGE not in self.tests[source] for source in sources)
             self._results = self._check(() if checks_everything else sorted(sources))
         return self._results[test]
 
     def _check(self, names: Iterable[str]) -> dict[str, list[tuple[str, str]]]:
         check = ("-m", "coursebuild", "-C", str(self.root), "check", "--format", "junit")
-        result = subprocess.run(
-            [sys.executable, *check, *names], capture_output=True, encoding="utf-8"
-        )
+        command = [sys.executable, *check, *names]
+        result = subprocess.run(command, capture_output=True, encoding="utf-8")
         if result.returncode not in (0, 1):
             raise CourseError(result.stderr)
         owners = {name: path for path, tests in self.tests.items() for name in tests}

@@ -43,9 +43,22 @@ _PORT = 8000
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+
+    def parse_port(text: str) -> int:
+        if text.isdecimal() and int(text) <= 65535:
+            return int(text)
+        message = f"{text!r} is not a port: a whole number from 0 to 65535"
+        raise argparse.ArgumentTypeError(message)
+
+    def parse_origin(text: str) -> str:
+        if re.fullmatch(r"[a-z][a-z0-9+.-]*:(//[\w.*\[\]:-]+)?", text):
+            return text
+        message = f"{text!r} is not an origin, such as https://example.org"
+        raise argparse.ArgumentTypeError(message)
+
     add_running(parser)
     help = "port to listen on (default: %(default)s; 0: any free port)"
-    parser.add_argument("--port", type=_parse_port, default=_PORT, help=help)
+    parser.add_argument("--port", type=parse_port, default=_PORT, help=help)
     parser.add_argument(
         "--host",
         default="127.0.0.1",
@@ -56,7 +69,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--embed",
         action="append",
-        type=_parse_origin,
+        type=parse_origin,
         default=[],
         metavar="ORIGIN",
         help="let pages of this origin show the preview in a frame, such as vscode-webview:",
@@ -75,18 +88,6 @@ def run(arguments: argparse.Namespace) -> int:
                 webbrowser.open(link)
             return CLEAN
     _serve(options, arguments, takes_commands=served is None)
-
-
-def _parse_port(text: str) -> int:
-    if not text.isdecimal() or int(text) > 65535:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a port: a whole number from 0 to 65535")
-    return int(text)
-
-
-def _parse_origin(text: str) -> str:
-    if not re.fullmatch(r"[a-z][a-z0-9+.-]*:(//[\w.*\[\]:-]+)?", text):
-        raise argparse.ArgumentTypeError(f"{text!r} is not an origin, such as https://example.org")
-    return text
 
 
 def _serve(options: Options, arguments: argparse.Namespace, *, takes_commands: bool) -> NoReturn:

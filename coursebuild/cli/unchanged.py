@@ -216,18 +216,16 @@ def _rows(path: str, began: int | None) -> Iterator[tuple[object, ...]]:
     for folder in folders:
         yield folder, "folder"
         with os.scandir(folder) as entries:
-            contents = sorted(
-                (entry.name, entry) for entry in entries if not is_dropping(entry.name)
-            )
-        for name, entry in contents:
+            contents = [entry for entry in entries if not is_dropping(entry.name)]
+        for entry in sorted(contents, key=lambda entry: entry.name):
             if entry.is_dir(follow_symlinks=False):
                 folders.append(entry.path)
             elif not entry.is_symlink():
-                yield name, *_numbers(entry.stat(follow_symlinks=False), began)
+                yield entry.name, *_numbers(entry.stat(follow_symlinks=False), began)
             elif entry.is_dir():
                 raise _UnclearError
             else:
-                yield name, os.readlink(entry.path)
+                yield entry.name, os.readlink(entry.path)
                 yield from _rows(entry.path, began)
 
 

@@ -7,6 +7,7 @@ import fcntl
 import os
 import pty
 import re
+import shlex
 import shutil
 import signal
 import socket
@@ -20,6 +21,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.cli.handover import ask_preview, hand_over, receive, send, socket_place
+from support.fixture_cases import fixture_text
 from support.preview_process import Preview, serve_preview
 from support.scratch_course import (
     FIRST,
@@ -73,29 +75,6 @@ def normalize(result: CommandResult, folder: Folder) -> tuple[int, str, str]:
     return result.status, plain(result.out), plain(result.err)
 
 
-COMMANDS = (
-    ("export", "page"),
-    ("build", "--out", "elsewhere"),
-    ("DRIFT",),
-    ("check",),
-    ("check", "-v", "1.2"),
-    ("check", "--format", "json"),
-    ("check", "9.9"),
-    ("check", "--nonsense"),
-    ("-C", "content", "check"),
-    ("new", "lesson", "1.3", "Third"),
-    ("new", "lesson", "1.3", "Third"),
-    ("fmt", "--check"),
-    ("fmt",),
-    ("SLIP",),
-    ("check", "--fix"),
-    ("undo",),
-    ("check", "--fix"),
-    ("extract", "-q"),
-    ("rename", "1.2", "1.4"),
-    ("update", "--dry-run"),
-    ("update",),  # after this, the preview runs the script again
-)
 EDITS = {"DRIFT": ("2.5\n```", "2.4\n```"), "SLIP": ("```text\n2.4", "```tetx\n2.4")}
 
 
@@ -108,7 +87,8 @@ def test_commands_do_what_they_do_without_a_preview(make: Make, runtime: str) ->
     env = {"XDG_RUNTIME_DIR": runtime}
     with preview_of(served, runtime) as preview:
         preview.wait_for_line("checked: ")
-        for words in COMMANDS:
+        lines = fixture_text("scripts/commands_beside_preview.txt").splitlines()
+        for words in (shlex.split(line) for line in lines if not line.startswith("#")):
             if words[0] in EDITS:
                 for folder in (alone, served):
                     folder.replace(folder.lesson(), *EDITS[words[0]])

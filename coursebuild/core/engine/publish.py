@@ -29,8 +29,6 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from msgspec import Struct
-
 from coursebuild.core.engine import manifest
 from coursebuild.core.engine.manifest import MARKER, Manifest, ManifestEntry
 from coursebuild.core.engine.page_pool import Workers, can_fork
@@ -83,7 +81,7 @@ def publish(
         place.parent.mkdir(parents=True, exist_ok=True)
         with folder_lock(place.parent):
             _check_place(root, out, place)
-            site = new_site(Manifest.read(root, place), files, file_list)
+            site = _NewSite(Manifest.read(root, place), files, file_list)
             if site.is_there():
                 return ()
             slot = _sibling(place, "new")
@@ -93,7 +91,15 @@ def publish(
                 if not manifest.holds(slot, entries):
                     message = f"another process is changing what is being written to {place}"
                     raise EffectError(message)
-                _swap(slot, place)
+                slot.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o755)
+                if not os.path.lexists(place):
+                    slot.rename(place)
+                elif not exchange(slot, place):
+                    old = _sibling(place, "old")
+                    remove(old)
+                    place.rename(old)
+                    slot.rename(place)
+                    old.rename(slot)
             finally:
                 _recover(place)
                 put_away(root, slot)
@@ -101,19 +107,6 @@ def publish(
             return tuple(sorted(paths))
     except OSError as error:
         raise EffectError(f"the site cannot be written to {out}: {reason(error)}") from None
-
-
-def _swap(slot: Path, place: Path) -> None:
-    """Move the new site to the place, with the permissions of the old one, which goes the way."""
-    slot.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o755)
-    if not os.path.lexists(place):
-        slot.rename(place)
-    elif not exchange(slot, place):
-        old = _sibling(place, "old")
-        remove(old)
-        place.rename(old)
-        slot.rename(place)
-        old.rename(slot)
 
 
 # --- the place
@@ -180,7 +173,6 @@ def _sibling(place: Path, suffix: str) -> Path:
 
 # --- the slot
 
-
 _NO_PATH = re.compile(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
 """What no path may have: an empty part, `.` or `..`, a control character, a backslash."""
 _MIN_FOR_COPIES = 128
@@ -191,15 +183,38 @@ _MAX_COPIES = 4
 """The most copies: more would wait for the disk."""
 
 
-class NewSite(Struct, frozen=True):
-    """The site to be published, and the manifest of the one that is there."""
+class _NewSite:
+    """The site to be published, and the manifest of the one that is there.
 
-    old: Manifest
-    files: Mapping[str, SiteFile]
-    """By path, without the file list."""
-    file_list: FileList | None
-    keys: Mapping[str, str]
-    """The key of each file by its path, that of the file list included."""
+    Raises:
+        ValueError: a path is not valid in a site, or two files have the same.
+    """
+
+    def __init__(
+        self, old: Manifest, files: Iterable[SiteFile], file_list: FileList | None
+    ) -> None:
+        self.old = old
+        self.file_list = file_list
+        self.files: dict[str, SiteFile] = {}
+        """By path, without the file list."""
+        self.keys: dict[str, str] = {}
+        """The key of each file by its path, that of the file list included."""
+        for file in files:
+            path = file.path
+            if _NO_PATH.search(path) or path == MARKER:
+                raise ValueError(f"{path!r} is not a path that a site may have")
+            if path in self.files or (file_list is not None and path == file_list.path):
+                raise ValueError(f"the site has two files {path}")
+            self.files[path] = file
+            if isinstance(file, OutputFile):
+                self.keys[path] = f"={hashlib.sha256(file.data).hexdigest()}"
+            else:
+                self.keys[path] = file.key
+        if file_list is not None:
+            # Of the keys of all files, since the list names all of them.
+            lines = (file_list.key, *(f"{key} {path}" for path, key in self.keys.items()))
+            data = "\n".join(lines).encode("utf-8", "surrogatepass")
+            self.keys[file_list.path] = hashlib.sha256(data).hexdigest()
 
     def is_there(self) -> bool:
         """Whether the published site is already this one, whole and without other files."""
@@ -274,28 +289,6 @@ def _write_file(path: str, data: bytes) -> str:
         file.write(data)
         os.fchmod(file.fileno(), 0o644)  # whatever the umask is
     return hashlib.sha256(data).hexdigest()
-
-
-def new_site(old: Manifest, files: Iterable[SiteFile], file_list: FileList | None) -> NewSite:
-    """The site of these files over the one of a manifest; a `ValueError` where a path is bad."""
-    by_path: dict[str, SiteFile] = {}
-    keys: dict[str, str] = {}
-    for file in files:
-        path = file.path
-        if _NO_PATH.search(path) or path == MARKER:
-            raise ValueError(f"{path!r} is not a path that a site may have")
-        if path in by_path or (file_list is not None and path == file_list.path):
-            raise ValueError(f"the site has two files {path}")
-        by_path[path] = file
-        if isinstance(file, OutputFile):
-            keys[path] = f"={hashlib.sha256(file.data).hexdigest()}"
-        else:
-            keys[path] = file.key
-    if file_list is not None:
-        # Of the keys of all files, since the list names all of them.
-        text = "\n".join((file_list.key, *(f"{key} {path}" for path, key in keys.items())))
-        keys[file_list.path] = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
-    return NewSite(old, by_path, file_list, keys)
 
 
 def open_slot(root: Path, slot: Path) -> None:

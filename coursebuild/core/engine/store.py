@@ -1,21 +1,14 @@
 """Results that are expensive to make and depend on nothing but their key, kept in `.coursebuild/`.
 
-The words are those of `core.engine`.
-
 1. An entry lies at `.coursebuild/KIND/KEY`, or `KIND/GROUP/KEY` where several results belong
    together. It is sealed under its name with the user's key (see `core.files.trust`), and the
    reader says which type the data must have. What somebody else wrote, or damaged, is not there.
-2. It is written under a temporary name and then renamed, so that other processes see whole entries
-   only.
+2. It is renamed when it is whole. Nothing is lost when the folder is deleted.
 3. Results of scripts and trials can be shared: they are also looked for in the shared place, if
-   there is one, and sent there. Everything else is made on this machine.
-4. Reading waits for the shared place; up to four threads write while the work goes on. If it cannot
-   be reached or takes too long, that is reported once, and it is left alone for a while: it costs
-   time, but is never an error.
-5. Now and then, as a command ends, the entries used longest ago are removed until the rest is
-   within the limit.
-
-Nothing is lost when the folder is deleted.
+   there is one, and sent there. Reading waits for it; up to four threads write while the work goes
+   on. If it cannot be reached or takes too long, that is reported once, and it is left alone for a
+   while: it costs time, but is never an error.
+4. Now and then, as a command ends, the entries used longest ago are removed, down to the limit.
 """
 
 from __future__ import annotations

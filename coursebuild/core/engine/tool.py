@@ -157,10 +157,8 @@ def code_digest(*parts: str, root: Path = Path(_CORE).parents[1]) -> str:
     try:
         for place in (root / part for part in parts):
             for path in (place,) if place.is_file() else sorted(place.rglob("*.py")):
-                name = path.relative_to(root).as_posix()
-                content = path.read_bytes()
-                digest.update(f"{name}\0{len(content)}\0".encode())
-                digest.update(content)
+                name, content = path.relative_to(root).as_posix(), path.read_bytes()
+                digest.update(f"{name}\0{len(content)}\0".encode() + content)
     except OSError as error:
         raise EffectError(f"the tool's own code cannot be read: {reason(error)}") from None
     return digest.hexdigest()

@@ -173,7 +173,6 @@ def _waiting_message(holder: str) -> str:
 
 # --- temporary folders
 
-
 _PREFIX = "coursebuild.tmp."
 _NAME = re.compile(re.escape(_PREFIX) + r"[a-z0-9_]{8}")
 _OPEN_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC

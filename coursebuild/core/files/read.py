@@ -1,14 +1,10 @@
 """Reading a course: where it is, which files it has, what they say.
 
-1. `content/` and `models/` are walked in sorted order, without what editors leave there (names that
-   begin with a dot, `x.md~`).
-2. Lessons, pages and models are decoded as strict UTF-8. Line ends and byte order marks stay, so
-   that edits by offset change no other byte.
-3. A file that cannot be read becomes a diagnostic. One that is not UTF-8 still becomes a source,
-   with U+FFFD for the wrong bytes, so that its other mistakes are found in the same run. Since it
-   differs from the file, no edit can be written back over that by mistake.
-4. A file that is no text at all, such as a picture, or is in UTF-16, becomes a diagnostic and
-   nothing else: any mistake found in it would be noise.
+Lessons, pages and models are decoded as strict UTF-8. Line ends and byte order marks stay, so that
+edits by offset change no other byte. A file that cannot be read becomes a diagnostic. One that is
+not UTF-8 still becomes a source, with U+FFFD for the wrong bytes, so that its other mistakes are
+found in the same run; since it differs from the file, no edit can be written back over that. A file
+that is no text at all, or is in UTF-16, is nothing else: any mistake found in it would be noise.
 """
 
 from __future__ import annotations
@@ -62,10 +58,8 @@ def find_root(path: Path | None, start: Path) -> Path:
     root = find_course_root(str(start))
     if root is not None:
         return Path(root)
-    raise UsageError(
-        f"there is no {MAP} in this folder or one above it",
-        help="go to a course, or name one with `-C DIR`",
-    )
+    help = "go to a course, or name one with `-C DIR`"
+    raise UsageError(f"there is no {MAP} in this folder or one above it", help=help)
 
 
 def read_course(root: Path, open_texts: Mapping[str, str] = {}) -> Parsed[CourseFiles]:

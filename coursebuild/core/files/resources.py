@@ -92,14 +92,11 @@ def _find_folder(installed: str, in_tree: str, problem: str) -> Path:
     for folder in (_PACKAGE / installed, _PACKAGE.parent / in_tree):
         if folder.is_dir():
             return folder
-    raise EffectError(
-        f"{problem}: there is no {_PACKAGE / installed}",
-        help="in a source tree, run `make site`; otherwise install coursebuild again",
-    )
+    help = "in a source tree, run `make site`; otherwise install coursebuild again"
+    raise EffectError(f"{problem}: there is no {_PACKAGE / installed}", help=help)
 
 
 # --- what is prepared when the tool is made
-
 
 PREPARED = "prepared"
 """Its name in the folder of the bundled files."""

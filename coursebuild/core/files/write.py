@@ -63,7 +63,15 @@ def write_atomic(
             target.parent.mkdir(parents=True, exist_ok=True)
         fd, temporary = _open_temporary(target.parent)
         try:
-            _fill(fd, data, target)
+            rest = memoryview(data)
+            while rest:
+                rest = rest[os.write(fd, rest) :]
+            with contextlib.suppress(FileNotFoundError):
+                old = target.stat()
+                with contextlib.suppress(PermissionError):  # only root may give a file away
+                    if (old.st_uid, old.st_gid) != (os.geteuid(), os.getegid()):
+                        os.fchown(fd, old.st_uid, old.st_gid)
+                os.fchmod(fd, stat.S_IMODE(old.st_mode))
             if durable:
                 os.fsync(fd)
             check_unchanged(target, path, expected)
@@ -138,18 +146,6 @@ def _open_temporary(folder: Path) -> tuple[int, str]:
         os.close(fd)
 
 
-def _fill(fd: int, data: bytes, target: Path) -> None:
-    rest = memoryview(data)
-    while rest:
-        rest = rest[os.write(fd, rest) :]
-    with contextlib.suppress(FileNotFoundError):
-        old = target.stat()
-        with contextlib.suppress(PermissionError):  # only root may give a file away
-            if (old.st_uid, old.st_gid) != (os.geteuid(), os.getegid()):
-                os.fchown(fd, old.st_uid, old.st_gid)
-        os.fchmod(fd, stat.S_IMODE(old.st_mode))
-
-
 def _move(temporary: str, target: Path, path: str, *, new: bool) -> None:
     try:
         if new:  # a link, unlike a rename, never replaces a file that somebody just made
@@ -178,13 +174,11 @@ def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
         raise FileChangedError(f"{path} was removed in the meantime")
     if expected is None:
         raise FileChangedError(f"{path} was created by another program in the meantime")
-    raise FileChangedError(
-        f"{path} was changed in the meantime", help="nothing was written; run the command again"
-    )
+    help = "nothing was written; run the command again"
+    raise FileChangedError(f"{path} was changed in the meantime", help=help)
 
 
 # --- several files
-
 
 _CLOSED = frozenset({".git", ".venv", FOLDER})
 """Folders of the project in which nothing is made."""

@@ -129,9 +129,8 @@ class JsonChild:
                 self.stop()
                 errors.seek(0)
                 lines = errors.read().decode("utf-8", "replace").strip().splitlines()
-                raise EffectError(
-                    f"MuJoCo cannot be loaded: {lines[-1] if lines else 'the import crashed'}"
-                )
+                cause = lines[-1] if lines else "the import crashed"
+                raise EffectError(f"MuJoCo cannot be loaded: {cause}")
         with contextlib.suppress(AttributeError, OSError):  # only Linux can
             resource.prlimit(process.pid, resource.RLIMIT_DATA, (self.memory << 20,) * 2)
             resource.prlimit(process.pid, resource.RLIMIT_CORE, (0, 0))

@@ -169,9 +169,8 @@ def sought_files(name: str) -> tuple[str, ...]:
     """The files that were looked for, given the name of a need of kind `SOUGHT`."""
     folder, modules = parse_sought(name)
     prefix = f"{folder}/" if folder else ""  # the project's own folder has no name
-    return tuple(
-        f"{prefix}{module}{suffix}" for module in modules for suffix in (".py", "/__init__.py")
-    )
+    endings = (".py", "/__init__.py")
+    return tuple(f"{prefix}{module}{ending}" for module in modules for ending in endings)
 
 
 def reason_forgotten(run: ScriptRun) -> str:

@@ -125,9 +125,8 @@ class _Compiler(JsonChild):
     def _try(self, path: str, texts: Mapping[str, str]) -> CompileResult:
         """Compile the model at a path, with these texts in place of files."""
         text = texts[path]
-        for file in sorted(
-            {f for name in texts for f in model_files(self.root, name, texts[name])}
-        ):
+        files = {f for name in texts for f in model_files(self.root, name, texts[name])}
+        for file in sorted(files):
             if file_state(str(self.root / file)) == SPECIAL:  # to read it may take for ever
                 return CompileResult(f"'{file}' is a device or a pipe")
         limit = min(_ONE * self.seconds, self.left)

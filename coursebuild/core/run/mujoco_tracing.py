@@ -43,9 +43,8 @@ def wrap(mujoco: ModuleType) -> None:
         """Notes the files of a model whose path or text is the first argument."""
 
         def note_files(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-            files = ModelFiles(
-                active_tracer().note_read, _given_names(args, keywords), assets=assets
-            )
+            given_names = _given_names(args, keywords)
+            files = ModelFiles(active_tracer().note_read, given_names, assets=assets)
             scan(files, _get_argument(args, keywords, 0, "filename", "xml"))
 
         return note_files

@@ -93,7 +93,7 @@ class _Watch:
     def _note_warning(self, message: str) -> None:
         if mujoco_tracing.tracer is None:
             return
-        try:
+        with contextlib.suppress(Exception):  # the script's own step must not fail for this
             for text, _, kind in _KINDS:
                 if text in message:
                     self._warned.add(kind)
@@ -102,8 +102,6 @@ class _Watch:
                     all_data = list(self._data_by_id.values())
                     names = {_name(data) for data in all_data if f"{data.time:.4f}" == time}
                     self._note(kind, "", time, names.pop() if len(names) == 1 else "")
-        except Exception:  # the script's own step must not fail for this
-            pass
 
     # --- checks
 

@@ -159,7 +159,6 @@ def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str
 
 # --- environments with other versions
 
-
 _FOLDER = "environments"
 _MAX_ENVIRONMENTS = 4
 """Environments that are kept."""
@@ -229,10 +228,9 @@ def environment_prefix(root: Path, engine: str) -> Path:
     name = f"mujoco-{engine}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
     state = state_folder(str(root))
     if state is None:
-        raise EffectError(
-            f"there is no place for an environment with MuJoCo {engine}",
-            help="set HOME or XDG_STATE_HOME to a folder outside the course",
-        )
+        help = "set HOME or XDG_STATE_HOME to a folder outside the course"
+        message = f"there is no place for an environment with MuJoCo {engine}"
+        raise EffectError(message, help=help)
     return Path(state, _FOLDER, name)
 
 
@@ -252,10 +250,8 @@ def _install_command(python: str) -> list[str]:
         return [*pip, "--no-input", "--progress-bar", "off", *plain]
     if uv := shutil.which("uv"):
         return [uv, "pip", "install", "--python", python, "--no-progress", *plain]
-    raise EffectError(
-        "this Python has no pip, and there is no uv, so nothing can be installed",
-        help="run `python -m ensurepip`",
-    )
+    message = "this Python has no pip, and there is no uv, so nothing can be installed"
+    raise EffectError(message, help="run `python -m ensurepip`")
 
 
 def _create_environment(prefix: Path, engine: str) -> None:
@@ -304,9 +300,8 @@ def _install_error(engine: str, output: str) -> EffectError:
     lines = _lines(output)
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
     reasons = errors if errors != ["Exception:"] else lines[-1:]  # pip's own traceback
-    return EffectError(
-        f"{tool} cannot install MuJoCo {engine}: {'; '.join((reasons or lines)[-_MOST_QUOTED:])}"
-    )
+    quoted_lines = (reasons or lines)[-_MOST_QUOTED:]
+    return EffectError(f"{tool} cannot install MuJoCo {engine}: {'; '.join(quoted_lines)}")
 
 
 def _lines(output: str) -> list[str]:

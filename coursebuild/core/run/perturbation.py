@@ -309,7 +309,6 @@ def _model_and_data(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple
 
 # --- shorter steps
 
-
 _INTEGRATORS = ("mj_Euler", "mj_implicit", "mj_RungeKutta")
 """Integrators; a script has computed the accelerations itself before it calls one."""
 

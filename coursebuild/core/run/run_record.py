@@ -122,20 +122,19 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
             elif kind == "d":
                 sign, detail, time, model, path, line = value.split("\t")
                 depth, *geoms = detail.split("\x1f")
-                divergences.append(
-                    Divergence(Sign(sign), time, model, path, int(line), depth, tuple(geoms))
-                )
+                place = (time, model, path, int(line))
+                divergences.append(Divergence(Sign(sign), *place, depth, tuple(geoms)))
     files = {_resolve(path, top) for path in values_by_kind["r"]}
     inside = {path.removeprefix(f"{top}/") for path in files if path.startswith(f"{top}/")}
     sought_names: dict[str, set[str]] = defaultdict(set)  # by the folder where they are not
     for record in values_by_kind["v"]:
         folder, _, names = record.partition("\t")
         sought_names[_make_relative(folder, top)].update(names.split(","))
+    folders = {_make_relative(folder, top) or "." for folder in values_by_kind["l"]}
+    sought = (f"{at}/{{{','.join(sorted(n))}}}" for at, n in sorted(sought_names.items()))
     return Trace(
         files=tuple(sorted(inside - {os.path.normpath(script)})),
-        folders=tuple(
-            sorted({_make_relative(folder, top) or "." for folder in values_by_kind["l"]})
-        ),
+        folders=tuple(sorted(folders)),
         outside=tuple(sorted(path for path in files if not path.startswith(f"{top}/"))),
         modules=tuple(sorted(set(values_by_kind["m"]))),
         opaque=next(iter(values_by_kind["o"]), ""),
@@ -143,9 +142,7 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
         effects=tuple(effects),
         is_perturbed=bool(values_by_kind["p"]),
         states=tuple(values_by_kind["s"]),
-        sought=tuple(
-            f"{folder}/{{{','.join(sorted(n))}}}" for folder, n in sorted(sought_names.items())
-        ),
+        sought=tuple(sought),
     )
 
 

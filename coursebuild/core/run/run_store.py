@@ -1,12 +1,11 @@
 """The results of scripts: one runs again only if something that it depends on has changed.
 
-1. `get_runs`: what is known before a script runs determines a group of results; the one whose
-   dependencies are all unchanged is its result. Groups that this machine lacks are looked for in
-   the shared cache.
-2. `put_run`: after a run, the state of everything in its trace is read and stored with the result.
-   If something changed while it ran, the script may have seen another state, and nothing is stored.
-3. `claim`: of several processes that need the same result one runs the script, and the others get
-   its result. So `serve` and other commands can run scripts at the same time.
+1. What is known before a script runs determines a group of results; the one whose dependencies are
+   all unchanged is its result. Groups that this machine lacks are sought in the shared cache.
+2. After a run, the state of everything in its trace is read and stored with the result. If
+   something changed while it ran, the script may have seen another state, and nothing is stored.
+3. Of several processes that need the same result one runs the script, and the others get its
+   result (`claim`). So `serve` and other commands can run scripts at the same time.
 4. How a script's last run ended is noted under its path, whether it is remembered or not: for
    `explain`, and for the order in which scripts run.
 """
@@ -18,6 +17,7 @@ import math
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import assert_never
 
@@ -51,9 +51,8 @@ class States:
         self._inside = f"{str(root).rstrip('/')}/"
         self.places = places(root, os.environ, interpreter)
         self.conditions = conditions(os.environ, interpreter)
-        self._installed = InstalledPackages(
-            store, None if interpreter is None else interpreter.packages
-        )
+        folders = None if interpreter is None else interpreter.packages
+        self._installed = InstalledPackages(store, folders)
         self._states: dict[Need, str] = {}
 
     def __call__(self, need: Need) -> str:
@@ -262,8 +261,6 @@ class RunStore:
                 for key in new_keys[:_MOST_SHARED]
             )
             return [record for record in records if record is not None and _fits(record, inputs)]
-
-        from concurrent.futures import ThreadPoolExecutor
 
         with ThreadPoolExecutor(_FETCHERS, "cache") as pool:
             groups = [filter(self._holds, group) for group in pool.map(fetch, all_inputs)]

@@ -90,28 +90,26 @@ def find_sandbox(root: Path) -> Sandbox:
 
 def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[SandboxPart, ...]]:
     """The sandbox of this machine, and its parts; none, and those up to the first that lacks."""
-    parts = [SandboxPart("Bubblewrap"), SandboxPart("a filter of system calls")]
+    bubblewrap, system_call_filter = "Bubblewrap", "a filter of system calls"
     program, machine = shutil.which("bwrap"), platform.machine()
     if program is None:
         problem = "needs Bubblewrap, but there is no program `bwrap`"
         help = "install it, for example with `apt-get install bubblewrap`"
-        return None, (SandboxPart("Bubblewrap", problem, help),)
+        return None, (SandboxPart(bubblewrap, problem, help),)
     system_calls = compile_filter(machine)
     if system_calls is None:
         problem = f"needs a filter of system calls, and there is none for {machine} machines"
-        return None, (
-            parts[0],
-            SandboxPart(parts[1].name, problem, "use an x86_64 or aarch64 machine"),
-        )
+        part = SandboxPart(system_call_filter, problem, "use an x86_64 or aarch64 machine")
+        return None, (SandboxPart(bubblewrap), part)
     scope = _find_scope()
     sandbox = Sandbox(program, system_calls.hex(), scope)
     problem = _try_sandbox(sandbox, root)
+    parts = tuple(map(SandboxPart, (bubblewrap, system_call_filter)))
     if problem:
         return None, (*parts, SandboxPart("namespaces", problem, _ALLOW))
     means = "by a control group and by watching" if scope else "by watching"
-    parts += [SandboxPart("namespaces"), SandboxPart("a session keyring")]
-    parts += [SandboxPart(f"limits of memory and processes in all, {means}")]
-    return sandbox, tuple(parts)
+    names = ("namespaces", "a session keyring", f"limits of memory and processes in all, {means}")
+    return sandbox, (*parts, *map(SandboxPart, names))
 
 
 def _find_scope() -> tuple[str, ...]:
@@ -152,11 +150,11 @@ def _try_sandbox(sandbox: Sandbox, root: Path) -> str:
     if not state:
         output = errors.strip().removeprefix("bwrap: ")
         return f"does not work here, Bubblewrap says: {output or 'nothing'}"
-    faults = (
-        fault for (fault, value), actual in zip(_FAULTS, state, strict=True) if actual != value
-    )
-    fault = next(faults, "" if is_watched else "its memory and processes cannot be seen in /proc")
-    return fault and f"does not work here: {fault}"
+    for (fault, value), actual in zip(_FAULTS, state, strict=True):
+        if actual != value:
+            return f"does not work here: {fault}"
+    unseen = "does not work here: its memory and processes cannot be seen in /proc"
+    return "" if is_watched else unseen
 
 
 class Sandbox(Struct, frozen=True):

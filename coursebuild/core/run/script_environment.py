@@ -152,9 +152,8 @@ def engine_version() -> str:
     """The version of the installed MuJoCo, such as `3.14.0`; an `EffectError` without one."""
     version = package_version("mujoco")
     if version == "none":
-        raise EffectError(
-            "MuJoCo is not installed for this Python", help="run `pip install coursebuild` again"
-        )
+        message = "MuJoCo is not installed for this Python"
+        raise EffectError(message, help="run `pip install coursebuild` again")
     return version
 
 
@@ -165,7 +164,6 @@ def package_version(name: str, folders: Iterable[str] | None = None) -> str:
 
 
 # --- the course's own environment
-
 
 _OLDEST = (3, 11)
 """The oldest Python that can run the modules of this package."""
@@ -186,10 +184,8 @@ def course_environment(root: Path, course: Course) -> Parsed[Interpreter | None]
     try:
         settings = dict(_SETTING.findall((prefix / "pyvenv.cfg").read_text("utf-8", "replace")))
     except OSError as error:
-        message = (
-            f"`{named_path.path}` is not of a virtual environment: no pyvenv.cfg, {reason(error)}"
-        )
-        return _reject(named_path, message)
+        problem = f"is not of a virtual environment: no pyvenv.cfg, {reason(error)}"
+        return _reject(named_path, f"`{named_path.path}` {problem}")
     version_text = settings.get("version") or settings.get("version_info", "")
     # Such as 3.12.1, or virtualenv's 3.12.1.final.0.
     match = re.match(r"(\d+)\.(\d+)\.\d+", version_text)
@@ -213,7 +209,6 @@ def _reject(named_path: NamedPath, message: str, help: str = "") -> Parsed[Inter
 
 
 # --- the machine
-
 
 _INFO = Path("/proc/cpuinfo")
 _GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")

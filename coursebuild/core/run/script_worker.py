@@ -183,7 +183,6 @@ class Worker:
 
 # --- what a sandbox takes
 
-
 PROCESSES = 256
 """Processes and threads that a script may have, with all that it starts."""
 _MANY = f"had more than {PROCESSES} processes and threads"

@@ -172,15 +172,8 @@ class RunningScript:
 def _children() -> Iterator[int]:
     """The children of this process that are alive or not yet reaped, where the system can tell."""
     me = os.getpid()
-    try:
-        children_fd = os.open(f"/proc/self/task/{me}/children", os.O_RDONLY)
-    except OSError:
-        pass
-    else:
-        try:
-            yield from map(int, os.read(children_fd, _CHUNK).split())
-        finally:
-            os.close(children_fd)
+    with contextlib.suppress(OSError):
+        yield from map(int, Path(f"/proc/self/task/{me}/children").read_bytes().split())
         return
     with contextlib.suppress(OSError):
         for entry in Path("/proc").iterdir():

@@ -26,30 +26,9 @@ from support.runners import SOURCE_TREE
 
 pytestmark = pytest.mark.site
 
-ARM = """<mujoco model="arm">
-  <option timestep="0.001" integrator="implicitfast"/>
-  <worldbody>
-    <body name="ünder"><freejoint/><geom size="0.1" mass="2"/><site name="tip"/><site/>
-      <body><joint name="h" type="hinge" pos="1 0 0"/><geom size="0.1" mass="0.5"/></body>
-    </body>
-  </worldbody>
-  <actuator><motor name="m" joint="h"/></actuator>
-  <keyframe><key name="home"/><key/></keyframe>
-</mujoco>
-"""
-MAIN = """<mujoco>
-  <compiler meshdir="parts" texturedir="parts"/>
-  <include file="parts/asset.xml"/>
-  <asset><model name="child" file="child.xml"/></asset>
-  <worldbody><geom type="mesh" mesh="m"/><attach model="child" body="b" prefix="c_"/></worldbody>
-</mujoco>
-"""
-PARTS = (
-    "models/child.xml",
-    "models/parts/asset.xml",
-    "models/parts/mesh.obj",
-    "models/parts/skin.png",
-)
+MODELS = tomllib.loads(fixture_text("documents/models.toml"))
+PART_NAMES = "child.xml parts/asset.xml parts/mesh.obj parts/skin.png".split()
+PARTS = tuple(f"models/{name}" for name in PART_NAMES)
 
 
 @pytest.fixture
@@ -57,14 +36,9 @@ def root(tmp_path: Path) -> Path:
     root = tmp_path / "course"
     (root / "models/parts").mkdir(parents=True)
     (root / "models/parts/mesh.obj").write_text(TETRAHEDRON)
+    for name, text in MODELS["parts"].items():
+        (root / "models" / name).write_text(text)
     (root / "models/parts/skin.png").write_bytes(png())
-    (root / "models/parts/asset.xml").write_text(
-        '<mujoco><asset><mesh name="m" file="mesh.obj"/>'
-        '<texture name="t" type="2d" file="skin.png"/></asset></mujoco>'
-    )
-    (root / "models/child.xml").write_text(
-        '<mujoco><worldbody><body name="b"><geom size="1"/></body></worldbody></mujoco>'
-    )
     return root
 
 
@@ -85,7 +59,7 @@ def includes(root: Path, xmls: Sequence[str]) -> list[tuple[str, ...] | None]:
 
 def test_facts_of_the_text_that_was_read(root: Path) -> None:
     (root / "models/arm.xml").write_text("<broken")
-    assert compile_all(root, [("models/arm.xml", ARM)]) == (
+    assert compile_all(root, [("models/arm.xml", MODELS["arm"])]) == (
         CompileResult(
             "",
             None,
@@ -117,7 +91,7 @@ def test_integrators_by_their_names(root: Path) -> None:
 
 def test_everything_that_a_model_or_a_text_pulls_in(root: Path) -> None:
     for path in ("models/main.xml", TEXT_PATH):
-        (result,) = compile_all(root, [(path, MAIN)])
+        (result,) = compile_all(root, [(path, MODELS["main"])])
         assert result.facts is not None, result.error
         assert (result.facts.includes, result.facts.body_names) == (PARTS, ("c_b",))
     assert (names(root), names(root / "models")) == (["models"], ["child.xml", "parts"])
@@ -289,10 +263,6 @@ def test_a_compiler_that_crashes_or_cannot_be_loaded(
     assert caught.value.message == "MuJoCo cannot be loaded: ImportError: no MuJoCo here"
 
 
-MODEL_TEXT = """<mujoco><compiler meshdir="assets"/><include file="part.xml"/>
-<asset><mesh name="m" file="m.obj"/></asset>
-<worldbody><geom type="mesh" mesh="m"/></worldbody></mujoco>"""
-PART = '<mujoco><worldbody><body><geom size="1"/></body></worldbody></mujoco>'
 TEXT = '<mujoco><include file="part.xml"/></mujoco>'
 BROKEN = "<mujoco><nonsense/></mujoco>"
 
@@ -322,12 +292,9 @@ class Course:
 def course(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Course:
     course = Course(tmp_path / "course")
     (course.root / "models/assets").mkdir(parents=True)
-    for path, text in {
-        "assets/m.obj": TETRAHEDRON,
-        "part.xml": PART,
-        "main.xml": MODEL_TEXT,
-    }.items():
-        (course.root / "models" / path).write_text(text)
+    (course.root / "models/assets/m.obj").write_text(TETRAHEDRON)
+    for name, text in MODELS["course"].items():
+        (course.root / "models" / name).write_text(text)
     real = mjcf.compile_all
 
     def compile(root: Path, texts: Sequence[tuple[str, str]], **limits: int) -> object:

@@ -27,21 +27,7 @@ pytestmark = pytest.mark.site
 CASES = tomllib.loads(fixture_text("scripts/model_files.toml"))
 
 
-SHOW = """
-import hashlib
-import mujoco
-import numpy as np
-
-def show(model):
-    size = mujoco.mj_sizeModel(model)
-    buffer = np.zeros(size, np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    print(hashlib.sha256(buffer.tobytes()).hexdigest(), model.opt.timestep)
-
-load = mujoco.MjModel.from_xml_path
-text = mujoco.MjModel.from_xml_string
-Spec = mujoco.MjSpec
-"""
+SHOW = fixture_text("scripts/show_model.txt")
 
 
 def write(root: Path, files: dict[str, str]) -> None:

@@ -18,16 +18,8 @@ from support.runners import Run, both_ways
 
 pytestmark = pytest.mark.site
 
-HEAD = """\
-import mujoco
-XML = '''
-<mujoco model="spinner">
-  <worldbody><body><joint/><geom size="1" contype="0"/></body></worldbody>
-</mujoco>
-'''
-model = mujoco.MjModel.from_xml_string(XML)
-data = mujoco.MjData(model)
-"""
+SCRIPTS = tomllib.loads(fixture_text("scripts/watched.toml"))
+HEAD: str = SCRIPTS["head"]
 FAST = "data.qvel[0] = 1e20\n"
 STEP = "mujoco.mj_step(model, data)\n"
 LINE = len(HEAD.splitlines())
@@ -65,9 +57,6 @@ def test_a_warning_is_noticed_with_its_line_time_and_model(
     assert find_divergences(HEAD + "import numpy.random\n" + FAST + STEP) == warned(3)
 
 
-SCRIPTS = tomllib.loads(fixture_text("scripts/watched.toml"))
-
-
 def test_a_warning_is_noticed_however_the_script_goes_about_it(
     find_divergences: FindDivergences,
 ) -> None:
@@ -82,20 +71,9 @@ def test_a_warning_is_noticed_however_the_script_goes_about_it(
 def test_a_warning_in_the_threads_of_a_rollout_has_the_line_that_began_it(
     find_divergences: FindDivergences,
 ) -> None:
-    rollout = """\
-import numpy, threading
-from mujoco import rollout
-states = numpy.zeros((8, 3))
-states[:, 2] = 1e20
-datas = [mujoco.MjData(model) for _ in range(3)]
-rollout.rollout(model, datas, states, nstep=20)
-"""
-    [divergence] = find_divergences(HEAD + rollout)
-    assert (divergence.sign, divergence.model, divergence.line) == (
-        Sign.VELOCITIES,
-        "spinner",
-        LINE + 6,
-    )
+    [divergence] = find_divergences(HEAD + SCRIPTS["rollout"])
+    assert (divergence.sign, divergence.model) == (Sign.VELOCITIES, "spinner")
+    assert divergence.line == LINE + 6
 
 
 def test_each_warning_and_each_lost_state_has_its_name(find_divergences: FindDivergences) -> None:
@@ -133,14 +111,7 @@ def test_a_loop_that_diverges_often_does_not_fill_the_notes(
 def test_with_another_handler_the_counter_is_noticed(
     find_divergences: FindDivergences,
 ) -> None:
-    silent = """\
-import ctypes
-library = ctypes.PyDLL(mujoco._functions.__file__)
-ignore = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(lambda message: None)
-pointer = ctypes.c_void_p.in_dll(library, "mju_user_warning")
-pointer.value = ctypes.cast(ignore, ctypes.c_void_p).value
-"""
-    [divergence] = find_divergences(HEAD + silent + FAST + STEP)
+    [divergence] = find_divergences(HEAD + SCRIPTS["silent"] + FAST + STEP)
     assert (divergence.sign, divergence.model, divergence.line) == (Sign.VELOCITIES, "spinner", 0)
 
 

@@ -80,11 +80,7 @@ def test_files_outside_and_links_into_the_project(
 
 @both_ways
 def test_folders_that_are_listed(traced: RunTraced) -> None:
-    trace = traced(
-        "import os, glob, pathlib\nos.listdir('data')\nos.listdir()\nglob.glob('lib/*')\n"
-        "list(pathlib.Path('examples').iterdir())\nlist(os.scandir('data'))\n"
-        "try: os.listdir('none')\nexcept OSError: pass\n"
-    )
+    trace = traced(SCRIPTS["scripts"]["listing"])
     assert trace.folders == (".", "data", "examples", "lib", "none")
     assert trace.opaque == ""
 
@@ -110,10 +106,7 @@ def test_modules_of_the_project_are_files(traced: RunTraced, root: Path) -> None
     (root / "examples/pack").mkdir()
     for name in ("sibling", "random", "pack/__init__", "pack/inner"):
         (root / f"examples/{name}.py").write_text("value = 'mine'")
-    trace = traced(
-        "import sibling, random, sys\nfrom pack import inner\nassert random.value == 'mine'\n"
-        "sys.path.insert(0, 'lib')\nimport helper"
-    )
+    trace = traced(SCRIPTS["scripts"]["imports"])
     files = {f"examples/{name}.py" for name in ("sibling", "random", "pack/inner")}
     files |= {f"examples/{name}/__init__.py" for name in ("sibling", "random", "pack/inner")}
     files |= {f"lib/{name}{end}" for name in ("helper", "other") for end in (".py", "/__init__.py")}
@@ -131,10 +124,7 @@ def test_a_cached_module_counts_as_its_source(traced: RunTraced, root: Path) -> 
 
 
 def test_what_could_hide_a_module_and_what_is_not_installed(traced: RunTraced) -> None:
-    trace = traced(
-        "import json\nimport numpy.linalg\nimport sys\n"
-        "try: import no_such_module\nexcept ImportError: pass"
-    )
+    trace = traced(SCRIPTS["scripts"]["not installed"])
     (sought,) = trace.sought
     folder, _, names = sought.rstrip("}").partition("/{")
     assert (folder, trace.files) == ("examples", ())
@@ -176,10 +166,7 @@ def test_a_package_writes_as_it_is_imported_where_the_tool_lies_in_the_course(
 def test_forked_and_spawned_scripts_have_the_same_trace(
     root: Path, forking: ScriptServer, spawning: ScriptServer
 ) -> None:
-    (root / "examples/x.py").write_text(
-        "import json, numpy, mujoco\nimport numpy.testing, logging\nopen('data/a.txt')\n"
-        "numpy.random.rand()\n"
-    )
+    (root / "examples/x.py").write_text(SCRIPTS["scripts"]["both ways"])
     forked_trace, spawned_trace = (
         s.run(root, [job()], parallel=1)[0].trace for s in (forking, spawning)
     )
@@ -198,17 +185,11 @@ def test_effects_are_noted_once_for_each_line(
     traced: RunTraced, root: Path, tmp_path: Path
 ) -> None:
     (root / "examples/sibling.py").write_text("\ndef write(): open('data/c', 'w')\n")
-    trace = traced(
-        f"import os, sibling, socket\nopen({str(tmp_path / 'o')!r}, 'w')\n"
-        "for n in range(9): os.mkdir(f'data/{n}')\n"
-        "socket.getaddrinfo('localhost', 1)\n"
-        "if not os.fork(): sibling.write(); os._exit(0)\n"
-        "os.wait()\n"
-        "socket.socket().bind(('127.0.0.1', 0))\n"
-    )
+    outside = str(tmp_path / "o")
+    trace = traced(SCRIPTS["scripts"]["effects"].replace("OUTSIDE", outside))
     assert (trace.opaque, trace.outside) == ("it writes files outside its temporary folder", ())
     assert sorted((effect.target, effect.path, effect.line) for effect in trace.effects) == [
-        (str(tmp_path / "o"), "examples/x.py", 2),
+        (outside, "examples/x.py", 2),
         ("127.0.0.1:0", "examples/x.py", 7),
         ("data/0", "examples/x.py", 3),
         ("data/c", "examples/sibling.py", 2),

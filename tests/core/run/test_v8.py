@@ -199,17 +199,7 @@ class TestHostile:
         assert len(bad.message) <= 160
 
 
-SCRIPT = """
-const same = x => x
-const spin = x => { for (;;) ; }
-const eat = () => { const a = []; for (;;) a.push(new Array(1e5).fill(1.5)) }
-const fail = x => { throw new Error(x) }
-const number = x => 1
-const busy = x => { for (let i = 0; i < +x; i++); return x }
-let place
-const reserve = (name, size) => place = new ArrayBuffer(size)
-const read = x => String(new Uint8Array(place))
-"""
+SCRIPT = fixture_text("scripts/isolate.js")
 
 
 @pytest.fixture
