@@ -217,7 +217,7 @@ def _describe_comparison(words: Strings, comparison: model.Comparison) -> str:
         case model.Mode.DIGITS:
             text = words("receipt.digits")
         case model.Mode.TOLERANCE:
-            rtol, atol = short(comparison.rtol), short(comparison.atol)
+            rtol, atol = _short(comparison.rtol), _short(comparison.atol)
             if comparison.rtol and comparison.atol:
                 text = words("receipt.rtol_atol", rtol=rtol, atol=atol)
             elif comparison.rtol:
@@ -233,7 +233,7 @@ def _describe_comparison(words: Strings, comparison: model.Comparison) -> str:
     return text
 
 
-def short(value: Decimal) -> str:
+def _short(value: Decimal) -> str:
     """A tolerance as a person writes it: `1e-6`, `0.05`."""
     value = value.normalize()
     return f"{value:f}" if -4 < value.adjusted() < 6 else f"{value:e}"
