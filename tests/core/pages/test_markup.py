@@ -193,59 +193,29 @@ def test_code_without_a_file_is_shown_with_its_language_escaped(make: Make) -> N
     assert "<script" not in hostile
 
 
-ROW = "<mrow><mi>alpha</mi><mrow><mi>beta</mi></mrow><mo>=</mo></mrow>"
-END = "<mrow><mi>gamma</mi><mo>+</mo><mn>123456</mn></mrow>"
+FORMULAS = {
+    "{X}": "<math><mi>x</mi></math>",
+    "{Y}": "<math><mi>y</mi></math>",
+    "{ROW}": "<mrow><mi>alpha</mi><mrow><mi>beta</mi></mrow><mo>=</mo></mrow>",
+    "{END}": "<mrow><mi>gamma</mi><mo>+</mo><mn>123456</mn></mrow>",
+}
 
 
-@pytest.mark.parametrize("space", ["", "<mspace/>"])
-def test_a_long_formula_is_cut_between_its_outermost_rows(space: str) -> None:
-    expected = f"<math>{ROW}</math><math>{space}{END}</math>"
-    assert split_formula(f"<math>{ROW}{space}{END}</math>") == expected
+def filled(text: str) -> str:
+    for name, formula in FORMULAS.items():
+        text = text.replace(name, formula)
+    return text
 
 
-@pytest.mark.parametrize(
-    "mathml",
-    [
-        f"<math>{ROW}</math>",
-        "<math><mrow><mi>a</mi><mo>=</mo></mrow><mrow><mi>b</mi></mrow></math>",
-        f'<math display="block">{ROW}{END}</math>',
-        f"<math>{ROW}{END}<mo>+</mo></math>",
-    ],
-)
-def test_short_displayed_and_open_formulas_stay_whole(mathml: str) -> None:
-    assert split_formula(mathml) == mathml
+def test_a_long_formula_is_cut_between_its_outermost_rows() -> None:
+    """Short, displayed and open ones stay whole."""
+    for mathml, expected in CASES["pieces"]:
+        assert split_formula(filled(mathml)) == filled(expected)
 
 
-X = "<math><mi>x</mi></math>"
-Y = "<math><mi>y</mi></math>"
-
-
-@pytest.mark.parametrize(("html", "expected"), CASES["punctuation"])  # fmt: skip
-def test_punctuation_stays_on_the_line_of_its_formula(html: str, expected: str) -> None:
-    assert glue_formulas(html) == expected
-
-
-START, TWO = "of <math><mrow>", "<mn>2</mn>"
-NOTE = '<annotation encoding="application/x-tex">=2</annotation></semantics></math>'
-
-
-@pytest.mark.parametrize(
-    ("html", "expected"),
-    [
-        (f"{START}<mo>=</mo>{TWO}</mrow>", f'{START}<mo lspace="0em">=</mo>{TWO}</mrow>'),
-        (f"\n<math><semantics><mo>≈</mo>{TWO}", f'\n<math><semantics><mo lspace="0em">≈</mo>{TWO}'),
-        (f"{TWO}<mo>&lt;</mo></mrow>{NOTE} 3", f'{TWO}<mo rspace="0em">&lt;</mo></mrow>{NOTE} 3'),
-        ("a <math><mo>=</mo></math> b", 'a <math><mo lspace="0em" rspace="0em">=</mo></math> b'),
-        *((unchanged, unchanged) for unchanged in (
-            f"of {X}<math><mo>=</mo>{TWO}</math> m",
-            f"of <math>{TWO}<mo>=</mo></math><math>{TWO}</math> m",
-            f"of <math><mo>sin</mo>{TWO}</math> m",
-            f'of <math><mo lspace="0em">−</mo>{TWO}</math> m',
-        )),
-    ],
-)  # fmt: skip
-def test_an_operator_beside_a_space_of_the_text_has_none(html: str, expected: str) -> None:
-    assert glue_formulas(html) == expected
+def test_formulas_keep_their_punctuation_and_operators_their_space() -> None:
+    for html, expected in CASES["punctuation"] + CASES["operators"]:
+        assert glue_formulas(filled(html)) == filled(expected)
 
 
 LANGUAGES = {
