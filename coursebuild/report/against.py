@@ -156,30 +156,28 @@ def _script(script: ScriptComparison, version: str, style: Style) -> list[str]:
         lines.append(visible(f"  {span.path}:{span.line}: {message}{label}"))
     changes = sorted(script.changes, key=lambda change: (change.span.path, change.span.start))
     for change in changes[:_MOST_CHANGES]:
-        lines.append(visible(f"  {location(change.span)}: {_change(change, engine)}"))
+        first_lines = (text.strip().split("\n")[0] for text in (change.recorded, change.printed))
+        recorded, printed = (shorten(line, _WIDTH) for line in first_lines)
+        match change.kind:
+            case DriftKind.ROUNDING | DriftKind.NUMERIC:
+                distance = closeness(change)
+                text = f"recorded {recorded}; {engine} printed {printed}"
+                text += f" ({distance})" if distance else ""
+            case DriftKind.TEXT:
+                text = f"recorded `{recorded}`; {engine} printed `{printed}`"
+            case DriftKind.MISSING:
+                count = plural(change.recorded.count("\n") + 1, "line")
+                text = f"{engine} did not print {count} from `{recorded}` on"
+            case DriftKind.EXTRA:
+                count = plural(change.printed.count("\n") + 1, "more line")
+                text = f"{engine} printed {count} here: `{printed}`"
+        lines.append(visible(f"  {location(change.span)}: {text}"))
     if len(changes) > _MOST_CHANGES:
         lines.append(f"  and {plural(len(changes) - _MOST_CHANGES, 'more difference')}")
     if script.diff:
         diff = visible_lines(f"--- here\n+++ {engine}\n{script.diff}")
         lines += [style.paint(f"  {line}", FAINT) for line in diff.split("\n")]
     return lines
-
-
-def _change(change: Change, engine: str) -> str:
-    first_lines = (text.strip().split("\n")[0] for text in (change.recorded, change.printed))
-    recorded, printed = (shorten(line, _WIDTH) for line in first_lines)
-    distance = closeness(change)
-    match change.kind:
-        case DriftKind.ROUNDING | DriftKind.NUMERIC:
-            return f"recorded {recorded}; {engine} printed {printed}{distance and f' ({distance})'}"
-        case DriftKind.TEXT:
-            return f"recorded `{recorded}`; {engine} printed `{printed}`"
-        case DriftKind.MISSING:
-            lines = change.recorded.count("\n") + 1
-            return f"{engine} did not print {plural(lines, 'line')} from `{recorded}` on"
-        case DriftKind.EXTRA:
-            lines = change.printed.count("\n") + 1
-            return f"{engine} printed {plural(lines, 'more line')} here: `{printed}`"
 
 
 def _count(scripts: Iterable[ScriptComparison]) -> dict[str, int]:

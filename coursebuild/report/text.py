@@ -58,25 +58,24 @@ class Style(Struct, frozen=True):
 
 def visible(text: str) -> str:
     """Return a text with symbols for control characters, so that it cannot change the terminal."""
-    return "".join(map(_show_char, text))
+    parts: list[str] = []
+    for char in text:
+        code = ord(char)
+        if char == "\t":
+            char = " " * TAB
+        elif code < 0x20:
+            char = chr(0x2400 + code)
+        elif code == 0x7F:
+            char = "\u2421"
+        elif unicodedata.category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp") and char != "\u200d":
+            char = "\ufffd"
+        parts.append(char)
+    return "".join(parts)
 
 
 def visible_lines(text: str) -> str:
     """Do the same for a text of several lines."""
     return "\n".join(visible(line) for line in text.split("\n"))
-
-
-def _show_char(char: str) -> str:
-    code = ord(char)
-    if char == "\t":
-        return " " * TAB
-    if code < 0x20:
-        return chr(0x2400 + code)
-    if code == 0x7F:
-        return "\u2421"
-    if unicodedata.category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp") and char != "\u200d":
-        return "\ufffd"
-    return char
 
 
 def clip(text: str, room: int) -> str:

@@ -100,8 +100,8 @@ def address(library: Library, place: urls.Place, path: str, target: model.Target
         case model.TermTarget():
             owner = library.terms.get(target.id)
             # In a preview the definition may just have been removed.
-            path = place.path if owner is None else urls.owner_path(owner)
-            return place.href(path, f"term:{target.id}")
+            owner_path = place.path if owner is None else urls.owner_path(owner)
+            return place.href(owner_path, f"term:{target.id}")
         case model.UrlTarget():
             return urls.file_address(place, path, target.url)
         case _:

@@ -301,14 +301,11 @@ def _script(kind: str, data: dict[str, Json]) -> Markup:
 
 def sitemap(course: Course, paths: Iterable[str]) -> bytes:
     """The sitemap of the given pages; the course must have a base address."""
-    rows = "".join(
-        f"<url><loc>{escape(urls.absolute(course.base_url, path), quote=False)}</loc></url>\n"
-        for path in paths
-    )
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        '<urlset xmlns="http://www.sitemaps.org/schemas/sitemap/0.9">\n' + rows + "</urlset>\n"
-    ).encode()
+    addresses = (escape(urls.absolute(course.base_url, path), quote=False) for path in paths)
+    rows = "".join(f"<url><loc>{address}</loc></url>\n" for address in addresses)
+    head = '<?xml version="1.0" encoding="UTF-8"?>\n'
+    space = "http://www.sitemaps.org/schemas/sitemap/0.9"
+    return f'{head}<urlset xmlns="{space}">\n{rows}</urlset>\n'.encode()
 
 
 def versions(course: Course) -> bytes:

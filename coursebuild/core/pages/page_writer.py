@@ -146,22 +146,22 @@ class PageWriter(PageContext, frozen=True):
 
     def _script(self, block: model.Script, recordings: tuple[model.Recording, ...]) -> Markup:
         """A script and the outputs that belong to it, as one object."""
-        text = block.code.text.rstrip("\n")
+        text, words = block.code.text.rstrip("\n"), self.words
         lines = highlight_lines("python", text)
-        parts = (Part(1, len(lines), folded=True),) if block.figures else fold(text)
+        parts: list[CodePart] = []
+        for part in (Part(1, len(lines), folded=True),) if block.figures else fold(text):
+            key = "code.lines" if part.first < part.last else "code.line"
+            holds = [words("code.docstring")] if part.docstring else []
+            holds += [words("code.imports")] if part.imports else []
+            label = words(key, first=part.first, last=part.last)
+            label += ": " * bool(holds or part.names) + ", ".join((*holds, *part.names))
+            html = numbered_lines(lines[part.first - 1 : part.last], block.path, part.first)
+            parts.append(CodePart(html, part.first, part.folded, label))
         return self.template(
             "blocks/script.html",
             script=block,
             number=self.number(block.label),
-            parts=tuple(
-                CodePart(
-                    numbered_lines(lines[part.first - 1 : part.last], block.path, part.first),
-                    part.first,
-                    part.folded,
-                    _fold_label(self.words, part),
-                )
-                for part in parts
-            ),
+            parts=tuple(parts),
             anchor=model.listing_anchor(block.path),
             href=self.place.href(block.path),
             command=shlex.join(("python", block.path, *block.args)),
@@ -217,7 +217,7 @@ def _describe_comparison(words: Strings, comparison: model.Comparison) -> str:
         case model.Mode.DIGITS:
             text = words("receipt.digits")
         case model.Mode.TOLERANCE:
-            rtol, atol = short(comparison.rtol), short(comparison.atol)
+            rtol, atol = _short(comparison.rtol), _short(comparison.atol)
             if comparison.rtol and comparison.atol:
                 text = words("receipt.rtol_atol", rtol=rtol, atol=atol)
             elif comparison.rtol:
@@ -233,7 +233,7 @@ def _describe_comparison(words: Strings, comparison: model.Comparison) -> str:
     return text
 
 
-def short(value: Decimal) -> str:
+def _short(value: Decimal) -> str:
     """A tolerance as a person writes it: `1e-6`, `0.05`."""
     value = value.normalize()
     return f"{value:f}" if -4 < value.adjusted() < 6 else f"{value:e}"
@@ -267,16 +267,6 @@ def numbered_lines(lines: Iterable[Markup], path: str, first: int = 1) -> Markup
     start, _, _ = model.line_anchor(path, first).rpartition(str(first))
     before = f'<span id="{escape(start)}'
     return Markup("\n".join(f'{before}{n}">{line}</span>' for n, line in enumerate(lines, first)))
-
-
-def _fold_label(words: Strings, part: Part) -> str:
-    lines = words(
-        "code.lines" if part.first < part.last else "code.line", first=part.first, last=part.last
-    )
-    holds = [words("code.docstring")] if part.docstring else []
-    holds += [words("code.imports")] if part.imports else []
-    holds += part.names
-    return f"{lines}: {', '.join(holds)}" if holds else lines
 
 
 # --- whole pages
@@ -370,7 +360,20 @@ def draw(
 ) -> tuple[PageHead, Markup, PageContext | None]:
     """Draw a page: return its head, its body and the context of its document."""
     page: PageContext | None = None
-    values = {name: _draw_value(value, renderer) for name, value in inputs.values.items()}
+    values = dict(inputs.values)
+    for name, value in inputs.values.items():
+        match value:
+            case HighlightedFile():
+                lines = highlight_lines(value.language, value.text)
+                values[name] = numbered_lines(lines, value.path)
+            case LessonGraph():
+                values[name] = drawings(value, renderer.words)
+            case AddedParts():
+                parts = model_parts()
+                html = (parts[key].draw(renderer, part) for key, part in value.values.items())
+                values[name] = Markup("").join(html)
+            case _:
+                pass
     head = inputs.head
     if document is not None and inputs.document_inputs is not None:
         page = PageWriter(renderer, inputs.document_inputs, urls.Place(head.path), document)
@@ -387,17 +390,3 @@ def draw(
     if kind is not None and kind.draw is not None:
         values |= {"title": head.title, "content": kind.draw(renderer, values)}
     return head, renderer.render(inputs.template, **values), page
-
-
-def _draw_value(value: object, renderer: Renderer) -> object:
-    match value:
-        case HighlightedFile():
-            return numbered_lines(highlight_lines(value.language, value.text), value.path)
-        case LessonGraph():
-            return drawings(value, renderer.words)
-        case AddedParts():
-            parts = model_parts()
-            html = (parts[name].draw(renderer, values) for name, values in value.values.items())
-            return Markup("").join(html)
-        case _:
-            return value

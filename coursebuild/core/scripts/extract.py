@@ -68,7 +68,8 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
             extraction = Extraction(
                 script, owner.id, packages, course.environment, course.limits.scripts
             )
-            key = _key(script.path)
+            # Equal for paths that some file system takes for the same file
+            key = unicodedata.normalize("NFC", script.path).casefold()
             blocking_file = next((files[f] for f in _folders(key) if f in files), None)
             first = files.get(key) or folders.get(key) or blocking_file
             if first is None:
@@ -115,11 +116,6 @@ def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[Scri
         )
         for extraction in extractions
     )
-
-
-def _key(path: str) -> str:
-    """A key that is equal for paths that some file system takes for the same file."""
-    return unicodedata.normalize("NFC", path).casefold()
 
 
 def _folders(key: str) -> list[str]:

@@ -35,18 +35,9 @@ SECONDS = Comparison(volatile="[0-9.]+ s")
 # ------------------------------------------------------------------------------------ new text
 
 
-def test_the_output_is_written() -> None:
-    assert body("a 1.5\nb", "a 2.5\nb\nc  \n\n\n") == "a 2.5\nb\nc\n"
-    assert body("", "a\n") == "a\n"
-    assert body("a\nb\nc", "\n\na") == "\n\na\n"
-
-
-def test_line_ends_and_prefixes_are_the_lesson_s() -> None:
-    assert body("a", "b\n\nc", eol="\r\n") == "b\r\n\r\nc\r\n"
-    assert body("a", "b\n\nc", eol="\r") == "b\r\rc\r"
-    assert body("a", "b\r\n\r\nc", prefix="> ") == "> b\n>\n> c\n"
-    assert body("a", " b\n\nc", prefix="   ", eol="\r\n") == "    b\r\n\r\n   c\r\n"
-    assert body("", "b\n\nc", prefix=">   ") == ">   b\n>\n>   c\n"
+def test_the_output_is_written_as_the_lesson_is() -> None:
+    for recorded, printed, style, expected in CASES["plain"]:
+        assert body(recorded, printed, **style) == expected
 
 
 def test_what_matches_is_left_alone() -> None:
@@ -73,11 +64,7 @@ def test_what_varies_is_written_with_the_rest_of_its_line_only() -> None:
     assert new.body_span.text == "a 7 s, E 3\nb 1 s\n"
 
 
-def test_a_tilde_fence_holds_backticks() -> None:
-    assert body("a", "```\nb", fence="~~~") == "```\nb\n"
-    assert body("a", "```\n~~~~\nb", fence="~~~~~") == "```\n~~~~\nb\n"
-    assert body("a", "    ```\n``\nb") == "    ```\n``\nb\n"
-    assert body("a", "```x", fence="~~~") == "```x\n"
+def test_an_output_that_would_close_its_fence_is_refused() -> None:
     assert "would close this fence, or begin another" in refusal_text("a", " ```x\nb")
 
 
