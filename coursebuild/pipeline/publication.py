@@ -1,11 +1,7 @@
 """`coursebuild build` and `export`: verify the course, and write its site or a file of it.
 
-Entry points: `build(options, out)`; `export(options, name, lesson, out)`, where features have the
-exporters. Nothing is written where something is wrong.
-
-An export is a file or an archive, written in one step, without holding the archive in memory. The
-same files give the same bytes: entries are sorted by path and have the same date. Files that are
-compressed already are stored.
+Nothing is written where something is wrong. An export is written in one step, without holding an
+archive in memory, and the same files give the same bytes.
 """
 
 from __future__ import annotations

@@ -1,13 +1,7 @@
 """The models of a course that can be measured, with their declarations.
 
-Entry points: `find_scenes(root, names)`, `scene_digest`.
-
-1. A scene is a file of `models/` that no other file includes, or one that was named.
-2. A model that does not compile or has wrong declarations is a diagnostic; the other scenes are
-   measured all the same.
-3. Measurements depend on the model with all files that it includes, on its scenarios, and on the
-   file with its exact motion. The digest is of these, but not of the machine or of the other
-   declarations.
+A scene is a file of `models/` that no other file includes, or one that was named. A model that does
+not compile or has wrong declarations is a diagnostic; the other scenes are measured all the same.
 """
 
 from __future__ import annotations
@@ -169,7 +163,6 @@ def _find_models(names: Sequence[str], models: dict[str, MjcfModel]) -> list[Mjc
 
 
 def _find_main_models(root: Path, models: Sequence[MjcfModel]) -> list[MjcfModel]:
-    """Find the models that are not part of others."""
     parts = {
         path for model in models for path in model_files(root, model.source.path, model.source.text)
     }

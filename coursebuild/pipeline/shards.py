@@ -1,10 +1,8 @@
 """`check --shard 2/8`: divides the scripts and labs of a course among several machines.
 
-Entry points: `Shard`, `read_shard`, `read_timings`, `write_timings`.
-
 Every machine computes the whole split by itself, so it must follow from what all machines have: the
-names of the scripts and labs, and times from files that are given to all. (Stores and shared caches
-differ from machine to machine: by their times, a script could fall between two shards.)
+names of the scripts and labs, and times from files that are given to all. Stores and shared caches
+differ from machine to machine: by their times, a script could fall between two shards.
 """
 
 from __future__ import annotations

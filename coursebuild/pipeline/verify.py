@@ -1,14 +1,7 @@
 """Course → Results: run the scripts, compare, compile the models, try the labs.
 
-Entry point: `verify(course, options, documents)`.
-
-1. Scripts are written to `examples/`, and those of the chosen documents run (`scripts`).
-2. Recorded outputs and bound numbers are compared with the runs.
-3. Models and MJCF blocks are compiled in a child process, which is not started for a course that
-   has none.
-4. Features' trials, such as those of labs, are run while the scripts run.
-
-Documents may be summaries. Formulas are not checked here: see `pipeline.reader`.
+Models and MJCF blocks are compiled in a child process, and features' trials, such as those of labs,
+are run while the scripts run. Documents may be summaries. Formulas are checked by the reader.
 """
 
 from __future__ import annotations
@@ -178,7 +171,6 @@ def _run_with_trials(
     context: TrialContext,
     progress: Progress,
 ) -> tuple[tuple[ScriptRun, ...], TrialOutcome]:
-    """Run scripts here and trials in a thread meanwhile; return the results of both."""
     if not trials:
         return run_scripts(), ((), ())
     groups = groupby(trials, key=itemgetter(0))
@@ -215,7 +207,6 @@ def _is_doubtful(line: ScriptLine, run_store: RunStore, *, repeat: bool) -> bool
 
 
 def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Diagnostic]:
-    """Diagnose that there is nothing to publish, or that nothing was verified."""
     place = course.map.span(0, 0)
     if not course.is_manual and all(lesson.status == "planned" for lesson in course.lessons):
         message = "the course has no written lesson"

@@ -1,8 +1,5 @@
 """Fences, directives and callouts of other tools as Markdown of coursebuild.
 
-Entry points: `convert_segment`; `runnable_code` of a cell, `join_cells`, `join_outputs`,
-`code_for_readers`.
-
 Scripts of coursebuild are complete. So all cells of a lesson, which share their names, become one
 script, which stands where the last of them stood; the ones before are shown where they stood, as
 parts of it.

@@ -1,8 +1,7 @@
 """The map of the new course.
 
-Entry points: `read_texts`, which reads the texts and gives each an id and a path; `map_lines`;
-`read_course_json`. People write `course.json` by hand in many dialects, so a field can have several
-names; unknown fields are reported once, with their number.
+People write `course.json` by hand in many dialects, so a field can have several names; unknown
+fields are reported once, with their number.
 """
 
 from __future__ import annotations
@@ -103,7 +102,6 @@ class _Reader:
         return {_field_name(key): item for key, item in value.items()}
 
     def level(self, value: object) -> ImportedLevel:
-        """Read a level with its lessons."""
         level = self.fields(value, _LEVEL_FIELDS)
         return ImportedLevel(
             id=_read_text(level, "id"),
@@ -113,7 +111,6 @@ class _Reader:
         )
 
     def lesson(self, value: object) -> ImportedText:
-        """Read a lesson or a page."""
         lesson = self.fields(value, _LESSON_FIELDS)
         minutes = re.search(r"\d+", _read_text(lesson, "minutes"))
         return ImportedText(

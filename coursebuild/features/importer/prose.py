@@ -1,7 +1,4 @@
-r"""Convert lines of prose: links, pictures, mentions, formulas, roles.
-
-Entry points: `rewrite_prose`, `display_formula`, `find_anchors`; `LessonContext`, what the
-conversion of a lesson needs to know of the whole course.
+"""Convert lines of prose: links, pictures, mentions, formulas, roles.
 
 Code is left alone, in lines and in blocks within quotations and lists, and so is whatever else is
 not recognized here.

@@ -1,7 +1,4 @@
-"""A file as segments: prose, cells of code, fences and directives of MyST, Quarto or MkDocs.
-
-Entry points: `read_segments`, for a file of Markdown or a notebook; `read_markdown`, for a text.
-"""
+"""A file as segments: prose, cells of code, fences and directives of MyST, Quarto or MkDocs."""
 
 from __future__ import annotations
 

@@ -200,7 +200,6 @@ def _sandbox(folder: Path) -> Iterator[Probe]:
 
 
 def _try_code(code: str, **environment: str) -> str:
-    """Run code in a process of its own; return the last line of its error, empty if it succeeds."""
     try:
         process = subprocess.run(
             [sys.executable, "-c", code],

@@ -1,7 +1,5 @@
 """The fields that JSON in a fence or a TOML file can have at a place, also while it is edited.
 
-Entry points: `field_place`; `fence_at`, the fence around a place; `possible_values` of a type.
-
 The fields come from the declarations that the decoder checks against (`schema_roots`). Only
 brackets, keys and scalars of the text are read, so that mistakes anywhere do no harm.
 """
