@@ -15,6 +15,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
 import json
 import os
@@ -102,7 +103,14 @@ class PreviewServer(ThreadingHTTPServer):
         """The addresses of the preview: one for this machine, then one for others."""
         hosts = [str(self._address)]
         if self._address.is_unspecified:
-            hosts = ["127.0.0.1", *_outer_address()]
+            hosts = ["127.0.0.1"]
+            # The address at which other machines reach this one, if any; nothing is sent
+            with (
+                socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe,
+                contextlib.suppress(OSError),
+            ):
+                probe.connect(("192.0.2.1", 9))
+                hosts.append(probe.getsockname()[0])
         names = [f"[{host}]" if ":" in host else host for host in hosts]
         query = f"?token={self.access.token}" if self.access.token else ""
         return [f"http://{host}:{self._port}/{query}" for host in names]
@@ -121,16 +129,6 @@ class PreviewServer(ThreadingHTTPServer):
         if self._thread.ident is not None:  # otherwise `shutdown` would wait forever
             self.shutdown()
         self.server_close()
-
-
-def _outer_address() -> list[str]:
-    """Find the address at which other machines reach this one, if any; nothing is sent."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(("192.0.2.1", 9))
-        except OSError:
-            return []
-        return [probe.getsockname()[0]]
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -293,8 +293,8 @@ def align_table(rows: Sequence[str], width: int) -> list[str]:
     table.insert(
         1,
         [
-            _write_delimiter(*mark)
-            for mark in zip(marks, widths if fits else min_widths, strict=True)
+            re.sub("-+", "-" * (width - mark.count(":")), mark)
+            for mark, width in zip(marks, widths if fits else min_widths, strict=True)
         ],
     )
     return ["|" + "".join(f" {cell} |" if cell else " |" for cell in row) for row in table]
@@ -304,11 +304,6 @@ def _pad(cell: str, width: int, mark: str) -> str:
     room = width - cells(cell)
     left = 0 if not mark.endswith(":") else room // 2 if mark.startswith(":") else room
     return " " * left + cell + " " * (room - left)
-
-
-def _write_delimiter(mark: str, width: int) -> str:
-    left, right = mark.startswith(":"), mark.endswith(":")
-    return ":" * left + "-" * (width - left - right) + ":" * right
 
 
 # --- JSON

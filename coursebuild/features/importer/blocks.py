@@ -8,6 +8,7 @@ parts of it.
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import json
 import re
@@ -176,9 +177,10 @@ def convert_segment(segment: Segment, context: LessonContext) -> str:
                 head = "text"
             elif kind not in (*CORE_FENCES, *fence_names()):
                 head = head.strip("{}. ").partition(" ")[0].rstrip(",}")
-                if head != "json" and _is_json(text):
-                    context.add_leftover(f"a block `{head}`, which is shown as JSON")
-                    head = "json"
+                with contextlib.suppress(ValueError, RecursionError):
+                    if head != "json" and isinstance(json.loads(text), dict):
+                        context.add_leftover(f"a block `{head}`, which is shown as JSON")
+                        head = "json"
             return fence(head, text)
 
 
@@ -260,13 +262,6 @@ def _highlighted_languages() -> frozenset[str]:
     from pygments.lexers import get_all_lexers
 
     return frozenset(alias for _, aliases, _, _ in get_all_lexers() for alias in aliases)
-
-
-def _is_json(text: str) -> bool:
-    try:
-        return isinstance(json.loads(text), dict)
-    except (ValueError, RecursionError):
-        return False
 
 
 def _reverse_camera(camera: re.Match[str]) -> str:

@@ -251,12 +251,13 @@ def map_lines(
         yield from ("", "[[level]]")
         yield from _field_lines(id=level.id, title=level.title, summary=level.summary)
         for lesson in level.lessons:
+            status = "complete" if lesson.status.lower() in _COMPLETE else "draft"
             yield from ("", "[[level.lesson]]")
             yield from _field_lines(
                 id=lesson.id,
                 slug=lesson.slug,
                 title=lesson.title,
-                status=_status(lesson),
+                status=status if lesson.path else "planned",
                 summary=lesson.summary,
                 objectives=lesson.objectives,
                 prerequisites=tuple(ids[p] for p in lesson.prerequisites if p in ids),
@@ -265,12 +266,6 @@ def map_lines(
     for page in course.pages:
         yield from ("", "[[page]]")
         yield from _field_lines(id=page.id, title=page.title, file=page.path)
-
-
-def _status(lesson: ImportedText) -> str:
-    if not lesson.path:
-        return "planned"
-    return "complete" if lesson.status.lower() in _COMPLETE else "draft"
 
 
 def _field_lines(**values: str | tuple[str, ...] | int | None) -> Iterator[str]:

@@ -88,7 +88,11 @@ def field_place(source: Source, offset: int) -> FieldPlace | None:
     declared_type = inspect.type_info(roots[kind][0])
     for object, key in objects[:-1]:
         field = _fields(declared_type, object.members).get(key)
-        declared_type = _mapping_value(declared_type) if field is None else field.type
+        if field is not None:
+            declared_type = field.type
+            continue
+        mappings = (t for t in _alternatives(declared_type) if isinstance(t, inspect.DictType))
+        declared_type = next((mapping.value_type for mapping in mappings), inspect.AnyType())
     innermost, key = objects[-1]
     keys = frozenset(innermost.members) - {span.text.strip('"')}
     return FieldPlace(span, _fields(declared_type, innermost.members), keys, key)
@@ -142,11 +146,6 @@ def _fields(declared_type: inspect.Type, members: Mapping[str, str]) -> dict[str
         kinds = inspect.LiteralType(tuple(str(struct.tag) for struct in structs))
         fields[tag] = inspect.Field(tag, tag, kinds)
     return fields
-
-
-def _mapping_value(declared_type: inspect.Type) -> inspect.Type:
-    mappings = (t for t in _alternatives(declared_type) if isinstance(t, inspect.DictType))
-    return next((mapping.value_type for mapping in mappings), inspect.AnyType())
 
 
 def _alternatives(declared_type: inspect.Type) -> Iterator[inspect.Type]:

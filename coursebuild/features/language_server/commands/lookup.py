@@ -282,7 +282,12 @@ class _Lookup:
             for math in declarations
             if (meaning := math.meaning)
         )
-        at_offset = (m for m in declarations if _is_at(m.tex.text, formula.span, offset))
+        at_offset = (
+            math
+            for math in declarations
+            for match in re.finditer(re.escape(math.tex.text), formula.span.text)
+            if match.start() <= offset - formula.span.start < match.end()
+        )
         return Referent(formula.span, "\n".join(lines), next(at_offset, declarations[0]).span)
 
     def look_up_binding(self, binding: model.NumberBinding) -> Referent | None:
@@ -376,11 +381,6 @@ def _describe_shape(extent: tuple[str, ...], facts: ModelFacts | None) -> str:
     numbers = re.sub(r"\w+", lambda size: str(sizes.get(size[0], size[0])), text)
     suffix = f", here `{numbers}`" if numbers != text else ""
     return f"shape `{text}`{suffix}" if extent else ""
-
-
-def _is_at(tex: str, span: Span, offset: int) -> bool:
-    matches = re.finditer(re.escape(tex), span.text)
-    return any(match.start() <= offset - span.start < match.end() for match in matches)
 
 
 def _paragraphs(*texts: str) -> str:
