@@ -1,7 +1,4 @@
-"""The files that can be downloaded: scripts, models, files of the course, archives of scripts.
-
-Entry point: `Downloads.of`. `core.pages.zips` says what is in an archive.
-"""
+"""The files that can be downloaded: scripts, models, files of the course, archives of scripts."""
 
 from __future__ import annotations
 

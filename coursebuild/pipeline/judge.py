@@ -1,7 +1,4 @@
-"""From diagnostics to a report: silenced warnings are left out, the rest is sorted and counted.
-
-Entry points: `judge`; `depends_on`, the files that a report depends on.
-"""
+"""From diagnostics to a report: silenced warnings are left out, the rest is sorted and counted."""
 
 from __future__ import annotations
 
@@ -110,7 +107,6 @@ def _unrun_scripts(course: Course, lines: Iterable[ScriptLine]) -> Iterator[_Unr
 
 
 def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diagnostic]:
-    """Diagnose scripts that were not run and that the map does not let pass."""
     allowed_paths = {entry.path for entry in course.unproven}
     for script, line, reasons in scripts:
         if line.path in allowed_paths or not (line.missing or script.norun):
@@ -129,7 +125,6 @@ def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diag
 
 
 def _refuse_unrepeated(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Diagnostic]:
-    """Diagnose scripts whose only run is the one that was recorded."""
     by_path = {s.path: s for document in course.documents for s in document_scripts(document)}
     for line in lines:
         if line.unrepeated and line.path in by_path:
