@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import Course, Script, Silence, document_scripts
+from coursebuild.core.model import Course, Script, document_scripts
 from coursebuild.core.model.results import Results, TrialLine
 from coursebuild.core.run.dependencies import sought_files
 from coursebuild.core.run.script_environment import Interpreter
@@ -69,10 +69,16 @@ def judge(
         relevant = tuple(d for d in relevant if d.span.path in paths or d.rule in _RULES_OF_RUNS)
     silences = course.silences if course is not None else ()
     mild = {d.rule for d in inventory}
+
+    def is_silenced(diagnostic: Diagnostic) -> bool:
+        return any(
+            silence.rule == diagnostic.rule
+            and (silence.path is None or fnmatchcase(diagnostic.span.path, silence.path))
+            for silence in silences
+        )
+
     reported = tuple(
-        replace(d, strict=strict and d.rule not in mild)
-        for d in relevant
-        if not _is_silenced(d, silences)
+        replace(d, strict=strict and d.rule not in mild) for d in relevant if not is_silenced(d)
     )
     errors = sum(d.is_error for d in reported)
     summary = Summary(
@@ -147,15 +153,6 @@ def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnos
             path not in broken and not (rule == "control-character" and path in misread)
         ):
             yield diagnostic
-
-
-def _is_silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:
-    """Whether the map silences a diagnostic; a map that would silence an error is not valid."""
-    return any(
-        silence.rule == diagnostic.rule
-        and (silence.path is None or fnmatchcase(diagnostic.span.path, silence.path))
-        for silence in silences
-    )
 
 
 def depends_on(

@@ -268,17 +268,14 @@ def _wait_until_complete(
 ) -> frozenset[str]:
     began = now = time.monotonic()
     while True:
-        is_part = len(paths) > MAX_SINGLE_READS or _is_any_empty(root, paths)
+        is_part = len(paths) > MAX_SINGLE_READS
+        try:
+            is_part |= any((root / path).stat().st_size == 0 for path in paths)
+        except OSError:
+            is_part = True
         remaining = began + LONGEST - now
         later = watcher.get(min(LONG_QUIET if is_part else QUIET, remaining))
         if not later:
             return paths
         paths |= later
         now = time.monotonic()
-
-
-def _is_any_empty(root: Path, paths: Iterable[str]) -> bool:
-    try:
-        return any((root / path).stat().st_size == 0 for path in paths)
-    except OSError:
-        return True

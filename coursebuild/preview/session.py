@@ -1,14 +1,8 @@
 """A course in memory that follows its files, with its site as it is now.
 
-Entry point: `Session`.
-
-1. `edit(paths)` takes saves of documents: only these are read and checked.
-2. `read()` reads everything, after other changes and to be sure.
-3. `take_results` takes the results of running the course, which `runs` knows; `make_site` makes all
-   files of its site.
-4. `find(path)` returns a file.
-
-`condition` is the lock of everything here; whoever waits for news waits on it.
+`edit` takes saves of documents: only these are read and checked. `read` reads everything, after
+other changes and to be sure. `condition` is the lock of everything here; whoever waits for news
+waits on it.
 """
 
 from __future__ import annotations

@@ -349,13 +349,12 @@ def _find_text(name: object, files: SourceFiles) -> str:
     return next((path for end in TEXTS if (path := files.find(name + end))), "")
 
 
-def _natural_order(path: str) -> list[tuple[int, int | str]]:
-    parts = re.split(r"(\d+)", path)
-    return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
-
-
 def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
-    texts = sorted((path for path in files if path.endswith(TEXTS)), key=_natural_order)
+    def natural_order(path: str) -> list[tuple[int, int | str]]:
+        parts = re.split(r"(\d+)", path)
+        return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
+
+    texts = sorted((path for path in files if path.endswith(TEXTS)), key=natural_order)
     for folder, paths in itertools.groupby(texts, posixpath.dirname):
         lessons = [
             ImportedText(file=path)
