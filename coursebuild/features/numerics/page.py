@@ -14,7 +14,6 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.strings import Strings
 from coursebuild.features.bench import grids, scenario_view
 from coursebuild.numerics.reports.case_report import (
-    BoundaryLine,
     CaseReport,
     case_quantities,
     case_svgs,
@@ -80,12 +79,14 @@ def numerics_values(library: Library) -> dict[str, object]:
         *sorted(library.reports.cases, key=attrgetter("case")),
         *course_reports,
     ]
-    groups = tuple(
-        _group(words, place, number, tuple(group))
-        for number, group in groupby(cases, key=attrgetter("case"))
-    )
+    groups = []
+    for number, members in groupby(cases, key=attrgetter("case")):
+        views = tuple(case_view(words, place, report) for report in members)
+        key = f"numerics.case_{number}"
+        has_own_title = (not number or len(views) > 1) and words.has(key)
+        groups.append(CaseGroup(number, words(key) if has_own_title else views[0].title, views))
     return {
-        "groups": groups,
+        "groups": tuple(groups),
         "tables": tuple(_tables(groups)),
         "integrators": INTEGRATORS,
         "where": dict.fromkeys(grids.machine_text(words, report.machine) for report in cases),
@@ -101,35 +102,25 @@ def _tables(groups: Sequence[CaseGroup]) -> Iterator[tuple[str, int, list[list[C
             yield name, column, [cases for cases in bodies if cases]
 
 
-def _group(
-    words: Strings, place: urls.Place, number: int, cases: Sequence[CaseReport]
-) -> CaseGroup:
-    key = f"numerics.case_{number}"
-    has_group_title = not number or len(cases) > 1
-    title = words(key) if has_group_title and words.has(key) else cases[0].title
-    return CaseGroup(number, title, tuple(case_view(words, place, report) for report in cases))
-
-
 def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
     quantity = next(iter(case_quantities(report)), None)
     part = None if quantity is None or quantity.name == "energy_drift" else quantity.name
     fits = {row.integrator: getattr(row, part) for row in report.orders} if part else {}
-    limits = {line.integrator: line for line in report.boundaries}
+    limits = {}
+    for line in report.boundaries:
+        if line.largest == 0:
+            limits[line.integrator] = words("numerics.none")
+        elif line.largest is None and line.bracket is None:
+            limits[line.integrator] = words("numerics.all")
+        else:
+            limits[line.integrator] = limit_text(line)
     orders = (fits.get(integrator) for integrator in INTEGRATORS)
     costs = (report.cost_to(integrator, _RIGHT) for integrator in INTEGRATORS)
     return (
         tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
-        tuple(_limit(words, limits.get(integrator)) for integrator in INTEGRATORS),
+        tuple(limits.get(integrator, "") for integrator in INTEGRATORS),
         tuple("" if cost is None else seconds_text(cost, _DIGITS) for cost in costs),
     )
-
-
-def _limit(words: Strings, line: BoundaryLine | None) -> str:
-    if line is None:
-        return ""
-    if line.largest == 0 or (line.largest is None and line.bracket is None):
-        return words("numerics.all" if line.largest is None else "numerics.none")
-    return limit_text(line)
 
 
 def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
@@ -137,7 +128,19 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
     model = "" if report.case else report.name.rpartition("/")[0]
     label = words("numerics.orders", title=report.title)
     orders = scenario_view.orders_table(words, label, report.orders, merge=True)
-    rows = [(line.integrator, _boundary(words, line)) for line in report.boundaries]
+    rows = [
+        (
+            line.integrator,
+            (
+                *scenario_view.stable_cells(words, line),
+                grids.percent(line.difference),
+                status_text(line.beyond) if line.beyond else "",
+                grids.power(line.growth),
+                scenario_view.stable_again(words, line),
+            ),
+        )
+        for line in report.boundaries
+    ]
     label = (
         f"{report.title}: {scenario_view.stable_title(words, report.boundaries[0])}" if rows else ""
     )
@@ -175,16 +178,6 @@ def _describe(words: Strings, report: CaseReport, quantities: Sequence[Quantity]
         yield words("numerics.out_of_reach")
     if report.note:
         yield grids.sentence(report.note)
-
-
-def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
-    return (
-        *scenario_view.stable_cells(words, line),
-        grids.percent(line.difference),
-        status_text(line.beyond) if line.beyond else "",
-        grids.power(line.growth),
-        scenario_view.stable_again(words, line),
-    )
 
 
 def _figures(words: Strings, report: CaseReport) -> grids.Grid | None:
