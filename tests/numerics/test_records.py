@@ -187,12 +187,8 @@ def test_no_error_is_known_better_than_the_worse_of_both_references() -> None:
     assert len(departures_between(scenario([old]), scenario([new]))) == 4
     for floor, new_floor in ((1e-4, 1e-11), (1e-11, 1e-4)):
         old_report = scenario([old], floor=floor, velocity_floor=floor)
-        assert (
-            departures_between(
-                old_report, scenario([new], floor=new_floor, velocity_floor=new_floor)
-            )
-            == []
-        )
+        new_report = scenario([new], floor=new_floor, velocity_floor=new_floor)
+        assert departures_between(old_report, new_report) == []
 
 
 def test_settings_and_scenarios_that_come_and_go() -> None:

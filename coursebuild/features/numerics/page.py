@@ -80,26 +80,23 @@ def numerics_values(library: Library) -> dict[str, object]:
         *course_reports,
     ]
     groups = []
-    for number, members in groupby(cases, key=attrgetter("case")):
-        views = tuple(case_view(words, place, report) for report in members)
+    for number, group_reports in groupby(cases, key=attrgetter("case")):
+        views = tuple(case_view(words, place, report) for report in group_reports)
         key = f"numerics.case_{number}"
         has_own_title = (not number or len(views) > 1) and words.has(key)
         groups.append(CaseGroup(number, words(key) if has_own_title else views[0].title, views))
+    tables = []  # of all cases: name, column of `matrix`, and by group the cases with cells
+    for column, name in enumerate(("order", "largest", "cost")):
+        bodies = [[case for case in group.cases if any(case.matrix[column])] for group in groups]
+        if any(bodies):
+            tables.append((name, column, [members for members in bodies if members]))
     return {
         "groups": tuple(groups),
-        "tables": tuple(_tables(groups)),
+        "tables": tuple(tables),
         "integrators": INTEGRATORS,
         "where": dict.fromkeys(grids.machine_text(words, report.machine) for report in cases),
         "file": place.href(urls.file_path(STABILITY.path())),
     }
-
-
-def _tables(groups: Sequence[CaseGroup]) -> Iterator[tuple[str, int, list[list[CaseView]]]]:
-    """The tables of all cases: name, column of `matrix`, and by group the cases with cells."""
-    for column, name in enumerate(("order", "largest", "cost")):
-        bodies = [[case for case in group.cases if any(case.matrix[column])] for group in groups]
-        if any(bodies):
-            yield name, column, [cases for cases in bodies if cases]
 
 
 def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
@@ -181,11 +178,19 @@ def _describe(words: Strings, report: CaseReport, quantities: Sequence[Quantity]
 
 
 def _figures(words: Strings, report: CaseReport) -> grids.Grid | None:
+    def cells(line: FigureLine) -> tuple[str, ...]:
+        value = words("numerics.infinite") if line.measured is None else grids.power(line.measured)
+        difference: str = ""
+        if line.exact is not None and line.measured is not None:
+            difference = grids.power(line.measured - line.exact, 2)
+        spread = "" if line.spread is None else " … ".join(map(grids.power, line.spread))
+        return value, spread, grids.power(line.exact), difference
+
     named_rows: list[grids.NamedRow] = []
     parts: list[grids.FigurePart] = []
     for name in dict.fromkeys(line.name for line in report.figures):
         lines = [line for line in report.figures if line.name == name]
-        rows = grids.merge_rows((line.integrator, _figure(words, line)) for line in lines)
+        rows = grids.merge_rows((line.integrator, cells(line)) for line in lines)
         named_rows += rows
         unit = lines[0].unit
         sources = dict.fromkeys(figure.source for figure in lines if figure.source)
@@ -193,17 +198,6 @@ def _figures(words: Strings, report: CaseReport) -> grids.Grid | None:
         parts.append(grids.FigurePart(title, "; ".join(sources), len(rows)))
     label = words("numerics.figures", title=report.title)
     return scenario_view.integrator_table(words, label, _FIGURE, named_rows, parts=tuple(parts))
-
-
-def _figure(words: Strings, line: FigureLine) -> tuple[str, ...]:
-    measured_text = (
-        words("numerics.infinite") if line.measured is None else grids.power(line.measured)
-    )
-    difference: str = ""
-    if line.exact is not None and line.measured is not None:
-        difference = grids.power(line.measured - line.exact, 2)
-    spread = "" if line.spread is None else " … ".join(map(grids.power, line.spread))
-    return measured_text, spread, grids.power(line.exact), difference
 
 
 def _notes(words: Strings, report: CaseReport) -> list[str]:

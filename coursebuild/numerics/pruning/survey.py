@@ -1,7 +1,5 @@
 """The scene diet of one model.
 
-Entry point: `Surveyor`, whose `survey` gives a `Survey`.
-
 1. The model runs in each scenario, and from random starts nearby. From one that is lost nothing is
    claimed.
 2. *Proved*: what no motion is computed of is taken out at once, as much as the compiler can do
