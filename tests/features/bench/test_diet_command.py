@@ -73,15 +73,9 @@ def test_diet_shows_a_finding_as_text_and_as_json(course: Path, capsys: Capture)
     assert [scenario["status"] for scenario in model["scenarios"]] == ["ok"]
     (finding,) = model["findings"]
     assert finding["label"] == "proved" and finding["fixable"]
-    assert finding["places"] == [
-        {
-            "name": "time",
-            "element": 'mujoco/sensor/clock[@name="time"]',
-            "path": "models/swing.xml",
-            "line": 6,
-            "column": 5,
-        }
-    ]
+    element = 'mujoco/sensor/clock[@name="time"]'
+    place = {"name": "time", "element": element, "path": "models/swing.xml", "line": 6, "column": 5}
+    assert finding["places"] == [place]
     (edit,) = finding["edits"]
     assert MODEL[edit["start"] : edit["end"]] == edit["old"] and edit["new"] == ""
 
@@ -233,9 +227,8 @@ def test_a_report_is_recorded(course: Path, capsys: Capture) -> None:
     assert main(["-C", str(course), "diet", "--record"]) == 1
     assert "wrote content/reports/swing.diet.json" in capsys.readouterr().out
     report = DIET.decode(path.read_bytes())
-    assert report.model == "swing" and [finding.kind for finding in report.findings] == [
-        "sensor-unread"
-    ]
+    assert report.model == "swing"
+    assert [finding.kind for finding in report.findings] == ["sensor-unread"]
 
 
 def test_what_is_recorded_is_whole_and_nothing_else_is_done(course: Path, capsys: Capture) -> None:
@@ -267,10 +260,8 @@ def test_a_broken_model_keeps_no_other_from_being_looked_at(course: Path, capsys
     assert messages["models/loose.xml"] == (
         "models/loose.xml:1:19 is not XML: not well-formed (invalid token)"
     )
-    assert (
-        messages["models/swing.toml"]
-        == "`qpos` has 2 numbers, and the model has 1 positions (`nq`)"
-    )
+    expected = "`qpos` has 2 numbers, and the model has 1 positions (`nq`)"
+    assert messages["models/swing.toml"] == expected
 
 
 def test_a_scenario_that_diverges_is_reported(course: Path, capsys: Capture) -> None:
