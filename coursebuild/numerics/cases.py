@@ -6,7 +6,7 @@ A run is judged first: the error of a run that was lost is not given.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -35,7 +35,6 @@ from coursebuild.numerics.problem import (
     Integrator,
     Motion,
     Problem,
-    ScalarCheck,
     Scenario,
     SecondReference,
     Sizes,
@@ -62,7 +61,7 @@ class DisagreementError(ArithmeticError):
 
 def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport:
     """Measure everything on a problem; a `DisagreementError` if its references differ too much."""
-    first, second = problem.reference, _second_reference(problem)
+    first, second = problem.reference, problem.second or _ENGINE
     model = simulation.compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     drivers = problem.search and driving_force(model, problem.scenario)
     notes = (problem.note, f"energy is not judged: {drivers}" if drivers else "")
@@ -79,11 +78,7 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         note="; ".join(note for note in notes if note),
         reference=reference,
         boundaries=boundaries(problem),
-        figures=tuple(
-            _measure_figure(check, integrator)
-            for check in problem.checks
-            for integrator in check.integrators
-        ),
+        figures=tuple(_figures(problem)),
         orders=tuple(orders(problem, lines) for lines in runs.values() if lines),
         errors=tuple(line for lines in runs.values() for line in lines),
         costs=_costs(problem, runs, clock),
@@ -139,6 +134,20 @@ def orders(problem: Problem, lines: Sequence[ErrorLine]) -> OrderRow:
     return fit_orders(integrator, runs, floor(problem))
 
 
+def _figures(problem: Problem) -> Iterator[FigureLine]:
+    for check in problem.checks:
+        for integrator in check.integrators:
+            figure, exact = check.measure(integrator), check.expected(integrator)
+            spread = None
+            if not isinstance(figure, float):
+                quantiles = np.quantile(figure, (0.1, 0.5, 0.9), method="nearest")
+                low, figure, high = quantiles.tolist()
+                spread = (low, high) if math.isfinite(high) else None
+            value = figure if math.isfinite(figure) else None
+            line = check.name, check.unit, integrator.value, value, exact, check.source, spread
+            yield FigureLine(*line)
+
+
 @lru_cache(maxsize=64)
 def floor(problem: Problem) -> Sizes:
     """How well the motion is known: the distance of its two references.
@@ -148,7 +157,7 @@ def floor(problem: Problem) -> Sizes:
     """
     times = problem.scenario.times
     exact = reference_motion(problem.reference, tuple(times.tolist()))
-    second = _second_reference(problem).motion(problem.mjcf, problem.scenario, times)
+    second = (problem.second or _ENGINE).motion(problem.mjcf, problem.scenario, times)
     gap = largest_errors(errors(second, exact))
     for part in ("position", "attitude", "velocity"):
         difference, most = getattr(gap, part), getattr(problem.precision, part)
@@ -156,27 +165,6 @@ def floor(problem: Problem) -> Sizes:
             message = f"the references of `{problem.name}` differ by {difference:.2g} in {part}"
             raise DisagreementError(f"{message}, where {most:.0e} is said")
     return gap.at_least(ROUNDING)
-
-
-def _second_reference(problem: Problem) -> SecondReference:
-    return problem.second or _ENGINE
-
-
-def _measure_figure(check: ScalarCheck, integrator: Integrator) -> FigureLine:
-    figure, exact = check.measure(integrator), check.expected(integrator)
-    spread = None
-    if not isinstance(figure, float):
-        low, figure, high = np.quantile(figure, (0.1, 0.5, 0.9), method="nearest").tolist()
-        spread = (low, high) if math.isfinite(high) else None
-    return FigureLine(
-        check.name,
-        check.unit,
-        integrator.value,
-        figure if math.isfinite(figure) else None,
-        exact,
-        check.source,
-        spread,
-    )
 
 
 def closed_motion(

@@ -81,7 +81,12 @@ def time_jobs(
     gc_was_enabled = gc.isenabled()
     gc.disable()
     try:
-        repeats = [_count_repeats(job, clock) for job in jobs]
+        repeats = []
+        for job in jobs:  # how often it must be made to take long enough, which warms caches too
+            count = 1
+            while _time_job(job, count, clock) < _SHORTEST and count < 1 << 12:
+                count *= 2
+            repeats.append(count)
         for turn in range(MAX_ROUNDS):
             order = range(len(jobs))
             for index in order if turn % 2 else reversed(order):
@@ -96,13 +101,6 @@ def time_jobs(
         if gc_was_enabled:
             gc.enable()
     return timings
-
-
-def _count_repeats(job: Job, clock: Clock) -> int:
-    times = 1
-    while _time_job(job, times, clock) < _SHORTEST and times < 1 << 12:
-        times *= 2
-    return times
 
 
 def _time_job(job: Job, times: int, clock: Clock) -> int:
@@ -216,22 +214,17 @@ def mark_luck(
         if place is not None and is_usual and setting.timestep > limit * (1 + 1e-9):
             luck = f"it is beyond its largest stable timestep, {seconds_text(limit, 3)}"
         for rival in rows:
-            work, error = _more_work(rival.setting, setting), quantity.value_of(rival)
+            dear, error, work = rival.setting, quantity.value_of(rival), ""
+            if dear == replace(setting, timestep=dear.timestep):
+                work = "shorter timesteps" if dear.timestep < setting.timestep else ""
+            elif dear == replace(setting, iterations=dear.iterations):
+                work = "more iterations" if dear.iterations > setting.iterations else ""
             if luck or not work or place is None or error is None:
                 continue
             if error > max(place * (1 + ERROR_SLACK), quantity.least):
                 luck = f"its error rises with {work}"
         marked_rows.append(replace(row, lucky=luck))
     return tuple(marked_rows)
-
-
-def _more_work(dear: MeasuredSetting, cheap: MeasuredSetting) -> str:
-    """What a setting takes more of than another, in words; empty unless it is that alone."""
-    if dear == replace(cheap, timestep=dear.timestep) and dear.timestep < cheap.timestep:
-        return "shorter timesteps"
-    if dear == replace(cheap, iterations=dear.iterations) and dear.iterations > cheap.iterations:
-        return "more iterations"
-    return ""
 
 
 def verdict(
@@ -251,20 +244,17 @@ def verdict(
     if row.reasons:
         return _verdict_of_lost(rows, row, quantity)
     error = None if is_noticeable is None else row.seen
-    least_seen = quantity.least if quantity.name == SEEN.name else 0.0
-    own_place, remark = front_point(row, quantity), _describe_error(error, least_seen)
+    remark = "; whether its error can be seen is not known"
+    if error is not None:
+        least = quantity.least if quantity.name == SEEN.name else 0.0
+        remark = _describe_error(rows, noticeable, row, error, least)
+    own_place = front_point(row, quantity)
     if row.parted is not None:
         text = _verdict_of_chaos(rows, row, horizon_error)
         return RowVerdict(False, None, None, None, is_noticeable, text)
     if own_place is None:
         text = "nothing was timed, so no setting can be called better"
         return RowVerdict(False, None, None, None, is_noticeable, text + remark)
-    if error is not None and error >= 1:
-        remark += _cheapest_unseen(
-            rows,
-            own_place.cost.value,
-            hopeless=all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None),
-        )
     if row.dominated_by is None and row.lucky:
         text = f"nothing can be said of the scene's own setting: {row.lucky}"
         return RowVerdict(False, None, None, None, is_noticeable, text + remark)
@@ -310,16 +300,6 @@ def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
     return text
 
 
-def _cheapest_unseen(rows: Rows, own_cost: float, *, hopeless: bool) -> str:
-    """The cheapest setting with an error that no learner notices, in words."""
-    unseen = [row for row in rows if row.seen is not None and row.seen < 1 and row.cost is not None]
-    if not unseen:
-        return ", and that of every other setting too" if hopeless else ""
-    cost, least = min((row.cost.value, n) for n, row in enumerate(unseen) if row.cost)
-    name, times = setting_text(unseen[least].setting), f"{cost / own_cost:.2g} times its cost"
-    return f"; the cheapest without one that is seen is {name}, at {times}"
-
-
 def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> RowVerdict:
     text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
     text += "; ".join(row.reasons)
@@ -347,10 +327,25 @@ def _describe_ratios(cost: float, error: float) -> str:
     return f"{cheap} and {exact}"
 
 
-def _describe_error(error: float | None, least: float) -> str:
-    if error is None:
-        return "; whether its error can be seen is not known"
-    if error >= 1:
-        return f"; its error can be seen: it is {error:.2g} times what an eye can tell"
-    size = f"{'less than ' if 0 < error <= least else ''}{error:.2g}"
-    return f"; its error cannot be seen: it is {size} of what an eye can tell"
+def _describe_error(
+    rows: Rows,
+    noticeable: Sequence[bool | None],
+    own_row: WorkPrecisionRow,
+    error: float,
+    least: float,
+) -> str:
+    """Whether the own error is seen, and where it is, the cheapest setting with one that is not."""
+    if error < 1:
+        size = f"{'less than ' if 0 < error <= least else ''}{error:.2g}"
+        return f"; its error cannot be seen: it is {size} of what an eye can tell"
+    text = f"; its error can be seen: it is {error:.2g} times what an eye can tell"
+    unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost is not None]
+    if own_row.cost is None:
+        return text
+    if unseen:
+        cost, first = min((r.cost.value, n) for n, r in enumerate(unseen) if r.cost)
+        name, times = setting_text(unseen[first].setting), f"{cost / own_row.cost.value:.2g}"
+        text += f"; the cheapest without one that is seen is {name}, at {times} times its cost"
+    elif all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None):
+        text += ", and that of every other setting too"
+    return text

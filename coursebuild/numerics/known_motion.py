@@ -205,7 +205,14 @@ def _check_exact(
         return ROUNDING
     gaps = [gap.place]
     for times in _STIFFER:
-        stiff = self_reference(_stiffen(model, times), pilot, quick=quick)
+        stiffer = with_integrator(model, Integrator.EULER, float(model.opt.timestep))
+        for table_name in ("geom_solref", "pair_solref", "eq_solref", "jnt_solref", "dof_solref"):
+            table = getattr(stiffer, table_name)
+            is_time = table[:, 0] > 0
+            table[is_time, 0] /= times
+            table[~is_time] *= times**2, times
+        stiffer.opt.cone, stiffer.opt.impratio = CONES["elliptic"], model.opt.impratio * times**2
+        stiff = self_reference(stiffer, pilot, quick=quick)
         count = min(len(states.times), len(stiff.states.times))
         gaps.append(_gap(model, states.head(count), stiff.states.head(count)).place)
     if gaps[0] > max(precision, FLOORS * second.floor.place) and not (
@@ -220,18 +227,6 @@ def _check_exact(
     # What is left after the law of the last two: the formula is known no better.
     rest = max(0.0, gaps[2] - (gaps[1] - gaps[2]))
     return ROUNDING.at_least(Sizes(rest, rest, 0.0)).at_least(second.floor)
-
-
-def _stiffen(model: Any, times: float) -> Any:
-    """A copy of a model whose constraints are stiffer, with a cone and less creep."""
-    stiff = with_integrator(model, Integrator.EULER, float(model.opt.timestep))
-    for name in ("geom_solref", "pair_solref", "eq_solref", "jnt_solref", "dof_solref"):
-        table = getattr(stiff, name)
-        is_time = table[:, 0] > 0
-        table[is_time, 0] /= times
-        table[~is_time] *= times**2, times
-    stiff.opt.cone, stiff.opt.impratio = CONES["elliptic"], stiff.opt.impratio * times**2
-    return stiff
 
 
 def _exact_states(

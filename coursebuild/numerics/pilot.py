@@ -25,7 +25,7 @@ from msgspec.structs import replace
 
 from coursebuild.numerics import simulation
 from coursebuild.numerics.detector import Peaks, driving_force, update_peaks
-from coursebuild.numerics.problem import STANDARD, Array, Integrator, Scenario, Setup
+from coursebuild.numerics.problem import STANDARD, Array, Integrator, Setup
 from coursebuild.numerics.reports.scene_report import MeasuredSetting
 from coursebuild.numerics.scene import Scene, SceneError
 
@@ -83,7 +83,13 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
     )
     variant.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data, errors = simulation.initial_data(scenario, variant), horizon_errors(variant, scene)
-    twins, sizes = _twins(variant, scenario, errors)
+    twins, nudge_sizes = [], []
+    for position, velocity in nudges(variant, 2 * _DIRECTIONS, NUDGE):
+        twin = simulation.initial_data(scenario, variant)
+        mujoco.mj_integratePos(variant, twin.qpos, position, 1.0)
+        twin.qvel[:] += velocity
+        twins.append(twin)
+        nudge_sizes.append(float(np.max(np.abs(position / errors), initial=0.0)))
     look = _Observer(variant)
     peaks = Peaks()
     times, steps_per_sample = scenario.times, scenario.steps(step)
@@ -102,10 +108,13 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
             if index == 0 or gap[index - 1] < 1:
                 simulation.advance(variant, twin, steps_per_sample)
                 gap[index] = position_distance(variant, data.qpos, twin.qpos, errors)
-    horizons, rates = zip(
-        *(_horizon(times, *twin) for twin in zip(gaps, sizes, strict=True)), strict=True
-    )
-    growth_rates = [rate for rate in rates if rate is not None]
+    horizons, growth_rates = [], []
+    for gap, size in zip(gaps, nudge_sizes, strict=True):
+        parted = np.flatnonzero(gap >= 1)
+        end = int(parted[0]) if parted.size else len(times)
+        horizons.append(float(times[max(0, end - 1)]))
+        if parted.size:
+            growth_rates.append(math.log(float(gap[end]) / size) / float(times[end]))
     return Pilot(
         scene=scene,
         setup=_bounds(variant, scene, peaks),
@@ -175,7 +184,13 @@ class _Observer:
     def __init__(self, model: Any) -> None:
         self.contact = self.limit = self.constrained = False
         self.friction = self.full = False
-        self._limited, self._range = _limited_activations(model)
+        clamped = [
+            (int(model.actuator_actadr[i]) + k, model.actuator_actrange[i])
+            for i in np.flatnonzero(model.actuator_actlimited)
+            for k in range(int(model.actuator_actnum[i]))
+        ]
+        self._limited = np.array([number for number, _ in clamped], dtype=np.intp)
+        self._range = np.array([limits for _, limits in clamped]).reshape(-1, 2)
 
     def __call__(self, data: Any) -> None:
         if data.nefc:
@@ -202,44 +217,12 @@ class _Observer:
         return tuple(words for is_present, words in causes if is_present)
 
 
-def _limited_activations(model: Any) -> tuple[Any, Array]:
-    """The numbers of activations that are clamped (n,), and their limits (n, 2)."""
-    activations = [
-        (int(model.actuator_actadr[i]) + k, model.actuator_actrange[i])
-        for i in np.flatnonzero(model.actuator_actlimited)
-        for k in range(int(model.actuator_actnum[i]))
-    ]
-    limits: Array = np.array([limits for _, limits in activations]).reshape(-1, 2)
-    return np.array([number for number, _ in activations], dtype=np.intp), limits
-
-
-def _twins(model: Any, scenario: Scenario, units: Array) -> tuple[list[Any], list[float]]:
-    """Copies of the beginning, nudged always in the same ways; how far each is off, in `units`."""
-    twins, distances = [], []
-    for position, velocity in nudges(model, 2 * _DIRECTIONS, NUDGE):
-        twin = simulation.initial_data(scenario, model)
-        mujoco.mj_integratePos(model, twin.qpos, position, 1.0)
-        twin.qvel[:] += velocity
-        twins.append(twin)
-        distances.append(float(np.max(np.abs(position / units), initial=0.0)))
-    return twins, distances
-
-
 def nudges(model: Any, count: int, size: float) -> Array:
     """Changes of positions and velocities, to both sides of random directions: (count, 2, nv)."""
     directions = np.random.default_rng(1).normal(size=(count // 2, 2, int(model.nv)))
     largest = np.abs(directions).max(axis=2, initial=mujoco.mjMINVAL)[:, :1, None]
     directions = directions / largest * size * scales(model)
     return np.concatenate([directions, -directions])
-
-
-def _horizon(times: Array, gaps: Array, nudge: float) -> tuple[float, float | None]:
-    parted = np.flatnonzero(gaps >= 1)
-    if not parted.size:
-        return float(times[-1]), None
-    end = int(parted[0])
-    growth = math.log(float(gaps[end]) / nudge) / float(times[end])
-    return float(times[max(0, end - 1)]), growth
 
 
 def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:

@@ -100,22 +100,18 @@ def scenes(model: Any, declarations: Declarations, *, quick: bool = False) -> tu
         return ()
     step = float(model.opt.timestep)
     steps = [step * 2.0**power for power in (QUICK_LADDER if quick else LADDER)]
-    declared_scenarios = declarations.scenarios or _keyframe_scenarios(
-        model, declarations.source.span(0, 0)
-    )
-    return tuple(
-        _scene(model, declaration, declarations.bench, steps) for declaration in declared_scenarios
-    )
-
-
-def _keyframe_scenarios(model: Any, place: Span) -> tuple[DeclaredScenario, ...]:
-    names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
-    if not model.nkey:
-        return (DeclaredScenario(names[0], "from the model's own state", span=place),)
-    return tuple(
-        DeclaredScenario(name, f"from the keyframe {name}", key, span=place)
-        for key, name in enumerate(names)
-    )
+    scenarios = declarations.scenarios
+    if not scenarios:
+        place = declarations.source.span(0, 0)
+        names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
+        titles = [f"from the keyframe {name}" for name in names]
+        scenarios = tuple(
+            DeclaredScenario(name, title, key, span=place)
+            for key, (name, title) in enumerate(zip(names, titles, strict=True))
+        )
+        if not model.nkey:
+            scenarios = (DeclaredScenario(names[0], "from the model's own state", span=place),)
+    return tuple(_scene(model, scenario, declarations.bench, steps) for scenario in scenarios)
 
 
 def thickness(model: Any) -> Array:
@@ -152,7 +148,11 @@ def _scene(
             )
             help = "give `sample` a value that all timesteps divide"
             raise SceneError(message, declaration.place("timesteps"), help)
-    ladder = _ladder(scenario, step, declaration.timesteps or steps)
+    by_count = {round(scenario.sample / step): step}
+    for timestep in declaration.timesteps or steps:
+        count = max(1, round(scenario.sample / timestep))
+        by_count.setdefault(count, _decimal(scenario.sample / count))
+    ladder = tuple(by_count[count] for count in sorted(by_count, reverse=True))
     if scenario.duration > LONGEST * ladder[0]:
         message = f"{scenario.duration:g} s in steps of {ladder[0]:g} s are over {LONGEST:,} steps"
         place = declaration.place("duration" if declaration.duration is not None else "timesteps")
@@ -209,12 +209,3 @@ def _sample_steps(basis: int, total: int) -> int:
         return (deviation if deviation > 0 else -deviation / 2) + 0.7 * odd_factors
 
     return min(sorted(divisors), key=badness)
-
-
-def _ladder(scenario: Scenario, timestep: float, steps: Sequence[float]) -> tuple[float, ...]:
-    """The model's own timestep, and those nearest to `steps` (s) that divide the sample, rising."""
-    ladder = {round(scenario.sample / timestep): timestep}
-    for step in steps:
-        count = max(1, round(scenario.sample / step))
-        ladder.setdefault(count, _decimal(scenario.sample / count))
-    return tuple(ladder[count] for count in sorted(ladder, reverse=True))

@@ -87,9 +87,15 @@ def measure_sweep(
     states = base_run.states if base_run.judgement.ok else None
     rows = [_measure_variant(scene, base, states, row, model) for row, model in variants]
     if clocks is not None:
-        models = [base, *(model for _, model in variants)]
         with silent():
-            rows = _with_costs(scene.scenario, models, rows, clocks[0], quick=quick)
+            usable = [n for n, row in enumerate(rows) if row.status == "ok"]
+            jobs = [
+                scenario_job(model, [scene.scenario], float(model.opt.timestep))
+                for model in (base, *(variants[n][1] for n in usable))
+            ]
+            timings = time_jobs(jobs, 0, clocks[0], quick=quick)
+            for n, timing in zip(usable, timings[1:], strict=True):
+                rows[n] = replace(rows[n], cost=timing.ratio)
             for part in threads:
                 rows += _rollouts(scene.scenario, base, part, clocks[1], quick=quick)
     return SweepReport(sweep.name, sweep.title or sweep.name, scene.name, sweep.show, tuple(rows))
@@ -254,17 +260,6 @@ def _follow_hits(
         hit = previous[pair]
         hit.parting = max(0.0, contact_speeds(model, data, hit.contact)[0])
     return current
-
-
-def _with_costs(
-    scenario: Scenario, models: list[Any], rows: list[SweepRow], clock: Clock, *, quick: bool
-) -> list[SweepRow]:
-    usable = [n for n, row in enumerate(rows) if row.status == "ok"]
-    timed_models = [models[n] for n in (0, *(n + 1 for n in usable))]
-    jobs = [scenario_job(model, [scenario], float(model.opt.timestep)) for model in timed_models]
-    for n, timing in zip(usable, time_jobs(jobs, 0, clock, quick=quick)[1:], strict=True):
-        rows[n] = replace(rows[n], cost=timing.ratio)
-    return rows
 
 
 def _rollouts(

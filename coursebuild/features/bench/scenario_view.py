@@ -100,6 +100,13 @@ def scenario_view(
     softened = [name for name, row in zip(names, report.rows, strict=True) if row.refsafe]
     if softened:
         notes.append(words("measured.refsafe", settings="; ".join(softened)))
+    rows = []
+    for row in report.stable:
+        remark = stable_again(words, row)
+        if row.largest is None and is_cut_short(report):
+            remark = words("measured.stable_short", steps=FEWEST_STEPS)
+        rows.append((row.integrator, (*stable_cells(words, row), remark)))
+    label = stable_title(words, report.stable[0]) if rows else ""
     return ScenarioView(
         anchor=anchor,
         title=report.title or report.name,
@@ -108,7 +115,7 @@ def scenario_view(
         settings=_settings_table(words, report),
         notes=tuple(notes),
         orders=orders_table(words, words("measured.orders"), report.orders),
-        stable=_stability_table(words, report),
+        stable=integrator_table(words, label, (*STABLE, "measured.remark"), rows),
         report=report,
     )
 
@@ -237,19 +244,6 @@ def integrator_table(
     return grids.grid(
         label, columns, words=(words("measured.map"), words("measured.remark")), parts=parts
     )
-
-
-def _stability_table(words: Strings, report: ScenarioReport) -> grids.Grid | None:
-    short = is_cut_short(report)
-
-    def remark(row: StableRow) -> str:
-        if row.largest is None and short:
-            return words("measured.stable_short", steps=FEWEST_STEPS)
-        return stable_again(words, row)
-
-    rows = [(row.integrator, (*stable_cells(words, row), remark(row))) for row in report.stable]
-    label = stable_title(words, report.stable[0]) if rows else ""
-    return integrator_table(words, label, (*STABLE, "measured.remark"), rows)
 
 
 STABLE = (

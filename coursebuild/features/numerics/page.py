@@ -14,7 +14,6 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.strings import Strings
 from coursebuild.features.bench import grids, scenario_view
 from coursebuild.numerics.reports.case_report import (
-    BoundaryLine,
     CaseReport,
     case_quantities,
     case_svgs,
@@ -80,56 +79,45 @@ def numerics_values(library: Library) -> dict[str, object]:
         *sorted(library.reports.cases, key=attrgetter("case")),
         *course_reports,
     ]
-    groups = tuple(
-        _group(words, place, number, tuple(group))
-        for number, group in groupby(cases, key=attrgetter("case"))
-    )
+    groups = []
+    for number, group_reports in groupby(cases, key=attrgetter("case")):
+        views = tuple(case_view(words, place, report) for report in group_reports)
+        key = f"numerics.case_{number}"
+        has_own_title = (not number or len(views) > 1) and words.has(key)
+        groups.append(CaseGroup(number, words(key) if has_own_title else views[0].title, views))
+    tables = []  # of all cases: name, column of `matrix`, and by group the cases with cells
+    for column, name in enumerate(("order", "largest", "cost")):
+        bodies = [[case for case in group.cases if any(case.matrix[column])] for group in groups]
+        if any(bodies):
+            tables.append((name, column, [members for members in bodies if members]))
     return {
-        "groups": groups,
-        "tables": tuple(_tables(groups)),
+        "groups": tuple(groups),
+        "tables": tuple(tables),
         "integrators": INTEGRATORS,
         "where": dict.fromkeys(grids.machine_text(words, report.machine) for report in cases),
         "file": place.href(urls.file_path(STABILITY.path())),
     }
 
 
-def _tables(groups: Sequence[CaseGroup]) -> Iterator[tuple[str, int, list[list[CaseView]]]]:
-    """The tables of all cases: name, column of `matrix`, and by group the cases with cells."""
-    for column, name in enumerate(("order", "largest", "cost")):
-        bodies = [[case for case in group.cases if any(case.matrix[column])] for group in groups]
-        if any(bodies):
-            yield name, column, [cases for cases in bodies if cases]
-
-
-def _group(
-    words: Strings, place: urls.Place, number: int, cases: Sequence[CaseReport]
-) -> CaseGroup:
-    key = f"numerics.case_{number}"
-    has_group_title = not number or len(cases) > 1
-    title = words(key) if has_group_title and words.has(key) else cases[0].title
-    return CaseGroup(number, title, tuple(case_view(words, place, report) for report in cases))
-
-
 def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
     quantity = next(iter(case_quantities(report)), None)
     part = None if quantity is None or quantity.name == "energy_drift" else quantity.name
     fits = {row.integrator: getattr(row, part) for row in report.orders} if part else {}
-    limits = {line.integrator: line for line in report.boundaries}
+    limits = {}
+    for line in report.boundaries:
+        if line.largest == 0:
+            limits[line.integrator] = words("numerics.none")
+        elif line.largest is None and line.bracket is None:
+            limits[line.integrator] = words("numerics.all")
+        else:
+            limits[line.integrator] = limit_text(line)
     orders = (fits.get(integrator) for integrator in INTEGRATORS)
     costs = (report.cost_to(integrator, _RIGHT) for integrator in INTEGRATORS)
     return (
         tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
-        tuple(_limit(words, limits.get(integrator)) for integrator in INTEGRATORS),
+        tuple(limits.get(integrator, "") for integrator in INTEGRATORS),
         tuple("" if cost is None else seconds_text(cost, _DIGITS) for cost in costs),
     )
-
-
-def _limit(words: Strings, line: BoundaryLine | None) -> str:
-    if line is None:
-        return ""
-    if line.largest == 0 or (line.largest is None and line.bracket is None):
-        return words("numerics.all" if line.largest is None else "numerics.none")
-    return limit_text(line)
 
 
 def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
@@ -137,7 +125,19 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
     model = "" if report.case else report.name.rpartition("/")[0]
     label = words("numerics.orders", title=report.title)
     orders = scenario_view.orders_table(words, label, report.orders, merge=True)
-    rows = [(line.integrator, _boundary(words, line)) for line in report.boundaries]
+    rows = [
+        (
+            line.integrator,
+            (
+                *scenario_view.stable_cells(words, line),
+                grids.percent(line.difference),
+                status_text(line.beyond) if line.beyond else "",
+                grids.power(line.growth),
+                scenario_view.stable_again(words, line),
+            ),
+        )
+        for line in report.boundaries
+    ]
     label = (
         f"{report.title}: {scenario_view.stable_title(words, report.boundaries[0])}" if rows else ""
     )
@@ -177,22 +177,20 @@ def _describe(words: Strings, report: CaseReport, quantities: Sequence[Quantity]
         yield grids.sentence(report.note)
 
 
-def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
-    return (
-        *scenario_view.stable_cells(words, line),
-        grids.percent(line.difference),
-        status_text(line.beyond) if line.beyond else "",
-        grids.power(line.growth),
-        scenario_view.stable_again(words, line),
-    )
-
-
 def _figures(words: Strings, report: CaseReport) -> grids.Grid | None:
+    def cells(line: FigureLine) -> tuple[str, ...]:
+        value = words("numerics.infinite") if line.measured is None else grids.power(line.measured)
+        difference: str = ""
+        if line.exact is not None and line.measured is not None:
+            difference = grids.power(line.measured - line.exact, 2)
+        spread = "" if line.spread is None else " … ".join(map(grids.power, line.spread))
+        return value, spread, grids.power(line.exact), difference
+
     named_rows: list[grids.NamedRow] = []
     parts: list[grids.FigurePart] = []
     for name in dict.fromkeys(line.name for line in report.figures):
         lines = [line for line in report.figures if line.name == name]
-        rows = grids.merge_rows((line.integrator, _figure(words, line)) for line in lines)
+        rows = grids.merge_rows((line.integrator, cells(line)) for line in lines)
         named_rows += rows
         unit = lines[0].unit
         sources = dict.fromkeys(figure.source for figure in lines if figure.source)
@@ -200,17 +198,6 @@ def _figures(words: Strings, report: CaseReport) -> grids.Grid | None:
         parts.append(grids.FigurePart(title, "; ".join(sources), len(rows)))
     label = words("numerics.figures", title=report.title)
     return scenario_view.integrator_table(words, label, _FIGURE, named_rows, parts=tuple(parts))
-
-
-def _figure(words: Strings, line: FigureLine) -> tuple[str, ...]:
-    measured_text = (
-        words("numerics.infinite") if line.measured is None else grids.power(line.measured)
-    )
-    difference: str = ""
-    if line.exact is not None and line.measured is not None:
-        difference = grids.power(line.measured - line.exact, 2)
-    spread = "" if line.spread is None else " … ".join(map(grids.power, line.spread))
-    return measured_text, spread, grids.power(line.exact), difference
 
 
 def _notes(words: Strings, report: CaseReport) -> list[str]:

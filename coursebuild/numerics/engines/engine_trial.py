@@ -257,11 +257,7 @@ class EngineBasis(Struct, frozen=True, eq=False):
 
 
 def engine_basis(model: Any, scene: Scene, *, quick: bool = False) -> EngineBasis:
-    """Find the reference of a scene, and how MuJoCo itself moves.
-
-    Raises:
-        SceneError: the scenario does not fit the model.
-    """
+    """Find the reference of a scene, and how MuJoCo itself moves."""
     pilot = run_pilot(model, scene)
     setting = own_setting(model, pilot)
     reference = find_references(model, pilot, quick=quick)[setting.cone].reference

@@ -1,8 +1,5 @@
 """What takes no part in what a scene shows, as far as runs can say: bodies, joints, couplings.
 
-Entry points: `far_bodies(text, names, scenarios, runs)`, `resting_joints(text, runs)`,
-`couplings(text)`.
-
 1. What touched a body that can move and is left, at any time and along any chain, is no candidate,
    however little that seems to have changed.
 2. What refers to a thing that goes, such as a sensor, goes with it.

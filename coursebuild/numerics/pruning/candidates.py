@@ -1,9 +1,5 @@
 """Candidates: what could be left out of a model, and why all motions would stay the same.
 
-Entry points: `unread_elements(text, scenarios)`, of which no motion is computed;
-`unreachable_contacts(text)`, where nothing can touch; `idle_contacts`, `contact_of_rest`,
-`inner_geoms`, `primitive_meshes`, `other_settings`, for which only runs speak.
-
 1. The proof of a kind holds only if MuJoCo compiles the model without the thing, so that no other
    element refers to it. The survey checks that nothing else in the compiled model changes.
 2. What has no proof is tried by running. The integrator and the timestep are not candidates: they

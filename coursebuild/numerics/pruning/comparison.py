@@ -1,9 +1,5 @@
 """Two models in the same scenario: whether they do the same, bit for bit or nearly.
 
-Entry points: `pruning_scenes(model, declarations, quick=…)`, the scenarios by which a smaller model
-is judged; `watch(model, scene)`, the whole model in one; `nearby_scenes(model, run, count)`, from
-random starts nearby; `compare(base, variant, index, runs)`.
-
 1. Both begin in the same state and are stepped side by side to the end: neither is ever set to the
    state of the other, which would hide what a part does that is gone. Positions, velocities,
    activations and the sensors that are left must be the same bits after every step; so must

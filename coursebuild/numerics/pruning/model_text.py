@@ -1,7 +1,5 @@
 """A model as its files and as what MuJoCo compiles from them.
 
-Entry point: `open_model`; then `ModelText.compile(edits)`, `ModelText.elements`, `ModelText.ids`.
-
 1. Files that the model includes are found where MuJoCo finds them, and read as markup.
 2. To compile a change, all files are joined to one text. That this gives the same model is checked
    byte by byte on the unchanged files.

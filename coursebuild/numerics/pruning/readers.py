@@ -1,9 +1,5 @@
 """What code may notice of a model: what cannot be ruled out counts as a use.
 
-Entry points: `read_code(path, text, course_modules)`, `ModelReader`; of two compiled models, or of
-their states, `difference(whole, variant)`, `unrelated_fields(fields, kinds)`, and `VIEWS`, the
-words by which code asks a model for one thing.
-
 1. Code is not interpreted, only searched for words. A thing counts as used where code has its name
    as a text, a field where its name stands anywhere, and every thing of a kind where code has the
    word that asks for one, unless a complete name follows: `model.sensor("tip")`.

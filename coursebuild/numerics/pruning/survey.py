@@ -1,7 +1,5 @@
 """The scene diet of one model.
 
-Entry point: `Surveyor`, whose `survey` gives a `Survey`.
-
 1. The model runs in each scenario, and from random starts nearby. From one that is lost nothing is
    claimed.
 2. What is *proved* needless goes first, then far bodies. All else is tried in what is left: as much

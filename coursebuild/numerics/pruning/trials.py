@@ -1,7 +1,4 @@
-"""A model without some things: compiled, compared with the whole model, run and timed beside it.
-
-Entry points: `PruningTrials`, which makes a `PrunedModel`; `largest_subset(items, holds)`.
-"""
+"""A model without some things: compiled, compared with the whole model, run and timed beside it."""
 
 from __future__ import annotations
 

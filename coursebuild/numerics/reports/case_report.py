@@ -168,15 +168,16 @@ def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:
 
 def case_svgs(report: CaseReport, quantity: Quantity, name: str) -> tuple[str, ...]:
     """The plots of an error against processor time, where it was measured, and evaluations."""
+    charts = (_case_chart(report, quantity, is_time=is_time) for is_time in (True, False))
     svgs = (
-        _case_svg(report, quantity, work, f"{name}{suffix}")
-        for work, suffix in (("processor time", ""), (EVALUATION_LABEL, "-evaluations"))
+        chart_svg(chart, f"{name}{suffix}", PAIR_SIZE)
+        for chart, suffix in zip(charts, ("", "-evaluations"), strict=True)
     )
     return tuple(svg_text for svg_text in svgs if svg_text)
 
 
-def _case_svg(report: CaseReport, quantity: Quantity, work: str, name: str) -> str:
-    is_time = work == "processor time"
+def _case_chart(report: CaseReport, quantity: Quantity, *, is_time: bool) -> Chart:
+    work = "processor time" if is_time else EVALUATION_LABEL
 
     def amount(x: float, digits: int = 2) -> str:
         return seconds_text(x, digits) if is_time else f"{x:.{digits}g}"
@@ -200,11 +201,10 @@ def _case_svg(report: CaseReport, quantity: Quantity, work: str, name: str) -> s
         if visible := line.visible_points:
             ends = (f"{p.y:.2g} at {amount(p.x.value)}" for p in (visible[0], visible[-1]))
             texts.append(f"{line.name}: {', '.join(ends)}.")
-    chart = Chart(
+    return Chart(
         title=f"{report.title}: {quantity.label} against {work}",
         text=" ".join(texts),
         axes=(f"{work} for a simulated second{' (s)' * is_time}", quantity.label),
         lines=tuple(lines),
         least=quantity.least,
     )
-    return chart_svg(chart, name, PAIR_SIZE)

@@ -350,7 +350,13 @@ def _grid(x: Scale, y: Scale, titles: tuple[str, str]) -> tuple[list[str], list[
     for at, text in _ticks_y(y):
         texts.append(label(x.start - 7, at + 4, text, f'text-anchor="end" {FINE}'))
         lines.append(f"M{x.start:.1f} {at:.1f}h-4")
-    x_ticks = _ticks_x(x)
+    for most in (9, 7, 5, 4, 3, 2):  # as many as fit without their texts touching
+        x_ticks = x.ticks(most)
+        ends = [(at, text_width(text, TICK_SIZE) / 2) for at, text in x_ticks]
+        if all(b - a >= w + v + 8 for (a, w), (b, v) in pairwise(ends)):
+            break
+    else:
+        x_ticks = x_ticks[:1]
     for at in _decades(x) or [at for at, _ in x_ticks]:
         lines.append(f"M{at:.1f} {y.end:.1f}V{y.start:.1f}")
     for at, text in x_ticks:
@@ -374,13 +380,3 @@ def _decades(scale: Scale) -> list[float]:
 
 def _ticks_y(y: Scale) -> list[tuple[float, str]]:
     return y.ticks(max(2, int((y.start - y.end) / 30)))
-
-
-def _ticks_x(x: Scale) -> list[tuple[float, str]]:
-    """As many ticks as fit without their texts touching."""
-    for most in (9, 7, 5, 4, 3, 2):
-        ticks = x.ticks(most)
-        ticks_with_widths = [(at, text_width(text, TICK_SIZE)) for at, text in ticks]
-        if all(b - a >= (w + v) / 2 + 8 for (a, w), (b, v) in pairwise(ticks_with_widths)):
-            return ticks
-    return ticks[:1]

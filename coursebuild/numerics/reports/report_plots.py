@@ -126,6 +126,17 @@ def _chart(
         for name in INTEGRATORS
         if (points := tuple(_points(report, quantity, works, name)))
     )
+    visible = [point for line in lines for point in line.visible_points]
+    marks = [Entry("front", "on the Pareto front")] if any(p.full for p in visible) else []
+    if not all(point.full for point in visible):
+        marks.append(Entry("beaten", "another is better"))
+    if any(point.small for point in visible):
+        marks.append(Entry("other", "other solver, iterations or cone"))
+    own_names = (setting_text(row.setting, row.setting) for row in report.rows if row.own)
+    marks += [Entry("own", f"the scene’s own: {name}") for name in own_names]
+    losses = {"run lost": _lost(report), "past its horizon": _parted(report)}
+    if words := [text for text, names in losses.items() if names]:
+        marks.append(Entry("lost", ", or ".join(words)))
     return Chart(
         title=f"{report.title or report.name}: error of {quantity.label} against {label}",
         text=" ".join(_describe(report, quantity, lines, work)),
@@ -133,7 +144,7 @@ def _chart(
         lines=lines,
         least=quantity.least,
         unit_label="just visible" if quantity.name == "seen" else "",
-        marks=tuple(_marks(report, lines)),
+        marks=tuple(marks),
     )
 
 
@@ -182,22 +193,6 @@ def _find_works(report: ScenarioReport, work: str) -> list[Interval | None]:
             x = Interval(value, value, value)
         works.append(x)
     return works
-
-
-def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
-    visible = [point for line in lines for point in line.visible_points]
-    if any(point.full for point in visible):
-        yield Entry("front", "on the Pareto front")
-    if not all(point.full for point in visible):
-        yield Entry("beaten", "another is better")
-    if any(point.small for point in visible):
-        yield Entry("other", "other solver, iterations or cone")
-    for row in report.rows:
-        if row.own:
-            yield Entry("own", f"the scene’s own: {setting_text(row.setting, row.setting)}")
-    kinds = {"run lost": _lost(report), "past its horizon": _parted(report)}
-    if words := [text for text, names in kinds.items() if names]:
-        yield Entry("lost", ", or ".join(words))
 
 
 def _lost(report: ScenarioReport) -> list[str]:
@@ -291,7 +286,16 @@ def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
     top = bottom = 0.0
     for n, figure in enumerate(figures):
         start = left + (n % column_count) * (scale_width + _GAP)
-        scale = _scale(sweep.rows, figure, start, start + scale_width)
+        intervals = [figure_interval(row, figure) for row in sweep.rows]
+        ends = [x for interval in intervals if interval for x in (interval.low, interval.high)]
+        low, high = min(ends, default=0.0), max(ends, default=1.0)
+        is_log = low > 0 and high > _SPREAD * low
+        if is_log:
+            low, high = log(low), log(high)
+        elif low < 0.5 * high:
+            low = min(low, 0.0)
+        pad = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
+        scale = Scale(start, start + scale_width, low - pad, high + pad, is_log)
         names = left if n % column_count == 0 else 0.0
         bottom = _panel(parts, sweep, figure, scale, top, names)
         top = bottom if narrow else top
@@ -299,22 +303,12 @@ def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
         key_svg, bottom = key([Entry("own", "as the model is")], 6.0, bottom + 20, width)
         parts.append(key_svg)
     title = f"{sweep.title}: {', '.join(FIGURES[figure] for figure in figures)}"
-    return svg("".join(parts), (width, bottom), name, (title, _describe_sweep(sweep, figures)))
-
-
-def _scale(rows: Sequence[SweepRow], figure: str, left: float, right: float) -> Scale:
-    intervals = [figure_interval(row, figure) for row in rows]
-    values = [
-        x for interval in intervals if interval is not None for x in (interval.low, interval.high)
+    cells = [
+        (row, [f"{FIGURES[figure]} {cell(row, figure) or row.status}" for figure in figures])
+        for row in sweep.rows
     ]
-    low, high = min(values, default=0.0), max(values, default=1.0)
-    powers = low > 0 and high > _SPREAD * low
-    if powers:
-        low, high = log(low), log(high)
-    elif low < 0.5 * high:
-        low = min(low, 0.0)
-    pad = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
-    return Scale(left, right, low - pad, high + pad, powers)
+    text = " ".join(f"{row.parameter} {row.value}: {', '.join(texts)}." for row, texts in cells)
+    return svg("".join(parts), (width, bottom), name, (title, text))
 
 
 def _panel(
@@ -360,15 +354,6 @@ def _group(
         yield symbols(number, [symbol(number, x, y, MARK, full=True, title=title)])
         if row.own:
             yield ring(x, y, 7)
-
-
-def _describe_sweep(sweep: SweepReport, figures: Sequence[str]) -> str:
-    return " ".join(
-        f"{row.parameter} {row.value}: "
-        + ", ".join(f"{FIGURES[figure]} {cell(row, figure) or row.status}" for figure in figures)
-        + "."
-        for row in sweep.rows
-    )
 
 
 def engine_svg(report: EngineScenario, *, name: str, narrow: bool = False) -> str:

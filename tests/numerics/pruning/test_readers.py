@@ -87,11 +87,8 @@ def test_no_hostile_script_loses_a_part() -> None:
         kind, _, name = part.partition(" ")
         assert any(kind in finding for finding in whole), kind
         survey = run_survey(MODEL, lesson=HEAD + script, declarations=GO)
-        faults = [
-            finding
-            for finding in survey.report.findings
-            if finding.is_fault and kind in finding.kind
-        ]
+        findings = survey.report.findings
+        faults = [finding for finding in findings if finding.is_fault and kind in finding.kind]
         lost += [(title, finding.kind) for finding in faults if not name or name in names(finding)]
     assert lost == []
 

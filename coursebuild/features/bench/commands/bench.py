@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -46,7 +46,6 @@ from coursebuild.numerics.reports.scene_report import (
     ScenarioReport,
     SceneReport,
     SweepReport,
-    WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.shown_errors import is_idle
 from coursebuild.numerics.sweep import THREADS
@@ -349,25 +348,24 @@ _OWN_MARK, _FRONT_MARK = ">", "*"
 
 def bench_text(scenes: Sequence[SceneReport], style: Style) -> str:
     """Write every model with its scenarios, and a blank line between models."""
-    return "\n".join(_scene(scene, style) for scene in scenes)
-
-
-def _scene(scene: SceneReport, style: Style) -> str:
-    head = style.paint(visible(scene.model), BOLD)
-    if scene.quick:
-        head += "  " + style.paint("quick: fewer settings, rough times", YELLOW)
-    lines = [head, *style.wrap(machine_text(english(), scene.machine), _INDENT)]
-    if not scene.scenarios:
-        lines.append(f"{_INDENT}nothing in it can move, so nothing was measured")
-    for scenario in scene.scenarios:
-        lines += ["", *_scenario(scenario, style)]
-    for sweep in scene.sweeps:
-        view = scenario_view(english(), sweep)
-        marks = (((_OWN_MARK, BOLD) if row.own else (" ", "")) for row in sweep.rows)
-        lines += ["", _title(sweep.name, sweep.title, style)]
-        lines += _table(view.settings, marks, f"{_OWN_MARK} as the model is", style)
-        lines += _notes(view.notes, style)
-    return "\n".join(lines) + "\n"
+    texts = []
+    for scene in scenes:
+        head = style.paint(visible(scene.model), BOLD)
+        if scene.quick:
+            head += "  " + style.paint("quick: fewer settings, rough times", YELLOW)
+        lines = [head, *style.wrap(machine_text(english(), scene.machine), _INDENT)]
+        if not scene.scenarios:
+            lines.append(f"{_INDENT}nothing in it can move, so nothing was measured")
+        for scenario in scene.scenarios:
+            lines += ["", *_scenario(scenario, style)]
+        for sweep in scene.sweeps:
+            view = scenario_view(english(), sweep)
+            marks = [((_OWN_MARK, BOLD) if row.own else (" ", "")) for row in sweep.rows]
+            lines += ["", _title(sweep.name, sweep.title, style)]
+            lines += _table(view.settings, marks, f"{_OWN_MARK} as the model is", style)
+            lines += _notes(view.notes, style)
+        texts.append("\n".join(lines) + "\n")
+    return "\n".join(texts)
 
 
 def _scenario(report: ScenarioReport, style: Style) -> list[str]:
@@ -381,8 +379,14 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
     for text in (*texts, *report.notes):
         lines += style.wrap(text, 2 * _INDENT)
     legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
-    shown_rows = (row for row in report.rows if not is_idle(row))
-    lines += _table(view.settings, map(_mark, shown_rows), legend, style)
+    marks = []
+    for row in report.rows:
+        if not is_idle(row):
+            code = BOLD if row.own else RED if row.status in ("diverged", "reset") else ""
+            code = code or (YELLOW if row.status != "ok" else GREEN if row.front else "")
+            mark = (_OWN_MARK if row.own else " ") + (_FRONT_MARK if row.front else " ")
+            marks.append((mark, code))
+    lines += _table(view.settings, marks, legend, style)
     colour = GREEN if report.verdict.on_front and not report.verdict.noticeable else YELLOW
     if report.verdict.text:
         lines += ["", *style.wrap(report.verdict.text, 2 * _INDENT, colour)]
@@ -397,21 +401,15 @@ def _title(name: str, title: str, style: Style) -> str:
 
 
 def _table(
-    grid: Grid, marks: Iterable[tuple[str, str]], legend: str, style: Style
+    grid: Grid, marks: Sequence[tuple[str, str]], legend: str, style: Style
 ) -> Iterator[str]:
     yield ""
     if not grid.rows:
         yield f"{2 * _INDENT}no setting was measured"
         return
-    _, *lines = grid_lines(grid, style, tuple(marks))
+    _, *lines = grid_lines(grid, style, marks)
     for line in (*lines, style.paint(legend, FAINT)):
         yield f"{2 * _INDENT}{line}".rstrip()
-
-
-def _mark(row: WorkPrecisionRow) -> tuple[str, str]:
-    code = BOLD if row.own else RED if row.status in ("diverged", "reset") else ""
-    code = code or (YELLOW if row.status != "ok" else GREEN if row.front else "")
-    return (_OWN_MARK if row.own else " ") + (_FRONT_MARK if row.front else " "), code
 
 
 def _notes(notes: Sequence[str], style: Style) -> list[str]:

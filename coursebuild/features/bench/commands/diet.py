@@ -1,8 +1,5 @@
 """`coursebuild diet`: what models of the course hold that their scenarios do not need.
 
-Entry points: `diet(options, names, …)`; `diet_text(reports, style)`; `diet_values(reports)`, for
-JSON.
-
 1. Names mean models. One that does not compile is reported, and the others are looked at.
 2. A part that code of the course may notice is not proved superfluous, and a part without which
    scripts or labs have another output is no finding. A part that is to stay stands in

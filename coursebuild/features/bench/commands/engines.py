@@ -46,7 +46,6 @@ from coursebuild.numerics.engines.engine_trial import (
     Engine,
     EngineBasis,
     EngineTrial,
-    Variant,
     engine_basis,
     judge_motion,
 )
@@ -237,31 +236,22 @@ class _EngineRun(MeasuringRun):
                     yield _refuse(named_row, reply)
                     continue
                 named_row = judge_motion(basis, named_row, reply.motion)
-                counts = WORLDS[:2] if self.quick else WORLDS
-                costs = [_batch_cost(1, reply)]
-                if choice.engine.batched:
-                    costs += _costs(child, variant, trial, counts[1:], self.seconds)
+                costs, expected = [_batch_cost(1, reply)], 0.0
+                counts = WORLDS[1:2] if self.quick else WORLDS[1:]
+                for worlds in counts if choice.engine.batched else ():
+                    if expected * worlds * _ROUNDS > self.seconds:
+                        remark = f"not tried: a step would take about {expected * worlds:.2g} s"
+                        costs.append(BatchCost(worlds, remark=remark))
+                        continue
+                    reply = child.reply(action="costs", variant=variant, trial=trial, worlds=worlds)
+                    expected = 0.0 if reply.cost is None else reply.cost.seconds.value
+                    costs.append(_batch_cost(worlds, reply))
                 yield replace(named_row, costs=tuple(costs))
 
 
 def _refuse(row: EngineRow, reply: Reply) -> EngineRow:
     status = "unsupported" if reply.unsupported else "failed"
     return replace(row, status=status, message=reply.refusal)
-
-
-def _costs(
-    child: _EngineChild, variant: Variant, trial: EngineTrial, counts: Iterable[int], limit: float
-) -> Iterator[BatchCost]:
-    """What a step costs among more and more worlds."""
-    expected = 0.0
-    for worlds in counts:
-        if expected * worlds * _ROUNDS > limit:
-            remark = f"not tried: a step would take about {expected * worlds:.2g} s"
-            yield BatchCost(worlds, remark=remark)
-            continue
-        reply = child.reply(action="costs", variant=variant, trial=trial, worlds=worlds)
-        expected = 0.0 if reply.cost is None else reply.cost.seconds.value
-        yield _batch_cost(worlds, reply)
 
 
 def _batch_cost(worlds: int, reply: Reply) -> BatchCost:

@@ -69,19 +69,6 @@ class Measurement(Struct, Generic[_T], frozen=True):
         return not (has_errors or self.failures or has_departures or has_tasks)
 
 
-def measurement_text(reports: str, measurement: Measurement[_T], style: Style) -> str:
-    """Write diagnostics, failures, the text of the reports, checks and remarks."""
-    parts = list(diagnostic_paragraphs(measurement.diagnostics, style))
-    failures = ""
-    for failure in measurement.failures:
-        message = style.paint(f": {visible(failure.message)}", BOLD)
-        failures += f"{style.paint('error', RED)}{message}\n"
-        failures += f"  help: {visible(failure.help)}\n" if failure.help else ""
-    parts += [failures, reports, format_checks(measurement.checked, style)]
-    parts += ["".join(f"{visible(remark)}\n" for remark in measurement.remarks)]
-    return "\n".join(part for part in parts if part)
-
-
 def measurement_json(reports: Mapping[str, object], measurement: Measurement[_T]) -> str:
     """Write the same as one JSON object."""
     rest = {name: getattr(measurement, name) for name in Measurement.__struct_fields__[1:]}
@@ -150,8 +137,19 @@ def run_measurement(
     if arguments.format == "json":
         return write(json(measurement), status)
     style = style_of(sys.stdout)
-    reports = text(measurement.reports, style)
-    return write(measurement_text(reports, measurement, style) or empty, status)
+    failures = ""
+    for failure in measurement.failures:
+        message = style.paint(f": {visible(failure.message)}", BOLD)
+        failures += f"{style.paint('error', RED)}{message}\n"
+        failures += f"  help: {visible(failure.help)}\n" if failure.help else ""
+    parts = [
+        *diagnostic_paragraphs(measurement.diagnostics, style),
+        failures,
+        text(measurement.reports, style),
+        format_checks(measurement.checked, style),
+        "".join(f"{visible(remark)}\n" for remark in measurement.remarks),
+    ]
+    return write("\n".join(part for part in parts if part) or empty, status)
 
 
 class CannotMeasureError(Exception):
