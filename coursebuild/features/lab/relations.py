@@ -6,6 +6,7 @@ wrong elsewhere.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from msgspec import Struct
@@ -195,26 +196,18 @@ def _check_setting(label: StringNode, value: Node, controls: Controls) -> Iterat
             pass
 
 
-_FOLDER = "content/labs/"
-
-
-def lab_kinds(course: Course) -> frozenset[str]:
-    """The built-in kinds, and one for each `content/labs/NAME.js` of the course."""
-    files = (path.removeprefix(_FOLDER) for path in course.files if path.startswith(_FOLDER))
-    kinds = (file.removesuffix(".js") for file in files if file.endswith(".js"))
-    return frozenset((*BUILT_IN_KINDS, *(kind for kind in kinds if "/" not in kind)))
+_OWN_KIND = re.compile(r"content/labs/([^/]*)\.js")
 
 
 def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
     """Report unknown kinds and models of the labs in some documents."""
-    kinds = lab_kinds(course)
+    own_kinds = (match[1] for path in course.files if (match := _OWN_KIND.fullmatch(path)))
+    kinds = frozenset((*BUILT_IN_KINDS, *own_kinds))
     models = {model.name for model in course.models}
     for lab in (lab for document in documents for lab in find_blocks(document, Lab)):
         if lab.kind not in kinds:
-            message, help = (
-                f"`{lab.kind}` is not a known kind of lab",
-                did_you_mean(lab.kind, kinds),
-            )
+            message = f"`{lab.kind}` is not a known kind of lab"
+            help = did_you_mean(lab.kind, kinds)
             yield diagnose("lab-kind", lab.kind_span, message, help=help)
         for name in lab.models():
             if name not in models:
@@ -239,8 +232,6 @@ def check_model_names(
                 ("trail", "site", lab.fields.trail, facts.sites),
             ):
                 if isinstance(name, str) and name not in names:
-                    message, help = (
-                        f"the model has no {element} `{name}`",
-                        did_you_mean(name, names),
-                    )
+                    message = f"the model has no {element} `{name}`"
+                    help = did_you_mean(name, names)
                     yield diagnose("lab-name", lab.place((field,)), message, help=help)

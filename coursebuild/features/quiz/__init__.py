@@ -61,10 +61,8 @@ def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Dia
             for question in quiz.output_questions():
                 script, place = question.script, question.script_span
                 if script not in norun:
-                    message, help = (
-                        f"no lesson has a script `{script}`",
-                        did_you_mean(script, norun),
-                    )
+                    message = f"no lesson has a script `{script}`"
+                    help = did_you_mean(script, norun)
                     yield diagnose("quiz-output", place, message, help=help)
                 elif norun[script]:
                     message = f"`{script}` is marked `norun`, so it has no output"
