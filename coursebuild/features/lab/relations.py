@@ -99,7 +99,17 @@ def check_controls(
                     yield diagnose("field-value", control.place("step"), message)
             case Select() as select:
                 yield from require_one_of(control, Select, targets)
-                yield from _check_select(control, select)
+                pairs = [p.items for p in control.items("options") if isinstance(p, ArrayNode)]
+                for part, message in (
+                    (0, "two options are called `{}`"),
+                    (1, "two options have the value `{}`"),
+                ):
+                    texts = zip(select.options, pairs, strict=True)
+                    places = [(option[part], pair[part].span) for option, pair in texts]
+                    yield from check_unique(places, "field-value", message)
+                value = control.get("value")
+                if select.value is not None and value is not None:
+                    yield from _check_choice(value, "value", select.value, select)
             case _:
                 pass
 
@@ -113,17 +123,6 @@ def check_axes(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
             if least is not None and most is not None and not least < most:
                 message = f"`{high}` must be greater than `{low}`, which is {least:g}"
                 yield diagnose("field-value", plot.place(high), message)
-
-
-def _check_select(node: ObjectNode, select: Select) -> Iterator[Diagnostic]:
-    pairs = [pair.items for pair in node.items("options") if isinstance(pair, ArrayNode)]
-    labels = [(o[0], pair[0].span) for o, pair in zip(select.options, pairs, strict=True)]
-    yield from check_unique(labels, "field-value", "two options are called `{}`")
-    values = [(o[1], pair[1].span) for o, pair in zip(select.options, pairs, strict=True)]
-    yield from check_unique(values, "field-value", "two options have the value `{}`")
-    value = node.get("value")
-    if select.value is not None and value is not None:
-        yield from _check_choice(value, "value", select.value, select)
 
 
 def _check_choice(

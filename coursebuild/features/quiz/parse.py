@@ -23,6 +23,8 @@ from coursebuild.core.syntax.nodes import JSON, Node, ObjectNode, StringNode
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span, key_of, unique_name
 from coursebuild.core.text.units import check_unit
+from coursebuild.features.lab.parse import sim_lab
+from coursebuild.features.lab.relations import check_lab
 from coursebuild.features.quiz import model, schema
 
 TOLERANCE = 0.02
@@ -138,8 +140,6 @@ def _check(node: ObjectNode, decoding: Decoding[schema.QuizFile]) -> Iterator[Di
         case _:
             pass
     if isinstance(sim, ObjectNode) and sim in decoding.structs:
-        from coursebuild.features.lab.relations import check_lab
-
         yield from check_lab(sim, decoding.structs)
 
 
@@ -164,8 +164,6 @@ def _question(
             sim = node.get("sim")
             lab = None
             if isinstance(sim, ObjectNode):
-                from coursebuild.features.lab.parse import sim_lab
-
                 lab = sim_lab(sim.span, sim.mark, sim, decoding.structs, prose)
             run = node.get("run") if has_value(node, "run") else None
             return model.ChoiceQuestion(

@@ -245,8 +245,18 @@ def document_symbols(document: model.Document, mathml: Mathml) -> Parsed[Documen
             use = uses.setdefault(symbol, SymbolUse(symbol, section, targets))
             if meaning is not None and not use.meaning:
                 uses[symbol] = replace(use, meaning=meaning.text, unit=meaning.unit)
-        if meaning is not None and html:
-            diagnostics += _check_declaration(formula, only, first_declarations)
+        if meaning is None or not html:
+            continue
+        if only is None:
+            message = f"`${formula.tex.text}$` is declared as a symbol, but is not a single one"
+            help = "declare one letter with its accents and indices"
+            diagnostics.append(diagnose("symbol-formula", formula.tex.span(), message, help=help))
+        elif (first := first_declarations.setdefault(only, formula)) is not formula:
+            notes = [Note("first declared here", first.span)]
+            message = f"`${formula.tex.text}$` is declared twice in this text"
+            help = "a reader looks for one meaning; give the other quantity another letter"
+            place = formula.span
+            diagnostics.append(diagnose("symbol-repeated", place, message, help=help, notes=notes))
     return Parsed(DocumentSymbols(tuple(uses.values())) if uses else None, tuple(diagnostics))
 
 
@@ -270,22 +280,6 @@ def _formulas(
                 section = block.anchor, " ".join(text.split())
             for formula in model.block_formulas(block):
                 yield formula, section, tuple(targets)
-
-
-def _check_declaration(
-    formula: _Formula, symbol: str | None, first_declarations: dict[str, _Formula]
-) -> Iterator[Diagnostic]:
-    if symbol is None:
-        message = f"`${formula.tex.text}$` is declared as a symbol, but is not a single one"
-        help = "declare one letter with its accents and indices"
-        yield diagnose("symbol-formula", formula.tex.span(), message, help=help)
-        return
-    first = first_declarations.setdefault(symbol, formula)
-    if first is not formula:
-        note = Note("first declared here", first.span)
-        message = f"`${formula.tex.text}$` is declared twice in this text"
-        help = "a reader looks for one meaning; give the other quantity another letter"
-        yield diagnose("symbol-repeated", formula.span, message, help=help, notes=[note])
 
 
 class CourseSymbol(Struct):

@@ -89,9 +89,11 @@ class _Scene:
             a, b = (self._row(start, 3) for start in starts)
             if np.isfinite((a, b)).all() and np.any(a != b):
                 yield _coil(a, b, spring["radius"])
+        radius = _PIN * self.scene["camera"]["distance"]
         for hinge in self.scene["pins"]:
-            distance = self.scene["camera"]["distance"]
-            yield _pin(np.array(hinge["position"]), np.array(hinge["axis"]), distance)
+            position, half = np.array(hinge["position"]), 2.2 * radius * np.array(hinge["axis"])
+            ends = np.stack((position - half, position + half))
+            yield Solid(ropes(ends, np.array([[0, 1]]), radius), np.zeros(3), np.eye(3), _IRON)
 
     def _row(self, start: int, floats: int) -> Array:
         return self.frame[start : start + floats]
@@ -250,11 +252,3 @@ def _coil(a: Array, b: Array, radius: float) -> Solid:
     steps = np.arange(len(points))
     ends = np.column_stack((steps[:-1], steps[1:]))
     return Solid(ropes(points, ends, _WIRE * radius), np.zeros(3), np.eye(3), _STEEL)
-
-
-def _pin(position: Array, axis: Array, distance: float) -> Solid:
-    half = 2.2 * _PIN * distance * axis
-    surface = ropes(
-        np.stack((position - half, position + half)), np.array([[0, 1]]), _PIN * distance
-    )
-    return Solid(surface, np.zeros(3), np.eye(3), _IRON)
