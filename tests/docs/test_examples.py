@@ -24,6 +24,7 @@ from coursebuild.cli.commands import known_commands, parser_of
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.schemas import json_schema
 from coursebuild.core.text.source import Source
+from support.fixture_cases import fixture_text
 from support.markdown_files import PAGES, ROOT, Fence, fences
 from support.scratch_course import Folder
 from support.workflows import commit, git
@@ -63,36 +64,7 @@ FENCES = [
     )
 ]
 
-MAP = """
-[course]
-title = "Swings"
-
-[[level]]
-id = "1"
-title = "First"
-
-[[level.lesson]]
-id = "1.1"
-slug = "pendulum"
-title = "A pendulum"
-status = "complete"
-
-[[level.lesson]]
-id = "1.2"
-slug = "lab"
-title = "A lab"
-status = "complete"
-
-[[level]]
-id = "4"
-title = "Fourth"
-
-[[level.lesson]]
-id = "4.2"
-slug = "mass"
-title = "Mass"
-status = "complete"
-"""
+MAP = fixture_text("documents/swings.toml")
 SCRIPT = "## A script\n\n```python file=examples/{}.py\nprint(2)\n```\n\n```output\n2\n```\n"
 LAB = """
 ## A lab

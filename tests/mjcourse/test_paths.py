@@ -163,17 +163,7 @@ def test_a_helper_outside_the_course_acts_for_the_script(course: Path, tmp_path:
 
 
 SCRIPT = fixture_text("scripts/paths.txt")
-SIBLING = """
-from mjcourse import model_path
-
-AT_IMPORT = model_path("box")
-
-def load():
-    return AT_IMPORT
-
-def load_named(name):
-    return model_path(name)
-"""
+SIBLING = fixture_text("scripts/paths_sibling.txt")
 
 
 @pytest.mark.site
