@@ -262,39 +262,29 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
     for line, lab in trials:
         name = line.name
         if lab.config.get("kind") in (PLOT, ODE):
-            data = {key: value for key, value in lab.config.items() if key not in _CLAIMS}
-            picture = publish(f"{name}.svg", lab.picture) if lab.record is not None else ""
-            address = publish(f"{name}.json", _json(data))
-            labs[name] = PublishedLab(
-                name, address, equation_script, lab.record, picture, line.tried, line.parity
-            )
-            continue
-        is_editable, model = (
-            "xml" in lab.config,
-            lab.config.get("model") or name,
-        )  # the page compiles the model, in a worker of its own
-        # Labs of the same model share its file.
-        parts = {
-            "module": publish(f"{name}.js", lab.module.encode()),
-            "mjb": "" if is_editable else publish(f"{model}.mjb", lab.mjb),
-            "worker": f"{worker}#{name}" if is_editable else worker,
-            "wasm": wasm,
-        }
-        addresses = {key: path.removeprefix(f"{_FOLDER}/") for key, path in parts.items()}
-        config = lab.config | addresses
-        if lab.script is not None:
-            config["exportPython"] = dict(zip(("name", "text"), lab.script, strict=True))
-        picture = publish(f"{name}.png", lab.picture) if lab.record is not None else ""
-        address = publish(f"{name}.json", _json(config))
-        labs[name] = PublishedLab(
-            name, address, lab_script, lab.record, picture, line.tried, line.parity
-        )
+            script, ending = equation_script, "svg"
+            config = {key: value for key, value in lab.config.items() if key not in _CLAIMS}
+        else:
+            script, ending = lab_script, "png"
+            # The page compiles a model that the reader edits, in a worker of its own; other labs of
+            # the same model share its file.
+            is_editable, model = "xml" in lab.config, lab.config.get("model") or name
+            parts = {
+                "module": publish(f"{name}.js", lab.module.encode()),
+                "mjb": "" if is_editable else publish(f"{model}.mjb", lab.mjb),
+                "worker": f"{worker}#{name}" if is_editable else worker,
+                "wasm": wasm,
+            }
+            addresses = {key: path.removeprefix(f"{_FOLDER}/") for key, path in parts.items()}
+            config = lab.config | addresses
+            if lab.script is not None:
+                config["exportPython"] = dict(zip(("name", "text"), lab.script, strict=True))
+        picture = publish(f"{name}.{ending}", lab.picture) if lab.record is not None else ""
+        data = json.dumps(config, ensure_ascii=False, separators=(",", ":")).encode()
+        address, tried = publish(f"{name}.json", data), line.tried
+        labs[name] = PublishedLab(name, address, script, lab.record, picture, tried, line.parity)
     return PublishedTrials(labs, tuple(files.values()))
 
 
 _CLAIMS = ("expect", "verify")
 """Data of a lab without an engine that only its trial needs."""
-
-
-def _json(data: dict[str, Any]) -> bytes:
-    return json.dumps(data, ensure_ascii=False, separators=(",", ":")).encode()

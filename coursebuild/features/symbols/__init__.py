@@ -26,14 +26,8 @@ from coursebuild.core import model
 from coursebuild.core.features import Feature, PageKind
 from coursebuild.core.model import Lesson, Owner
 from coursebuild.core.model.results import Mathml
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.document_inputs import (
-    OwnerLink,
-    OwnerLinks,
-    added_page,
-    owner_link,
-    owner_links,
-)
+from coursebuild.core.pages import document_inputs, urls
+from coursebuild.core.pages.document_inputs import OwnerLink, OwnerLinks
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.numbering import UNNAMED, fill_in, name_outside
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
@@ -338,18 +332,22 @@ def symbols_values(library: Library) -> dict[str, object]:
             SymbolView(
                 Markup(f"<math>{row.first.symbol}</math>"),
                 tuple(
-                    MeaningView(text, unit, owner_links(place, owners) if is_ambiguous else None)
+                    MeaningView(
+                        text,
+                        unit,
+                        document_inputs.owner_links(place, owners) if is_ambiguous else None,
+                    )
                     for (text, unit), owners in row.meanings.items()
                 ),
-                owner_link(place, row.owners[0], anchor),
+                document_inputs.owner_link(place, row.owners[0], anchor),
                 fill_in(section, names),
-                owner_links(place, row.owners[1:]),
+                document_inputs.owner_links(place, row.owners[1:]),
             )
         )
     return {
         "declared": tuple(row for row in rows if row.meanings),
         "undeclared": tuple(row for row in rows if not row.meanings),
-        "glossary": added_page(library, place, "glossary"),
+        "glossary": document_inputs.added_page(library, place, "glossary"),
     }
 
 
