@@ -145,7 +145,6 @@ def test_every_command_runs(swings: Folder, tmp_path: Path) -> None:
 
 
 def prepare(folder: Folder, words: list[str]) -> None:
-    """Make what a command names in a copy of the course."""
     line = " ".join(words)
     for start, commands in BEFORE.items():
         for command in commands if line.startswith(start) else ():
@@ -214,7 +213,6 @@ def test_the_site_is_put_on_a_branch_by_its_lines(swings: Folder, tmp_path: Path
 
 
 def without_required(schema: Any) -> Any:
-    """A schema for a part of a file."""
     if isinstance(schema, dict):
         return {k: without_required(value) for k, value in schema.items() if k != "required"}
     return [without_required(x) for x in schema] if isinstance(schema, list) else schema

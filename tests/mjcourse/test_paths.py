@@ -32,7 +32,6 @@ def course(tmp_path: Path) -> Path:
 
 
 def ask(script: Path, name: object = "box", run_name: str = "__main__") -> Path:
-    """What a script at a path gets."""
     scope: dict[str, object] = {"__name__": run_name, "__file__": str(script), "name": name}
     exec("from mjcourse import model_path\nfound = model_path(name)", scope)
     path = scope["found"]

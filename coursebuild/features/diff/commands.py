@@ -60,7 +60,6 @@ class ScriptState(Struct, frozen=True):
     """A script with its recorded outputs."""
 
     owner: str
-    """The id of its lesson or page."""
     code: str
     outputs: tuple[Recording, ...]
     """Each with its comparison; tables as their text."""
@@ -73,7 +72,6 @@ class LabState(Struct, frozen=True):
     data: Mapping[str, object]
     """The values in its text, if that is JSON."""
     models: Mapping[str, str]
-    """The texts of its models, by name."""
 
 
 def report(base: str, old: CourseState, new: CourseState) -> str:

@@ -54,7 +54,6 @@ class LabModule(Struct, frozen=True):
     literal: str
     """The code as a JavaScript expression, for an engine without modules."""
     config: dict[str, Any]
-    """The data, as JSON has it."""
 
 
 def pieces(lab: Lab) -> Iterator[LabCode]:

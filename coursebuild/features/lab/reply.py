@@ -151,7 +151,6 @@ class TrialReply(Struct, frozen=True):
     failures: tuple[TrialFailure, ...]
     main: MainRun | None
     seconds: Annotated[float, Meta(ge=0)] = 0.0
-    """How long the trial took."""
     timestamp: Moment = msgspec.field(name="made", default=0)
     steps_per_second: Count | None = msgspec.field(name="stepsPerSecond", default=None)
 
@@ -202,7 +201,6 @@ class LabRecord(Struct, frozen=True):
     end: float
     """Simulated time of the readouts and of the end of the plots, s."""
     plots: tuple[Markup, ...]
-    """One SVG element for each plot."""
     place: str = ""
     """Where on the axis the readouts were taken, for a lab without an engine."""
 
@@ -211,11 +209,9 @@ class LabOutput(Struct, frozen=True):
     """What a page needs to show and run a lab."""
 
     module: str
-    """The lab's code as an ES module."""
     config: dict[str, Any]
     """The lab's data, as JSON has it."""
     mjb: bytes = b""
-    """The model."""
     record: LabRecord | None = None
     picture: bytes = b""
     """PNG on a transparent ground, if there is a record; SVG of a lab without an engine."""

@@ -17,7 +17,6 @@ from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Source, Span
 
 NAMES = ("author", "editor", "translator")
-"""Fields that hold names of people."""
 _KEY = re.compile(r"@\s*\w+\s*[{(]\s*([^,\s{}()]*)")
 _ENTRY = re.compile(r"^[ \t]*@", re.MULTILINE)
 _DOI = re.compile(r"(?:https?://(?:dx\.)?doi\.org/|doi:\s*)?(10\.\d{4,9}/\S+)", re.IGNORECASE)

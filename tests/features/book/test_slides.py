@@ -20,14 +20,12 @@ MAP = "content/course.toml"
 
 
 def slides(folder: Folder, lesson: str = "1.1") -> str:
-    """The slides of a lesson."""
     result = folder.main("export", "slides", lesson, "--quiet")
     assert result.status == 0, result.out + result.err
     return folder.text(f"{lesson}-slides.html")
 
 
 def texts(page: str) -> list[tuple[str, str, str]]:
-    """The section, the heading and the text of each slide."""
     body = HtmlElement("body", {}, parse_html(page))
     parts = []
     for slide in body.nearest("section"):

@@ -170,7 +170,6 @@ def test_script_is_offered_where_it_does_what_the_lab_does_and_a_reason_where_no
 
 
 def run(path: Path, *values: object) -> str:
-    """Run a script with these values in place of the marks, and return what it prints."""
     text = path.read_text()
     for i, value in enumerate(values):
         text = text.replace(f"{{{{control:{i}}}}}", repr(value))

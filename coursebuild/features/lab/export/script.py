@@ -59,9 +59,7 @@ class ExportMetadata(Struct, frozen=True):
     """As in `a lab of lesson 4.2, “Mass and inertia”`."""
     course: str
     engine: str
-    """Version of MuJoCo."""
     seconds: float
-    """Simulated time."""
 
 
 class Export(Struct, frozen=True):
@@ -71,7 +69,6 @@ class Export(Struct, frozen=True):
     text: str
     """With `{{control:N}}` for the value of control N."""
     buttons: tuple[str, ...]
-    """Names of the functions of the lab's buttons."""
 
 
 def file_name(lab: str) -> str:
