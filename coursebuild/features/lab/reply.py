@@ -277,8 +277,10 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
                 config["exportPython"] = dict(zip(("name", "text"), lab.script, strict=True))
         picture = publish(f"{name}.{ending}", lab.picture) if lab.record is not None else ""
         data = json.dumps(config, ensure_ascii=False, separators=(",", ":")).encode()
-        address, tried = publish(f"{name}.json", data), line.tried
-        labs[name] = PublishedLab(name, address, script, lab.record, picture, tried, line.parity)
+        address = publish(f"{name}.json", data)
+        labs[name] = PublishedLab(
+            name, address, script, lab.record, picture, line.tried, line.parity
+        )
     return PublishedTrials(labs, tuple(files.values()))
 
 
