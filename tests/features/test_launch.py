@@ -11,23 +11,10 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.course import Launch
 from coursebuild.features.notebook import launch_services
-from support.fixture_cases import check_lines
+from support.fixture_cases import check_lines, fixture_text
 from support.rendered_course import MAP, Make
 
-LESSON = """## Part
-
-```python file=examples/a.py
-import numpy
-
-print("one")
-```
-
-Output:
-
-```text
-one
-```
-"""
+LESSON = fixture_text("documents/launched.md")
 PATH = "lessons/0.1-falling.ipynb"
 ALL = Launch(
     repository="https://github.com/some-one/My.Course",

@@ -32,7 +32,6 @@ def course(tmp_path: Path) -> Path:
 
 
 def ask(script: Path, name: object = "box", run_name: str = "__main__") -> Path:
-    """What a script at a path gets."""
     scope: dict[str, object] = {"__name__": run_name, "__file__": str(script), "name": name}
     exec("from mjcourse import model_path\nfound = model_path(name)", scope)
     path = scope["found"]
@@ -163,17 +162,7 @@ def test_a_helper_outside_the_course_acts_for_the_script(course: Path, tmp_path:
 
 
 SCRIPT = fixture_text("scripts/paths.txt")
-SIBLING = """
-from mjcourse import model_path
-
-AT_IMPORT = model_path("box")
-
-def load():
-    return AT_IMPORT
-
-def load_named(name):
-    return model_path(name)
-"""
+SIBLING = fixture_text("scripts/paths_sibling.txt")
 
 
 @pytest.mark.site

@@ -40,7 +40,6 @@ _ID_ATTRIBUTES = frozenset(
     "aria-activedescendant aria-controls aria-describedby aria-details aria-errormessage"
     " aria-flowto aria-labelledby aria-owns for headers list".split()
 )
-"""Attributes that hold ids."""
 _ADDRESSES = frozenset(("href", "xlink:href", "src"))
 _IN_SVG = re.compile(r"url\(#([^)]+)\)")
 
@@ -49,7 +48,6 @@ class RewriteRules(Struct, frozen=True):
     """How a lesson is rewritten."""
 
     place: urls.Place
-    """Its page."""
     address: Callable[[str, str], str]
     """Return the address for a site path and an anchor; empty if the link has no target."""
     picture: Callable[[str], str]
@@ -57,7 +55,6 @@ class RewriteRules(Struct, frozen=True):
     id: Callable[[str], str]
     """Return the new id for an old one."""
     heading_shift: int = 0
-    """Levels that headings move down."""
     closed_classes: frozenset[str] = frozenset()
     """Classes of the folds that stay closed."""
     section: str = ""

@@ -30,7 +30,6 @@ from coursebuild.core.text.characters import visible
 from coursebuild.features.book import chapters
 
 _MODIFICATION_TIME = "2000-01-01T00:00:00Z"
-"""A constant, see the module."""
 _CONTAINER = """\
 <?xml version="1.0" encoding="utf-8"?>
 <container xmlns="urn:oasis:names:tc:opendocument:xmlns:container" version="1.0">

@@ -60,7 +60,6 @@ class ScriptState(Struct, frozen=True):
     """A script with its recorded outputs."""
 
     owner: str
-    """The id of its lesson or page."""
     code: str
     outputs: tuple[Recording, ...]
     """Each with its comparison; tables as their text."""
@@ -73,7 +72,6 @@ class LabState(Struct, frozen=True):
     data: Mapping[str, object]
     """The values in its text, if that is JSON."""
     models: Mapping[str, str]
-    """The texts of its models, by name."""
 
 
 def report(base: str, old: CourseState, new: CourseState) -> str:
@@ -86,7 +84,11 @@ def report(base: str, old: CourseState, new: CourseState) -> str:
         ", ".join(f"{escape_text(id)} {change}" for id, change in _changes(before, now))
         or "no change"
     )
-    figures = _changes(_figures(old), _figures(new), _describe_figure_change)
+    figures = _changes(
+        _figures(old),
+        _figures(new),
+        lambda a, b: describe_difference(*a, b[1]) or "less than can be seen",
+    )
     labs = _changes(_labs(old.course), _labs(new.course), _describe_lab_change)
     parts = (
         f"## What this change does\n\nCompared with {base}. Lessons and pages: {texts}.\n",
@@ -193,10 +195,6 @@ def _figures(state: CourseState) -> dict[str, tuple[str, bytes]]:
     documents = state.course.documents
     paths = (figure.path for document in documents for figure in recorded_figures(document))
     return {path: (path, data) for path in paths if (data := state.read(path)) is not None}
-
-
-def _describe_figure_change(before: tuple[str, bytes], now: tuple[str, bytes]) -> str:
-    return describe_difference(*before, now[1]) or "less than can be seen"
 
 
 def _labs(course: Course) -> dict[tuple[str, str], LabState]:

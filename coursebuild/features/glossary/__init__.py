@@ -56,12 +56,6 @@ class DocumentTerms(Struct, frozen=True):
     terms: tuple[DefinedTerm, ...]
 
 
-def document_terms(document: model.Document, mathml: Mathml) -> Parsed[DocumentTerms | None]:
-    """Return the terms of a document; a formula that is not typeset remains TeX."""
-    terms = tuple(_find_terms(document, mathml)) if "]{" in document.source.text else ()
-    return Parsed(DocumentTerms(terms) if terms else None)
-
-
 class _ExcerptWriter(HtmlWriter):
     def __init__(self, mathml: Mathml) -> None:
         self._mathml = mathml
@@ -74,9 +68,13 @@ class _ExcerptWriter(HtmlWriter):
         return Markup(self._mathml(tex, True)) or super().display(tex, start)
 
 
-def _find_terms(document: model.Document, mathml: Mathml) -> Iterator[DefinedTerm]:
+def document_terms(document: model.Document, mathml: Mathml) -> Parsed[DocumentTerms | None]:
+    """Return the terms of a document; a formula that is not typeset remains TeX."""
+    if "]{" not in document.source.text:
+        return Parsed(None)
     writer = _ExcerptWriter(mathml)
     targets: list[model.Target] = []
+    terms: list[DefinedTerm] = []
 
     def reference(target: model.Target) -> str:
         targets.append(target)
@@ -97,7 +95,8 @@ def _find_terms(document: model.Document, mathml: Mathml) -> Iterator[DefinedTer
                 title = Markup.escape(term.name) if term.renamed else html(term.children)
                 definition = definition_of(block.children, term)
                 pieces = tuple(_split_definition(definition, following, html, writer))
-                yield DefinedTerm(term.id, term.name, title, pieces, tuple(targets))
+                terms.append(DefinedTerm(term.id, term.name, title, pieces, tuple(targets)))
+    return Parsed(DocumentTerms(tuple(terms)) if terms else None)
 
 
 def _split_definition(

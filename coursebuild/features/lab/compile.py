@@ -20,6 +20,13 @@ from coursebuild.features.lab import schema
 from coursebuild.features.lab.model import MJCF, Entry, Lab
 
 _NAMES = "{model, data, mj, sim, ctx, lib}"
+_FUNCTIONS = {
+    "statements": "({}) => {{ {}\n}}",
+    "setter": "({}, value) => {{ {}\n}}",
+    "expression": "({}) => ({}\n)",
+    "target": "({}, value) => {{ ({}\n) = value;\n}}",
+}
+"""Functions by their form, of names and code; a line end closes a comment with which it may end."""
 
 
 class LabCode(Struct, frozen=True):
@@ -34,16 +41,7 @@ class LabCode(Struct, frozen=True):
     @property
     def function(self) -> str:
         """The piece as a function, as it stands in the module."""
-        # A line end closes a comment with which a piece may end.
-        match self.form:
-            case "target":
-                return f"({_NAMES}, value) => {{ ({self.code}\n) = value;\n}}"
-            case "expression":
-                return f"({_NAMES}) => ({self.code}\n)"
-            case "setter":
-                return f"({_NAMES}, value) => {{ {self.code}\n}}"
-            case "statements":
-                return f"({_NAMES}) => {{ {self.code}\n}}"
+        return _FUNCTIONS[self.form].format(_NAMES, self.code)
 
 
 class LabModule(Struct, frozen=True):
@@ -56,7 +54,6 @@ class LabModule(Struct, frozen=True):
     literal: str
     """The code as a JavaScript expression, for an engine without modules."""
     config: dict[str, Any]
-    """The data, as JSON has it."""
 
 
 def pieces(lab: Lab) -> Iterator[LabCode]:

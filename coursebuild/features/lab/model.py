@@ -41,12 +41,10 @@ class Lab(FeatureBlock, frozen=True):
     """What the author wrote; for a course's own kind, only the fields that all labs have."""
     note: tuple[Block, ...] = ()
     goal: tuple[Inline, ...] = ()
-    """The text of the goal."""
     xml: Excerpt | None = None
     places: tuple[tuple[Entry, Span], ...] = ()
     """The place of each value in the JSON."""
     code: tuple[tuple[Entry, Excerpt], ...] = ()
-    """The pieces of JavaScript in it."""
 
     @property
     def is_of_text(self) -> bool:

@@ -6,6 +6,7 @@ wrong elsewhere.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from msgspec import Struct
@@ -98,7 +99,17 @@ def check_controls(
                     yield diagnose("field-value", control.place("step"), message)
             case Select() as select:
                 yield from require_one_of(control, Select, targets)
-                yield from _check_select(control, select)
+                pairs = [p.items for p in control.items("options") if isinstance(p, ArrayNode)]
+                for part, message in (
+                    (0, "two options are called `{}`"),
+                    (1, "two options have the value `{}`"),
+                ):
+                    texts = zip(select.options, pairs, strict=True)
+                    places = [(option[part], pair[part].span) for option, pair in texts]
+                    yield from check_unique(places, "field-value", message)
+                value = control.get("value")
+                if select.value is not None and value is not None:
+                    yield from _check_choice(value, "value", select.value, select)
             case _:
                 pass
 
@@ -112,17 +123,6 @@ def check_axes(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
             if least is not None and most is not None and not least < most:
                 message = f"`{high}` must be greater than `{low}`, which is {least:g}"
                 yield diagnose("field-value", plot.place(high), message)
-
-
-def _check_select(node: ObjectNode, select: Select) -> Iterator[Diagnostic]:
-    pairs = [pair.items for pair in node.items("options") if isinstance(pair, ArrayNode)]
-    labels = [(o[0], pair[0].span) for o, pair in zip(select.options, pairs, strict=True)]
-    yield from check_unique(labels, "field-value", "two options are called `{}`")
-    values = [(o[1], pair[1].span) for o, pair in zip(select.options, pairs, strict=True)]
-    yield from check_unique(values, "field-value", "two options have the value `{}`")
-    value = node.get("value")
-    if select.value is not None and value is not None:
-        yield from _check_choice(value, "value", select.value, select)
 
 
 def _check_choice(
@@ -195,26 +195,18 @@ def _check_setting(label: StringNode, value: Node, controls: Controls) -> Iterat
             pass
 
 
-_FOLDER = "content/labs/"
-
-
-def lab_kinds(course: Course) -> frozenset[str]:
-    """The built-in kinds, and one for each `content/labs/NAME.js` of the course."""
-    files = (path.removeprefix(_FOLDER) for path in course.files if path.startswith(_FOLDER))
-    kinds = (file.removesuffix(".js") for file in files if file.endswith(".js"))
-    return frozenset((*BUILT_IN_KINDS, *(kind for kind in kinds if "/" not in kind)))
+_OWN_KIND = re.compile(r"content/labs/([^/]*)\.js")
 
 
 def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
     """Report unknown kinds and models of the labs in some documents."""
-    kinds = lab_kinds(course)
+    own_kinds = (match[1] for path in course.files if (match := _OWN_KIND.fullmatch(path)))
+    kinds = frozenset((*BUILT_IN_KINDS, *own_kinds))
     models = {model.name for model in course.models}
     for lab in (lab for document in documents for lab in find_blocks(document, Lab)):
         if lab.kind not in kinds:
-            message, help = (
-                f"`{lab.kind}` is not a known kind of lab",
-                did_you_mean(lab.kind, kinds),
-            )
+            message = f"`{lab.kind}` is not a known kind of lab"
+            help = did_you_mean(lab.kind, kinds)
             yield diagnose("lab-kind", lab.kind_span, message, help=help)
         for name in lab.models():
             if name not in models:
@@ -239,8 +231,6 @@ def check_model_names(
                 ("trail", "site", lab.fields.trail, facts.sites),
             ):
                 if isinstance(name, str) and name not in names:
-                    message, help = (
-                        f"the model has no {element} `{name}`",
-                        did_you_mean(name, names),
-                    )
+                    message = f"the model has no {element} `{name}`"
+                    help = did_you_mean(name, names)
                     yield diagnose("lab-name", lab.place((field,)), message, help=help)

@@ -258,9 +258,7 @@ class NameReference(Struct, frozen=True):
 
     path: tuple[str, ...]
     places: tuple[Span, ...]
-    """The place of each part of the path."""
     index: int | None = None
-    """The number in brackets after it."""
     element: Span | None = None
     """The place of all of it, brackets included."""
 

@@ -235,8 +235,11 @@ class DocumentWriter:
                 elif "\n" in tex:
                     tex = " ".join(part.strip() for part in tex.split("\n"))
                 return f"$${tex}$$" if inline.display else f"${tex}$"
-            case model.Emphasis() | model.Strong() | model.Term() | model.Strikethrough():
-                mark = _delimiter(inline)
+            case model.Strikethrough():
+                return f"~~{self._join_inlines(inline.children, room)}~~"
+            case model.Emphasis() | model.Strong() | model.Term():
+                mark = "_" if inline.span.text[:1] == "_" else "*"  # as in its source
+                mark *= 2 if isinstance(inline, model.Strong) else 1
                 return f"{mark}{self._join_inlines(inline.children, room)}{mark}"
             case model.Link():
                 text = self._join_inlines(inline.children, room)
@@ -352,14 +355,6 @@ def _text(node: model.Text, room: _Room) -> str:
 
 def _escape_pipes(text: str, room: _Room) -> str:
     return _PIPE.sub(r"\\|", text) if room == "cell" else text
-
-
-def _delimiter(node: model.Emphasis | model.Strong | model.Term | model.Strikethrough) -> str:
-    """Return the marks around a text; those of emphasis are as in its source."""
-    if isinstance(node, model.Strikethrough):
-        return "~~"
-    mark = "_" if node.span.text[:1] == "_" else "*"
-    return mark * 2 if isinstance(node, model.Strong) else mark
 
 
 def _remove_empty_lines(tex: str) -> str:

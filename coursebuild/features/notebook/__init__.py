@@ -176,7 +176,6 @@ def _slug(name: str) -> str:
 _MAX_SIZE = 4 << 20
 """The limit for the files in a notebook, in bytes."""
 _PLACEHOLDER = "\ue000"
-"""Stands for a name in a text."""
 
 
 def notebook_files(site: SiteContext) -> Iterator[CachedFile]:

@@ -16,7 +16,6 @@ from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_htm
 from coursebuild.core.pages.xml import Element, add, element
 
 STRIKE_CLASS = "struck"
-"""A class of the package's style sheet."""
 _BLOCKS = frozenset(
     "address article aside blockquote center details dialog div dl fieldset figcaption figure"
     " footer form h1 h2 h3 h4 h5 h6 header hgroup hr main nav ol p pre section summary table"

@@ -9,7 +9,6 @@ from msgspec import Struct
 
 from coursebuild.core.features import Feature, FenceKind, PagePart
 from coursebuild.core.model import (
-    Block,
     CodeBlock,
     Course,
     Document,
@@ -30,8 +29,8 @@ from coursebuild.core.text.diagnostics import (
     did_you_mean,
     is_one_edit,
 )
-from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.relations import check_steps
 from coursebuild.features.quiz.model import ChoiceQuestion, Quiz
 from coursebuild.features.quiz.page import draw_quiz, index_quiz, quiz_markdown
 from coursebuild.features.quiz.parse import parse_fence
@@ -61,10 +60,8 @@ def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Dia
             for question in quiz.output_questions():
                 script, place = question.script, question.script_span
                 if script not in norun:
-                    message, help = (
-                        f"no lesson has a script `{script}`",
-                        did_you_mean(script, norun),
-                    )
+                    message = f"no lesson has a script `{script}`"
+                    help = did_you_mean(script, norun)
                     yield diagnose("quiz-output", place, message, help=help)
                 elif norun[script]:
                     message = f"`{script}` is marked `norun`, so it has no output"
@@ -101,25 +98,19 @@ def _check_predictions(quiz: Quiz, document: Document) -> Iterator[Diagnostic]:
             message = "nothing follows that could be hidden"
             help = "what answers the question stands below the quiz, before the next heading"
             yield diagnose("quiz-gate", question.gate_span, message, help=help, notes=stops)
-        if question.run is not None:
-            later = next((block.span for block in rest if isinstance(block, Lab)), None)
-            yield from _check_run(question.run, labs, blocks, later)
-
-
-def _check_run(
-    run: Excerpt, labs: list[Lab], blocks: tuple[Block, ...], later: Span | None
-) -> Iterator[Diagnostic]:
-    if labs:
-        from coursebuild.features.lab.relations import check_steps
-
-        node = parse_json(run, run.span()).value
-        controls = {control.label: control for control in labs[0].fields.controls}
-        yield from () if node is None else check_steps(node, "run", controls)
-    elif not any(isinstance(block, CodeBlock) and block.language == "lab" for block in blocks):
-        message = "no lab follows that could be run"
-        help = "the lab stands below the quiz, before the next heading"
-        notes = [Note("the next lab is here", later.first_line())] if later is not None else []
-        yield diagnose("quiz-gate", run.span(), message, help=help, notes=notes)
+        run = question.run
+        if run is not None and labs:
+            node = parse_json(run, run.span()).value
+            controls = {control.label: control for control in labs[0].fields.controls}
+            yield from () if node is None else check_steps(node, "run", controls)
+        elif run is not None and not any(
+            isinstance(block, CodeBlock) and block.language == "lab" for block in blocks
+        ):
+            message = "no lab follows that could be run"
+            help = "the lab stands below the quiz, before the next heading"
+            later = [block.span.first_line() for block in rest if isinstance(block, Lab)][:1]
+            notes = [Note("the next lab is here", span) for span in later]
+            yield diagnose("quiz-gate", run.span(), message, help=help, notes=notes)
 
 
 def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:

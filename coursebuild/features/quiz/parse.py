@@ -23,6 +23,8 @@ from coursebuild.core.syntax.nodes import JSON, Node, ObjectNode, StringNode
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span, key_of, unique_name
 from coursebuild.core.text.units import check_unit
+from coursebuild.features.lab.parse import sim_lab
+from coursebuild.features.lab.relations import check_lab
 from coursebuild.features.quiz import model, schema
 
 TOLERANCE = 0.02
@@ -63,31 +65,21 @@ def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[model.Qui
         # If its JSON is wrong, nobody knows what its texts were meant to be.
         is_garbled = any(question_node.span.contains(d.span) for d in json.diagnostics)
         question = _question(question_node, keys.get(question_node, ""), decoding, prose)
-        if question is not None and not is_garbled:
-            questions.append(_without_broken_lab(question, diagnostics))
-    fields = decoding.value
-    id, title = (fields.id, fields.title) if fields is not None else (_id(node, diagnostics), "")
+        if question is None or is_garbled:
+            continue
+        if isinstance(question, model.ChoiceQuestion) and question.sim is not None:
+            sim_span = question.sim.span
+            if any(sim_span.contains(d.span) for d in diagnostics):
+                question = replace(question, sim=None)  # so that no trial runs it
+        questions.append(question)
+    fields, id_node, id, title = decoding.value, node.get("id"), "", ""
+    if fields is not None:
+        id, title = fields.id, fields.title
+    elif isinstance(id_node, StringNode) and all(d.span != id_node.mark for d in diagnostics):
+        id = id_node.value
     question_keys = tuple(question.key for question in questions)
     quiz = model.Quiz(span, id, node.place("id"), title, tuple(questions), question_keys)
     return Parsed(quiz, sort_diagnostics(diagnostics))
-
-
-def _id(node: ObjectNode, diagnostics: list[Diagnostic]) -> str:
-    """Return the id of a quiz with mistakes; empty if the id is one of them."""
-    id = node.get("id")
-    if not isinstance(id, StringNode) or any(d.span == id.mark for d in diagnostics):
-        return ""
-    return id.value
-
-
-def _without_broken_lab(
-    question: model.AnyQuestion, diagnostics: list[Diagnostic]
-) -> model.AnyQuestion:
-    """Take away a question's simulation if it has mistakes, so that no trial runs it."""
-    if not isinstance(question, model.ChoiceQuestion) or question.sim is None:
-        return question
-    is_broken = any(question.sim.span.contains(diagnostic.span) for diagnostic in diagnostics)
-    return replace(question, sim=None) if is_broken else question
 
 
 def _keys(
@@ -138,8 +130,6 @@ def _check(node: ObjectNode, decoding: Decoding[schema.QuizFile]) -> Iterator[Di
         case _:
             pass
     if isinstance(sim, ObjectNode) and sim in decoding.structs:
-        from coursebuild.features.lab.relations import check_lab
-
         yield from check_lab(sim, decoding.structs)
 
 
@@ -164,8 +154,6 @@ def _question(
             sim = node.get("sim")
             lab = None
             if isinstance(sim, ObjectNode):
-                from coursebuild.features.lab.parse import sim_lab
-
                 lab = sim_lab(sim.span, sim.mark, sim, decoding.structs, prose)
             run = node.get("run") if has_value(node, "run") else None
             return model.ChoiceQuestion(

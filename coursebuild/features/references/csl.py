@@ -115,7 +115,6 @@ class FormattedWorks(Struct, frozen=True):
     """The works of a course that its texts cite, in the order of the style."""
 
     entries: Mapping[str, Markup]
-    """The references by their keys."""
     mark: Any
     """Returns the text of a citation, given a key, and what is named within the work."""
     prefix: str

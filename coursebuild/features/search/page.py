@@ -77,13 +77,7 @@ class SectionReader:
         block_values: Mapping[int, Struct] = {},
         reference: Reference = _unnamed,
     ) -> None:
-        """Begin a page.
-
-        Args:
-            labels: the labels of the kinds of callouts, by name.
-            block_values: the values of features' blocks, by the block's offset.
-            reference: the texts of links without one.
-        """
+        """`labels` are those of callouts by their kind; `block_values` go by the block's offset."""
         self._reference = reference
         self._labels = labels
         self._block_values = block_values
@@ -246,13 +240,7 @@ _FIELDS = {"text": _TEXT, "formula": _TEXT, "code": _CODE, "output": _CODE}
 
 
 def note_page(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
-    """Return the note of a page for the search; empty if it is not searched.
-
-    Args:
-        inputs: what is drawn.
-        page: the document on it, where it has one.
-        body: its HTML.
-    """
+    """Return the note of a page with this HTML for the search; empty if it is not searched."""
     if inputs.head.kind in _EXCLUDED_KINDS or not (
         inputs.head.indexed or inputs.head.kind in LEAD_ONLY
     ):
@@ -263,8 +251,19 @@ def note_page(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
         sections = page_sections(inputs, None, body)
     else:
         sections = page_sections(inputs, page.document, body, page.reference)
+    # Sections as the page's file has them; kinds of pieces by their first letter
+    rows = [
+        [
+            section.anchor,
+            section.heading,
+            section.level,
+            [[piece.kind[0], piece.text] for piece in section.pieces],
+            " ".join(section.names),
+        ]
+        for section in sections
+    ]
     terms = weigh_terms([name, inputs.head.title], sections)
-    return visible(as_json(pack_sections(sections))).encode() + b"\0" + terms
+    return visible(as_json(rows)).encode() + b"\0" + terms
 
 
 def text_and_terms(note: bytes) -> tuple[bytes, bytes]:
@@ -308,20 +307,6 @@ def script(kind: str, name: str, text: str) -> bytes:
     It is a script because browsers load no other data from a disk.
     """
     return visible(f'coursebuildSearch.take("{kind}","{name}",{text})\n').encode()
-
-
-def pack_sections(sections: Iterable[Section]) -> object:
-    """Return the sections of a page as its file has them; kinds by their first letter."""
-    return [
-        [
-            section.anchor,
-            section.heading,
-            section.level,
-            [[piece.kind[0], piece.text] for piece in section.pieces],
-            " ".join(section.names),
-        ]
-        for section in sections
-    ]
 
 
 def weigh_terms(titles: list[str], sections: Iterable[Section]) -> bytes:

@@ -187,9 +187,7 @@ _FUNCTIONS = (
     "sin cos tan cot sec csc arcsin arccos arctan sinh cosh tanh exp log ln lim max min sup inf det"
     " dim ker arg deg gcd Pr tr"
 ).split()
-"""Functions that are written with their names."""
 _TEXTS = _SIGNS | {name: name for name in _FUNCTIONS}
-"""The texts of commands without arguments."""
 _STYLE = frozenset(
     "left right big Big bigg Bigg bigl bigr Bigl Bigr middle displaystyle textstyle scriptstyle"
     " limits nolimits quad qquad text textrm textit textbf mathrm mathbf mathit mathsf mathcal"

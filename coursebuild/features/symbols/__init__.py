@@ -26,14 +26,8 @@ from coursebuild.core import model
 from coursebuild.core.features import Feature, PageKind
 from coursebuild.core.model import Lesson, Owner
 from coursebuild.core.model.results import Mathml
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.document_inputs import (
-    OwnerLink,
-    OwnerLinks,
-    added_page,
-    owner_link,
-    owner_links,
-)
+from coursebuild.core.pages import document_inputs, urls
+from coursebuild.core.pages.document_inputs import OwnerLink, OwnerLinks
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.numbering import UNNAMED, fill_in, name_outside
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
@@ -245,8 +239,18 @@ def document_symbols(document: model.Document, mathml: Mathml) -> Parsed[Documen
             use = uses.setdefault(symbol, SymbolUse(symbol, section, targets))
             if meaning is not None and not use.meaning:
                 uses[symbol] = replace(use, meaning=meaning.text, unit=meaning.unit)
-        if meaning is not None and html:
-            diagnostics += _check_declaration(formula, only, first_declarations)
+        if meaning is None or not html:
+            continue
+        if only is None:
+            message = f"`${formula.tex.text}$` is declared as a symbol, but is not a single one"
+            help = "declare one letter with its accents and indices"
+            diagnostics.append(diagnose("symbol-formula", formula.tex.span(), message, help=help))
+        elif (first := first_declarations.setdefault(only, formula)) is not formula:
+            notes = [Note("first declared here", first.span)]
+            message = f"`${formula.tex.text}$` is declared twice in this text"
+            help = "a reader looks for one meaning; give the other quantity another letter"
+            place = formula.span
+            diagnostics.append(diagnose("symbol-repeated", place, message, help=help, notes=notes))
     return Parsed(DocumentSymbols(tuple(uses.values())) if uses else None, tuple(diagnostics))
 
 
@@ -270,22 +274,6 @@ def _formulas(
                 section = block.anchor, " ".join(text.split())
             for formula in model.block_formulas(block):
                 yield formula, section, tuple(targets)
-
-
-def _check_declaration(
-    formula: _Formula, symbol: str | None, first_declarations: dict[str, _Formula]
-) -> Iterator[Diagnostic]:
-    if symbol is None:
-        message = f"`${formula.tex.text}$` is declared as a symbol, but is not a single one"
-        help = "declare one letter with its accents and indices"
-        yield diagnose("symbol-formula", formula.tex.span(), message, help=help)
-        return
-    first = first_declarations.setdefault(symbol, formula)
-    if first is not formula:
-        note = Note("first declared here", first.span)
-        message = f"`${formula.tex.text}$` is declared twice in this text"
-        help = "a reader looks for one meaning; give the other quantity another letter"
-        yield diagnose("symbol-repeated", formula.span, message, help=help, notes=[note])
 
 
 class CourseSymbol(Struct):
@@ -344,18 +332,22 @@ def symbols_values(library: Library) -> dict[str, object]:
             SymbolView(
                 Markup(f"<math>{row.first.symbol}</math>"),
                 tuple(
-                    MeaningView(text, unit, owner_links(place, owners) if is_ambiguous else None)
+                    MeaningView(
+                        text,
+                        unit,
+                        document_inputs.owner_links(place, owners) if is_ambiguous else None,
+                    )
                     for (text, unit), owners in row.meanings.items()
                 ),
-                owner_link(place, row.owners[0], anchor),
+                document_inputs.owner_link(place, row.owners[0], anchor),
                 fill_in(section, names),
-                owner_links(place, row.owners[1:]),
+                document_inputs.owner_links(place, row.owners[1:]),
             )
         )
     return {
         "declared": tuple(row for row in rows if row.meanings),
         "undeclared": tuple(row for row in rows if not row.meanings),
-        "glossary": added_page(library, place, "glossary"),
+        "glossary": document_inputs.added_page(library, place, "glossary"),
     }
 
 

@@ -25,7 +25,6 @@ from support.scratch_course import Folder, Make
 
 
 def export(folder: Folder, kind: str) -> Path:
-    """The course as one file."""
     process = folder.main("export", kind, "--quiet")
     assert process.status == 0, process.out
     return folder.root / {"epub": "course.epub", "page": "course.html"}[kind]

@@ -22,7 +22,6 @@ Form: TypeAlias = Literal["statements", "setter", "expression", "target"]
 
 
 def check_code(bench: Bench, pieces: list[tuple[Form, str]]) -> list[str | None]:
-    """Say of each piece of code why it cannot be part of a lab; `None` if it can."""
     return bench.browser.check_code([LabCode(("x",), form, code) for form, code in pieces])
 
 
@@ -165,7 +164,6 @@ EDITS = [
 
 
 def inputs_of(text: str) -> Inputs:
-    """Return what the trial of a lesson's lab depends on besides files."""
     inputs = trial_inputs(Trial("1.2-lab-1", "1.2", lab_of(text)))
     assert inputs is not None
     return inputs

@@ -154,18 +154,7 @@ def test_files_that_raw_html_shows_have_the_address_of_the_copy() -> None:
 
 
 LESSON = fixture_text("documents/copied.md")
-NEXT_LESSON = """## More {#more}
-
-Back to [it](lesson:0.1#part).
-
-```lab simlab
-{"model": "box"}
-```
-
-```lab mjcf
-<mujoco/>
-```
-"""
+NEXT_LESSON = fixture_text("documents/copied_next.md")
 
 
 def site(make: Make, text: str = LESSON, **texts: str) -> dict[str, bytes]:

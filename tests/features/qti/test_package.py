@@ -39,7 +39,6 @@ def export(folder: Folder, *arguments: str) -> CommandResult:
 
 
 def package(folder: Folder) -> dict[str, bytes]:
-    """The package, in which everything is as it must be."""
     export(folder)
     files = entries(folder.root / ZIP)
     check(files)
@@ -63,7 +62,6 @@ def check(files: dict[str, bytes]) -> None:
 
 
 def items(files: dict[str, bytes], test: str = "") -> list[etree._Element]:
-    """The items of a test, or of all, in their order."""
     paths = [path for path in files if path.startswith(f"tests/{test}")]
     tests = [etree.fromstring(files[path]) for path in paths]
     names = [ref.get("href") for test in tests for ref in test.iter(f"{{{QTI}}}assessmentItemRef")]
@@ -72,12 +70,10 @@ def items(files: dict[str, bytes], test: str = "") -> list[etree._Element]:
 
 @pytest.fixture(scope="session")
 def zoo_items(qti: Package) -> dict[str, etree._Element]:
-    """The items by the names of their questions."""
     return dict(zip(ANY, items(qti.files), strict=True))
 
 
 def shape(node: etree._Element, path: str) -> list[str]:
-    """Return the texts or attributes at a path."""
     nodes = node.xpath(path, namespaces=SPACES)
     return [part if isinstance(part, str) else "".join(part.itertext()) for part in nodes]
 

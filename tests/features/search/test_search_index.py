@@ -87,7 +87,6 @@ def lines(terms: dict[str, int]) -> bytes:
 
 
 def decode_shard(data: bytes) -> dict[str, list[tuple[int, int]]]:
-    """Read the file of a shard."""
     return read_shard(json.loads(data.decode().partition(",")[2].partition(",")[2].rstrip()[:-1]))
 
 

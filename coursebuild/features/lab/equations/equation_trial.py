@@ -73,7 +73,6 @@ class EquationReply(Struct, frozen=True):
     difference: float = 0.0
     """The largest, relative, from NumPy and SciPy."""
     start: reference.CurveRun | None = None
-    """What follows from the controls as they start."""
     seconds: float = 0.0
     timestamp: int = 0
     lasting: bool = True

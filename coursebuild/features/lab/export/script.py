@@ -8,7 +8,6 @@ fails for any value that the page may fill in.
 
 from __future__ import annotations
 
-import functools
 import json
 import keyword
 import math
@@ -18,11 +17,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined, Template
+from jinja2 import Environment, StrictUndefined
 from msgspec import Struct
 
 from coursebuild.core.features import Trial, TrialContext
-from coursebuild.core.model import Course
+from coursebuild.core.model import Lesson
 from coursebuild.core.text.source import unique_name
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.engines.native import (
@@ -44,7 +43,10 @@ from coursebuild.features.lab.schema import Button, Control, Select, Slider
 
 _HALF_CHARACTER = re.compile("[\ud800-\udfff]")
 _PLACE = re.compile(r"\{\{control:(\d+)\}\}")
-_TEMPLATE = Path(__file__).with_name("script.jinja")
+_ENVIRONMENT = Environment(
+    trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=StrictUndefined
+)
+_TEMPLATE = _ENVIRONMENT.from_string(Path(__file__).with_name("script.jinja").read_text("utf-8"))
 _WIDTH = 88
 
 
@@ -57,9 +59,7 @@ class ExportMetadata(Struct, frozen=True):
     """As in `a lab of lesson 4.2, “Mass and inertia”`."""
     course: str
     engine: str
-    """Version of MuJoCo."""
     seconds: float
-    """Simulated time."""
 
 
 class Export(Struct, frozen=True):
@@ -69,7 +69,6 @@ class Export(Struct, frozen=True):
     text: str
     """With `{{control:N}}` for the value of control N."""
     buttons: tuple[str, ...]
-    """Names of the functions of the lab's buttons."""
 
 
 def file_name(lab: str) -> str:
@@ -138,7 +137,7 @@ def _export(lab: Lab, metadata: ExportMetadata) -> Export:
         (json.dumps(readout.label, ensure_ascii=False), readout.expr, readout.digits)
         for readout in code.readouts
     )
-    text = _template().render(
+    text = _TEMPLATE.render(
         introduction=_introduction(lab, metadata),
         seconds=_literal(metadata.seconds),
         constants=constants,
@@ -156,14 +155,6 @@ def _export(lab: Lab, metadata: ExportMetadata) -> Export:
     if len(_PLACE.findall(text)) != len(setters) or _HALF_CHARACTER.search(text):
         raise UntranslatableError("a text that no script can hold")
     return Export(metadata.name, text, tuple(names[i] for i in buttons))
-
-
-@functools.cache
-def _template() -> Template:
-    environment = Environment(
-        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=StrictUndefined
-    )
-    return environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
 
 
 def _names(controls: Sequence[Control]) -> list[str]:
@@ -259,9 +250,13 @@ def export_lab(
     `main` is the main run of the lab's trial.
     """
     start, end = (main["pictures"][i]["time"] for i in (0, -1))
+    owner = next((o for o in context.course.owners if o.id == trial.owner), None)
+    origin = f"a lab of the page “{trial.owner if owner is None else owner.title}”"
+    if isinstance(owner, Lesson):
+        origin = f"a lab of lesson {owner.id}, “{owner.title}”"
     metadata = ExportMetadata(
         file_name(trial.name),
-        _origin(context.course, trial.owner),
+        origin,
         context.course.title,
         LAB_ENGINE,
         round(end - start, 9),
@@ -310,14 +305,6 @@ def _try_export(
     rtol = PARITY_RTOL if lab.verify.rtol is None else lab.verify.rtol
     reason = _difference(main, run, rtol)
     return LabExport(None, reason) if reason else LabExport((export.name, export.text))
-
-
-def _origin(course: Course, owner: str) -> str:
-    for lesson in course.lessons:
-        if lesson.id == owner:
-            return f"a lab of lesson {owner}, “{lesson.title}”"
-    title = next((page.title for page in course.pages if page.id == owner), owner)
-    return f"a lab of the page “{title}”"
 
 
 def _control_variants(lab: Lab) -> list[dict[int, float | str]]:

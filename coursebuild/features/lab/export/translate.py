@@ -148,10 +148,8 @@ class _Statements(expressions.Expressions):
                 else:
                     raise js.UntranslatableError(f"`{operator}`")
             case "update_expression":
-                target, sign = (
-                    self.target(js.field(node, "argument")),
-                    expressions.operator_of(node)[0],
-                )
+                target = self.target(js.field(node, "argument"))
+                sign = expressions.operator_of(node)[0]
                 yield f"{target} {sign}= 1"
             case "call_expression":
                 yield from self.call_statement(node)

@@ -29,7 +29,6 @@ _FROM_BELOW = 0.5
 """Factor of the opacity of a plane seen from below, as in MuJoCo."""
 _TOP = 0.5
 _AT_ONCE = 1 << 16
-"""How many samples are coloured together."""
 _STEPS = 127
 """Shades from black to white: nobody can see more, and the file is a quarter smaller."""
 _PLAIN = Material()

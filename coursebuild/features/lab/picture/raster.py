@@ -83,18 +83,6 @@ class GBuffer:
             self.attributes[at] = attributes[order]
 
 
-def nearest_depth(eye: Eye, vertices: Array, faces: NDArray[np.int64]) -> Array:
-    """Return the depth of the nearest triangle at each sample; infinite where there is none."""
-    width, height = eye.size
-    nearest = np.full((height, width), np.inf)
-    with np.errstate(over="ignore", invalid="ignore"):
-        in_view = rotate(vertices - eye.position, eye.axes)
-    for part, shares, x, y in _fragments(eye, in_view, faces, front=False):
-        depth = 1.0 / (shares / part[..., 2]).sum(axis=1)
-        np.minimum.at(nearest, (y, x), depth)
-    return nearest
-
-
 Fragments: TypeAlias = Iterator[tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]]
 """Samples that triangles cover, each with its triangle, the shares of the triangle's corners in it,
 its column and its row."""
@@ -243,7 +231,11 @@ class Floor(Struct, frozen=True):
             slope = radius * np.array((np.cos(angle), np.sin(angle))) + LAMP[:2]
             flat = joined_surface.vertices[:, :2] - elevation * slope / LAMP[2]
             vertices = np.column_stack((flat, np.full(len(flat), height)))
-            shadow = nearest_depth(eye, vertices, joined_surface.faces)
+            with np.errstate(over="ignore", invalid="ignore"):
+                in_view = rotate(vertices - eye.position, eye.axes)
+            shadow = np.full_like(depth, np.inf)
+            for part, shares, x, y in _fragments(eye, in_view, joined_surface.faces, front=False):
+                np.minimum.at(shadow, (y, x), 1.0 / (shares / part[..., 2]).sum(axis=1))
             shade += shadow < depth * (1 + _DEPTH_TOLERANCE)
         return shade / _POINTS
 

@@ -205,7 +205,7 @@ def plot_svg(
     paths: list[str] = []
     names: list[tuple[float, str, int]] = []
     for n, (trace, points) in enumerate(zip(plot.traces, lines, strict=True)):
-        paths.append(_line(frame, points, n, _dash(trace, n)))
+        paths.append(_line(frame, points, n, trace))
         last = next((v for _, v in reversed(points) if _is_finite(v)), None)
         if last is not None:
             names.append((frame.y(last), trace.label, n))
@@ -222,12 +222,6 @@ def plot_svg(
         f'<svg class="lab-plot" viewBox="0 0 {frame.width:g} {_HEIGHT:g}" role="img" '
         f'aria-label="{_text(": ".join((title, ", ".join(labels))))}">' + "".join(parts) + "</svg>"
     )
-
-
-def _dash(trace: TraceFields, n: int) -> str:
-    if trace.dash is True:
-        return _DASHES[1]
-    return _DASHES[n % len(_DASHES)] if not trace.dash else " ".join(f"{x:g}" for x in trace.dash)
 
 
 def _frame(
@@ -299,7 +293,14 @@ def _reference(frame: _Frame, y: float, label: str) -> str:
     )
 
 
-def _line(frame: _Frame, points: Sequence[tuple[float, float | None]], n: int, dash: str) -> str:
+def _line(
+    frame: _Frame, points: Sequence[tuple[float, float | None]], n: int, trace: TraceFields
+) -> str:
+    dash = _DASHES[n % len(_DASHES)]
+    if trace.dash is True:
+        dash = _DASHES[1]
+    elif trace.dash:
+        dash = " ".join(f"{x:g}" for x in trace.dash)
     path: list[str] = []
     # Values that are not finite end a run of points.
     for finite, group in groupby(points, key=lambda point: _is_finite(point[1])):
