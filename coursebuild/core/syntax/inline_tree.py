@@ -54,6 +54,7 @@ from coursebuild.core.syntax.mentions import (
     may_mention,
     text_inlines,
 )
+from coursebuild.core.syntax.numerals import check_numerals
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.syntax.unread_markup import check_unread_markup, find_repetitions, find_stars
@@ -149,6 +150,7 @@ class _TokenReader:
         self._flush()
         if not html:
             self.state.diagnostics += find_repetitions(self.content)
+            self.state.diagnostics += check_numerals(self.content, self.texts)
         for diagnostic in check_unread_markup(self.content, self.texts, html=html):
             self.report(diagnostic)
         if not html and not self.open_literals:
@@ -310,6 +312,8 @@ class _TokenReader:
             start, end = start + 1, end - 1
         place = self.content.span(start, end)
         if token.type == "number_given":
+            text = (start, token.content)
+            self.state.diagnostics += check_numerals(self.content, [text], is_alone=True)
             return NumberBinding(span, token.content, place, None, collapse_spaces(token.info))
         return NumberBinding(span, token.content, place, token.info or None)
 

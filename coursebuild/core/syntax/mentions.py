@@ -117,6 +117,9 @@ def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> D
 
     A link without a text shows the name of what has a number.
     """
+    if target == UrlTarget(""):
+        message, help = "this link has no address", "write one in the brackets behind its text"
+        return diagnose("link-text", span, message, help=help)
     if not children:
         address = getattr(target, "url", None) or f"#{getattr(target, 'anchor', None) or ''}"
         if address.partition("#")[2].partition(":")[0] in LABEL_KINDS:
