@@ -143,6 +143,22 @@ _PAIR = re.compile(
     r"|\][^()\[\]]*[,;][^()\[\]]*\[|\[[^()\[\]]*\]"
 )
 """Brackets with none between them that belong together; those of an interval may differ."""
+_SLIPS = (
+    (r"(?:^|[(\[=+,;&-])\s*(')", "this prime follows nothing", "write the letter before it"),
+    (r"[-+=/]\s*(_)\w(?![\w^{(])", "this index follows nothing", "write the letter before it"),
+    (
+        r"(?<=[\w)}\]'])\s*(--|\+\s*\+|=\s*=|\\cdot\s*\\cdot\b)(?=\s*[\w\\({])",
+        "an operator stands here twice",
+        "delete one of the two",
+    ),
+    (
+        r"(?:[-+*/]|\\cdot)\s*(\d+\.\.\d+)|(?<![\w.])(\.\d+\.)(?![\d.])"
+        r"|[=+*/<>-]\s*(\d+ +\d{1,2})(?=\s*(?:$|[=+*/)<>,;-]))",
+        "this is no number",
+        "write one point, or a comma between two numbers",
+    ),
+)
+"""What no formula has, with what is wrong and how to mend it."""
 _JOINT = re.compile(
     rf"[A-Za-z]{{0,2}}?({'|'.join(sorted(_COMMANDS, key=len, reverse=True))})[A-Za-z]{{0,2}}"
 )
@@ -226,9 +242,11 @@ def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnosti
         yield diagnose(
             "math-command", place, message, help=Fix(help, None if is_string else proposal)
         )
-    if (prime := re.search(r"(?:^|[(\[=+,;&-])\s*(')", text)) is not None:
-        message, help = "this prime follows nothing", "write the letter before it"
-        yield diagnose("math-syntax", tex.span(*prime.span(1)), message, help=help)
+    for pattern, message, help in _SLIPS:
+        if (slip := re.search(pattern, text)) is not None:
+            yield diagnose(
+                "math-syntax", tex.span(*slip.span(slip.lastindex or 0)), message, help=help
+            )
     if (at := text.find("`")) >= 0:
         message, help = "a backtick would be shown in this formula", Fix("delete it", "", safe=True)
         yield diagnose("math-syntax", tex.span(at, at + 1), message, help=help)

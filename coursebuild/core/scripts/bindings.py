@@ -366,8 +366,7 @@ def _distance(
         if not (s.is_finite and p.is_finite):
             return Decimal("Infinity"), absolute
         shown_size, printed_size = s.value.copy_abs(), p.value.copy_abs()
-        relative += _QUOTIENT.divide(
-            difference(shown_size, printed_size), max(shown_size, printed_size)
-        )
+        if size := max(shown_size, printed_size):  # `00` is 0 and not shown as it
+            relative += _QUOTIENT.divide(difference(shown_size, printed_size), size)
         absolute += difference(s.value, p.value)
     return relative, absolute

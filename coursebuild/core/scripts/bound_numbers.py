@@ -16,7 +16,7 @@ from coursebuild.core.scripts.tables import RowCell, table_rows
 from coursebuild.core.text.source import Excerpt, Span
 
 Locate = Callable[[int, int], Span]
-_STRAY = re.compile(r"[-+*/.,:;=_]+")
+_STRAY = re.compile(r"[-+*/.,:;=_]+|-?[eE][-+]+\d*|[-+][eE]\d*")
 """What beside a number is neither a unit nor a word: `-9.81-` has a slip."""
 
 

@@ -146,6 +146,14 @@ def read_table(
         elif token.type == "th_open":
             align.append(_ALIGN.get(token.attrs.get("style")))
     cells = [_read_cells(base, row, len(align), inlines, report) for row in rows]
+    for above, row in pairwise(rows[1:]):
+        line = base.text[row.start : row.end].strip()
+        if line == base.text[above.start : above.end].strip() and re.search(r"[^\W\d_]{2}", line):
+            place, message = base.span(row.start, row.end), "this row is repeated here"
+            source, number = place.source, place.line
+            whole_line = source.span(source.line_start(number), source.line_start(number + 1))
+            fix = Fix("delete one of the two", edits=(Edit(whole_line, ""),))
+            report(diagnose("text-repeated", place, message, help=fix))
     span = base.span(opening.start, opening.end)
     return Table(span, tuple(align), cells[0], tuple(cells[1:])), at + 1
 
@@ -210,6 +218,10 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
         begins_inside = re.match(r">[ >]*(?:[a-z]|\$\$)", span.text)
         is_doubled = marks[0].count(">") == 2 and (any(fewer) or begins_inside is not None)
         is_in_text = is_in_text or is_doubled
+        if not is_in_text and marks[0].count(">") > 1 and _is_in_callout(source, line):
+            place, message = span.first_line(), "a second quotation begins in this callout"
+            help = "remove one `>`, or begin each line of it with `> > `"
+            yield diagnose("markup-unread", place, message, help=help)
     if is_in_text and ">>" in marks[0]:
         message = "a quotation begins in the middle of a paragraph"
         help = "remove one `>`, or leave a line with nothing but `>` above it"
@@ -229,6 +241,13 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
             place = source.span(start + slip.start(1), start + slip.end(1))
             help = Fix("begin the line with `> `", ">", safe=True)
             yield diagnose("markup-unread", place, message, help=help)
+
+
+def _is_in_callout(source: Source, line: int) -> bool:
+    """Whether the quotation that has a line begins as a callout does."""
+    while line > 1 and source.line_text(line - 1).startswith(">"):
+        line -= 1
+    return re.match(r"> ?\[!", source.line_text(line)) is not None
 
 
 def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterator[Diagnostic]:

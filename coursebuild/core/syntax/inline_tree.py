@@ -26,6 +26,7 @@ from coursebuild.core.syntax.mentions import (
     text_inlines,
 )
 from coursebuild.core.syntax.nodes import shorten
+from coursebuild.core.syntax.numerals import check_numerals
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.syntax.unread_markup import (
@@ -128,6 +129,7 @@ class _TokenReader:
         self._flush()
         if not html:
             self.state.diagnostics += find_repetitions(self.content)
+            self.state.diagnostics += check_numerals(self.content, self.texts)
         for diagnostic in check_unread_markup(self.content, self.texts, html=html):
             self.report(diagnostic)
         if not html and not self.open_literals:
@@ -289,6 +291,8 @@ class _TokenReader:
             start, end = start + 1, end - 1
         place = self.content.span(start, end)
         if token.type == "number_given":
+            text = (start, token.content)
+            self.state.diagnostics += check_numerals(self.content, [text], is_alone=True)
             return model.NumberBinding(
                 span, token.content, place, None, collapse_spaces(token.info)
             )
@@ -366,7 +370,14 @@ _OPEN_VALUE = re.compile(r'\b([A-Za-z]\w*)=(?:"|[\w.-]+")')
 _ATTRIBUTE = re.compile(r'[A-Za-z][\w:-]*="[^"]*"')
 _NO_EQUALS = re.compile(r'([A-Za-z]\w*)\W?"[\w. -]*"')
 _LONE_DASH = re.compile(r'([A-Za-z]\w*)[-+;]"[^"]*"')
-_LATE_QUOTE = re.compile(r'\b([A-Za-z]\w*)=\.?\d[\d.]*"')
+_LATE_QUOTE = re.compile(r'\b([A-Za-z]\w*)=(?:[-.]?\d[-\d. ]*"|="[-\d. ]+")')
+_BROKEN_VALUE = re.compile(
+    r'\b[A-Za-z]\w*="(?:(?:[^"]*\s)?([-+]?\d+\.\.+\d+|[-+]?(?:\d*\.\d*[oOlI]|[oOlI]\.)\d*'
+    r'|(?<=[\d.]\s)[oOl])(?=[\s"])|-(?= -?\w+")|[^"\s]+ -(?="))'
+)
+"""The value of an attribute with a part that is a number but for a slip."""
+_END = re.compile(r"[\w.]*[._][\w.]*(?:\[\w*\]|\(\))?[\\'´]|[0DSWbdnrstw]\\")
+"""A name, or a letter of an escape, with a backslash or a quotation mark after it."""
 _PAIR = re.compile(r"\([^()\[\]{}]*\)|\[[^()\[\]{}]*\]|\{[^()\[\]{}]*\}")
 _PROSE = re.compile(r"(?<!`)`[,.;:)]\s+\w|(?<!`)`[^`]*\w`{2,}[\s,.;:)]")
 """Code that begins with a mark of punctuation and a blank, or that holds two backticks."""
@@ -400,9 +411,19 @@ def _check_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[D
     rest = code if re.fullmatch(r"[A-Za-z][\w.()\[\]{}:-]+", code) else ""
     while (shorter := _PAIR.sub(lambda pair: "_" * len(pair[0]), rest)) != rest:
         rest = shorter
-    if bracket := re.search(r"(?<=\w)[()\[\]{}](?=\w)", rest):
+    if bracket := re.search(r"(?<=\w)[()\[\]{}](?=\w)|(?<=\w\w)[)\]}]\Z", rest):
         message = f"`{bracket[0]}` has no matching bracket"
         yield diagnose("markup-unread", span, message, help="write the missing one, or a blank")
+    if broken := _BROKEN_VALUE.search(code):
+        part = broken[1] or "-"
+        message = f"`{part}` stands in the value of an attribute, and is no number"
+        help = "write a number with one point, and a blank between two"
+        yield diagnose("number-form", span, message, help=help)
+    if (end_mark := _END.fullmatch(code)) is not None and code.count(code[-1]) == 1:
+        message = f"`{code[-1]}` stands at the end of `{shorten(code[:-1])}`"
+        is_escape = end_mark[0][:-1].isalnum() and len(code) == 2
+        help = f"did you mean `\\{code[0]}`?" if is_escape else "delete it"
+        yield diagnose("markup-unread", span, message, help=help)
     # A letter and a backtick change places easily, as in "i`mpratio`" and "`body_mass `while".
     letter, first = _LETTER_BEFORE.search(text, max(start - 2, 0), start), start - 1
     if letter is None and text[start:end].endswith(" `"):

@@ -69,7 +69,8 @@ FOREIGN = {
     "attributes": MarkupKind(
         r"\{:?[ \t]*[.#][A-Za-z][\w:.-]*[^{}\n\0]*\}?|\{:[^{}\n\0]+\}"
         r"|\{#?(?:eq|fig|lab|lst|tab):[^{}\n\0]*\}?"
-        r"|(?<![{\w&\0])[#.][A-Za-z][\w:.-]*\}",
+        r"|(?<![{\w&\0])[#.][A-Za-z][\w:.-]*\}|#(?:eq|fig|lab|lst|tab):[\w.-]+\}"
+        r"|(?<!\])\(#(?:eq|fig|lab|lst|tab):[\w.-]+\)|\(\.further\)$",
         "only headings have attributes, and only formulas, captions and fences have labels",
         "in a heading, `## Title {#id .class}` ends the line; a label ends a caption, "
         "`Figure: … {#fig:name}`, or a fence's first line; write HTML for a class or a size",
@@ -175,7 +176,8 @@ BROKEN = {
         "binding-attribute",
     ),
     "mark": MarkupKind(
-        r"\{[ \t]*(?:term|symbol|further)\b[^{}\n\0]*\}",
+        r"\{[ \t]*(?:term|symbol|further)\b[^{}\n\0]*\}"
+        r"|(?<=\])term\b[^\s{}\0]*\}|(?<=\0)(?:symbol|unit|value)=\"[^{}\0]*\}",
         "braces stand directly after what they mark",
         'write `[word]{term}`, `$x${symbol="meaning"}`, `## Heading {.further}`',
     ),
@@ -189,7 +191,7 @@ BROKEN = {
         rf"|(?<![\w:/.])(?-i:{_SCHEME})[\w.#/-]*\w"
         r"|(?<!\\)\[[^\[\]]{0,200}\(" + _ADDRESS + r"[^()\s]*\)(?![^\[\n]*\])"
         r"|(?<!\\)\[[^\[\]]{0,200}\]?\(?\]?\S?" + _ADDRESS + r"[^()\s\]]*\)(?![^\[\n]*\])"
-        r"|(?<!\\)\[[^\[\]]{0,200}\]#\([^()\s]*\)|(?<=\0)\]|\[(?=\0)",
+        r"|(?<!\\)\[[^\[\]]{0,200}\]#\([^()\s]*\)|(?<=\0)[\])]|\[(?=\0)",
         "this is not a complete link",
         "a link is `[text](address)`, with no blank before the `(` and none in the address",
     ),

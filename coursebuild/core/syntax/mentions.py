@@ -102,6 +102,9 @@ _NUMBERED = re.compile(r"(?:[^\W\d_]+ )?(\d+(?:\.\d+)+)")
 
 def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> Diagnostic | None:
     """The diagnostic of a text that is missing, another lesson, or almost its target's name."""
+    if target == UrlTarget(""):
+        message, help = "this link has no address", "write one in the brackets behind its text"
+        return diagnose("link-text", span, message, help=help)
     if not children:
         address = getattr(target, "url", None) or f"#{getattr(target, 'anchor', None) or ''}"
         if address.partition("#")[2].partition(":")[0] in LABEL_KINDS:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from itertools import chain
 
@@ -13,12 +14,17 @@ from coursebuild.core.model import (
     Course,
     Document,
     Heading,
+    Math,
     ThematicBreak,
+    block_inlines,
     document_scripts,
     find_blocks,
     plain_text,
+    walk_blocks,
+    walk_inlines,
 )
 from coursebuild.core.model.results import Mathml, Outcome, ScriptRun
+from coursebuild.core.scripts.numbers import scan_prose
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -31,7 +37,7 @@ from coursebuild.core.text.diagnostics import (
 )
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.relations import check_steps
-from coursebuild.features.quiz.model import ChoiceQuestion, Quiz
+from coursebuild.features.quiz.model import ChoiceQuestion, NumericQuestion, Quiz
 from coursebuild.features.quiz.page import draw_quiz, index_quiz, quiz_markdown
 from coursebuild.features.quiz.parse import parse_fence
 from coursebuild.features.quiz.schema import QuizFile
@@ -92,6 +98,8 @@ def _check_predictions(quiz: Quiz, document: Document) -> Iterator[Diagnostic]:
             fix = Fix(f"did you mean `{title}`?", title)
             yield diagnose("field-value", place, message, help=fix)
     for question in quiz.questions:
+        if isinstance(question, NumericQuestion):
+            yield from _check_answer(question)
         if not isinstance(question, ChoiceQuestion):
             continue
         if question.gate and blocks in ((), tuple(labs[:1])):
@@ -111,6 +119,28 @@ def _check_predictions(quiz: Quiz, document: Document) -> Iterator[Diagnostic]:
             later = [block.span.first_line() for block in rest if isinstance(block, Lab)][:1]
             notes = [Note("the next lab is here", span) for span in later]
             yield diagnose("quiz-gate", run.span(), message, help=help, notes=notes)
+
+
+def _check_answer(question: NumericQuestion) -> Iterator[Diagnostic]:
+    """Report an answer that is a number of its explanation, but for the order of its digits."""
+    text = " ".join(
+        inline.tex.text if isinstance(inline, Math) else getattr(inline, "text", "")
+        for block in walk_blocks(question.explain)
+        for inline in walk_inlines(block_inlines(block))
+    )
+    numbers = [n for n in scan_prose(text.replace("\\cdot", "·")) if n.is_finite]
+    if any(abs(float(n.value) - question.answer) <= question.tolerance for n in numbers):
+        return
+    digits = re.sub(r"\D", "", question.answer_text).strip("0")
+    for number in numbers:
+        number_digits = re.sub(r"\D", "", number.text).strip("0")
+        if len(digits) > 2 and digits != number_digits and sorted(digits) == sorted(number_digits):
+            place = question.span
+            if match := re.search(r'"answer"\s*:\s*([^\s,}]+)', place.text):
+                place = place.source.span(place.start + match.start(1), place.start + match.end(1))
+            message = f"the explanation says {number.text}, and not {question.answer_text}"
+            yield diagnose("quiz-answer", place, message)
+            return
 
 
 def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
