@@ -1,12 +1,10 @@
 """`coursebuild bench`: speed against error of the course's models.
 
-Entry points: `bench(options, names, …)`, `check(…)`; `bench_text(scenes, style)`, the tables of the
-models' pages, on a terminal.
+Entry points: `bench(options, names, …)`, `check(…)`; `bench_text(scenes, style)`.
 
-1. Names mean models. One that does not compile is reported, and the others are measured.
-2. Each scenario's report is stored by all that it depends on, so that a run that was stopped goes
+1. Each scenario's report is stored by all that it depends on, so that a run that was stopped goes
    on where it was. Times are true of this machine only, so reports are not shared.
-3. Recording writes the reports into `content/reports/`; checking measures again, whatever is
+2. Recording writes the reports into `content/reports/`; checking measures again, whatever is
    stored, and compares figures of accuracy with what is recorded there.
 """
 
@@ -394,7 +392,7 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
         texts.append(f"It measures {report.figure}.")
     if report.velocity_floor > report.floor:
         texts.append(f"Velocities are known to {plain_text(power(report.velocity_floor, 1))}.")
-    for text in (*texts, *report.notes):
+    for text in (*texts, *report.notes, *_theory(report)):
         lines += style.wrap(text, 2 * _INDENT)
     legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
     shown_rows = (row for row in report.rows if not is_idle(row))
@@ -406,6 +404,22 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
         if grid is not None:
             lines += ["", *(f"{2 * _INDENT}{line}".rstrip() for line in grid_lines(grid, style))]
     return [*lines, *_notes(view.notes, style)]
+
+
+def _theory(report: ScenarioReport) -> Iterator[str]:
+    """What theory says of quantities, and what each integrator makes of them."""
+
+    def amount(value: float | None, unit: str) -> str:
+        return "none" if value is None else f"{value:.4g} {unit}".strip()
+
+    for name in dict.fromkeys(line.name for line in report.figures):
+        lines = [line for line in report.figures if line.name == name]
+        integrators: dict[str, list[str]] = {}
+        for line in lines:
+            integrators.setdefault(amount(line.measured, line.unit), []).append(line.integrator)
+        values = (f"{value} under {', '.join(names)}" for value, names in integrators.items())
+        exact = amount(lines[0].exact, lines[0].unit)
+        yield f"theory ({lines[0].source}): the {name} is {exact}; measured: {'; '.join(values)}"
 
 
 def _title(name: str, title: str, style: Style) -> str:
