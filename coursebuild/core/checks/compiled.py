@@ -300,7 +300,13 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
         rows = (
             ("qpos", "`qpos`", scenario.qpos or None, facts.nq, "positions (`nq`)"),
             ("qvel", "`qvel`", scenario.qvel or None, facts.nv, "velocities (`nv`)"),
-            ("controls", "a command", next(iter(scenario.controls), None), facts.nu, "actuators"),
+            (
+                "controls",
+                "a command",
+                next(iter(scenario.controls), None),
+                facts.nu,
+                "controls (`nu`)",
+            ),
         )
         for name, subject, values, count, noun in rows:
             if values is not None and len(values) != count:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import functools
 import re
 import tokenize
+import unicodedata
 from collections.abc import Collection, Iterator
 from typing import Any
 
@@ -206,6 +207,8 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Mod
     rest = _THING.sub(lambda match: "named" if match[1] in VIEWS else match[0], rest)
     is_python = path.endswith(".py")
     code = _python_code(rest) if is_python else _PROSE.sub(lambda m: m[1] or '""', rest)
+    if is_python:  # to which letters of another width are the same
+        code = unicodedata.normalize("NFKC", code)
     words = frozenset(_WORD.findall(rest if filled else code))
     if not words.isdisjoint(("mj_stateSize", "mj_getState", "mj_setState")):
         words |= _STATE_WORDS

@@ -38,6 +38,7 @@ HOSTILE = {
     "raw f-string": ("sensor", 's = "r"\nprint(fr"{data.sensordata}")'),
     "f-string before a text": ("sensor", 'print(f"{model}", data.sensordata, "x")'),
     "triple f-string": ("sensor", "print(f'''it's {data.sensordata}''', \"x\")"),
+    "letters of another width": ("sensor", "print(data.\uff53ensordata)"),
     "size of a state": ("actuator", "print(mujoco.mj_stateSize(model, 8191))"),
     "whole state": ("actuator", "mujoco.mj_getState(model, data, np.empty(9), 31)"),
     "file mapped": ("sensor", "print(np.memmap(model_path('leg')))"),

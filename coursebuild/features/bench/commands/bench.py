@@ -376,7 +376,7 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
         texts.append(f"It measures {report.figure}.")
     if report.velocity_floor > report.floor:
         texts.append(f"Velocities are known to {plain_text(power(report.velocity_floor, 1))}.")
-    for text in (*texts, *report.notes):
+    for text in (*texts, *report.notes, *_theory(report)):
         lines += style.wrap(text, 2 * _INDENT)
     legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
     marks = []
@@ -394,6 +394,22 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
         if grid is not None:
             lines += ["", *(f"{2 * _INDENT}{line}".rstrip() for line in grid_lines(grid, style))]
     return [*lines, *_notes(view.notes, style)]
+
+
+def _theory(report: ScenarioReport) -> Iterator[str]:
+    """What theory says of quantities, and what each integrator makes of them."""
+
+    def amount(value: float | None, unit: str) -> str:
+        return "none" if value is None else f"{value:.4g} {unit}".strip()
+
+    for name in dict.fromkeys(line.name for line in report.figures):
+        lines = [line for line in report.figures if line.name == name]
+        integrators: dict[str, list[str]] = {}
+        for line in lines:
+            integrators.setdefault(amount(line.measured, line.unit), []).append(line.integrator)
+        values = (f"{value} under {', '.join(names)}" for value, names in integrators.items())
+        exact = amount(lines[0].exact, lines[0].unit)
+        yield f"theory ({lines[0].source}): the {name} is {exact}; measured: {'; '.join(values)}"
 
 
 def _title(name: str, title: str, style: Style) -> str:
