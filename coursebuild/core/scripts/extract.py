@@ -81,7 +81,7 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
             path, first_path = script.path, first.path
             note = f"`{first_path}` is written here"
             if first_path == path:
-                message, note = f"`{path}` is the file of two blocks", "the first one is here"
+                message, note = f"two blocks have the file `{path}`", "the first one is here"
             elif key in files:
                 message = f"`{path}` and `{first_path}` are one file where case does not count"
             elif key in folders:
