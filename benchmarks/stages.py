@@ -30,15 +30,15 @@ from coursebuild.core.model import Course
 from coursebuild.core.model.results import Formula, MathError, Reports, Results
 from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages import listings
-from coursebuild.core.pages.article import draw
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
+from coursebuild.core.pages.page_writer import draw
 from coursebuild.core.pages.record import record
 from coursebuild.core.run.v8 import MathEngine
-from coursebuild.core.syntax import code_blocks
+from coursebuild.core.syntax import python_syntax
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.values import encode
 from coursebuild.features.language_server.commands.diagnosis import current_diagnostics
@@ -202,7 +202,7 @@ def measure_lessons(course: Course, results: Results, repeat: int) -> None:
         return [find_imports(script) for script in scripts]
 
     def parses() -> list[object]:
-        code_blocks._compile_error.cache_clear()
+        python_syntax._compile_error.cache_clear()
         return [parse_document(d.source, kinds, lesson=True) for d in documents]
 
     drafts = draws()

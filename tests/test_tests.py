@@ -17,6 +17,8 @@ from textwrap import indent
 
 import pytest
 
+from support.fixture_cases import Case, check_cases
+
 HERE = Path(__file__).parent
 ACTIONS = frozenset(
     "blur check clear click dblclick dispatch_event drag_to emulate_media fill focus go_back "
@@ -257,44 +259,12 @@ def test_tests_are_free_of(rule: Rule) -> None:
     assert mended == set(), "take these out of TO_MEND"
 
 
-def test_assertion_that_looks_at_page_once_is_found() -> None:
-    (function,) = functions(
-        ast.parse(
-            "def test(page):\n"
-            "    page.click('a')\n"
-            "    expect(page.locator('b')).to_be_visible()\n"
-            "    assert page.locator('b').count() == 1\n"
-            "    page.click('a')\n"
-            "    assert page.locator('b').count() == 1\n"
-            "    becomes(page, lambda: page.locator('b').count(), 1)\n"
-        )
-    )
-    assert list(looks_once(function, WAITS, ACTIONS)) == [6]
+def test_lines_that_look_too_early_or_too_late_are_found(rewriting: bool) -> None:
+    def render(case: Case) -> str:
+        code = "def test(page, lab):\n" + indent(case.input, "    ")
+        (function,) = functions(ast.parse(code))
+        lines = [f"{line - 1} looks once" for line in looks_once(function, WAITS, ACTIONS)]
+        lines += [f"{line - 1} may pass unseen" for line in passes_unseen(function, ACTIONS)]
+        return "".join(f"{line}\n" for line in lines)
 
-
-@pytest.mark.parametrize(
-    ("lines", "passing"),
-    [
-        ("expect(lab).to_have_attribute('data-state', 'loading')", [1]),
-        ("lab.get_by_role('button', name='Copied').wait_for()", [1]),
-        ("expect(button).to_have_text(re.compile('^Copied$'))", [1]),
-        ("page.wait_for_selector('.lab[data-state=loading]')", [1]),
-        ("until(page, \"document.querySelector('.lab').dataset.state === 'loading'\")", [1]),
-        ("becomes(page, lambda: button.inner_text(), 'Copied')", [1]),
-        ("wait_for_condition(page, lambda: button.inner_text() == 'Copied')", [1]),
-        ("expect(lab.locator('.copy')).not_to_have_text('Copied')", []),
-        ("expect(lab.locator('[data-state=loading]')).to_have_count(0)", []),
-        ("has_been(lab, 'Copied')", []),
-        ("reach(page, 1, 'playing')\nreach(page, 2, 'playing')\nreach(page, 1, 'paused')", [1]),
-        (
-            "expect(a).to_have_text('1')\nexpect(b).to_be_visible()\nexpect(a).to_have_text('2')",
-            [1],
-        ),
-        ("becomes(page, lambda: a.count(), 1)\nbecomes(page, lambda: a.count(), 2)", [1]),
-        ("expect(a).to_have_text('1')\npage.click('b')\nexpect(a).to_have_text('2')", []),
-        ("expect(a).to_contain_text('1')\nexpect(a).to_contain_text('2')", []),
-    ],
-)
-def test_wait_for_a_state_that_may_pass_unseen_is_found(lines: str, passing: list[int]) -> None:
-    (function,) = functions(ast.parse("def test(page, lab):\n" + indent(lines, "    ")))
-    assert [line - 1 for line in passes_unseen(function, ACTIONS)] == passing
+    check_cases(HERE / "fixtures/waits.md", render, rewriting=rewriting)

@@ -1,16 +1,9 @@
 """The command line: arguments → pipeline → exit status.
 
-Entry point: `main(arguments)`. Exit status 0: clean; 1: something is wrong in the course; 2: wrong
-usage. Heavy imports happen in the command that needs them, and here in `main`, which first lets
-Ctrl-C end this process without a word.
-
-- `unchanged`: a command that has nothing to do, for which little is loaded
-- `handover`: a command that a running `serve` does (`command_server`)
-- `commands`: the list of commands, and how one is run, to its end or until a signal comes; each of
-  the core has a module (`build`, `check`, …), and features have further ones
-- `pytest_plugin`: checks of a course as tests of pytest
-- `arguments`: what several commands share
-- `output`: standard output and error, and the exit status
+Exit status 0: clean; 1: something is wrong in the course; 2: wrong usage. Heavy imports happen in
+the command that needs them, and here in `main`: first `unchanged`, for a command that has nothing
+to do, then `handover`, for one that a running `serve` does (`command_server`), then `commands`,
+which runs one of the modules here, or of features.
 """
 
 from __future__ import annotations
@@ -23,10 +16,7 @@ from coursebuild.cli.output import CLEAN, FAILURE, USAGE, say, write
 
 
 def main(arguments: list[str] | tuple[str, ...] | None = None) -> int:
-    """Run the command that the arguments name; return the exit status.
-
-    Without arguments the command is that of this process, which ends with it.
-    """
+    """Run a command; return its exit status. Without arguments it is that of this process."""
     alone = arguments is None
     if alone and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         # Until there is something to clean up, Ctrl-C ends this process at once. Python would show

@@ -1,8 +1,4 @@
-"""What several commands share: their arguments, and how they print what they have found.
-
-Entry points: `add_lessons`, `add_format` and others, which declare arguments; `options_of`, from
-arguments to options; `print_report`; `run_unless_unchanged`.
-"""
+"""What several commands share: their arguments, and how they print what they have found."""
 
 from __future__ import annotations
 
@@ -53,7 +49,7 @@ def options_of(arguments: argparse.Namespace) -> Options:
 def available_cores() -> int:
     """The number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
-        return max(1, len(os.sched_getaffinity(0)))
+        return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
@@ -67,34 +63,26 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
 
 def add_cache(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments about stored results."""
-    parser.add_argument(
-        "--cache",
-        metavar="PLACE",
-        help="share results in a folder or at a URL such as s3://… (default: $COURSEBUILD_CACHE)",
-    )
-    parser.add_argument(
-        "--no-cache",
-        action="store_true",
-        help="ignore kept results, and keep the new ones",
-    )
-    parser.add_argument(
-        "--cache-size",
-        metavar="SIZE",
-        help="size limit of .coursebuild, such as 500M (default: $COURSEBUILD_CACHE_SIZE, or 1G)",
-    )
+    help = "share results in a folder or at a URL such as s3://… (default: $COURSEBUILD_CACHE)"
+    parser.add_argument("--cache", metavar="PLACE", help=help)
+    help = "ignore kept results, and keep the new ones"
+    parser.add_argument("--no-cache", action="store_true", help=help)
+    help = "size limit of .coursebuild, such as 500M (default: $COURSEBUILD_CACHE_SIZE, or 1G)"
+    parser.add_argument("--cache-size", metavar="SIZE", help=help)
 
 
 def add_running(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of commands that run scripts."""
+
+    def parse_jobs(text: str) -> int:
+        if text.isdecimal() and 1 <= int(text) <= 1024:
+            return int(text)
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of jobs: a whole number from 1")
+
     add_quiet(parser)
     parser.add_argument("--verbose", "-v", action="store_true", help="say why each script runs")
-    parser.add_argument(
-        "--jobs",
-        "-j",
-        type=_parse_jobs,
-        metavar="N",
-        help="scripts to run at a time (default: one per core)",
-    )
+    help = "scripts to run at a time (default: one per core)"
+    parser.add_argument("--jobs", "-j", type=parse_jobs, metavar="N", help=help)
     add_cache(parser)
 
 
@@ -112,50 +100,32 @@ def add_executors(parser: argparse.ArgumentParser) -> None:
 
 def add_sandbox(parser: argparse.ArgumentParser) -> None:
     """Declare `--sandbox`."""
-    parser.add_argument(
-        "--sandbox",
-        action="store_true",
-        help="run each script without network, able to see and write only the course",
-    )
+    help = "run each script without network, able to see and write only the course"
+    parser.add_argument("--sandbox", action="store_true", help=help)
 
 
 def add_strict(parser: argparse.ArgumentParser) -> None:
     """Declare `--strict`."""
-    parser.add_argument(
-        "--strict",
-        action="store_true",
-        help="treat warnings as errors, and reject scripts that are not run",
-    )
-
-
-def _parse_jobs(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= 1024:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of jobs: a whole number from 1")
-    return int(text)
+    help = "treat warnings as errors, and reject scripts that are not run"
+    parser.add_argument("--strict", action="store_true", help=help)
 
 
 def add_lessons(parser: argparse.ArgumentParser) -> None:
     """Declare the names of lessons and pages."""
-    parser.add_argument(
-        "lessons",
-        nargs="*",
-        metavar="LESSON",
-        help="id, slug or file of a lesson or page (default: all)",
-    )
+    help = "id, slug or file of a lesson or page (default: all)"
+    parser.add_argument("lessons", nargs="*", metavar="LESSON", help=help)
 
 
 def add_long(parser: argparse.ArgumentParser) -> None:
     """Declare `--long`."""
-    parser.add_argument(
-        "--long", action="store_true", help="also run scripts that are recorded once"
-    )
+    help = "also run scripts that are recorded once"
+    parser.add_argument("--long", action="store_true", help=help)
 
 
 def add_format(parser: argparse.ArgumentParser, *formats: str) -> None:
     """Declare `--format`."""
-    parser.add_argument(
-        "--format", choices=formats, default="text", help="output format (default: %(default)s)"
-    )
+    help = "output format (default: %(default)s)"
+    parser.add_argument("--format", choices=formats, default="text", help=help)
 
 
 # --- what is printed
@@ -182,9 +152,7 @@ def style_of(stream: TextIO | None) -> Style:
 
 
 def run_unless_unchanged(
-    arguments: argparse.Namespace,
-    outputs: tuple[str, ...],
-    work: Callable[[Options], Report],
+    arguments: argparse.Namespace, outputs: tuple[str, ...], work: Callable[[Options], Report]
 ) -> int:
     """Do the work; if it succeeds, the same command has nothing to do while nothing changes.
 

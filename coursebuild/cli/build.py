@@ -20,12 +20,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     add_running(parser)
     add_sandbox(parser)
     add_strict(parser)
-    parser.add_argument(
-        "--out",
-        default="public",
-        metavar="FOLDER",
-        help="folder of the site, from the course's folder (default: %(default)s)",
-    )
+    help = "folder of the site, from the course's folder (default: %(default)s)"
+    parser.add_argument("--out", default="public", metavar="FOLDER", help=help)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -7,19 +7,8 @@ import sys
 
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import (
-    add_executors,
-    add_format,
-    add_lessons,
-    add_long,
-    add_running,
-    add_sandbox,
-    add_strict,
-    options_of,
-    print_report,
-    run_unless_unchanged,
-    style_of,
-)
+from coursebuild.cli import arguments as shared
+from coursebuild.cli.arguments import options_of, print_report
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.errors import UsageError
 from coursebuild.pipeline.check import check
@@ -40,54 +29,33 @@ examples:
 """
 
 
+_FLAGS = {
+    "--fix": "fix mistakes that have a single cure; `undo` reverts it",
+    "--unsafe": "with --fix: also make fixes that are only likely to be right",
+    "--sensitivity": "repeat recorded runs, move initial states, halve timesteps, and report which "
+    "digits hold",
+    "--truth": "list numbers and arithmetic that nothing proves",
+}
+
+
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    add_running(parser)
-    add_executors(parser)
-    add_lessons(parser)
-    add_format(parser, "text", "json", "junit", "sarif", "github")
-    parser.add_argument(
-        "--shard",
-        metavar="I/N",
-        help="run only part I of N of the scripts and labs, for use on several machines",
-    )
-    parser.add_argument(
-        "--timings",
-        metavar="FILE",
-        action="append",
-        default=[],
-        help="run times that make the parts equally long; give every part the same file",
-    )
+    shared.add_running(parser)
+    shared.add_executors(parser)
+    shared.add_lessons(parser)
+    shared.add_format(parser, "text", "json", "junit", "sarif", "github")
+    help = "run only part I of N of the scripts and labs, for use on several machines"
+    parser.add_argument("--shard", metavar="I/N", help=help)
+    help = "run times that make the parts equally long; give every part the same file"
+    parser.add_argument("--timings", metavar="FILE", action="append", default=[], help=help)
     parser.add_argument("--write-timings", metavar="FILE", help="write run times to this file")
-    add_long(parser)
-    add_sandbox(parser)
-    add_strict(parser)
-    parser.add_argument(
-        "--fix",
-        action="store_true",
-        help="fix mistakes that have a single cure; `undo` reverts it",
-    )
-    parser.add_argument(
-        "--unsafe",
-        action="store_true",
-        help="with --fix: also make fixes that are only likely to be right",
-    )
-    parser.add_argument(
-        "--sensitivity",
-        action="store_true",
-        help="repeat recorded runs, move initial states, halve timesteps, and report which "
-        "digits hold",
-    )
-    parser.add_argument(
-        "--truth",
-        action="store_true",
-        help="list numbers and arithmetic that nothing proves",
-    )
-    parser.add_argument(
-        "--against",
-        metavar="VERSION",
-        help="run the scripts with this MuJoCo version, or `latest`, and report what it changes",
-    )
+    shared.add_long(parser)
+    shared.add_sandbox(parser)
+    shared.add_strict(parser)
+    for option, help in _FLAGS.items():
+        parser.add_argument(option, action="store_true", help=help)
+    help = "run the scripts with this MuJoCo version, or `latest`, and report what it changes"
+    parser.add_argument("--against", metavar="VERSION", help=help)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -122,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.format != "text" or arguments.long or _special_options(arguments):
         options = options_of(arguments)
         return print_report(work(options), arguments.format, options)
-    return run_unless_unchanged(arguments, ("examples",), work)
+    return shared.run_unless_unchanged(arguments, ("examples",), work)
 
 
 def _special_options(arguments: argparse.Namespace) -> list[str]:
@@ -149,4 +117,5 @@ def _compare_with_version(arguments: argparse.Namespace) -> int:
         options.store.close()
     if arguments.format == "json":
         return write(comparison_json(report), CLEAN)
-    return write(comparison_text(report, style_of(sys.stdout), quiet=options.progress.quiet), CLEAN)
+    style = shared.style_of(sys.stdout)
+    return write(comparison_text(report, style, quiet=options.progress.quiet), CLEAN)

@@ -1,15 +1,11 @@
 """Does commands for other terminals, in the place of their own processes; for `coursebuild serve`.
 
-Entry point: `CommandServer`. How a command comes here, see `handover`.
-
 1. The server is a copy of the preview's process, made before that has threads, with everything
-   imported that commands need. So a command begins at once.
-2. Each command runs in a process of its own, a copy of the server, with the working folder, the
-   environment, the limits and the standard streams of whoever sent it. What it does is what it
-   would do elsewhere: the course is read anew, and what was made before comes from the store.
+   imported that commands need. So a command, which comes as in `handover`, begins at once.
+2. Each runs in a copy of the server, with the working folder, the environment, the limits and the
+   standard streams of whoever sent it. It does what it would do elsewhere: the course is read anew.
 3. Beside it another copy waits for its end, and passes signals on. When the sender goes away, it
-   ends the command.
-4. If the preview ends, commands that have begun go on to their end.
+   ends the command. If the preview ends, commands that have begun go on to their end.
 
 The preview itself holds the lock of the course only while it writes, and a script that both need
 runs once (`RunStore.claim`). So the command need not wait for the preview.
@@ -36,16 +32,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from coursebuild.cli.handover import (
-    COMMANDS,
-    SIGNALS,
-    is_own_process,
-    is_private,
-    process_state,
-    receive,
-    send,
-    socket_place,
-)
+from coursebuild.cli import handover
+from coursebuild.cli.handover import SIGNALS, send
 from coursebuild.cli.output import FAILURE
 from coursebuild.core.engine.lifetime import end_with_parent
 from coursebuild.core.engine.page_pool import can_fork
@@ -75,19 +63,24 @@ class CommandServer:
         taken.
         """
         self._root = str(root.resolve())
-        place = socket_place(self._root)
+        place = handover.socket_place(self._root)
         self._place = None if place is None else Path(place)
         self._events: socket.socket | None = None
         with contextlib.suppress(OSError):
             listener = self._listen() if can_fork() else None
             if listener is not None:
-                self._fork(listener, preview)
+                ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+                if os.fork() == 0:
+                    _end_with(lambda: _serve(listener, theirs, self._root, preview))
+                theirs.close()
+                listener.close()
+                self._events = ours
 
     def _listen(self) -> socket.socket | None:
         if self._place is None:
             return None
         self._place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if not is_private(str(self._place.parent)):
+        if not handover.is_private(str(self._place.parent)):
             return None
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         new = self._place.with_suffix(f".{os.getpid()}")
@@ -101,14 +94,6 @@ class CommandServer:
         finally:
             os.umask(mask)
         return listener
-
-    def _fork(self, listener: socket.socket, preview: dict[str, Any]) -> None:
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        if os.fork() == 0:
-            _end_with(lambda: _serve(listener, theirs, self._root, preview))
-        theirs.close()
-        listener.close()
-        self._events = ours
 
     def follow(self, tell: Callable[[dict[str, Any]], None]) -> None:
         """Report what is done, as long as commands are taken."""
@@ -128,7 +113,6 @@ class CommandServer:
 
 
 def _end_with(work: Callable[[], object]) -> NoReturn:
-    """Do some work in a copied process, which ends with it."""
     status = FAILURE
     try:
         status = int(work() or 0)  # type: ignore[call-overload]
@@ -137,7 +121,6 @@ def _end_with(work: Callable[[], object]) -> NoReturn:
 
 
 def _close_all_but(*files: int) -> None:
-    """Close what is open here except these, and the standard streams."""
     edges = [2, *sorted(files), 1 << 16]
     for before, after in itertools.pairwise(edges):
         os.closerange(before + 1, after)
@@ -146,7 +129,6 @@ def _close_all_but(*files: int) -> None:
 def _serve(
     listener: socket.socket, events: socket.socket, root: str, preview: dict[str, Any]
 ) -> None:
-    """Take commands until the preview's process ends."""
     os.setsid()  # Ctrl-C in the preview's terminal is not for commands of others
     for number in (*SIGNALS, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
@@ -156,7 +138,7 @@ def _serve(
         os.dup2(null, stream)
     _close_all_but(listener.fileno(), events.fileno())
     wait: float | None = _WARM_UP
-    state, modules = process_state(), list(_NEEDED)
+    state, modules = handover.process_state(), list(_NEEDED)
     while True:
         ready, _, _ = select.select([listener, events], [], [], wait)
         if events in ready:  # nothing comes here but the end
@@ -185,21 +167,21 @@ def _attend(
     state: str | None,
     preview: dict[str, Any],
 ) -> None:
-    """Answer a request; have a command done."""
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     _close_all_but(connection.fileno(), events.fileno())
     files: list[int] = []
     connection.settimeout(60.0)
-    request = (receive(connection, files) if is_own_process(connection) else None) or {}
+    request = (
+        handover.receive(connection, files) if handover.is_own_process(connection) else None
+    ) or {}
     match request:
         case {"ask": "preview"}:
             send(connection, preview)
-        case {"ask": "command", "words": [command, *_]} if command in COMMANDS:
+        case {"ask": "command", "words": [command, *_]} if command in handover.COMMANDS:
             if request["root"] != root or len(files) != 4:
                 send(connection, {"refusal": "belongs to another course"})
             elif state is None or request["state"] != state:
-                reason = "runs another version or Python environment"
-                send(connection, {"refusal": reason})
+                send(connection, {"refusal": "runs another version or Python environment"})
             else:
                 _supervise(connection, events, request, files)
         case _:

@@ -1,7 +1,5 @@
 """The list of commands, the choice of one by the words of a command line, and how it ends.
 
-Entry points: `run`; `known_commands`; `parser_of`, the argument parser of a command.
-
 A command is a name, a summary, and a module with `declare(parser)`, which adds its arguments, and
 `run(arguments)`, which gives the exit status. `EXAMPLES` of the module, if there, end its help.
 Features have further commands (`core.features.Command`). Only the module of the command that is
@@ -25,12 +23,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from coursebuild import MANUAL
 from coursebuild.cli.output import CLEAN, FAILURE, USAGE, fail, say, write
-from coursebuild.core.files.errors import (
-    EffectError,
-    PublishRefusedError,
-    UsageError,
-    lacking,
-)
+from coursebuild.core.files.errors import EffectError, PublishRefusedError, UsageError, lacking
 
 if TYPE_CHECKING:  # asking for the version loads nothing heavy
     from coursebuild.core.features import Command
@@ -82,10 +75,7 @@ if MANUAL:
 
 
 def run(directory: str | None, words: list[str], *, alone: bool) -> int:
-    """Run the command that the words name, in a folder; return the exit status.
-
-    `alone`: the command is that of this process, which ends with it.
-    """
+    """Run the command that the words name; `alone`: this process ends with it."""
     thresholds, handlers = gc.get_threshold(), {}
     # The objects of a command live until its end, and hardly any are in cycles: collecting garbage
     # takes time for nothing, most of all when the process ends.
@@ -124,10 +114,9 @@ def _run_command(directory: str | None, words: list[str]) -> int:
         return _choose_command(directory, words)
     except UsageError as error:
         return fail(USAGE, str(error))
-    except PublishRefusedError as error:
-        return fail(USAGE, error.message, error.help)
     except EffectError as error:
-        return fail(FAILURE, error.message, error.help)
+        status = USAGE if isinstance(error, PublishRefusedError) else FAILURE
+        return fail(status, error.message, error.help)
     except (MemoryError, OSError, RuntimeError) as error:
         lack = lacking(error)
         if lack is None:
@@ -136,11 +125,6 @@ def _run_command(directory: str | None, words: list[str]) -> int:
 
 
 def _choose_command(directory: str | None, words: list[str]) -> int:
-    """Run the command that the words name, in a folder; return the exit status.
-
-    Raises:
-        UsageError: there is no such command or option.
-    """
     match words:
         case []:
             return say(USAGE, _overview().rstrip())
@@ -210,10 +194,7 @@ def parser_of(command: Command) -> argparse.ArgumentParser:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that proposes the option that was meant."""
-
     def error(self, message: str) -> NoReturn:
-        """Raise a `UsageError` that says what is wrong with the command line."""
         option = re.match("unrecognized arguments: (--[^ =]+)", message)
         if option is None:
             super().error(message)

@@ -64,33 +64,22 @@ def run(arguments: argparse.Namespace) -> int:
     commands = known_commands()
     if not before or before == ["help"]:
         candidates: Iterable[str] = [*commands, *([] if before else ["help", "--version", "-C"])]
-    elif before[0] not in commands:
-        candidates = ()
     else:
-        candidates = _command_candidates(parser_of(commands[before[0]]), before, last, directory)
+        actions = parser_of(commands[before[0]])._actions if before[0] in commands else []
+        positionals = [action for action in actions if not action.option_strings]
+        takes_word = (a for a in actions if before[-1] in a.option_strings and a.nargs != 0)
+        if last.startswith("-"):
+            candidates = [name for action in actions for name in action.option_strings]
+        elif (option := next(takes_word, None)) is not None:
+            candidates = option.choices or ()
+        else:
+            values = (_argument_values(action, directory) for action in positionals)
+            candidates = [word for words in values for word in words]
     completions = sorted({word for word in candidates if word.startswith(last)})
     return write("".join(f"{word}\n" for word in completions), CLEAN)
 
 
-def _command_candidates(
-    parser: argparse.ArgumentParser, before: list[str], last: str, directory: str | None
-) -> Iterable[str]:
-    actions = parser._actions
-    if last.startswith("-"):
-        return [name for action in actions for name in action.option_strings]
-    for action in actions:
-        if before[-1] in action.option_strings and action.nargs != 0:
-            return action.choices or ()
-    return [
-        word
-        for action in actions
-        if not action.option_strings
-        for word in _argument_values(action, directory)
-    ]
-
-
 def _argument_values(action: argparse.Action, directory: str | None) -> Iterable[str]:
-    """The values of a positional argument, by its name in the help."""
     if action.choices:
         return action.choices
     root = find_course_root(directory or ".")
@@ -110,7 +99,6 @@ def _argument_values(action: argparse.Action, directory: str | None) -> Iterable
 
 
 def _read_ids(root: Path) -> list[str]:
-    """The ids of the lessons and pages of a map; none where it cannot be read."""
     try:
         course = tomllib.loads((root / MAP).read_text("utf-8"))
         lessons = [lesson["id"] for level in course["level"] for lesson in level["lesson"]]

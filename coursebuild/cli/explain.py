@@ -10,9 +10,11 @@ import argparse
 import re
 import sys
 import time
+from collections.abc import Sequence
 from typing import Literal
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_format, options_of, style_of
 from coursebuild.cli.output import CLEAN, write
@@ -34,14 +36,7 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.registry import feature_trials, installed_features
-from coursebuild.core.run.dependencies import (
-    Inputs,
-    Kind,
-    describe,
-    is_there,
-    sought_files,
-    state_changes,
-)
+from coursebuild.core.run.dependencies import Kind, describe, is_there, sought_files, state_changes
 from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.extract import extract, jobs
@@ -103,18 +98,15 @@ def rule_text(rule: Rule, page: str) -> str:
 def explanation_text(explanation: Explanation, style: Style) -> str:
     """Return an explanation as text for people."""
     e = explanation
-    parts: list[str] = []
-    if e.kind in ("script", "lab"):
-        parts += ["\n".join(_full_text(run, style)) for run in e.runs]
-    else:
-        parts.append(style.paint(_heading(e), BOLD))
-        parts += ["\n".join(_short_text(run, style)) for run in e.runs]
+    is_run = e.kind in ("script", "lab")
+    parts = [] if is_run else [style.paint(_heading(e), BOLD)]
+    parts += ["\n".join(_run_lines(run, style, full=is_run)) for run in e.runs]
     if e.files:
         parts.append(_block("consists also of", e.files))
     if e.part_of:
         parts.append(_block("is a part of", e.part_of))
     if e.dependents:
-        lines = [line for run in e.dependents for line in _short_text(run, style)]
+        lines = [line for run in e.dependents for line in _run_lines(run, style)]
         parts.append("\n".join(["depending on it:", *(f"  {line}" for line in lines)]))
     elif e.kind in ("model", "file"):
         parts.append("no result of a script or lab depends on it")
@@ -126,36 +118,31 @@ def explanation_text(explanation: Explanation, style: Style) -> str:
 def _heading(e: Explanation) -> str:
     if e.kind in ("model", "file"):
         return visible(e.path)
-    count = sum(run.state == "would run" for run in e.runs)
     if not e.runs:
         return f"{visible(e.path)} has no scripts and no labs"
-    verdict = "none would run" if not count else f"{count} would run"
-    scripts = sum(run.kind == "script" for run in e.runs)
-    labs = len(e.runs) - scripts
-    counts = [plural(scripts, "script")] if scripts else []
-    counts += [plural(labs, "lab")] if labs else []
-    return f"{visible(e.path)}: {' and '.join(counts)}, of which {verdict}"
+    kinds = [run.kind for run in e.runs]
+    counts = [plural(kinds.count(kind), kind) for kind in ("script", "lab") if kind in kinds]
+    count = sum(run.state == "would run" for run in e.runs)
+    return f"{visible(e.path)}: {' and '.join(counts)}, of which {count or 'none'} would run"
 
 
 def _block(head: str, lines: tuple[str, ...]) -> str:
     return "\n".join([f"{head}:", *(f"  {visible(line)}" for line in lines)])
 
 
-def _verdict(run: RunExplanation, style: Style) -> str:
-    match run.state:
-        case "remembered":
-            return style.paint("is remembered", GREEN)
-        case "norun":
-            return "is never run: its lesson says `norun`"
-        case "would run":
-            suffix = " again" if run.made is not None else ""
-            verb = "run" if run.kind == "script" else "be tried"
-            return style.paint(f"would {verb}{suffix}", YELLOW)
-
-
-def _full_text(run: RunExplanation, style: Style) -> list[str]:
-    lines = [f"{style.paint(visible(run.name), BOLD)} {_verdict(run, style)}"]
+def _run_lines(run: RunExplanation, style: Style, *, full: bool = False) -> list[str]:
+    name = style.paint(visible(run.name), BOLD) if full else visible(run.name)
+    verb = "run" if run.kind == "script" else "be tried"
+    again = " again" if run.made is not None else ""
+    verdicts = {
+        "remembered": style.paint("is remembered", GREEN),
+        "norun": "is never run: its lesson says `norun`",
+        "would run": style.paint(f"would {verb}{again}", YELLOW),
+    }
+    lines = [f"{name} {verdicts[run.state]}"]
     lines += [f"  because {visible(reason)}" for reason in run.reasons]
+    if not full:
+        return lines
     last = "not run yet on this machine"
     if run.made is not None and run.seconds is not None:
         time_text = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(run.made))
@@ -165,11 +152,6 @@ def _full_text(run: RunExplanation, style: Style) -> list[str]:
         lines += ["", "its last result depends on:"]
         lines += [f"  {visible(line)}" for line in run.depends]
     return lines
-
-
-def _short_text(run: RunExplanation, style: Style) -> list[str]:
-    line = f"{visible(run.name)} {_verdict(run, style)}"
-    return [line, *(f"  because {visible(reason)}" for reason in run.reasons)]
 
 
 EXAMPLES = """\
@@ -182,11 +164,8 @@ examples:
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        "name",
-        metavar="RULE|PATH",
-        help="a rule, or a script, lab, lesson, page, model, or any file of the project",
-    )
+    help = "a rule, or a script, lab, lesson, page, model, or any file of the project"
+    parser.add_argument("name", metavar="RULE|PATH", help=help)
     add_format(parser, "text", "json")
 
 
@@ -204,37 +183,25 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def explain(options: Options, name: str) -> Explanation:
-    """What is known of a script, lab, lesson, page, model, or any file of the project.
-
-    Raises:
-        UsageError: the course cannot be read, or nothing in it is called so.
-    """
+    """What is known of a script, lab, lesson, page, model, or any file of the project."""
     return _Explainer(load_course(options.root), options).explain(name)
 
 
 class _Explainer:
-    """Knows a course and its last results."""
-
     def __init__(self, course: Course, options: Options) -> None:
         self.course = course
         self.root = options.root
         self.run_store = options.for_course(course).run_store()
-        self.models = {
-            model.source.path: existing_files(options.root, model.source.path, model.source.text)
-            for model in course.models
-        }
+        sources = [model.source for model in course.models]
+        self.models = {s.path: existing_files(options.root, s.path, s.text) for s in sources}
         extractions = extract(course).value
         self.documents = documents_by_name(course)
-        self.scripts = {
-            extraction.path: (extraction, job)
-            for extraction, job in zip(extractions, jobs(extractions), strict=True)
-        }
-        trials = feature_trials(course).items()
-        inputs = ((name, kind.inputs(trial), trial) for name, (kind, trial) in trials)
+        pairs = zip(extractions, jobs(extractions), strict=True)
+        self.scripts = {extraction.path: (extraction, job) for extraction, job in pairs}
         self.labs = {
-            name: (trial_inputs, trial)
-            for name, trial_inputs, trial in inputs
-            if trial_inputs is not None
+            name: (inputs, trial)
+            for name, (kind, trial) in feature_trials(course).items()
+            if (inputs := kind.inputs(trial)) is not None
         }
 
     def explain(self, name: str) -> Explanation:
@@ -243,52 +210,41 @@ class _Explainer:
             explanation = self._find_by_name(candidate)
             if explanation is not None:
                 return explanation
-        dependents = self._find_dependents(path)
-        whole = self._models_with(path)
-        if not dependents and not whole and not (self.root / path).exists():
+        explanation = self._explain_file(path, "file")
+        is_known = explanation.dependents or explanation.part_of or (self.root / path).exists()
+        if not is_known:
             closest = nearest(name, [*self.scripts, *self.labs, *self.documents, *RULES])
             help = f"did you mean `{closest}`?" if closest is not None else ""
             raise UsageError(f"nothing in this course is called `{name}`", help=help)
-        return self._explain_file(path, "file", dependents)
+        return explanation
 
     def _find_by_name(self, name: str) -> Explanation | None:
         if name in self.scripts:
-            dependents = self._find_dependents(name)
-            explanation = self._explain_script(name)
-            return Explanation(
-                name, "script", (explanation,), dependents, shown_in=self._documents_using(name)
-            )
+            run, users = self._explain_script(name), self._documents_using(name)
+            return Explanation(name, "script", (run,), self._find_dependents(name), shown_in=users)
         if name in self.labs:
             return Explanation(name, "lab", (self._explain_lab(name),))
         part = self.documents.get(name)
         if part is not None:
-            scripts = [
-                self._explain_script(p)
-                for p, (e, _) in self.scripts.items()
-                if e.document == part.path
-            ]
-            labs = [
-                self._explain_lab(name)
-                for name, (_, trial) in self.labs.items()
-                if trial.block.span.path == part.path
-            ]
-            kind: Literal["lesson", "page"] = "lesson" if isinstance(part, Lesson) else "page"
-            return Explanation(part.path, kind, (*scripts, *labs))
+            scripts = [p for p, (e, _) in self.scripts.items() if e.document == part.path]
+            labs = [n for n, (_, trial) in self.labs.items() if trial.block.span.path == part.path]
+            runs = (*map(self._explain_script, scripts), *map(self._explain_lab, labs))
+            return Explanation(part.path, "lesson" if isinstance(part, Lesson) else "page", runs)
         for model in self.course.models:
-            path = model.source.path
-            if name in (model.name, path):
-                return self._explain_file(path, "model", self._find_dependents(path))
+            if name in (model.name, model.source.path):
+                return self._explain_file(model.source.path, "model")
         return None
 
-    def _explain_file(
-        self, path: str, kind: Literal["model", "file"], dependents: tuple[RunExplanation, ...]
-    ) -> Explanation:
-        files = self.models.get(path, ())
-        whole, documents = self._models_with(path), self._documents_using(path)
-        return Explanation(path, kind, (), dependents, files, whole, documents)
-
-    def _models_with(self, path: str) -> tuple[str, ...]:
-        return tuple(model for model, files in self.models.items() if path in files)
+    def _explain_file(self, path: str, kind: Literal["model", "file"]) -> Explanation:
+        return Explanation(
+            path,
+            kind,
+            runs=(),
+            dependents=self._find_dependents(path),
+            files=self.models.get(path, ()),
+            part_of=tuple(model for model, files in self.models.items() if path in files),
+            shown_in=self._documents_using(path),
+        )
 
     # --- scripts and labs
 
@@ -299,23 +255,19 @@ class _Explainer:
         inputs = self.run_store.inputs(job, extraction.data)
         record = self.run_store.get_record(inputs)
         if record is not None:
-            return _describe_run("script", path, extraction.owner, record, ())
+            return _describe_run("script", path, extraction.owner, record)
         last, reasons = self.run_store.last_record(path), self.run_store.reasons(inputs)
-        return _describe_run("script", path, extraction.owner, last, tuple(reasons))
+        return _describe_run("script", path, extraction.owner, last, reasons)
 
     def _explain_lab(self, name: str) -> RunExplanation:
         inputs, trial = self.labs[name]
-        last = self.run_store.last_record(inputs.path)
-        holds = last is not None and self._is_lab_remembered(last, inputs)
-        reasons = [] if holds else self.run_store.reasons(inputs)
-        return _describe_run("lab", name, trial.owner, last, tuple(reasons))
-
-    def _is_lab_remembered(self, last: RunRecord, inputs: Inputs) -> bool:
-        is_unchanged = not last.reason_forgotten and last.inputs == inputs
-        return is_unchanged and not list(state_changes(last.dependencies, self.run_store.states))
+        last, states = self.run_store.last_record(inputs.path), self.run_store.states
+        holds = last is not None and not last.reason_forgotten and last.inputs == inputs
+        if holds and last is not None and not any(state_changes(last.dependencies, states)):
+            return _describe_run("lab", name, trial.owner, last)
+        return _describe_run("lab", name, trial.owner, last, self.run_store.reasons(inputs))
 
     def _find_dependents(self, path: str) -> tuple[RunExplanation, ...]:
-        """Find scripts and labs whose last results depend on a file or on its folder's listing."""
         dependents = []
         for script in self.scripts:
             if script != path and self._depends(self.run_store.last_record(script), path):
@@ -338,13 +290,10 @@ class _Explainer:
     # --- pages
 
     def _documents_using(self, path: str) -> tuple[str, ...]:
-        return tuple(
-            document.source.path for document in self.course.documents if _uses(document, path)
-        )
+        return tuple(d.source.path for d in self.course.documents if _uses(d, path))
 
 
 def _uses(document: Document, path: str) -> bool:
-    """Whether a document shows a file, links to it, or quotes its output."""
     for block in document_blocks(document):
         if isinstance(block, FeatureBlock):
             mentioned = block.mentioned_models()
@@ -352,9 +301,10 @@ def _uses(document: Document, path: str) -> bool:
             if path in models.union(map(BENCH.path, mentioned), map(ENGINES.path, mentioned)):
                 return True
         for inline in walk_inlines(block_inlines(block)):
+            shown_path = None
             match inline:
                 case Link(target=UrlTarget(url=url)) if "://" in url:
-                    shown_path = None
+                    pass
                 case Image(url=url) | Link(target=UrlTarget(url=url)):
                     shown_path = local_file(url, document.source.path)
                 case Link(target=ModelTarget(name=name)):
@@ -364,7 +314,7 @@ def _uses(document: Document, path: str) -> bool:
                 case NumberBinding(script=script):
                     shown_path = script
                 case _:
-                    shown_path = None
+                    pass
             if shown_path == path:
                 return True
     return False
@@ -375,21 +325,14 @@ def _describe_run(
     name: str,
     owner: str,
     record: RunRecord | None,
-    reasons: tuple[str, ...],
+    reasons: Sequence[str] = (),
 ) -> RunExplanation:
     state: State = "would run" if reasons else "remembered"
+    explanation = RunExplanation(kind, name, owner, state, tuple(reasons))
     if record is None:
-        return RunExplanation(kind, name, owner, state, reasons)
+        return explanation
     depends = [describe(d) for d in record.dependencies if is_there(d)]
     depends += [f"{subject}: {value}" for subject, value in record.inputs.conditions]
-    return RunExplanation(
-        kind,
-        name,
-        owner,
-        state,
-        reasons,
-        tuple(dict.fromkeys(depends)),
-        record.timestamp,
-        record.stored_run.seconds,
-        record.stored_run.outcome.value,
-    )
+    run = record.stored_run
+    last = {"made": record.timestamp, "seconds": run.seconds, "outcome": run.outcome.value}
+    return replace(explanation, depends=tuple(dict.fromkeys(depends)), **last)

@@ -24,19 +24,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
     offers = ", ".join(f"{e.name} ({e.summary})" for e in exporters)
     files = ", ".join(f"LESSON-{e.file}" if e.of_lesson else e.file for e in exporters)
     of_lesson = ", ".join(e.name for e in exporters if e.of_lesson)
-    parser.add_argument(
-        "name", metavar="EXPORT", help=f"{offers}, or an export that a feature of the course adds"
-    )
-    parser.add_argument(
-        "lesson",
-        metavar="LESSON",
-        nargs="?",
-        default="",
-        help=f"the lesson to export ({of_lesson} only)",
-    )
-    parser.add_argument(
-        "--out", metavar="FILE", help=f"output file, from the course's folder (default: {files})"
-    )
+    help = f"{offers}, or an export that a feature of the course adds"
+    parser.add_argument("name", metavar="EXPORT", help=help)
+    help = f"the lesson to export ({of_lesson} only)"
+    parser.add_argument("lesson", metavar="LESSON", nargs="?", default="", help=help)
+    help = f"output file, from the course's folder (default: {files})"
+    parser.add_argument("--out", metavar="FILE", help=help)
 
 
 def run(arguments: argparse.Namespace) -> int:

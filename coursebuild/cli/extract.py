@@ -16,11 +16,8 @@ examples:
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_quiet(parser)
-    parser.add_argument(
-        "--adopt",
-        action="store_true",
-        help="copy edits of extracted files back into their lessons",
-    )
+    help = "copy edits of extracted files back into their lessons"
+    parser.add_argument("--adopt", action="store_true", help=help)
 
 
 def run(arguments: argparse.Namespace) -> int:

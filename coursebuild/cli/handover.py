@@ -1,8 +1,6 @@
 """Hands a command to `coursebuild serve`, where that runs for the same course, and waits for it.
 
-Entry points: `hand_over`, which gives the command's exit status; `ask_preview`, where the preview
-is; `socket_place` and `process_state`, on which both sides must agree. The other side is
-`command_server`.
+The other side is `command_server`.
 
 1. A preview listens at a Unix socket in a folder that only its user can enter: `coursebuild` in
    `$XDG_RUNTIME_DIR`, or `run` in the state folder. The socket's name is made of the real path of
@@ -14,8 +12,6 @@ is; `socket_place` and `process_state`, on which both sides must agree. The othe
    the command is ended.
 4. Another version of the tool, another Python or other packages would do something else. Then the
    command is done here, as without a preview.
-
-This is loaded by each command, so it imports little.
 """
 
 from __future__ import annotations
@@ -24,19 +20,19 @@ import contextlib
 import hashlib
 import json
 import os
+import resource
 import signal
+import socket
 import stat
+import struct
 import sys
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coursebuild.cli.output import FAILURE, say
 from coursebuild.cli.unchanged import tool_state
 from coursebuild.core.files.course_root import find_course_root
 from coursebuild.core.files.trust import state_folder
-
-if TYPE_CHECKING:
-    import socket
 
 COMMANDS = frozenset("build check export extract fmt new rename undo update".split())
 """Commands that work on the files of a course, as a preview does. Others read only, make another
@@ -78,9 +74,6 @@ def is_private(folder: str) -> bool:
 
 def is_own_process(connection: socket.socket) -> bool:
     """Whether the process at the other end is this user's, as far as the system says."""
-    import socket
-    import struct
-
     if not hasattr(socket, "SO_PEERCRED"):
         return True
     data = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
@@ -89,30 +82,19 @@ def is_own_process(connection: socket.socket) -> bool:
 
 def process_state() -> str | None:
     """A hash over what two processes have in common that do the same; `None` if it is unclear."""
-    import resource
-
     tool = tool_state()
     if tool is None:
         return None
     variables = {n: v for n, v in os.environ.items() if n.startswith(_DECISIVE)}
     hard_limits = [resource.getrlimit(limit)[1] for limit in limits()]
-    parts = (
-        tool,
-        sys.prefix,
-        sys.base_prefix,
-        *sys.flags,
-        *sys.warnoptions,
-        sys.getfilesystemencoding(),
-        *hard_limits,
-        *sorted(variables.items()),
-    )
+    python = (sys.prefix, sys.base_prefix, *sys.flags, *sys.warnoptions)
+    encoding = sys.getfilesystemencoding()
+    parts = (tool, *python, encoding, *hard_limits, *sorted(variables.items()))
     return hashlib.sha256(repr(parts).encode("utf-8", "surrogateescape")).hexdigest()
 
 
 def limits() -> list[int]:
     """The system's limits of a process, by number."""
-    import resource
-
     return sorted({getattr(resource, name) for name in dir(resource) if name.startswith("RLIMIT_")})
 
 
@@ -133,7 +115,6 @@ def hand_over(directory: str | None, words: list[str]) -> int | None:
     with connect(root) as connection:
         if connection is None:
             return None
-        import resource
 
         streams = (sys.stdin, sys.stdout, sys.stderr)
         mask = os.umask(0o077)
@@ -184,7 +165,6 @@ def connect(root: str | None) -> Iterator[socket.socket | None]:
     if place is None or not is_private(os.path.dirname(place)) or not os.path.lexists(place):
         yield None
         return
-    import socket
 
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         connection.settimeout(_PATIENCE)
@@ -200,8 +180,6 @@ def connect(root: str | None) -> Iterator[socket.socket | None]:
 
 
 def _wait(connection: socket.socket, process: int) -> int:
-    """Wait for the end of a command that a preview does; return its exit status."""
-
     def pass_on(number: int, frame: object) -> None:
         with contextlib.suppress(OSError):
             connection.send(bytes([number]))
@@ -235,8 +213,6 @@ def _wait(connection: socket.socket, process: int) -> int:
 
 def send(connection: socket.socket, message: dict[str, Any], files: Sequence[int] = ()) -> None:
     """Send a message, with open files."""
-    import socket
-
     data = json.dumps(message).encode()
     head = len(data).to_bytes(4, "big")
     if files:
@@ -248,8 +224,6 @@ def send(connection: socket.socket, message: dict[str, Any], files: Sequence[int
 
 def receive(connection: socket.socket, files: list[int] | None = None) -> dict[str, Any] | None:
     """Receive a message, and add the files that come with it; `None` at the end."""
-    import socket
-
     if files is None:
         head = connection.recv(4)
     else:

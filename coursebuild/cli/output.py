@@ -1,7 +1,4 @@
-"""What commands write to standard output and error, and their exit status.
-
-Entry points: `write`, `say`, `fail`; `terminal_style`.
-"""
+"""What commands write to standard output and error, and their exit status."""
 
 from __future__ import annotations
 

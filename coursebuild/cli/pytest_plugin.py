@@ -25,7 +25,7 @@ import pytest
 from coursebuild.core.files.course_root import MAP, find_course_root
 
 if TYPE_CHECKING:
-    from coursebuild.core.model import Course, Document
+    from coursebuild.core.model import Course
 
 _PAGE, _MAP, _MODEL = "page", "map", "model"
 _PLACE = re.compile(r"^ *--> (.*):(\d+):\d+$", re.MULTILINE)
@@ -84,18 +84,16 @@ class CourseTests:
     def results_of(self, session: pytest.Session, test: str) -> list[tuple[str, str]]:
         """The results of a test: JUnit's tags, with their texts."""
         if self._results is None:
-            sources = {
-                i.source for i in session.items if isinstance(i, CourseItem) and i.course is self
-            }
+            items = (item for item in session.items if isinstance(item, CourseItem))
+            sources = {item.source for item in items if item.course is self}
             checks_everything = any(_PAGE not in self.tests[source] for source in sources)
             self._results = self._check(() if checks_everything else sorted(sources))
         return self._results[test]
 
     def _check(self, names: Iterable[str]) -> dict[str, list[tuple[str, str]]]:
         check = ("-m", "coursebuild", "-C", str(self.root), "check", "--format", "junit")
-        result = subprocess.run(
-            [sys.executable, *check, *names], capture_output=True, encoding="utf-8"
-        )
+        command = [sys.executable, *check, *names]
+        result = subprocess.run(command, capture_output=True, encoding="utf-8")
         if result.returncode not in (0, 1):
             raise CourseError(result.stderr)
         owners = {name: path for path, tests in self.tests.items() for name in tests}
@@ -109,7 +107,6 @@ class CourseTests:
         return results
 
     def _find_test(self, diagnostic: str) -> str:
-        """Find the test that a diagnostic belongs to."""
         place = _PLACE.search(diagnostic)
         if place is None or place[1] not in self.tests:
             return f"{MAP}::{_MAP}"
@@ -122,7 +119,7 @@ _COURSES = pytest.StashKey[dict[str, CourseTests]]()
 
 
 def _tests_by_file(course: Course | None) -> dict[str, Mapping[str, _Lines]]:
-    """Return the tests of each file; if the map cannot be read, its test alone."""
+    from coursebuild.core.model import FeatureBlock, Recording, Script, document_blocks
     from coursebuild.core.registry import feature_trials
 
     tests_by_path: dict[str, Mapping[str, _Lines]] = {MAP: {_MAP: ()}}
@@ -132,26 +129,16 @@ def _tests_by_file(course: Course | None) -> dict[str, Mapping[str, _Lines]]:
     trials = {id(trial.block): name for name, (_, trial) in feature_trials(course).items()}
     for document in course.documents:
         tests: dict[str, _Lines] = {_PAGE: ()}
-        for name, lines in _named_parts(document, trials):
-            tests[name] = (*tests.get(name, ()), lines)
+        for block in document_blocks(document):
+            name: str | None = None
+            if isinstance(block, Script | Recording):
+                name = block.path if isinstance(block, Script) else block.script
+            elif isinstance(block, FeatureBlock):  # a lab or a quiz
+                name = trials.get(id(block)) or (block.progress_keys() or (None,))[0]
+            if name is not None:
+                tests[name] = (*tests.get(name, ()), (block.span.line, block.span.end_line))
         tests_by_path[document.source.path] = tests
     return tests_by_path
-
-
-def _named_parts(
-    document: Document, trials: Mapping[int, str]
-) -> Iterator[tuple[str, tuple[int, int]]]:
-    """The names and lines of scripts with their outputs, of quizzes, and of labs (`trials`)."""
-    from coursebuild.core.model import FeatureBlock, Recording, Script, document_blocks
-
-    for block in document_blocks(document):
-        name: str | None = None
-        if isinstance(block, Script | Recording):
-            name = block.path if isinstance(block, Script) else block.script
-        elif isinstance(block, FeatureBlock):
-            name = trials.get(id(block)) or (block.progress_keys() or (None,))[0]
-        if name is not None:
-            yield name, (block.span.line, block.span.end_line)
 
 
 class FileTests(pytest.File):

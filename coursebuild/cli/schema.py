@@ -15,9 +15,8 @@ examples:
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument(
-        "name", metavar="SCHEMA", help="lab, course, model, or a feature's schema, such as quiz"
-    )
+    help = "lab, course, model, or a feature's schema, such as quiz"
+    parser.add_argument("name", metavar="SCHEMA", help=help)
 
 
 def run(arguments: argparse.Namespace) -> int:

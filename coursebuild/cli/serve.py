@@ -30,7 +30,6 @@ from coursebuild.cli.output import CLEAN, say
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.preview.live_course import LiveCourse
 from coursebuild.preview.server import PreviewServer
-from coursebuild.report import Style
 
 EXAMPLES = """\
 examples:
@@ -44,13 +43,22 @@ _PORT = 8000
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+
+    def parse_port(text: str) -> int:
+        if text.isdecimal() and int(text) <= 65535:
+            return int(text)
+        message = f"{text!r} is not a port: a whole number from 0 to 65535"
+        raise argparse.ArgumentTypeError(message)
+
+    def parse_origin(text: str) -> str:
+        if re.fullmatch(r"[a-z][a-z0-9+.-]*:(//[\w.*\[\]:-]+)?", text):
+            return text
+        message = f"{text!r} is not an origin, such as https://example.org"
+        raise argparse.ArgumentTypeError(message)
+
     add_running(parser)
-    parser.add_argument(
-        "--port",
-        type=_parse_port,
-        default=_PORT,
-        help="port to listen on (default: %(default)s; 0: any free port)",
-    )
+    help = "port to listen on (default: %(default)s; 0: any free port)"
+    parser.add_argument("--port", type=parse_port, default=_PORT, help=help)
     parser.add_argument(
         "--host",
         default="127.0.0.1",
@@ -61,7 +69,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--embed",
         action="append",
-        type=_parse_origin,
+        type=parse_origin,
         default=[],
         metavar="ORIGIN",
         help="let pages of this origin show the preview in a frame, such as vscode-webview:",
@@ -69,10 +77,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Build, serve, rebuild and reload on change, until it is interrupted.
-
-    Where the course is served so already, only say where.
-    """
+    """Serve until it is interrupted; where the course is served so already, only say where."""
     options = options_of(arguments)
     served = ask_preview(str(options.root))
     if served is not None and arguments.host == served["host"] and not arguments.embed:
@@ -82,47 +87,15 @@ def run(arguments: argparse.Namespace) -> int:
             if arguments.open:
                 webbrowser.open(link)
             return CLEAN
-    serve(
-        options,
-        arguments.host,
-        arguments.port,
-        tuple(arguments.embed),
-        style_of(sys.stderr),
-        browse=arguments.open,
-        takes_commands=served is None,
-    )
+    _serve(options, arguments, takes_commands=served is None)
 
 
-def _parse_port(text: str) -> int:
-    if not text.isdecimal() or int(text) > 65535:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a port: a whole number from 0 to 65535")
-    return int(text)
-
-
-def _parse_origin(text: str) -> str:
-    if not re.fullmatch(r"[a-z][a-z0-9+.-]*:(//[\w.*\[\]:-]+)?", text):
-        raise argparse.ArgumentTypeError(f"{text!r} is not an origin, such as https://example.org")
-    return text
-
-
-def serve(
-    options: Options,
-    host: str,
-    port: int,
-    embed: tuple[str, ...],
-    style: Style,
-    *,
-    browse: bool,
-    takes_commands: bool,
-) -> NoReturn:
-    """Serve until interrupted.
-
-    `embed`: origins whose pages may show the preview in a frame. `style`: how mistakes are printed.
-    `browse`: open a browser. `takes_commands`: do what is given in other terminals.
-    """
-    live_course = LiveCourse(options, style)
+def _serve(options: Options, arguments: argparse.Namespace, *, takes_commands: bool) -> NoReturn:
+    """Serve until interrupted; `takes_commands`: do what is given in other terminals."""
+    host, port = arguments.host, arguments.port
+    live_course = LiveCourse(options, style_of(sys.stderr))
     try:
-        server = PreviewServer(host, port, live_course.session, embed)
+        server = PreviewServer(host, port, live_course.session, tuple(arguments.embed))
     except OSError as error:
         message = f"port {port} of {host} cannot be used: {error.strerror or error}"
         raise UsageError(message, help=_propose_port(host, port, error)) from None
@@ -143,10 +116,9 @@ def serve(
             print(f"     or {link}", file=sys.stderr, flush=True)
         if draw and "?" in links[-1]:
             segno.make(links[-1]).terminal(sys.stderr, compact=True)
-        if browse:  # in a thread, since some browsers only return when their window is open
-            threading.Thread(
-                target=webbrowser.open, args=(first,), name="open", daemon=True
-            ).start()
+        if arguments.open:  # in a thread, as some browsers only return when their window is open
+            browse = functools.partial(webbrowser.open, first)
+            threading.Thread(target=browse, name="open", daemon=True).start()
         live_course.rebuild()
     finally:
         if commands is not None:
@@ -156,7 +128,6 @@ def serve(
 
 
 def _propose_port(host: str, port: int, error: OSError) -> str:
-    """The command with the next port that is free, where the one that was asked for is taken."""
     for number in range(port + 1, min(port + 100, 65536)) if error.errno == EADDRINUSE else ():
         with contextlib.suppress(OSError), socket.create_server((host, number)):
             option = "" if host == "127.0.0.1" else f" --host {host}"

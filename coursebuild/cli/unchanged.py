@@ -1,9 +1,5 @@
 """Recognizes a command that has nothing to do, before its arguments are parsed.
 
-Entry points: `previous_output`, what such a command prints; `Watcher`, made before the work begins,
-whose `keep` records the state after it; `identify_command`; `split_directory`, which finds the
-course's folder among the arguments.
-
 1. A command is identified by its arguments as they were given, and by whatever else decides what it
    prints. Parsing arguments takes longer than looking at the files of a course; so a command that
    is spelled in another way counts as another command.
@@ -26,16 +22,8 @@ import time
 from collections.abc import Iterable, Iterator
 
 from coursebuild.cli.output import terminal_style
+from coursebuild.core.files import trust
 from coursebuild.core.files.course_root import DECISIVE, FOLDERS, find_course_root, is_dropping
-from coursebuild.core.files.trust import (
-    FOREIGN,
-    find_store,
-    make_store,
-    replace_file,
-    seal,
-    store_key,
-    unseal,
-)
 
 _NO_CACHE = "--no-cache"
 _ARGUMENT_VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_KEY", "COURSEBUILD_CACHE_SIZE")
@@ -111,16 +99,11 @@ class Watcher:
         self.before = self._look([])
 
     def keep(self, message: str, files: tuple[str, ...], outputs: tuple[str, ...]) -> bool:
-        """Record the state, if it is certainly the one that the command saw.
+        """Record the state, if it is certainly the one that the command saw; return whether it was.
 
-        Args:
-            message: what a later run with nothing to do prints instead of working.
-            files: further files that the command depends on, absolute or relative to the root;
-                they need not exist.
-            outputs: the folders and files that the command made, likewise.
-
-        Returns:
-            Whether the state was recorded.
+        `message` is what a later run with nothing to do prints instead of working. `files` are
+        further ones that the command depends on, `outputs` what it made, absolute or relative to
+        the root; they need not exist.
         """
         input_paths = sorted({os.path.join(self.root, path) for path in files})
         output_paths = sorted(os.path.join(self.root, path) for path in outputs)
@@ -135,14 +118,14 @@ class Watcher:
         body = "\n".join((_HEADER, state, *input_paths, *output_paths, "", message))
         data = body.encode("utf-8", "surrogateescape")
         name = _name(self.command)
-        store, reason = find_store(self.root)
-        if reason and reason != FOREIGN:  # it is worth a warning, in the next run too
+        store, reason = trust.find_store(self.root)
+        if reason and reason != trust.FOREIGN:  # it is worth a warning, in the next run too
             return False
         path = os.path.join(store, name)
         try:
-            make_store(store, self.root)
+            trust.make_store(store, self.root)
             os.makedirs(os.path.dirname(path), exist_ok=True)
-            replace_file(path, seal(name, data, store_key(self.root)))
+            trust.replace_file(path, trust.seal(name, data, trust.store_key(self.root)))
         except OSError:
             return False
         return True
@@ -159,11 +142,11 @@ def unchanged(root: str, command: tuple[str, ...]) -> str | None:
     """The message of the command's last run; `None` where anything has changed since."""
     try:
         name = _name(command)
-        store, reason = find_store(root)
-        if reason and reason != FOREIGN:
+        store, reason = trust.find_store(root)
+        if reason and reason != trust.FOREIGN:
             return None
         with open(os.path.join(store, name), "rb") as file:
-            body = unseal(name, file.read(), store_key(root)) or b""
+            body = trust.unseal(name, file.read(), trust.store_key(root)) or b""
         head, _, message = body.decode("utf-8", "surrogateescape").partition("\n\n")
         header, *lines = head.split("\n")
         if header != _HEADER:
@@ -195,7 +178,6 @@ def tool_state() -> str | None:
 
 
 def _tool() -> list[str]:
-    """The folders with installed packages, and those of the tool itself."""
     package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     source = os.path.dirname(package)
     tool = [*(folder for folder in sys.path if folder.endswith(_PACKAGES)), package]
@@ -234,18 +216,16 @@ def _rows(path: str, began: int | None) -> Iterator[tuple[object, ...]]:
     for folder in folders:
         yield folder, "folder"
         with os.scandir(folder) as entries:
-            contents = sorted(
-                (entry.name, entry) for entry in entries if not is_dropping(entry.name)
-            )
-        for name, entry in contents:
+            contents = [entry for entry in entries if not is_dropping(entry.name)]
+        for entry in sorted(contents, key=lambda entry: entry.name):
             if entry.is_dir(follow_symlinks=False):
                 folders.append(entry.path)
             elif not entry.is_symlink():
-                yield name, *_numbers(entry.stat(follow_symlinks=False), began)
+                yield entry.name, *_numbers(entry.stat(follow_symlinks=False), began)
             elif entry.is_dir():
                 raise _UnclearError
             else:
-                yield name, os.readlink(entry.path)
+                yield entry.name, os.readlink(entry.path)
                 yield from _rows(entry.path, began)
 
 
@@ -258,6 +238,5 @@ def _numbers(status: os.stat_result, began: int | None) -> tuple[int, ...]:
 
 
 def _name(command: tuple[str, ...]) -> str:
-    """The name of the record of a command in the store."""
     text = "\0".join(command).encode("utf-8", "surrogateescape")
     return f"unchanged/{hashlib.blake2b(text, digest_size=32).hexdigest()}"

@@ -4,14 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from coursebuild.cli.arguments import (
-    add_executors,
-    add_lessons,
-    add_long,
-    add_running,
-    options_of,
-    print_report,
-)
+from coursebuild.cli import arguments as shared
 from coursebuild.core.files.errors import UsageError
 from coursebuild.pipeline.outputs import update
 
@@ -24,19 +17,18 @@ examples:
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    add_running(parser)
-    add_executors(parser)
-    add_lessons(parser)
-    add_long(parser)
-    parser.add_argument(
-        "--dry-run", action="store_true", help="show what would change; write nothing"
-    )
+    shared.add_running(parser)
+    shared.add_executors(parser)
+    shared.add_lessons(parser)
+    shared.add_long(parser)
+    help = "show what would change; write nothing"
+    parser.add_argument("--dry-run", action="store_true", help=help)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Record what scripts print now."""
     if arguments.long and arguments.executor:  # what is recorded says which machine made it
         raise UsageError(f"--long cannot be combined with {arguments.executor[0].option}")
-    options = options_of(arguments)
+    options = shared.options_of(arguments)
     report = update(options, tuple(arguments.lessons), dry_run=arguments.dry_run)
-    return print_report(report, "text", options)
+    return shared.print_report(report, "text", options)

@@ -1,19 +1,9 @@
 """The interface of features: kinds of fences and pages, files of a site, exports, commands.
 
-Entry point: `Feature`, with `FenceKind`, `PageKind`, `ModelPart`, `PagePart`, `PageCopy`,
-`Trials`, `Exporter`, `Command` and `ExecutorKind`.
-
-A feature is a module with a `FEATURE`. It is found in `coursebuild.features`, under the entry
-points `coursebuild.features` of any installed package, or in a file that the course map names
-(`features = ["features/NAME.py"]`; see `registry.use_course_features`). All three work alike.
-docs/how-to/features.md says how to write one.
-
-What the core asks of a parsed block are methods of `FeatureBlock` (`core.model`), so that a parsed
-course can be used without loading its features. What pages and other features ask of it stands in
-its `FenceKind`.
-
-All that features are given is defined below this module: `Fence`, `Library`, `PageContext` and so
-on know no feature. What asks features, from parsing a fence to listing pages, is above `registry`.
+A feature is a module with a `FEATURE`, in `coursebuild.features`, under the entry points
+`coursebuild.features` of any installed package, or in a file that the course map names; see
+docs/how-to/features.md. What the core asks of a parsed block are methods of `FeatureBlock`
+(`core.model`), so that a parsed course can be used without loading its features.
 """
 
 from __future__ import annotations
@@ -112,13 +102,11 @@ class Picture(Struct, frozen=True):
     """A picture of a block that links to it."""
 
     path: str
-    """Its site path."""
     width: int
     """Pixels, as the height."""
     height: int
     title: str
     anchor: str
-    """The anchor of the block on its page."""
 
 
 class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
@@ -127,7 +115,6 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     name: str
     """The first word of its info string."""
     block: type[B]
-    """What `parse` makes."""
     parse: Callable[[Fence, TextParser], Parsed[B | None]]
     """The block and its diagnostics. Without a block the text is shown as code."""
     label: str = ""
@@ -139,7 +126,6 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """What the page shows with the block of the rest of the course; found in `page.inputs.blocks`
     under the block's offset. The page is drawn again when it changes."""
     draw: Callable[[PageContext, B], Markup]
-    """The block on a page."""
     markdown: Callable[[MarkdownWriter, B], str]
     """The block as Markdown that every reader understands: for copies, notebooks and e-books."""
     picture: Callable[[B, Struct | None], Picture | None] = lambda block, value: None
@@ -157,10 +143,7 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
 
 
 class PageKind(Struct, frozen=True, kw_only=True):
-    """A page that a feature adds to the site, at `NAME/index.html`.
-
-    The interface texts `NAME.title` and `NAME.description` are its title and description.
-    """
+    """A page of a feature at `NAME/index.html`, with texts `NAME.title` and `NAME.description`."""
 
     name: str
     values: Callable[[Library], Mapping[str, object]]
@@ -168,13 +151,11 @@ class PageKind(Struct, frozen=True, kw_only=True):
     draw: Callable[[Renderer, Mapping[str, Any]], Markup] | None = None
     """The content below the page's title. Without it, the template `NAME.html` is used."""
     exists: Callable[[Library], bool] = lambda library: True
-    """Whether a course has the page."""
     order: int = 100
     """Its place in the foot of every page, the lowest first."""
     indexed: bool = True
     """Whether it is found by searches, and has a copy in Markdown."""
     form: bool = False
-    """Whether it has a form that leads to a page of the site."""
 
     @property
     def path(self) -> str:
@@ -190,7 +171,6 @@ class ModelPart(Struct, frozen=True, kw_only=True):
     """Everything else that it shows of the course; the page is drawn again when this changes.
     `None` if it shows nothing of this model."""
     draw: Callable[[Renderer, Any], Markup]
-    """The HTML made from these values."""
     opens: bool = False
     """Whether it comes at the top of the page, and not below the facts."""
     picture: Callable[[Library, MjcfModel], Picture | None] = lambda library, model: None
@@ -203,7 +183,6 @@ class PageCopy(Struct, frozen=True, kw_only=True):
     ending: str
     """The ending that replaces `.html`, such as `.md`."""
     type: str
-    """Its media type."""
     text: str
     """Key of the interface text by which a lesson links to it."""
     lessons: bool = False
@@ -238,7 +217,6 @@ class Exporter(Struct, frozen=True, kw_only=True):
     summary: str
     """A few words on what it writes, for `coursebuild export --help`."""
     file: str
-    """The default name of the file."""
     mark: str
     """The sign of an earlier export, which may be replaced: a path in the archive, or a text near
     the beginning of a single file."""
@@ -284,7 +262,6 @@ class ExecutorKind(Struct, frozen=True, kw_only=True):
     """An option of `check`, `update`, `bench`, `stability` and `diet` that names an executor."""
 
     option: str
-    """Such as `--cluster`."""
     metavar: str
     """What stands for its value in the help."""
     help: str
@@ -301,7 +278,6 @@ class Trial(Struct, frozen=True):
     name: str
     """Unique in the course, as `4.2-lab-1`."""
     owner: str
-    """Id of its lesson or page."""
     block: FeatureBlock
 
 
@@ -309,10 +285,8 @@ class TrialContext(Struct, frozen=True):
     """The context of trials."""
 
     root: Path
-    """The course's folder."""
     course: Course
     models: Mapping[str, CompileResult]
-    """The compiled models of `models/`, by name."""
     run_store: RunStore
     """Notes of earlier trials; its `store` has their results, and takes new ones."""
     diagnostics: Sequence[Diagnostic] = ()
@@ -324,7 +298,6 @@ class TrialContext(Struct, frozen=True):
 
 
 TrialOutcome: TypeAlias = tuple[tuple[TrialResult, ...], tuple[Diagnostic, ...]]
-"""The results of trials, and their diagnostics."""
 
 
 class TrialRun(Protocol):
@@ -341,12 +314,10 @@ class Trials(Struct, frozen=True, kw_only=True):
     """The trials of a feature when a course is verified."""
 
     find: Callable[[Course], Iterable[Trial]]
-    """All trials of a course, in order."""
     start: Callable[[TrialContext], TrialRun]
     inputs: Callable[[Trial], Inputs | None]
     """What a result depends on besides files; `None` for a trial that is not run."""
     publish: Callable[[Results, Assets], PublishedTrials]
-    """The parts of the results that a site needs."""
 
 
 class Feature(Struct, frozen=True, kw_only=True):
@@ -376,7 +347,6 @@ class Feature(Struct, frozen=True, kw_only=True):
     check: Callable[[Course, Collection[Document]], Iterable[Diagnostic]] | None = None
     """The diagnostics about some documents of the course that parsing did not find."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None
-    """The diagnostics about finished runs of scripts."""
     unproven: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic | str]] | None = None
     """What nothing in the course proves, given the runs of its scripts, and summary lines, for
     `check --truth`."""
@@ -392,17 +362,13 @@ class Feature(Struct, frozen=True, kw_only=True):
     texts: Mapping[str, str] = {}
     """Interface texts by language, as TOML; English ones (`en`) stand in for missing ones."""
     style: str = ""
-    """CSS for every page of the site."""
     parts: tuple[PagePart, ...] = ()
     copies: tuple[PageCopy, ...] = ()
-    """The copies of pages among its `files`."""
     note: Callable[[PageInputs, PageContext | None, str], bytes] | None = None
     """What `files` must know of a page, made from its inputs, its document and its HTML; it is kept
     with the page. Empty if there is nothing."""
     files: Callable[[SiteContext], Iterable[SiteFile | FileList]] | None = None
-    """Further files of the site."""
     exporters: tuple[Exporter, ...] = ()
-    """Formats of `coursebuild export`."""
     commands: tuple[Command, ...] = ()
     """Further commands; only an installed feature can have some, not one of a course."""
     executors: tuple[ExecutorKind, ...] = ()

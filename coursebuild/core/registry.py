@@ -1,8 +1,4 @@
-"""The registry of features: loads them once, and collects what they offer.
-
-Entry points: `features()`; `fence_kind`, `kind_of_block`, `page_kinds` and `find_exporter`, which
-look up what features offer; `check_runs`, `feature_trials` and `publish_trials`, which call all.
-"""
+"""The registry of features: loads them once, and collects what they offer."""
 
 from __future__ import annotations
 
@@ -49,9 +45,7 @@ GROUP = "coursebuild.features"
 CORE_PAGES = ("home", "level", "lesson", "stub", "models", "model", "page", "notfound")
 """The kinds of pages that every site has."""
 _FOLDERS = ("assets", "examples", "files", "lessons", "levels", "models")
-"""Folders of every site."""
 CORE_FENCES = ("mjcf", "output", "python", "text")
-"""The kinds of fences that the core reads."""
 CORE_COMMANDS = {
     "build": "verify everything and publish the site",
     "check": "verify everything without publishing",
@@ -108,11 +102,7 @@ def features_digest() -> str:
 
 
 def feature_packages() -> tuple[frozenset[str], frozenset[str]]:
-    """What features need besides their code.
-
-    The names of the distributions that offer features, and the modules that the course's own ones
-    import.
-    """
+    """The distributions that offer features, and the modules that the course's own ones import."""
     names = frozenset(point.dist.name for point in _entry_points() if point.dist is not None)
     return names, _imports
 
@@ -284,11 +274,7 @@ def publish_trials(results: Results, assets: Assets) -> PublishedTrials:
 
 @functools.cache
 def installed_features() -> tuple[Feature, ...]:
-    """Load the features of coursebuild itself and of installed packages.
-
-    Raises:
-        RuntimeError: two of them cannot be used together, or one is broken.
-    """
+    """The features of coursebuild and of packages; RuntimeError for one that is broken."""
     package = importlib.import_module("coursebuild.features")
     # Not by `pkgutil`, which takes an unreadable folder for an empty one.
     folders = Path(package.__path__[0]).iterdir()
@@ -400,7 +386,6 @@ def _package_lines() -> tuple[str, ...]:
 
 
 def _names(features: Iterable[Feature], field: str) -> set[str]:
-    """The names of what features offer in one of their fields."""
     return {offer.name for feature in features for offer in getattr(feature, field)}
 
 

@@ -1,18 +1,13 @@
 """Values as bytes that hold data only: decoding them runs no code, whoever wrote them.
 
-Entry points: `encode` and `decode`; `fingerprint`, a hash that is the same for equal values.
-
-1. A value consists of texts, numbers, tuples, lists, sets, mappings, structs and members of enums.
-   In MessagePack each that is no scalar becomes a list: a number for its type, then its parts. The
-   names of structs, named tuples and enums stand before the value.
-2. Of the classes named there, only those of this package and of features are instantiated, and only
-   if each field is of its type.
-3. All places in a value are in one source. `encode` leaves it out, `decode` puts it in again.
+In MessagePack each value that is no scalar becomes a list: a number for its type, then its parts.
+The names of structs, named tuples and enums stand before the value. Of these, only classes of this
+package and of features are instantiated, and only if each field is of its type. All places in a
+value are in one source, which `encode` leaves out and `decode` puts in again.
 
 msgspec makes the bytes, and not the lists: it decodes a union of structs only where each class is
 known and tagged when the union is declared, and the classes of `FeatureBlock` are those of the
-features that a course happens to have. Little is left to gain: of a lesson of 15 kB, which takes 40
-ms to build, the summary takes 0.06 ms to encode, 0.10 to decode and 0.06 to fingerprint.
+features that a course happens to have.
 """
 
 from __future__ import annotations
@@ -75,11 +70,7 @@ DAMAGE = (
 
 
 def encode(value: object) -> bytes:
-    """A value as bytes, without the one source that all its places are in.
-
-    Raises:
-        TypeError: a part of it is of a type that cannot be encoded.
-    """
+    """A value as bytes, without its one source; a part of no such type raises TypeError."""
     return _to_bytes(value, {})
 
 
@@ -95,10 +86,7 @@ def decode(data: bytes | None, kind: type[Value], source: Source | None = None) 
 
 
 def fingerprint(value: object, substitutes: Mapping[type, Callable[[Any], object]] = {}) -> str:
-    """A hash of a value; the order of a mapping counts.
-
-    `substitutes` has a function for some types: what it returns is hashed in the place of a value.
-    """
+    """A hash of a value, in which `substitutes` for some types are hashed in its place."""
     return hashlib.sha256(_to_bytes(value, substitutes)).hexdigest()
 
 
@@ -144,7 +132,6 @@ class _Encoder:
 
 
 def _parts_of(kind: type) -> Callable[[Any], Iterable[Any]]:
-    """Return the function that takes a value of a class apart."""
     if issubclass(kind, Struct):
         names = kind.__struct_fields__
         if len(names) > 1:
@@ -158,7 +145,6 @@ def _parts_of(kind: type) -> Callable[[Any], Iterable[Any]]:
 
 
 def _make_builder(names: list[str], source: Source | None) -> Callable[[list[Any]], Any]:
-    """Return the function that builds a value of a packed list."""
 
     def span(start: Any, end: Any) -> Span:
         if type(start) is not int or type(end) is not int or source is None:
@@ -194,7 +180,6 @@ def _make_builder(names: list[str], source: Source | None) -> Callable[[list[Any
 
 
 def _find_class(name: str) -> type:
-    """The class of a name, `MODULE:CLASS`."""
     module, _, inner = name.partition(":")
     if module not in sys.modules and module.startswith(_VALUE_PACKAGES) and "__" not in module:
         importlib.import_module(module)

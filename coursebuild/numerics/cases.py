@@ -1,16 +1,12 @@
 """Measure a hard case: errors and orders, largest stable timesteps, known quantities.
 
-Entry points: `measure_case(problem, machine, clock)`; `measure(problem, integrator, timestep)`, one
-run of it; `floor(problem)`, how well its motion is known; `closed_motion(model, scene, …)`, a
-closed form as the motion of a model that begins like the hard case.
-
 A run is judged first: the error of a run that was lost is not given.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -20,6 +16,7 @@ from msgspec.structs import asdict, astuple
 
 from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import DeclaredScenario
+from coursebuild.numerics import simulation
 from coursebuild.numerics.costs import Clock, scenario_job, time_jobs
 from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.integrate import forward_motion
@@ -38,7 +35,6 @@ from coursebuild.numerics.problem import (
     Integrator,
     Motion,
     Problem,
-    ScalarCheck,
     Scenario,
     SecondReference,
     Sizes,
@@ -52,14 +48,6 @@ from coursebuild.numerics.reports.case_report import (
 )
 from coursebuild.numerics.reports.scene_report import Errors, FigureLine, OrderRow
 from coursebuild.numerics.scene import Scene, SceneError
-from coursebuild.numerics.simulation import (
-    EngineStates,
-    compile_model,
-    initial_data,
-    motion_of,
-    refsafe_active,
-    simulate,
-)
 from coursebuild.numerics.stability import boundaries
 from mjcourse.spatial import quat_conj, quat_mul
 
@@ -72,13 +60,9 @@ class DisagreementError(ArithmeticError):
 
 
 def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport:
-    """Measure everything on a problem.
-
-    Raises:
-        DisagreementError: its two references differ by more than they may.
-    """
-    first, second = problem.reference, _second_reference(problem)
-    model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
+    """Measure everything on a problem; a `DisagreementError` if its references differ too much."""
+    first, second = problem.reference, problem.second or _ENGINE
+    model = simulation.compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     drivers = problem.search and driving_force(model, problem.scenario)
     notes = (problem.note, f"energy is not judged: {drivers}" if drivers else "")
     reference = ReferenceLine(first.kind, first.source, second.source, *astuple(floor(problem)))
@@ -94,11 +78,7 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         note="; ".join(note for note in notes if note),
         reference=reference,
         boundaries=boundaries(problem),
-        figures=tuple(
-            _measure_figure(check, integrator)
-            for check in problem.checks
-            for integrator in check.integrators
-        ),
+        figures=tuple(_figures(problem)),
         orders=tuple(orders(problem, lines) for lines in runs.values() if lines),
         errors=tuple(line for lines in runs.values() for line in lines),
         costs=_costs(problem, runs, clock),
@@ -113,7 +93,7 @@ def _costs(
     for integrator, lines in runs.items():
         step = next((line.timestep for line in lines if line.status == "ok"), None)
         if step is not None:
-            model = compile_model(problem.mjcf, integrator, step)
+            model = simulation.compile_model(problem.mjcf, integrator, step)
             jobs.append(scenario_job(model, [problem.scenario], step))
             names.append(integrator.value)
             counts.append(round(problem.scenario.duration / step))
@@ -125,17 +105,13 @@ def _costs(
 
 
 def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorLine:
-    """Run a problem and compare it with its reference.
-
-    Raises:
-        ValueError: the timestep (s) does not divide the sampling interval.
-    """
-    model = compile_model(problem.mjcf, integrator, timestep)
-    run = simulate(problem, model)
+    """Run a problem with a timestep (s) that divides the sample; its errors and drifts."""
+    model = simulation.compile_model(problem.mjcf, integrator, timestep)
+    run = simulation.simulate(problem, model)
     run_errors = Errors(None, None, None)
     if run.judgement.ok:
         exact = reference_motion(problem.reference, tuple(run.states.times.tolist()))
-        run_errors = errors(motion_of(model, run.states), exact, floor(problem))
+        run_errors = errors(simulation.motion_of(model, run.states), exact, floor(problem))
     return ErrorLine(
         **asdict(run_errors),
         integrator=integrator.value,
@@ -145,7 +121,7 @@ def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorL
         energy_drift=energy_drift(run.energy) if problem.energy_conserved else None,
         momentum_drift=momentum_drift(run.momentum) if problem.momentum_conserved else None,
         penetration=run.penetration,
-        refsafe=refsafe_active(model),
+        refsafe=simulation.refsafe_active(model),
     )
 
 
@@ -158,6 +134,20 @@ def orders(problem: Problem, lines: Sequence[ErrorLine]) -> OrderRow:
     return fit_orders(integrator, runs, floor(problem))
 
 
+def _figures(problem: Problem) -> Iterator[FigureLine]:
+    for check in problem.checks:
+        for integrator in check.integrators:
+            figure, exact = check.measure(integrator), check.expected(integrator)
+            spread = None
+            if not isinstance(figure, float):
+                quantiles = np.quantile(figure, (0.1, 0.5, 0.9), method="nearest")
+                low, figure, high = quantiles.tolist()
+                spread = (low, high) if math.isfinite(high) else None
+            value = figure if math.isfinite(figure) else None
+            line = check.name, check.unit, integrator.value, value, exact, check.source, spread
+            yield FigureLine(*line)
+
+
 @lru_cache(maxsize=64)
 def floor(problem: Problem) -> Sizes:
     """How well the motion is known: the distance of its two references.
@@ -167,7 +157,7 @@ def floor(problem: Problem) -> Sizes:
     """
     times = problem.scenario.times
     exact = reference_motion(problem.reference, tuple(times.tolist()))
-    second = _second_reference(problem).motion(problem.mjcf, problem.scenario, times)
+    second = (problem.second or _ENGINE).motion(problem.mjcf, problem.scenario, times)
     gap = largest_errors(errors(second, exact))
     for part in ("position", "attitude", "velocity"):
         difference, most = getattr(gap, part), getattr(problem.precision, part)
@@ -177,37 +167,15 @@ def floor(problem: Problem) -> Sizes:
     return gap.at_least(ROUNDING)
 
 
-def _second_reference(problem: Problem) -> SecondReference:
-    return problem.second or _ENGINE
-
-
-def _measure_figure(check: ScalarCheck, integrator: Integrator) -> FigureLine:
-    figure, exact = check.measure(integrator), check.expected(integrator)
-    spread = None
-    if not isinstance(figure, float):
-        low, figure, high = np.quantile(figure, (0.1, 0.5, 0.9), method="nearest").tolist()
-        spread = (low, high) if math.isfinite(high) else None
-    return FigureLine(
-        check.name,
-        check.unit,
-        integrator.value,
-        figure if math.isfinite(figure) else None,
-        exact,
-        check.source,
-        spread,
-    )
-
-
 def closed_motion(
     model: Any, scene: Scene, declaration: DeclaredScenario, times: Array
 ) -> tuple[Problem, Motion]:
     """The hard case that a scenario names, and its motion from where the scene begins.
 
-    Raises:
-        SceneError: the scene begins otherwise than the hard case, but for the place of free bodies.
+    A `SceneError` where that differs from where the case begins, but for places of free bodies.
     """
     problem, place = all_problems()[declaration.closed_form], declaration.place("reference")
-    case_model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
+    case_model = simulation.compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     if (case_model.jnt_type.tolist(), case_model.nq) != (model.jnt_type.tolist(), model.nq):
         message = f"the model has different joints from the hard case `{declaration.closed_form}`"
         raise SceneError(message, place)
@@ -227,7 +195,8 @@ def closed_motion(
 
 
 def _start(model: Any, scenario: Scenario) -> Motion:
-    data = initial_data(scenario, model)
-    return motion_of(
-        model, EngineStates(np.zeros(1), data.qpos[None], data.qvel[None], data.act[None])
+    data = simulation.initial_data(scenario, model)
+    return simulation.motion_of(
+        model,
+        simulation.EngineStates(np.zeros(1), data.qpos[None], data.qvel[None], data.act[None]),
     )

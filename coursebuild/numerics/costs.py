@@ -1,25 +1,16 @@
 """What settings cost, which of them are worth it, and what that says of the scene's own.
 
-Entry points: `time_jobs(jobs, baseline, clock)`; `costs(model, scene, settings, …)`, of settings of
-a scene; `scenario_job(model, scenarios, timestep)`, a model's whole scenarios as a job;
-`mark_luck(rows, …)`, rows that know whether their errors are luck; `verdict(rows, …)`.
-
 1. A job is a scenario from its beginning to its end, so that each setting is timed on its own
    states; what takes little time is repeated.
 2. A round makes every job once, forwards and backwards in turn: what slows the machine for a while
    slows all.
 3. Of the times of each job the lowest tenth counts: it forgets those that were disturbed, and does
    not hang on a single lucky one. Intervals come from rounds drawn again at random (bootstrap).
-4. Rounds go on until all ratios are known well enough, or the time for them is over.
-5. A setting is dominated where another costs no more and errs no more, and is clearly better in one
-   of the two. Costs whose intervals meet do not differ, nor do those within 3 % or errors within
-   5 %.
-6. Only an error that falls as more work is done says what a setting does: one that is smaller than
+4. Only an error that falls as more work is done says what a setting does: one that is smaller than
    that of a shorter timestep, or of more iterations, is luck, and so is one beyond the largest
    stable timestep. An advantage has to hold from starts nearby too.
 
-The clock is an argument: processor time of the thread serves best, since it stands still while
-others run.
+The clock is best the processor time of the thread, which stands still while others run.
 """
 
 from __future__ import annotations
@@ -76,7 +67,7 @@ class Timing(Struct, frozen=True):
 
     @property
     def certain(self) -> bool:
-        """Whether the ratio differs from 1 by more than the measurement's uncertainty."""
+        """Whether the ratio differs from 1 by more than 3 % and the measurement's uncertainty."""
         differs = not self.ratio.low <= 1.0 <= self.ratio.high
         return differs and abs(self.ratio.value - 1.0) > 0.03
 
@@ -90,7 +81,12 @@ def time_jobs(
     gc_was_enabled = gc.isenabled()
     gc.disable()
     try:
-        repeats = [_count_repeats(job, clock) for job in jobs]
+        repeats = []
+        for job in jobs:  # how often it must be made to take long enough, which warms caches too
+            count = 1
+            while _time_job(job, count, clock) < _SHORTEST and count < 1 << 12:
+                count *= 2
+            repeats.append(count)
         for turn in range(MAX_ROUNDS):
             order = range(len(jobs))
             for index in order if turn % 2 else reversed(order):
@@ -105,14 +101,6 @@ def time_jobs(
         if gc_was_enabled:
             gc.enable()
     return timings
-
-
-def _count_repeats(job: Job, clock: Clock) -> int:
-    """How often a job must be repeated to take long enough; caches are warm afterwards."""
-    times = 1
-    while _time_job(job, times, clock) < _SHORTEST and times < 1 << 12:
-        times *= 2
-    return times
 
 
 def _time_job(job: Job, times: int, clock: Clock) -> int:
@@ -215,12 +203,7 @@ def mark_luck(
 ) -> tuple[WorkPrecisionRow, ...]:
     """Rows that say where their errors are luck.
 
-    They are where more work errs more, and beyond the largest stable timestep.
-
-    Args:
-        rows: of a scenario.
-        limits: the largest stable timesteps (s) under the scene's own solver, by integrator.
-        quantity: the error by which they are compared.
+    `limits`: the largest stable timesteps (s) under the scene's own solver, by integrator.
     """
     own_setting = next(row.setting for row in rows if row.own)
     marked_rows = []
@@ -231,22 +214,17 @@ def mark_luck(
         if place is not None and is_usual and setting.timestep > limit * (1 + 1e-9):
             luck = f"it is beyond its largest stable timestep, {seconds_text(limit, 3)}"
         for rival in rows:
-            work, error = _more_work(rival.setting, setting), quantity.value_of(rival)
+            dear, error, work = rival.setting, quantity.value_of(rival), ""
+            if dear == replace(setting, timestep=dear.timestep):
+                work = "shorter timesteps" if dear.timestep < setting.timestep else ""
+            elif dear == replace(setting, iterations=dear.iterations):
+                work = "more iterations" if dear.iterations > setting.iterations else ""
             if luck or not work or place is None or error is None:
                 continue
             if error > max(place * (1 + ERROR_SLACK), quantity.least):
                 luck = f"its error rises with {work}"
         marked_rows.append(replace(row, lucky=luck))
     return tuple(marked_rows)
-
-
-def _more_work(dear: MeasuredSetting, cheap: MeasuredSetting) -> str:
-    """What a setting takes more of than another, in words; empty unless it is that alone."""
-    if dear == replace(cheap, timestep=dear.timestep) and dear.timestep < cheap.timestep:
-        return "shorter timesteps"
-    if dear == replace(cheap, iterations=dear.iterations) and dear.iterations > cheap.iterations:
-        return "more iterations"
-    return ""
 
 
 def verdict(
@@ -258,32 +236,25 @@ def verdict(
 ) -> RowVerdict:
     """The verdict on the scene's own setting.
 
-    Args:
-        rows: of a scenario; they know their place.
-        noticeable: whether a learner sees the error of a row; `None` where that is not known.
-        quantity: the error by which settings are compared.
-        holds: whether the advantage of another setting holds from starts nearby too.
-        horizon_error: the error at which predictions of a chaotic scene end, in words.
+    `noticeable`: whether a learner sees the error of each row; `None` where that is not known.
+    `holds`: whether the advantage of another setting holds from starts nearby too.
     """
     own_index = next(number for number, row in enumerate(rows) if row.own)
     row, is_noticeable = rows[own_index], noticeable[own_index]
     if row.reasons:
         return _verdict_of_lost(rows, row, quantity)
     error = None if is_noticeable is None else row.seen
-    least_seen = quantity.least if quantity.name == SEEN.name else 0.0
-    own_place, remark = front_point(row, quantity), _describe_error(error, least_seen)
+    remark = "; whether its error can be seen is not known"
+    if error is not None:
+        least = quantity.least if quantity.name == SEEN.name else 0.0
+        remark = _describe_error(rows, noticeable, row, error, least)
+    own_place = front_point(row, quantity)
     if row.parted is not None:
         text = _verdict_of_chaos(rows, row, horizon_error)
         return RowVerdict(False, None, None, None, is_noticeable, text)
     if own_place is None:
         text = "nothing was timed, so no setting can be called better"
         return RowVerdict(False, None, None, None, is_noticeable, text + remark)
-    if error is not None and error >= 1:
-        remark += _cheapest_unseen(
-            rows,
-            own_place.cost.value,
-            hopeless=all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None),
-        )
     if row.dominated_by is None and row.lucky:
         text = f"nothing can be said of the scene's own setting: {row.lucky}"
         return RowVerdict(False, None, None, None, is_noticeable, text + remark)
@@ -317,7 +288,6 @@ def verdict(
 
 
 def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
-    """The verdict on a chaotic scene: how long each setting stays near the exact motion."""
     text = f"the motion is chaotic: it is {error} from the exact one at {row.parted:.3g} s"
     parted = [(r.parted, n) for n, r in enumerate(rows) if r.parted is not None]
     whole = [r for r in rows if r.status == "ok" and r.parted is None and r.seen is not None]
@@ -330,18 +300,7 @@ def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
     return text
 
 
-def _cheapest_unseen(rows: Rows, own_cost: float, *, hopeless: bool) -> str:
-    """The cheapest setting with an error that no learner notices, in words."""
-    unseen = [row for row in rows if row.seen is not None and row.seen < 1 and row.cost is not None]
-    if not unseen:
-        return ", and that of every other setting too" if hopeless else ""
-    cost, least = min((row.cost.value, n) for n, row in enumerate(unseen) if row.cost)
-    name, times = setting_text(unseen[least].setting), f"{cost / own_cost:.2g} times its cost"
-    return f"; the cheapest without one that is seen is {name}, at {times}"
-
-
 def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> RowVerdict:
-    """The verdict on a scene that does not run under its own setting: what does."""
     text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
     text += "; ".join(row.reasons)
     candidates = [(p, n) for n, r in enumerate(rows) if r.front and (p := front_point(r, quantity))]
@@ -368,10 +327,25 @@ def _describe_ratios(cost: float, error: float) -> str:
     return f"{cheap} and {exact}"
 
 
-def _describe_error(error: float | None, least: float) -> str:
-    if error is None:
-        return "; whether its error can be seen is not known"
-    if error >= 1:
-        return f"; its error can be seen: it is {error:.2g} times what an eye can tell"
-    size = f"{'less than ' if 0 < error <= least else ''}{error:.2g}"
-    return f"; its error cannot be seen: it is {size} of what an eye can tell"
+def _describe_error(
+    rows: Rows,
+    noticeable: Sequence[bool | None],
+    own_row: WorkPrecisionRow,
+    error: float,
+    least: float,
+) -> str:
+    """Whether the own error is seen, and where it is, the cheapest setting with one that is not."""
+    if error < 1:
+        size = f"{'less than ' if 0 < error <= least else ''}{error:.2g}"
+        return f"; its error cannot be seen: it is {size} of what an eye can tell"
+    text = f"; its error can be seen: it is {error:.2g} times what an eye can tell"
+    unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost is not None]
+    if own_row.cost is None:
+        return text
+    if unseen:
+        cost, first = min((r.cost.value, n) for n, r in enumerate(unseen) if r.cost)
+        name, times = setting_text(unseen[first].setting), f"{cost / own_row.cost.value:.2g}"
+        text += f"; the cheapest without one that is seen is {name}, at {times} times its cost"
+    elif all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None):
+        text += ", and that of every other setting too"
+    return text

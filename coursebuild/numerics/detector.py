@@ -1,8 +1,5 @@
 """Whether a simulation went well: divergence never passes as success.
 
-Entry points: `judge(model, data, elapsed, before, setup)`, `update_peaks`; `driving_force`, why
-energy may rise.
-
 1. MuJoCo resets a state that has become huge or no number, and carries on: a run that blew up can
    end in its initial state, with no error at all. Only the warning counters and the clock tell.
 2. A slow growth raises no warning for a long time: the state is compared with what can be.

@@ -1,11 +1,5 @@
 """References by integration: two methods that share nothing, and MuJoCo's accelerations under them.
 
-Entry points: `bulirsch_stoer(rate, start, times, tolerance)` and `dop853(rate, start, times)` of
-scipy, so that the two together say how well a motion is known; `cumulative_integral(function,
-times, width)`; `forward_motion(mjcf, scenario, times)`, for a smooth scene; `forward_states(model,
-setup, times, method)` for any model and method; `tends_to`, whether the engine in small steps does
-the same.
-
 *Bulirsch–Stoer*: Gragg's midpoint rule, extrapolated.
 
 1. A step of length H is made by the modified midpoint rule with 2, 4, …, 2k substeps; its error has
@@ -71,10 +65,8 @@ def bulirsch_stoer(
     """The states (n, d) at the times (n,), which rise; `start` (d,) is the state at time 0.
 
     `tolerance` bounds the estimated error of a step, relative to 1 + |y| in each component;
-    `columns` is half the order; `first` the first step tried, in seconds.
-
-    Raises:
-        NoConvergenceError: no step is small enough.
+    `columns` is half the order; `first` the first step tried, in seconds. A `NoConvergenceError`
+    where no step is small enough.
     """
     exact = start.dtype == object
     y, now, trial = start.copy(), Decimal(0) if exact else 0.0, first
@@ -134,11 +126,7 @@ def _midpoint(rate: Rate, y: State, slope: State, step: Any, n: int) -> State:
 
 
 def dop853(rate: Rate, start: Array, times: Array) -> Array:
-    """The states (n, d) at the rising times (n,) s; `start` (d,) is the state at time 0.
-
-    Raises:
-        NoConvergenceError: no step is small enough.
-    """
+    """The states (n, d) at the rising times (n,) s, as by `bulirsch_stoer`."""
     from scipy.integrate import DOP853  # which few commands need
 
     y, now, step = start, 0.0, math.inf
@@ -193,12 +181,7 @@ Method: TypeAlias = Callable[[Rate, State, Array], State]
 
 
 def forward_motion(mjcf: str, scenario: Scenario, times: Array) -> Motion:
-    """The motion of a smooth scene at the rising times (n,) s.
-
-    Raises:
-        ValueError: the MJCF is wrong.
-        NoConvergenceError: the scene is not smooth.
-    """
+    """The motion of a smooth scene at the rising times (n,) s."""
     model = compile_model(mjcf, Integrator.EULER, 1e-3)
     return motion_of(model, forward_states(model, scenario, times, dop853))
 
@@ -213,10 +196,7 @@ def forward_states(
 ) -> EngineStates:
     """The states of a smooth scene at the rising times (n,) s.
 
-    `evaluations`: the most accelerations to compute.
-
-    Raises:
-        NoConvergenceError: the scene is not smooth, or it takes more evaluations.
+    A `NoConvergenceError` where the scene is not smooth, or it takes more `evaluations`.
     """
     data = initial_data(scenario, model)
     state = np.concatenate([data.qpos, data.qvel, data.act])
@@ -276,18 +256,11 @@ _TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BA
 
 
 def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, parting: float) -> bool:
-    """Whether the engine comes nearer to these states, the smaller its steps are.
+    """Whether the engine comes nearer to these states, the smaller its steps are, from `step` (s).
 
-    Two integrations over the same accelerations agree also where these are not the engine's own, as
-    of an activation that only a step clamps.
-
-    Args:
-        model: `mjModel`; it is not changed.
-        setup: the scenario, as long as the states.
-        states: at its samples.
-        step: s; the longest to try.
-        parting: the difference at which motions are compared, where it grows beyond: later they
-            have nothing in common, however small the steps.
+    Two integrations over the same accelerations agree also where these are not the engine's own,
+    as of an activation that only a step clamps. Motions are compared at the difference `parting`,
+    where it grows beyond: later they have nothing in common, however small the steps.
     """
     before = _gaps(model, setup, states, step)
     if before.max() <= AGREEMENT:

@@ -1,8 +1,5 @@
 """The references that a scene's motion is measured against, and how well they are known.
 
-Entry points: `find_reference(model, pilot)`, the reference of a scene; `find_references(model,
-pilot)`, by cone where something touches; `find_conserved(…)`.
-
 1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; DOP853 does it
    again. Their difference bounds the error of the reference. Both take the same accelerations, so
    the engine in ever smaller steps must tend to the same motion.
@@ -32,15 +29,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.core.text.source import Span
+from coursebuild.numerics import integrate
 from coursebuild.numerics.cases import closed_motion, floor
-from coursebuild.numerics.integrate import (
-    Method,
-    NoConvergenceError,
-    bulirsch_stoer,
-    dop853,
-    forward_states,
-    tends_to,
-)
 from coursebuild.numerics.measure import (
     Sticks,
     energy_drift,
@@ -113,11 +103,7 @@ class KnownMotion(Struct, frozen=True):
 
 
 def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMotion:
-    """The reference of a scene.
-
-    Raises:
-        SceneError: the scenario names a closed form that is not this scene's.
-    """
+    """The reference of a scene; a `SceneError` where a closed form is not this scene's."""
     reference = _find_computed(model, pilot, quick=quick)
     declaration = pilot.scene.declaration
     if declaration.closed_form:
@@ -169,22 +155,18 @@ def find_nearby(
 
 
 def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
-    """The reference without closed forms: an integration, or the engine in small steps.
-
-    Raises:
-        SceneError: the scenario wants an integration, and there is none.
-    """
+    """The reference without closed forms: an integration, or the engine in small steps."""
     declaration = pilot.scene.declaration
     reference, note = None, ""
     if pilot.smooth and declaration.reference != "self":
         try:
             reference = _integrate(model, pilot, quick)
-        except NoConvergenceError as error:
+        except integrate.NoConvergenceError as error:
             note = f"no integration: {error}"
         if reference is not None:
             setup = _with_duration(pilot.setup, float(reference.states.times[-1]))
             states, step = reference.states, min(pilot.scene.timesteps)
-            if not tends_to(model, setup, states, step, PARTING_DISTANCE):
+            if not integrate.tends_to(model, setup, states, step, PARTING_DISTANCE):
                 reference, note = None, f"no integration: {_TENDS_ELSEWHERE}"
         if reference is None and note.endswith(_TENDS_ELSEWHERE) and declaration.reference == "ode":
             raise _no_integration(_TENDS_ELSEWHERE, declaration)
@@ -204,11 +186,7 @@ def _check_exact(
     *,
     quick: bool,
 ) -> Sizes:
-    """How well a course's exact motion, given with its name, is known where no integration says it.
-
-    Raises:
-        SceneError: it is not the motion of the scene.
-    """
+    """How well a course's exact motion, with its name, is known where no integration says it."""
     exact, name = named_exact
     subject, gap = f"{name} is not this scene's motion", _gap(model, states, second.states)
     precision = pilot.scene.declaration.precision or PRECISION
@@ -227,7 +205,14 @@ def _check_exact(
         return ROUNDING
     gaps = [gap.place]
     for times in _STIFFER:
-        stiff = self_reference(_stiffen(model, times), pilot, quick=quick)
+        stiffer = with_integrator(model, Integrator.EULER, float(model.opt.timestep))
+        for table_name in ("geom_solref", "pair_solref", "eq_solref", "jnt_solref", "dof_solref"):
+            table = getattr(stiffer, table_name)
+            is_time = table[:, 0] > 0
+            table[is_time, 0] /= times
+            table[~is_time] *= times**2, times
+        stiffer.opt.cone, stiffer.opt.impratio = CONES["elliptic"], model.opt.impratio * times**2
+        stiff = self_reference(stiffer, pilot, quick=quick)
         count = min(len(states.times), len(stiff.states.times))
         gaps.append(_gap(model, states.head(count), stiff.states.head(count)).place)
     if gaps[0] > max(precision, FLOORS * second.floor.place) and not (
@@ -242,18 +227,6 @@ def _check_exact(
     # What is left after the law of the last two: the formula is known no better.
     rest = max(0.0, gaps[2] - (gaps[1] - gaps[2]))
     return ROUNDING.at_least(Sizes(rest, rest, 0.0)).at_least(second.floor)
-
-
-def _stiffen(model: Any, times: float) -> Any:
-    """A copy of a model whose constraints are stiffer, with a cone and less creep."""
-    stiff = with_integrator(model, Integrator.EULER, float(model.opt.timestep))
-    for name in ("geom_solref", "pair_solref", "eq_solref", "jnt_solref", "dof_solref"):
-        table = getattr(stiff, name)
-        is_time = table[:, 0] > 0
-        table[is_time, 0] /= times
-        table[~is_time] *= times**2, times
-    stiff.opt.cone, stiff.opt.impratio = CONES["elliptic"], stiff.opt.impratio * times**2
-    return stiff
 
 
 def _exact_states(
@@ -280,7 +253,6 @@ def _no_integration(reason: str, declaration: DeclaredScenario) -> SceneError:
 
 
 def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
-    """Integrate the engine's accelerations by two methods."""
     times = pilot.setup.scenario.times
     times = times[times <= pilot.horizon * (1 + 1e-9)]
     variant = with_integrator(model, Integrator.EULER, _STEP)
@@ -290,12 +262,14 @@ def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
     variant.actuator_actearly[:] = 0  # it looks ahead by a timestep, which tends to nothing
     most = QUICK_EVALUATIONS if quick else EVALUATIONS
 
-    def run(method: Method) -> EngineStates:
-        return forward_states(variant, pilot.scene.scenario, times, method, evaluations=most)
+    def run(method: integrate.Method) -> EngineStates:
+        return integrate.forward_states(
+            variant, pilot.scene.scenario, times, method, evaluations=most
+        )
 
-    states = run(partial(bulirsch_stoer, tolerance=1e-13))
+    states = run(partial(integrate.bulirsch_stoer, tolerance=1e-13))
     source = "Bulirsch–Stoer over mj_forward"
-    second_states, second = run(dop853), "DOP853 over mj_forward"
+    second_states, second = run(integrate.dop853), "DOP853 over mj_forward"
     return _combine(model, "ode", source, states, second, second_states)
 
 
@@ -322,7 +296,6 @@ def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
 
 
 def _with_duration(setup: Setup, duration: float) -> Setup:
-    """The same with another duration (s), a multiple of the sample."""
     return replace(setup, scenario=replace(setup.scenario, duration=duration))
 
 
@@ -422,9 +395,8 @@ def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[st
 def find_conserved(model: Any, pilot: Pilot, reference: KnownMotion) -> tuple[float | None, bool]:
     """What the author says is conserved, or else what the reference conserves.
 
-    Returns:
-        The scale for changes of energy, J, or `None` where energy is not conserved; whether the
-        angular momentum about the centre of mass is.
+    The scale for changes of energy, J, or `None` where energy is not conserved; and whether the
+    angular momentum about the centre of mass is.
     """
     scenario = pilot.scene.scenario
     conserved = pilot.scene.declaration.conserved

@@ -1,8 +1,5 @@
 """Theory of stability: the one-step map, linearized at rest and along a periodic motion.
 
-Entry point: `find_theory(model, scenario, formula)`, a `Theory`; its parts are `find_rest` and
-`rest_limit`, `find_orbit` and `orbit_limit`.
-
 1. A step maps a state (`qpos`, `qvel`, `act`) to the next one. Its derivative is taken by central
    differences of fourth order, in the tangent space, so that quaternions and activations need no
    care of their own, and every integrator is treated alike.

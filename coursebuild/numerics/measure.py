@@ -1,10 +1,5 @@
 """The errors of a motion against its reference, the orders that they show, drifts, and contacts.
 
-Entry points: `errors`, `largest_errors`, `fit_orders`; `energy_drift`, `momentum_drift`,
-`mean_energy`; from the states of a scene `visible_error(model, scene, states, exact)`,
-`find_sticks` and `measure_slip`; `quantity_name`, `quantity_values`, of what a scenario declares to
-be measured.
-
 1. Errors of position, attitude and velocity stand apart, each at its largest and at the end: RK4 is
    of fourth order in velocity and of second in attitude.
 2. No error is given below ten times the floor, by which the reference itself may be off.
@@ -13,9 +8,8 @@ be measured.
    those errors lie on a line, in a logarithmic plot. Where slopes still tend somewhere, the
    interval holds that limit too.
 4. In the reference, two geoms stick to each other between two samples where a point in which they
-   touch hardly moves along the surface, at both of them. A body that rolls sticks too.
-5. In another run the speed of that point along the surface, added up over the same time, is creep:
-   by the solver, by soft contact, or by the timestep.
+   touch hardly moves along the surface, at both of them. A body that rolls sticks too. In another
+   run the speed of that point along the surface, added up over the same time, is creep.
 """
 
 from __future__ import annotations
@@ -30,14 +24,7 @@ import numpy as np
 
 from coursebuild.numerics.pilot import Pilot
 from coursebuild.numerics.problem import STANDARD, Array, Integrator, Motion, Reference, Sizes
-from coursebuild.numerics.reports.scene_report import (
-    FLOORS,
-    Errors,
-    FittedOrder,
-    MeasuredSetting,
-    OrderRow,
-    WorkPrecisionRow,
-)
+from coursebuild.numerics.reports import scene_report
 from coursebuild.numerics.scene import Scene
 from coursebuild.numerics.simulation import (
     EngineStates,
@@ -68,7 +55,7 @@ def reference_motion(reference: Reference, times: tuple[float, ...]) -> Motion:
     return reference.solution.motion(np.array(times))
 
 
-def errors(motion: Motion, exact: Motion, floor: Sizes = _ZERO_SIZES) -> Errors:
+def errors(motion: Motion, exact: Motion, floor: Sizes = _ZERO_SIZES) -> scene_report.Errors:
     """The errors of a motion against an exact one at the same times; none is below ten floors."""
     displacements, speed_differences = (
         motion.position - exact.position,
@@ -77,10 +64,10 @@ def errors(motion: Motion, exact: Motion, floor: Sizes = _ZERO_SIZES) -> Errors:
     angles = angular_distance(exact.attitude, motion.attitude)
 
     def pair(distances: Array, floor: float) -> tuple[float, float]:
-        least = FLOORS * floor
+        least = scene_report.FLOORS * floor
         return max(float(np.max(distances)), least), max(float(distances[-1]), least)
 
-    return Errors(
+    return scene_report.Errors(
         pair(np.linalg.norm(displacements, axis=1), floor.position) if displacements.size else None,
         pair(np.max(angles, axis=1), floor.attitude) if angles.size else None,
         pair(np.linalg.norm(speed_differences, axis=1), floor.velocity)
@@ -89,7 +76,7 @@ def errors(motion: Motion, exact: Motion, floor: Sizes = _ZERO_SIZES) -> Errors:
     )
 
 
-def largest_errors(motion_errors: Errors) -> Sizes:
+def largest_errors(motion_errors: scene_report.Errors) -> Sizes:
     """The largest error of each part; 0 for a part that is missing."""
     parts = (motion_errors.position, motion_errors.attitude, motion_errors.velocity)
     return Sizes(*(0.0 if part is None else part[0] for part in parts))
@@ -97,18 +84,12 @@ def largest_errors(motion_errors: Errors) -> Sizes:
 
 def fit_order(
     timesteps: Sequence[float], errors: Sequence[float], floor: float, extent: float = 1.0
-) -> FittedOrder | None:
-    """The order that errors at timesteps (s) show.
+) -> scene_report.FittedOrder | None:
+    """The order that errors at timesteps (s), in any order, show.
 
-    Args:
-        timesteps: in any order.
-        errors: one for each timestep.
-        floor: how far the reference may be off, in the unit of the errors.
-        extent: how much the motion changes, to know which errors are small.
-
-    Returns:
-        `None` where fewer than four errors are between a hundred floors and a tenth of 1 and of the
-        extent, or where they do not lie on a line: there is no order to be told then.
+    `floor` is how far the reference may be off, and `extent` how much the motion changes, in the
+    unit of the errors. `None` where fewer than four errors are between a hundred floors and a tenth
+    of 1 and of the extent, or where they do not lie on a line: there is no order to be told then.
     """
     from scipy.special import stdtrit
 
@@ -129,22 +110,19 @@ def fit_order(
     finest, finer, fine = slopes[:3].tolist()
     if (finer - finest) * (fine - finer) > 0:  # not noise: they tend to a slope beyond the finest
         uncertainty = max(uncertainty, abs(slope - finest) + _BEYOND * abs(finer - finest))
-    fit = FittedOrder(slope, uncertainty, float(np.ptp(slopes)))
+    fit = scene_report.FittedOrder(slope, uncertainty, float(np.ptp(slopes)))
     return fit if fit.uncertainty <= _UNCERTAIN and fit.bend <= _BENT else None
 
 
 def fit_orders(
     integrator: str,
-    runs: Sequence[tuple[float, Errors]],
+    runs: Sequence[tuple[float, scene_report.Errors]],
     floor: Sizes,
     extent: Sizes = _UNIT_SIZES,
-) -> OrderRow:
-    """Orders of an integrator, from its timesteps (s) and errors there; lost runs do not count.
+) -> scene_report.OrderRow:
+    """Orders of an integrator, from its timesteps (s) and errors there; lost runs do not count."""
 
-    `floor` and `extent` as for `fit_order`.
-    """
-
-    def fit(part: str) -> FittedOrder | None:
+    def fit(part: str) -> scene_report.FittedOrder | None:
         pairs = [
             (h, pair[0])
             for h, run_errors in runs
@@ -153,20 +131,17 @@ def fit_orders(
         steps, errors = [h for h, _ in pairs], [error for _, error in pairs]
         return fit_order(steps, errors, getattr(floor, part), getattr(extent, part))
 
-    return OrderRow(integrator, fit("position"), fit("attitude"), fit("velocity"))
+    return scene_report.OrderRow(integrator, fit("position"), fit("attitude"), fit("velocity"))
 
 
 def fit_scene_orders(
     model: Any,
-    rows: Iterable[WorkPrecisionRow],
-    baseline: MeasuredSetting,
+    rows: Iterable[scene_report.WorkPrecisionRow],
+    baseline: scene_report.MeasuredSetting,
     states: EngineStates,
     floor: Sizes,
-) -> tuple[OrderRow, ...]:
-    """The orders of all integrators in a scene, under the solver of its own setting.
-
-    `states` and `floor` are those of the reference.
-    """
+) -> tuple[scene_report.OrderRow, ...]:
+    """The orders of all integrators in a scene, under the solver of its own setting."""
     motion = motion_of(model, states)
     angles = angular_distance(motion.attitude[:1], motion.attitude)
     extent = Sizes(
@@ -174,7 +149,7 @@ def fit_scene_orders(
         float(angles.max(initial=0.0)),
         float(np.linalg.norm(np.ptp(motion.velocity, axis=0))),
     )
-    runs: dict[str, list[tuple[float, Errors]]] = {name.value: [] for name in STANDARD}
+    runs: dict[str, list[tuple[float, scene_report.Errors]]] = {name.value: [] for name in STANDARD}
     for row in rows:
         if row.setting.solver_settings == baseline.solver_settings:
             runs[row.setting.integrator].append((row.setting.timestep, row))
@@ -182,9 +157,9 @@ def fit_scene_orders(
 
 
 def energy_drift(energy: Array, scale: float | None = None) -> float | None:
-    """The largest change of potential and kinetic energy together, with its sign.
+    """The largest change of potential and kinetic energy (n, 2), J, together, with its sign.
 
-    `energy`: both (n, 2), J. Relative to `scale`, J; without one to `energy_scale`.
+    It is relative to `scale`, J, or else to `energy_scale`.
     """
     whole = energy.sum(axis=1)
     if scale is None:
@@ -326,10 +301,12 @@ def least_known(
     model: Any, scene: Scene, states: EngineStates, second_states: EngineStates
 ) -> tuple[float, float]:
     """Below which two references know nothing of what is seen, and of the declared quantity."""
-    least_seen = FLOORS * visible_error(model, scene, states, second_states)
+    least_seen = scene_report.FLOORS * visible_error(model, scene, states, second_states)
     if not quantity_name(model, scene):
         return least_seen, 0.0
-    return least_seen, FLOORS * float(quantity_errors(model, scene, states, second_states).max())
+    return least_seen, scene_report.FLOORS * float(
+        quantity_errors(model, scene, states, second_states).max()
+    )
 
 
 Pair: TypeAlias = tuple[int, int]

@@ -1,8 +1,5 @@
 """A first run of a scene in small steps: what acts in it, its bounds, and the settings to measure.
 
-Entry points: `run_pilot(model, scene)`; `settings(model, pilot)`, which are measured in a scene,
-`own_setting`, `apply`; `nudges`, of starts nearby.
-
 1. Every step is observed: a contact, a limit that is reached or dry friction makes accelerations
    jump, so that errors follow no power of the timestep and no smooth integration applies.
 2. Eight twins begin 1e-10 away, in four directions, to both sides. Where the first of them is off
@@ -26,18 +23,11 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.numerics import simulation
 from coursebuild.numerics.detector import Peaks, driving_force, update_peaks
-from coursebuild.numerics.problem import STANDARD, Array, Integrator, Scenario, Setup
+from coursebuild.numerics.problem import STANDARD, Array, Integrator, Setup
 from coursebuild.numerics.reports.scene_report import MeasuredSetting
 from coursebuild.numerics.scene import Scene, SceneError
-from coursebuild.numerics.simulation import (
-    advance,
-    initial_data,
-    integrator_of,
-    set_integrator,
-    with_integrator,
-    without_sleep,
-)
 
 NUDGE = 1e-10
 """How far a twin's beginning is off: rad, or relative to the model's extent; velocities per s."""
@@ -86,16 +76,20 @@ class Pilot(Struct, frozen=True):
 
 
 def run_pilot(model: Any, scene: Scene) -> Pilot:
-    """Run a scene at its shortest timestep under its own integrator.
-
-    Raises:
-        SceneError: it diverges even there.
-    """
+    """Run a scene at its shortest timestep; a `SceneError` says that it diverges even there."""
     step, scenario = min(scene.timesteps), scene.scenario
-    variant = without_sleep(with_integrator(model, integrator_of(model), step))
+    variant = simulation.without_sleep(
+        simulation.with_integrator(model, simulation.integrator_of(model), step)
+    )
     variant.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-    data, errors = initial_data(scenario, variant), horizon_errors(variant, scene)
-    twins, sizes = _twins(variant, scenario, errors)
+    data, errors = simulation.initial_data(scenario, variant), horizon_errors(variant, scene)
+    twins, nudge_sizes = [], []
+    for position, velocity in nudges(variant, 2 * _DIRECTIONS, NUDGE):
+        twin = simulation.initial_data(scenario, variant)
+        mujoco.mj_integratePos(variant, twin.qpos, position, 1.0)
+        twin.qvel[:] += velocity
+        twins.append(twin)
+        nudge_sizes.append(float(np.max(np.abs(position / errors), initial=0.0)))
     look = _Observer(variant)
     peaks = Peaks()
     times, steps_per_sample = scenario.times, scenario.steps(step)
@@ -104,7 +98,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
         for copy in (data, *twins) if command else ():
             copy.ctrl[:] = command
         for number in range(steps_per_sample):
-            advance(variant, data)
+            simulation.advance(variant, data)
             look(data)
             if number % _PEAK_INTERVAL == 0 or number == steps_per_sample - 1:
                 peaks = update_peaks(data, peaks)
@@ -112,12 +106,15 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
             raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
         for twin, gap in zip(twins, gaps, strict=True):
             if index == 0 or gap[index - 1] < 1:
-                advance(variant, twin, steps_per_sample)
+                simulation.advance(variant, twin, steps_per_sample)
                 gap[index] = position_distance(variant, data.qpos, twin.qpos, errors)
-    horizons, rates = zip(
-        *(_horizon(times, *twin) for twin in zip(gaps, sizes, strict=True)), strict=True
-    )
-    growth_rates = [rate for rate in rates if rate is not None]
+    horizons, growth_rates = [], []
+    for gap, size in zip(gaps, nudge_sizes, strict=True):
+        parted = np.flatnonzero(gap >= 1)
+        end = int(parted[0]) if parted.size else len(times)
+        horizons.append(float(times[max(0, end - 1)]))
+        if parted.size:
+            growth_rates.append(math.log(float(gap[end]) / size) / float(times[end]))
     return Pilot(
         scene=scene,
         setup=_bounds(variant, scene, peaks),
@@ -187,10 +184,15 @@ class _Observer:
     def __init__(self, model: Any) -> None:
         self.contact = self.limit = self.constrained = False
         self.friction = self.full = False
-        self._limited, self._range = _limited_activations(model)
+        clamped = [
+            (int(model.actuator_actadr[i]) + k, model.actuator_actrange[i])
+            for i in np.flatnonzero(model.actuator_actlimited)
+            for k in range(int(model.actuator_actnum[i]))
+        ]
+        self._limited = np.array([number for number, _ in clamped], dtype=np.intp)
+        self._range = np.array([limits for _, limits in clamped]).reshape(-1, 2)
 
     def __call__(self, data: Any) -> None:
-        """Note what acts in this state."""
         if data.nefc:
             self.constrained = True
             self.limit = self.limit or data.nl > 0
@@ -215,47 +217,12 @@ class _Observer:
         return tuple(words for is_present, words in causes if is_present)
 
 
-def _limited_activations(model: Any) -> tuple[Any, Array]:
-    """The numbers of activations that are clamped (n,), and their limits (n, 2)."""
-    activations = [
-        (int(model.actuator_actadr[i]) + k, model.actuator_actrange[i])
-        for i in np.flatnonzero(model.actuator_actlimited)
-        for k in range(int(model.actuator_actnum[i]))
-    ]
-    limits: Array = np.array([limits for _, limits in activations]).reshape(-1, 2)
-    return np.array([number for number, _ in activations], dtype=np.intp), limits
-
-
-def _twins(model: Any, scenario: Scenario, units: Array) -> tuple[list[Any], list[float]]:
-    """Copies of the beginning, nudged in positions and velocities, always in the same ways.
-
-    Also how far each is off, in `units`.
-    """
-    twins, distances = [], []
-    for position, velocity in nudges(model, 2 * _DIRECTIONS, NUDGE):
-        twin = initial_data(scenario, model)
-        mujoco.mj_integratePos(model, twin.qpos, position, 1.0)
-        twin.qvel[:] += velocity
-        twins.append(twin)
-        distances.append(float(np.max(np.abs(position / units), initial=0.0)))
-    return twins, distances
-
-
 def nudges(model: Any, count: int, size: float) -> Array:
     """Changes of positions and velocities, to both sides of random directions: (count, 2, nv)."""
     directions = np.random.default_rng(1).normal(size=(count // 2, 2, int(model.nv)))
     largest = np.abs(directions).max(axis=2, initial=mujoco.mjMINVAL)[:, :1, None]
     directions = directions / largest * size * scales(model)
     return np.concatenate([directions, -directions])
-
-
-def _horizon(times: Array, gaps: Array, nudge: float) -> tuple[float, float | None]:
-    parted = np.flatnonzero(gaps >= 1)
-    if not parted.size:
-        return float(times[-1]), None
-    end = int(parted[0])
-    growth = math.log(float(gaps[end]) / nudge) / float(times[end])
-    return float(times[max(0, end - 1)]), growth
 
 
 def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
@@ -312,7 +279,7 @@ _OF_CONTACTS = frozenset(("noslip_iterations", "impratio", "multiccd"))
 def own_setting(model: Any, pilot: Pilot) -> MeasuredSetting:
     """The setting that the model has."""
     return MeasuredSetting(
-        integrator=integrator_of(model).value,
+        integrator=simulation.integrator_of(model).value,
         timestep=pilot.scene.timestep,
         solver=_name(_SOLVERS, int(model.opt.solver)) if pilot.constrained else "",
         iterations=int(model.opt.iterations) if pilot.constrained else 0,
@@ -375,7 +342,7 @@ def apply(model: Any, setting: MeasuredSetting, own_model: Any) -> None:
     """Give a `mjModel` a setting; what is empty in it is as in `own_model`, the scene's."""
     for name in ("solver", "iterations", "cone", "disableflags", "enableflags", *_OPTIONS):
         setattr(model.opt, name, getattr(own_model.opt, name))
-    set_integrator(model, Integrator(setting.integrator), setting.timestep)
+    simulation.set_integrator(model, Integrator(setting.integrator), setting.timestep)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     if setting.solver:
         model.opt.solver = _SOLVERS[setting.solver]
@@ -394,6 +361,6 @@ def apply(model: Any, setting: MeasuredSetting, own_model: Any) -> None:
 
 def with_setting(model: Any, setting: MeasuredSetting) -> Any:
     """A copy of a `mjModel` with a setting, and automatic reset off."""
-    variant = with_integrator(model, Integrator(setting.integrator), setting.timestep)
+    variant = simulation.with_integrator(model, Integrator(setting.integrator), setting.timestep)
     apply(variant, setting, model)
     return variant

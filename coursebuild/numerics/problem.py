@@ -1,8 +1,5 @@
 """The definition of a hard case: a model, a scenario in it, and the exact motion.
 
-Entry points: `Problem`, `Scenario`, `Reference`, `SecondReference`, `Motion`, `ScalarCheck`,
-`Integrator`; `Setup`, what a run needs beside the model; `model_text`, its MJCF.
-
 A number that a motion depends on is written twice: in the MJCF and the scenario, and in the formula
 or the equations of the first reference. If only one of them is changed, the references disagree,
 which is an error.
@@ -72,17 +69,13 @@ class Scenario(Struct, frozen=True):
         return np.asarray(np.arange(1, count + 1) * (self.duration / count), dtype=np.float64)
 
     def steps(self, timestep: float) -> int:
-        """The number of timesteps (s) from one sample to the next.
-
-        Raises:
-            ValueError: no whole number.
-        """
+        """The number of timesteps (s) in a sample; a `ValueError` where it is no whole number."""
         return whole_number(self.sample, timestep, "the sampling interval", "the timestep")
 
     def holds(self, end: float | None = None) -> list[tuple[float, float, tuple[float, ...]]]:
-        """The intervals in which commands hold: begin and end (s), and the command.
+        """The intervals in which commands hold, to `end` (s) or the last: begin, end and command.
 
-        They follow each other to `end` (s), or for the duration. There is one without commands.
+        There is one without commands.
         """
         end = self.duration if end is None else end
         begins = [index * self.hold for index in range(max(1, len(self.controls)))]
@@ -100,11 +93,7 @@ class Scenario(Struct, frozen=True):
 
 
 def whole_number(length: float, part: float, length_name: str, part_name: str) -> int:
-    """How many times `part` goes into `length`.
-
-    Raises:
-        ValueError: not a whole number of times, so that an end would not be reached.
-    """
+    """How many times `part` goes into `length`; a `ValueError` if an end would not be reached."""
     if not is_multiple(length, part):
         message = f"{length_name} ({length:g} s) is not a multiple of {part_name} ({part:g} s)"
         raise ValueError(message)
@@ -268,10 +257,7 @@ NO_GRAVITY = 'gravity="0 0 0"'
 
 
 def model_text(world: str, option: str = "", inner: str = "", rest: str = "") -> str:
-    """MJCF of what is in the world, of attributes and elements of `option`, and of other sections.
-
-    It says neither timestep nor integrator.
-    """
+    """MJCF without timestep and integrator: what is in the world, of `option`, and the rest."""
     return (
         f"<mujoco>\n  <option {option}>{inner}</option>\n"
         f"  <worldbody>\n{world}\n  </worldbody>\n{rest}</mujoco>\n"

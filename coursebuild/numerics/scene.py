@@ -1,7 +1,5 @@
 """A model in one of its scenarios, with everything that its author left out filled in.
 
-Entry points: `scenes(model, declarations, quick)`, `Scene`.
-
 1. Without declarations each keyframe is a scenario; without a keyframe, the model's own state.
 2. Times are whole numbers of the model's own timestep: a sample is some of them, a hold and the
    duration are some samples.
@@ -94,10 +92,7 @@ class Scene(Struct, frozen=True):
 def scenes(model: Any, declarations: Declarations, *, quick: bool = False) -> tuple[Scene, ...]:
     """The scenarios of a model (`mjModel`); none of one in which nothing can move.
 
-    The declarations were checked: the model has what they name, and states have the right size.
-
-    Raises:
-        SceneError: one does not fit the model.
+    A `SceneError` where one does not fit, though the model has what the declarations name.
     """
     if not model.nv:
         if declarations.scenarios:
@@ -105,23 +100,18 @@ def scenes(model: Any, declarations: Declarations, *, quick: bool = False) -> tu
         return ()
     step = float(model.opt.timestep)
     steps = [step * 2.0**power for power in (QUICK_LADDER if quick else LADDER)]
-    declared_scenarios = declarations.scenarios or _keyframe_scenarios(
-        model, declarations.source.span(0, 0)
-    )
-    return tuple(
-        _scene(model, declaration, declarations.bench, steps) for declaration in declared_scenarios
-    )
-
-
-def _keyframe_scenarios(model: Any, place: Span) -> tuple[DeclaredScenario, ...]:
-    """The scenarios of a model that declares none."""
-    names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
-    if not model.nkey:
-        return (DeclaredScenario(names[0], "from the model's own state", span=place),)
-    return tuple(
-        DeclaredScenario(name, f"from the keyframe {name}", key, span=place)
-        for key, name in enumerate(names)
-    )
+    scenarios = declarations.scenarios
+    if not scenarios:
+        place = declarations.source.span(0, 0)
+        names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
+        titles = [f"from the keyframe {name}" for name in names]
+        scenarios = tuple(
+            DeclaredScenario(name, title, key, span=place)
+            for key, (name, title) in enumerate(zip(names, titles, strict=True))
+        )
+        if not model.nkey:
+            scenarios = (DeclaredScenario(names[0], "from the model's own state", span=place),)
+    return tuple(_scene(model, scenario, declarations.bench, steps) for scenario in scenarios)
 
 
 def thickness(model: Any) -> Array:
@@ -158,7 +148,11 @@ def _scene(
             )
             help = "give `sample` a value that all timesteps divide"
             raise SceneError(message, declaration.place("timesteps"), help)
-    ladder = _ladder(scenario, step, declaration.timesteps or steps)
+    by_count = {round(scenario.sample / step): step}
+    for timestep in declaration.timesteps or steps:
+        count = max(1, round(scenario.sample / timestep))
+        by_count.setdefault(count, _decimal(scenario.sample / count))
+    ladder = tuple(by_count[count] for count in sorted(by_count, reverse=True))
     if scenario.duration > LONGEST * ladder[0]:
         message = f"{scenario.duration:g} s in steps of {ladder[0]:g} s are over {LONGEST:,} steps"
         place = declaration.place("duration" if declaration.duration is not None else "timesteps")
@@ -168,11 +162,6 @@ def _scene(
 
 
 def _scenario_times(step: float, declaration: DeclaredScenario) -> Scenario:
-    """The times of a scenario, as whole numbers of the model's timestep.
-
-    Raises:
-        SceneError: what is given is no whole number of timesteps.
-    """
     duration, sample, hold = declaration.duration, declaration.sample, declaration.hold
     lengths = (("duration", duration), ("sample", sample), ("hold", hold))
     whole: dict[str, int] = {}
@@ -210,10 +199,7 @@ def _decimal(seconds: float) -> float:
 
 
 def _sample_steps(basis: int, total: int) -> int:
-    """The steps of a sample: a divisor of `basis`, near the usual number of looks.
-
-    Timesteps a few times as long should divide it too.
-    """
+    """A divisor of `basis` near the usual number of looks, which longer timesteps divide too."""
     small = [n for n in range(1, math.isqrt(basis) + 1) if basis % n == 0]
     divisors = {*small, *(basis // n for n in small)}
 
@@ -223,12 +209,3 @@ def _sample_steps(basis: int, total: int) -> int:
         return (deviation if deviation > 0 else -deviation / 2) + 0.7 * odd_factors
 
     return min(sorted(divisors), key=badness)
-
-
-def _ladder(scenario: Scenario, timestep: float, steps: Sequence[float]) -> tuple[float, ...]:
-    """The model's own timestep, and those nearest to `steps` (s) that divide the sample, rising."""
-    ladder = {round(scenario.sample / timestep): timestep}
-    for step in steps:
-        count = max(1, round(scenario.sample / step))
-        ladder.setdefault(count, _decimal(scenario.sample / count))
-    return tuple(ladder[count] for count in sorted(ladder, reverse=True))

@@ -1,13 +1,9 @@
 """Run MuJoCo for measuring: one integrator, one timestep, states sampled on a fixed grid of times.
 
-Entry points: `compile_model`, `with_integrator`, `without_sleep`, `initial_data`, `simulate`,
-`advance`, `advance_watching`, `motion_of`, `refsafe_active`.
-
 1. MuJoCo's automatic reset is off, so that a state that blew up stays visible.
 2. Energy and momentum belong to the sampled state: `mjData.energy` after `mj_step` is that of the
    state before the step, so it is computed again, on other data.
-3. Steps between two samples are made in one call.
-4. MuJoCo writes a warning to standard error and into a file in the working directory; here it is
+3. MuJoCo writes a warning to standard error and into a file in the working directory; here it is
    counted, and becomes part of the judgement.
 """
 
@@ -46,11 +42,7 @@ def _original(mjcf: str) -> Any:
 
 
 def compile_model(mjcf: str, integrator: Integrator, timestep: float) -> Any:
-    """A `mjModel` of its own with this integrator and timestep (s), and automatic reset off.
-
-    Raises:
-        ValueError: the MJCF is wrong.
-    """
+    """A `mjModel` of its own with this integrator and timestep (s), and automatic reset off."""
     return with_integrator(_original(mjcf), integrator, timestep)
 
 
@@ -221,11 +213,7 @@ class Run(Struct, frozen=True):
 
 
 def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
-    """Run a scenario with a model under its own options; `thickness` as for `update_peaks`.
-
-    Raises:
-        ValueError: its timestep does not divide the sampling interval.
-    """
+    """Run a scenario with a model under its own options; `thickness` as for `update_peaks`."""
     scenario, step = setup.scenario, float(model.opt.timestep)
     steps_per_sample, times = scenario.steps(step), scenario.times
     data, scratch = initial_data(scenario, model), initial_data(scenario, model)
@@ -285,10 +273,7 @@ def invariants(model: Any, scratch: Any, qpos: Array, qvel: Array) -> Array:
 
 
 def refsafe_active(model: Any) -> bool:
-    """Whether MuJoCo may soften a constraint because the timestep is long for its time constant.
-
-    See `refsafe_from`.
-    """
+    """Whether MuJoCo may soften a constraint because the timestep is long: see `refsafe_from`."""
     return float(model.opt.timestep) * (1 - 1e-12) > refsafe_from(model)
 
 

@@ -1,8 +1,5 @@
 """A laboratory of stability: largest stable timesteps by integrator, and what speaks against them.
 
-Entry points: `boundaries(problem)`, of a hard case; `stable_rows(model, pilot)`, of a scene;
-`with_energy_bound(problem)`.
-
 1. Stable is what stays within what can be over a simulated time that is the same for all timesteps,
    by the judgement that every run gets: finite, within bounds, and where nothing drives the motion,
    without much more energy than it has in small steps. What shoots up in the first steps and then

@@ -1,8 +1,5 @@
 """A model with its parameters at other values: its contacts, solver and cost.
 
-Entry points: `measure_sweep(spec, scene, sweep, …)`; `measure_expected(model, scene, baseline)`,
-what contacts and sensors do under each integrator, beside what theory knows of it.
-
 1. A parameter is a field of the model's elements as `mujoco.MjSpec` names it, so that all that
    follows from it is compiled anew. One is changed at a time.
 2. Every step of a run is looked at: a hit is over before the next sample.
@@ -78,10 +75,7 @@ def measure_sweep(
     """Measure a model (`MjSpec`) with its parameters at other values.
 
     `clocks`: processor time of the thread and wall time, in ns; `None`: nothing is timed. `piece`:
-    which of the values, over all parameters.
-
-    Raises:
-        SceneError: a parameter or a value is none of the model.
+    which of the values, over all parameters. A `SceneError` where a value is none of the model.
     """
     base = _runnable(spec.compile())
     threads = [part for part in sweep.variations if part.parameter == THREADS]
@@ -93,9 +87,15 @@ def measure_sweep(
     states = base_run.states if base_run.judgement.ok else None
     rows = [_measure_variant(scene, base, states, row, model) for row, model in variants]
     if clocks is not None:
-        models = [base, *(model for _, model in variants)]
         with silent():
-            rows = _with_costs(scene.scenario, models, rows, clocks[0], quick=quick)
+            usable = [n for n, row in enumerate(rows) if row.status == "ok"]
+            jobs = [
+                scenario_job(model, [scene.scenario], float(model.opt.timestep))
+                for model in (base, *(variants[n][1] for n in usable))
+            ]
+            timings = time_jobs(jobs, 0, clocks[0], quick=quick)
+            for n, timing in zip(usable, timings[1:], strict=True):
+                rows[n] = replace(rows[n], cost=timing.ratio)
             for part in threads:
                 rows += _rollouts(scene.scenario, base, part, clocks[1], quick=quick)
     return SweepReport(sweep.name, sweep.title or sweep.name, scene.name, sweep.show, tuple(rows))
@@ -172,10 +172,7 @@ def _runnable(model: Any) -> Any:
 def _measure_variant(
     scene: Scene, base: Any, base_states: EngineStates | None, row: SweepRow, model: Any
 ) -> SweepRow:
-    """Run a model and fill its row.
-
-    `base_states`: the motion of the model as it is; `None` where that run was lost.
-    """
+    """Run a model and fill its row; `base_states` is `None` where the model as it is was lost."""
     try:
         run = simulate(Setup(scenario=scene.scenario), model, thickness(model))
     except mujoco.FatalError as error:
@@ -265,22 +262,9 @@ def _follow_hits(
     return current
 
 
-def _with_costs(
-    scenario: Scenario, models: list[Any], rows: list[SweepRow], clock: Clock, *, quick: bool
-) -> list[SweepRow]:
-    """Add costs; the first model is as it is, the others are those of the rows."""
-    usable = [n for n, row in enumerate(rows) if row.status == "ok"]
-    timed_models = [models[n] for n in (0, *(n + 1 for n in usable))]
-    jobs = [scenario_job(model, [scenario], float(model.opt.timestep)) for model in timed_models]
-    for n, timing in zip(usable, time_jobs(jobs, 0, clock, quick=quick)[1:], strict=True):
-        rows[n] = replace(rows[n], cost=timing.ratio)
-    return rows
-
-
 def _rollouts(
     scenario: Scenario, model: Any, part: Variation, clock: Clock, *, quick: bool
 ) -> Iterator[SweepRow]:
-    """Measure the simulated time per second for numbers of threads."""
     counts = [int(value) for value in part.values if not isinstance(value, str | tuple)]
     batch, step = _COPIES * max(counts, default=1), float(model.opt.timestep)
     steps = min(_MOST_STEPS, scenario.steps(step) * len(scenario.times))

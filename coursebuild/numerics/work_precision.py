@@ -1,16 +1,9 @@
 """Speed against error of a model in its scenarios.
 
-Entry point: `measure_scenario(model, scene, quick=…, clock=…, tell=…)`.
-
-1. A first run in small steps shows what acts in a scenario and how long its motion can be
-   predicted (`pilot`).
-2. The reference is computed twice, in two ways (`known_motion`).
-3. Every setting is run, judged and compared, then timed beside the model's own (`costs`). The
-   error of a lost run is not given; no other is below ten floors of the reference. Errors count to
-   the horizon, and what should be conserved is watched to the end. Errors are also given as a
-   learner sees them: how far bodies are displaced or turned in a picture, where 1 is just visible.
-4. Orders are fitted, stability limits looked for, the front drawn. What a verdict says has to hold
-   from starts nearby.
+Every setting is run, judged and compared, then timed beside the model's own. The error of a lost
+run is not given; no other is below ten floors of the reference. Errors count to the horizon, and
+what should be conserved is watched to the end. Errors are also given as a learner sees them: how
+far bodies are displaced or turned in a picture, where 1 is just visible.
 """
 
 from __future__ import annotations
@@ -25,28 +18,9 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
+from coursebuild.numerics import known_motion, measure, simulation
 from coursebuild.numerics.costs import Clock, costs, mark_luck, verdict
 from coursebuild.numerics.detector import driving_force
-from coursebuild.numerics.known_motion import (
-    Cone,
-    KnownMotion,
-    find_conserved,
-    find_nearby,
-    find_references,
-)
-from coursebuild.numerics.measure import (
-    energy_drift,
-    errors,
-    fit_scene_orders,
-    least_known,
-    mean_energy,
-    mean_late_energy,
-    measure_slip,
-    momentum_drift,
-    quantity_errors,
-    quantity_name,
-    visible_error,
-)
 from coursebuild.numerics.pilot import (
     Pilot,
     horizon_error,
@@ -58,13 +32,7 @@ from coursebuild.numerics.pilot import (
     settings,
     with_setting,
 )
-from coursebuild.numerics.reports.scene_report import (
-    MeasuredSetting,
-    ScenarioReport,
-    StableRow,
-    WorkPrecisionRow,
-    step_evaluations,
-)
+from coursebuild.numerics.reports import scene_report
 from coursebuild.numerics.reports.shown_errors import (
     FrontPoint,
     Quantity,
@@ -76,16 +44,6 @@ from coursebuild.numerics.reports.shown_errors import (
     solving_parts,
 )
 from coursebuild.numerics.scene import Scene, thickness
-from coursebuild.numerics.simulation import (
-    EngineStates,
-    Run,
-    count_iterations,
-    initial_data,
-    motion_of,
-    refsafe_active,
-    refsafe_from,
-    simulate,
-)
 from coursebuild.numerics.stability import run_trial, stable_rows
 from coursebuild.numerics.sweep import measure_expected
 
@@ -95,9 +53,9 @@ class Basis(Struct, frozen=True, eq=False):
 
     model: Any
     pilot: Pilot
-    baseline: MeasuredSetting
+    baseline: scene_report.MeasuredSetting
     """The scene's own setting."""
-    cones: Mapping[str, Cone]
+    cones: Mapping[str, known_motion.Cone]
     energy: float | None
     """The scale for changes of energy, J; `None` where energy is not conserved."""
     momentum_conserved: bool
@@ -109,7 +67,7 @@ class Basis(Struct, frozen=True, eq=False):
     """The same of the declared quantity."""
 
     @property
-    def reference(self) -> KnownMotion:
+    def reference(self) -> known_motion.KnownMotion:
         """The reference of the scene's own setting."""
         return self.cones[self.baseline.cone].reference
 
@@ -121,30 +79,24 @@ def measure_scenario(
     quick: bool = False,
     clock: Clock | None,
     tell: Callable[[str], None] = lambda _: None,
-) -> ScenarioReport:
+) -> scene_report.ScenarioReport:
     """Measure a model (`mjModel`) in one of its scenarios.
 
-    Args:
-        model: compiled; it is not changed.
-        scene: the scenario.
-        quick: fewer timesteps, fewer repeats.
-        clock: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
-        tell: gets a line about each stage.
-
-    Raises:
-        SceneError: the scenario does not fit the model, or diverges at every timestep.
+    `clock`: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
+    `tell` gets a line about each stage. A `SceneError` where the scenario does not fit the model,
+    or diverges at every timestep.
     """
     tell(f"{scene.name}: a first run")
     pilot = run_pilot(model, scene)
     tell(f"{scene.name}: the reference")
-    cones = find_references(model, pilot, quick=quick)
+    cones = known_motion.find_references(model, pilot, quick=quick)
     baseline = own_setting(model, pilot)
     reference = cones[baseline.cone].reference
-    conserved = find_conserved(model, pilot, reference)
-    late_energy = mean_late_energy(model, pilot, reference.horizon)
+    conserved = known_motion.find_conserved(model, pilot, reference)
+    late_energy = measure.mean_late_energy(model, pilot, reference.horizon)
     leasts = zip(
         *(
-            least_known(model, scene, cone.reference.states, cone.reference.second_states)
+            measure.least_known(model, scene, cone.reference.states, cone.reference.second_states)
             for cone in cones.values()
         ),
         strict=True,
@@ -160,13 +112,13 @@ def measure_scenario(
     tell(f"{scene.name}: stable timesteps")
     largest = stable_rows(model, pilot, quick=quick)
     limits = {row.integrator: row.largest for row in largest if row.largest is not None}
-    figure = Quantity("figure", quantity_name(model, scene), basis.least_figure)
+    figure = Quantity("figure", measure.quantity_name(model, scene), basis.least_figure)
     quantity = compared_quantity(measured_rows, figure, basis.least_seen)
     rows = front(mark_luck(measured_rows, limits, quantity), quantity)
     holds = partial(_holds, basis, rows, quantity, quick)
     error = horizon_error(model, scene)
     judgement = verdict(rows, noticeable, quantity, holds, horizon_error_text(error))
-    return ScenarioReport(
+    return scene_report.ScenarioReport(
         name=scene.name,
         title=scene.title,
         duration=scene.scenario.duration,
@@ -182,9 +134,9 @@ def measure_scenario(
         horizons=None if pilot.lyapunov is None else pilot.horizons,
         smooth=pilot.smooth,
         notes=_notes(basis, largest, rows, cost_of, quantity),
-        figure=quantity_name(model, scene),
+        figure=measure.quantity_name(model, scene),
         rows=rows,
-        orders=fit_scene_orders(model, rows, baseline, reference.states, reference.floor)
+        orders=measure.fit_scene_orders(model, rows, baseline, reference.states, reference.floor)
         if pilot.smooth
         else (),
         figures=tuple(measure_expected(model, scene, baseline)),
@@ -198,14 +150,14 @@ def measure_scenario(
 
 
 def _measure_settings(
-    basis: Basis, choices: Sequence[MeasuredSetting], tell: Callable[[str], None]
-) -> list[tuple[WorkPrecisionRow, bool | None]]:
-    """The rows of settings in their order, and what is noticed of each.
+    basis: Basis, choices: Sequence[scene_report.MeasuredSetting], tell: Callable[[str], None]
+) -> list[tuple[scene_report.WorkPrecisionRow, bool | None]]:
+    """The rows of settings, and what is noticed of each.
 
     What changes no bit at the own timestep is not crossed with others.
     """
     baseline, rows_by_setting, idle_solving = basis.baseline, {}, set()
-    base_states: EngineStates | None = None
+    base_states: simulation.EngineStates | None = None
     # Other solvers come last, and of them those at the own timestep first.
     for setting in sorted(
         choices,
@@ -232,17 +184,17 @@ def _measure_settings(
 
 def _holds(
     basis: Basis,
-    rows: Sequence[WorkPrecisionRow],
+    rows: Sequence[scene_report.WorkPrecisionRow],
     quantity: Quantity,
     quick: bool,
-    better: MeasuredSetting,
+    better: scene_report.MeasuredSetting,
 ) -> bool:
     """Whether another setting is better than the scene's own from starts nearby too."""
     model, pilot = basis.model, basis.pilot
     scene, scenario = pilot.scene, pilot.scene.scenario
     places = [next(row for row in rows if row.setting == s) for s in (better, basis.baseline)]
     for position, velocity in nudges(model, 2 * (_QUICK_STARTS if quick else _STARTS), _NEARBY):
-        data = initial_data(scenario, model)
+        data = simulation.initial_data(scenario, model)
         mujoco.mj_integratePos(model, data.qpos, position, 1.0)
         start = {"qpos": tuple(data.qpos), "qvel": tuple(data.qvel + velocity)}
         nudged_scenario = replace(scenario, **start)
@@ -252,18 +204,18 @@ def _holds(
         for row in places:
             base = with_setting(model, replace(basis.baseline, cone=row.setting.cone))
             reference = basis.cones[row.setting.cone].reference
-            exact = find_nearby(base, near, reference, quick=quick)
+            exact = known_motion.find_nearby(base, near, reference, quick=quick)
             if exact is None:
                 return True
-            run = simulate(setup, with_setting(model, row.setting), thickness(model))
+            run = simulation.simulate(setup, with_setting(model, row.setting), thickness(model))
             if not run.judgement.ok or row.cost is None:
                 return False
             states = run.states.head(len(exact.times))
             if quantity.name == "figure":
-                error = float(quantity_errors(model, near.scene, states, exact).max())
+                error = float(measure.quantity_errors(model, near.scene, states, exact).max())
                 error = max(error, quantity.least)
             else:
-                error = max(visible_error(model, scene, states, exact), quantity.least)
+                error = max(measure.visible_error(model, scene, states, exact), quantity.least)
                 error += basis.cones[row.setting.cone].visible_model_error
             points.append(FrontPoint(row.cost, error))
         if not points[0].beats(points[1]):
@@ -279,18 +231,17 @@ _STARTS, _QUICK_STARTS = 2, 1
 
 def _notes(
     basis: Basis,
-    largest: Sequence[StableRow],
-    rows: Sequence[WorkPrecisionRow],
-    cost_of: MeasuredSetting | None,
+    largest: Sequence[scene_report.StableRow],
+    rows: Sequence[scene_report.WorkPrecisionRow],
+    cost_of: scene_report.MeasuredSetting | None,
     compared_quantity: Quantity,
 ) -> tuple[str, ...]:
-    """Remarks for reading the figures."""
     model, pilot, reference = basis.model, basis.pilot, basis.reference
     notes = [reference.note]
     if cost_of is not None:
         text = setting_text(cost_of)
         notes.append(f"costs are relative to {text}, as the scene's own setting does not run")
-    figure = quantity_name(model, pilot.scene)
+    figure = measure.quantity_name(model, pilot.scene)
     if figure and compared_quantity.name != "figure":
         notes.append(f"no error of the {figure} is resolved: settings are compared by what is seen")
     idle = [", ".join(solving_parts(r.setting, basis.baseline)) for r in rows if is_idle(r)]
@@ -299,6 +250,12 @@ def _notes(
     if pilot.jumps:
         reasons = ", ".join(pilot.jumps)
         notes.append(f"errors follow no power of the timestep, because of {reasons}")
+    slip = next((row.slip for row in rows if row.own), None)
+    if slip is not None and slip > scene_report.FLOORS * reference.floor.position:
+        notes.append(
+            f"what sticks creeps by {slip:.3g} m under the scene's own setting: "
+            "dry friction would hold it still, and that of the engine is soft"
+        )
     if reference.horizon < pilot.scene.scenario.duration * (1 - 1e-9):
         notes.append(
             f"errors count until {reference.horizon:.6g} s: the motion is not known beyond"
@@ -313,7 +270,7 @@ def _notes(
     states = np.abs(np.hstack([reference.states.qpos, reference.states.qvel, reference.states.act]))
     if np.any((states > 0) & (states < np.finfo(np.float64).tiny)):
         notes.append("the state holds subnormal numbers, with which processors are slow")
-    refsafe_limit = refsafe_from(model) if pilot.constrained else math.inf
+    refsafe_limit = simulation.refsafe_from(model) if pilot.constrained else math.inf
     if any(
         (row.searched[1] if row.largest is None else row.largest) > refsafe_limit for row in largest
     ):
@@ -324,8 +281,8 @@ def _notes(
 
 
 def _with_costs(
-    basis: Basis, rows: Sequence[WorkPrecisionRow], clock: Clock, quick: bool
-) -> tuple[list[WorkPrecisionRow], MeasuredSetting | None]:
+    basis: Basis, rows: Sequence[scene_report.WorkPrecisionRow], clock: Clock, quick: bool
+) -> tuple[list[scene_report.WorkPrecisionRow], scene_report.MeasuredSetting | None]:
     """Add the costs of usable settings, relative to the scene's own.
 
     Where that one was lost they are relative to the longest timestep under its integrator that
@@ -348,8 +305,8 @@ def _with_costs(
 
 
 def _measure_setting(
-    basis: Basis, setting: MeasuredSetting
-) -> tuple[WorkPrecisionRow, bool | None, EngineStates | None]:
+    basis: Basis, setting: scene_report.MeasuredSetting
+) -> tuple[scene_report.WorkPrecisionRow, bool | None, simulation.EngineStates | None]:
     """Run a scene under a setting and compare it with its reference; the cost is added later.
 
     The flag says whether a learner sees the error, for the scene's own setting with that of its
@@ -358,31 +315,31 @@ def _measure_setting(
     model, pilot, cone = basis.model, basis.pilot, basis.cones[setting.cone]
     variant = with_setting(model, setting)
     steps, energy = round(pilot.scene.scenario.duration / setting.timestep), basis.energy
-    figures: dict[str, Any] = dict.fromkeys(WorkPrecisionRow.__struct_fields__) | {
+    figures: dict[str, Any] = dict.fromkeys(scene_report.WorkPrecisionRow.__struct_fields__) | {
         "setting": setting,
         "status": "diverged",  # as of a run that MuJoCo refuses
         "reasons": (),
         "penetration": 0.0,
         "model_error": cone.model_error,
-        "refsafe": pilot.constrained and refsafe_active(variant),
+        "refsafe": pilot.constrained and simulation.refsafe_active(variant),
         "steps": steps,
-        "evaluations": steps * step_evaluations(setting.integrator),
+        "evaluations": steps * scene_report.step_evaluations(setting.integrator),
         "lucky": "",
         "own": setting == basis.baseline,
         **dict.fromkeys(("front", "same"), False),
     }
-    row = WorkPrecisionRow(**figures)
+    row = scene_report.WorkPrecisionRow(**figures)
     try:
-        run = simulate(pilot.setup, variant, thickness(model))
+        run = simulation.simulate(pilot.setup, variant, thickness(model))
     except mujoco.FatalError as error:
         return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None, None
     row = replace(
         row,
         status=run.judgement.status.value,
         reasons=run.judgement.reasons,
-        energy_drift=None if energy is None else energy_drift(run.energy, energy),
-        momentum_drift=momentum_drift(run.momentum) if basis.momentum_conserved else None,
-        mean_energy=mean_energy(run, cone.reference.horizon, basis.late_energy),
+        energy_drift=None if energy is None else measure.energy_drift(run.energy, energy),
+        momentum_drift=measure.momentum_drift(run.momentum) if basis.momentum_conserved else None,
+        mean_energy=measure.mean_energy(run, cone.reference.horizon, basis.late_energy),
         penetration=run.penetration,
     )
     if not run.judgement.ok:
@@ -392,26 +349,25 @@ def _measure_setting(
         return replace(row, growth=growth if has_grown else None), None, None
     if pilot.constrained:
         # A step of RK4 has four times the iterations of its last evaluation.
-        count = count_iterations(with_setting(model, setting), pilot.scene.scenario)
+        count = simulation.count_iterations(with_setting(model, setting), pilot.scene.scenario)
         row = replace(row, iterations=count * row.evaluations / steps)
     return *_with_errors(basis, row, run), run.states
 
 
 def _with_errors(
-    basis: Basis, row: WorkPrecisionRow, run: Run
-) -> tuple[WorkPrecisionRow, bool | None]:
-    """Add the errors of a run that went well."""
+    basis: Basis, row: scene_report.WorkPrecisionRow, run: simulation.Run
+) -> tuple[scene_report.WorkPrecisionRow, bool | None]:
     model, scene, cone = basis.model, basis.pilot.scene, basis.cones[row.setting.cone]
     reference = cone.reference
     states = run.states.head(len(reference.states.times))
-    exact = motion_of(model, reference.states)
-    run_errors = errors(motion_of(model, states), exact, reference.floor)
+    exact = simulation.motion_of(model, reference.states)
+    run_errors = measure.errors(simulation.motion_of(model, states), exact, reference.floor)
     floor = basis.least_seen
-    visible = visible_error(model, scene, states, reference.states)
+    visible = measure.visible_error(model, scene, states, reference.states)
     noticeable = None if max(1, visible) <= floor else visible >= 1
     if row.own and cone.visible_model_error >= 1:
         noticeable = True
-    creep = None if cone.sticks is None else measure_slip(model, scene, states, cone.sticks)
+    creep = None if cone.sticks is None else measure.measure_slip(model, scene, states, cone.sticks)
     if basis.pilot.lyapunov is not None:
         unit = horizon_errors(model, scene)
         gaps = position_distances(model, states.qpos, reference.states.qpos, unit)
@@ -420,8 +376,8 @@ def _with_errors(
             # How far apart they are later depends on the last digit of the start.
             return replace(row, parted=float(states.times[far[0]]), slip=creep), noticeable
     figure = None
-    if quantity_name(model, scene):
-        distances = quantity_errors(model, scene, states, reference.states)
+    if measure.quantity_name(model, scene):
+        distances = measure.quantity_errors(model, scene, states, reference.states)
         sizes = np.maximum([distances.max(), distances[-1]], basis.least_figure)
         figure = float(sizes[0]), float(sizes[1])
     row = replace(

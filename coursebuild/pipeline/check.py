@@ -1,7 +1,4 @@
-"""`coursebuild check`: verify the course, or some lessons of it; publish nothing.
-
-Entry points: `check(options, names)`; `read_and_verify`, which `build` and `export` share.
-"""
+"""`coursebuild check`: verify the course, or some lessons of it; publish nothing."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The files that can be downloaded: scripts, models, files of the course, archives of scripts.
-
-Entry point: `Downloads.of`. `core.pages.zips` says what is in an archive.
-"""
+"""The files that can be downloaded: scripts, models, files of the course, archives of scripts."""
 
 from __future__ import annotations
 
@@ -66,6 +63,11 @@ class Downloads(Struct, frozen=True):
 
 def _files(library: Library, assets: Assets, root: Path) -> Iterator[SiteFile]:
     """Files of the course that pages show or link to, and dark versions of its drawings."""
+
+    def make_dark_drawing(read: Callable[[], bytes]) -> bytes:
+        colours = dark_colours(assets.file("css/site.css").decode())
+        return dark_drawing(read().decode(), colours).encode()
+
     figures = (figure for d in library.course.documents for figure in recorded_figures(d))
     dark = frozenset(figure.path for figure in figures if figure.has_dark)
     for path in library.course.files:
@@ -75,13 +77,8 @@ def _files(library: Library, assets: Assets, root: Path) -> Iterator[SiteFile]:
             digest = hashlib.sha256(read()).hexdigest()
         yield CachedFile(urls.file_path(path), digest, read)
         if path in dark:
-            make = functools.partial(_make_dark_drawing, assets, read)
+            make = functools.partial(make_dark_drawing, read)
             yield CachedFile(urls.dark_path(path), step_key("dark drawing", digest), make)
-
-
-def _make_dark_drawing(assets: Assets, read: Callable[[], bytes]) -> bytes:
-    colours = dark_colours(assets.file("css/site.css").decode())
-    return dark_drawing(read().decode(), colours).encode()
 
 
 def _find_surroundings(

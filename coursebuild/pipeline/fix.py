@@ -1,16 +1,10 @@
 """`coursebuild check --fix`: make the edits that diagnostics carry, and check what comes of them.
 
-Entry points: `fix(options, names)`; for an editor and the preview `choose_fixes`, `may_edit`.
-
-1. The course is read; the edits of its diagnostics are made in memory, and it is read again: a fix
-   stays if its mistake is gone and the course has no more errors than before. Else each half of the
-   fixes is tried.
-2. Where reading finds nothing more to fix, scripts and labs run, and fixes of what they show, such
-   as of a bound number, are made in the same way.
-3. The files are written at the end, all or none, with a journal by which `coursebuild undo` takes
-   everything back.
-
-Only texts in `content/` and `models/` are edited, and none that a link leads elsewhere.
+Edits are made in memory, and the course is read again: a fix stays if its mistake is gone and the
+course has no more errors than before; else each half of the fixes is tried. Where reading finds
+nothing more to fix, scripts and labs run, and what they show is fixed likewise. The files, texts in
+`content/` and `models/` behind no link, are written at the end, all or none, with a journal for
+`coursebuild undo`.
 """
 
 from __future__ import annotations
@@ -132,7 +126,6 @@ class _Fixer:
         """Fixes that were made, or are not to be made."""
 
     def run(self) -> Report:
-        """Mend what can be mended, and return the report on the course as it is then."""
         for _ in range(_ROUNDS):
             diagnostics = self._read(self.texts)
             if self._mend(diagnostics, diagnostics):

@@ -1,7 +1,4 @@
-"""From diagnostics to a report: silenced warnings are left out, the rest is sorted and counted.
-
-Entry points: `judge`; `depends_on`, the files that a report depends on.
-"""
+"""From diagnostics to a report: silenced warnings are left out, the rest is sorted and counted."""
 
 from __future__ import annotations
 
@@ -12,7 +9,7 @@ from typing import TypeAlias
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import Course, Script, Silence, document_scripts
+from coursebuild.core.model import Course, Script, document_scripts
 from coursebuild.core.model.results import Results, TrialLine
 from coursebuild.core.run.dependencies import sought_files
 from coursebuild.core.run.script_environment import Interpreter
@@ -72,10 +69,16 @@ def judge(
         relevant = tuple(d for d in relevant if d.span.path in paths or d.rule in _RULES_OF_RUNS)
     silences = course.silences if course is not None else ()
     mild = {d.rule for d in inventory}
+
+    def is_silenced(diagnostic: Diagnostic) -> bool:
+        return any(
+            silence.rule == diagnostic.rule
+            and (silence.path is None or fnmatchcase(diagnostic.span.path, silence.path))
+            for silence in silences
+        )
+
     reported = tuple(
-        replace(d, strict=strict and d.rule not in mild)
-        for d in relevant
-        if not _is_silenced(d, silences)
+        replace(d, strict=strict and d.rule not in mild) for d in relevant if not is_silenced(d)
     )
     errors = sum(d.is_error for d in reported)
     summary = Summary(
@@ -110,7 +113,6 @@ def _unrun_scripts(course: Course, lines: Iterable[ScriptLine]) -> Iterator[_Unr
 
 
 def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diagnostic]:
-    """Diagnose scripts that were not run and that the map does not let pass."""
     allowed_paths = {entry.path for entry in course.unproven}
     for script, line, reasons in scripts:
         if line.path in allowed_paths or not (line.missing or script.norun):
@@ -129,7 +131,6 @@ def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diag
 
 
 def _refuse_unrepeated(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Diagnostic]:
-    """Diagnose scripts whose only run is the one that was recorded."""
     by_path = {s.path: s for document in course.documents for s in document_scripts(document)}
     for line in lines:
         if line.unrepeated and line.path in by_path:
@@ -152,15 +153,6 @@ def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnos
             path not in broken and not (rule == "control-character" and path in misread)
         ):
             yield diagnostic
-
-
-def _is_silenced(diagnostic: Diagnostic, silences: Sequence[Silence]) -> bool:
-    """Whether the map silences a diagnostic; a map that would silence an error is not valid."""
-    return any(
-        silence.rule == diagnostic.rule
-        and (silence.path is None or fnmatchcase(diagnostic.span.path, silence.path))
-        for silence in silences
-    )
 
 
 def depends_on(

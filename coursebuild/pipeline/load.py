@@ -1,13 +1,7 @@
 """Disk → Course: read the map, the lessons, the pages and the models, and parse them.
 
-Entry points: `load(root)`; `load_course(root)`, for commands that need a course. A `Reader` keeps
-what it reads, and returns summaries; without one documents come with their prose.
-
-1. Read everything (`core.files.read`), parse `content/course.toml`. Where the map is broken the
-   lessons are parsed all the same, so that one run reports all mistakes.
-2. Parse the declarations of models, `models/NAME.toml`.
-3. Attach its document to each lesson and page; compare what the map names with what is there.
-4. Check the course as a whole.
+A `Reader` keeps what it reads, and returns summaries; without one documents come with their prose.
+Where the map is broken the lessons are parsed all the same, so that one run reports all mistakes.
 """
 
 from __future__ import annotations
@@ -134,7 +128,6 @@ class _Loader:
         ]
 
     def load(self) -> Course | None:
-        """Return the whole course, or `None` where there is no usable map."""
         course = self._parse_map()
         self._drop_long_texts((Limits() if course is None else course.limits).text)
         declarations = self._parse_declarations()
@@ -242,7 +235,6 @@ class _Loader:
         return parsed_theme.value
 
     def _read_text(self, path: str) -> str | None:
-        """The text of a file of the project; `None` where there is none."""
         file = (self.root / path).resolve()
         if not file.is_file() or not file.is_relative_to(self.root.resolve()):
             return None
@@ -299,7 +291,6 @@ class _Loader:
         self.diagnostics += load_course_features(self.root, course)
 
     def _parse_declarations(self) -> tuple[Declarations, ...]:
-        """Parse the files beside the models; such a file without its model is a mistake."""
         names = {model.name for model in self.files.models}
         declarations: list[Declarations] = []
         for source in self.files.declarations:
@@ -317,7 +308,6 @@ class _Loader:
     # --- lessons and pages
 
     def _compare_lessons(self, course: Course) -> None:
-        """Compare the lessons of the map with the files that there are."""
         paths = {source.path for source in self.files.lessons}
         listed_paths = {lesson.path for lesson in course.lessons}
         unlisted = {s.path: s for s in self.files.lessons if s.path not in listed_paths}
@@ -408,7 +398,6 @@ class _Loader:
 
 
 def _check_unlisted_files(course: Course) -> Iterator[Diagnostic]:
-    """Warn of Markdown files outside the folders of lessons and pages that nothing uses."""
     folders = ("content/lessons/", "content/pages/")  # files in these have rules of their own
     paths = [path for path in course.files if path.startswith("content/") and path.endswith(".md")]
     paths = [path for path in paths if not path.startswith(folders)]

@@ -1,7 +1,4 @@
-"""What every command needs to know: where the course is, its store, the lessons named.
-
-Entry points: `Options`, `find_course(directory)`, `open_store`, `select`.
-"""
+"""What every command needs to know: where the course is, its store, the lessons named."""
 
 from __future__ import annotations
 

@@ -1,13 +1,8 @@
 """`coursebuild check --against VERSION`: what the scripts do with another version of MuJoCo.
 
-Entry point: `compare_with_version(options, names, version)`.
-
-1. The scripts run here, unless their results are remembered.
-2. They run in an environment with the other version and otherwise the same packages (see
-   `core.run.packages`). Their results are remembered, too.
-3. Those that do something else run once more there, and in a fresh environment with the version of
-   here, to find the cause (see `core.scripts.compare`).
-4. The models and MJCF blocks are compiled there, and the names in inline code looked up.
+The scripts run here and in an environment with the other version and otherwise the same packages.
+Those that do something else run once more there, and in a fresh environment with the version of
+here, to find the cause (see `core.scripts.compare`). Models and MJCF blocks are compiled there.
 """
 
 from __future__ import annotations
@@ -106,7 +101,6 @@ class _Comparison(Struct):
     runs_here: dict[str, ScriptRun] = field(default_factory=dict)
 
     def report(self, blocked: tuple[ScriptComparison, ...]) -> ComparisonReport:
-        """Run the scripts with both versions and compare what they do."""
         runs = run(self.course, self.scripts, self.options)
         self.runs_here = {r.path: r for r in runs}
         interpreter = self._prepare(self.version)
@@ -166,7 +160,6 @@ class _Comparison(Struct):
         *,
         fresh: bool = False,
     ) -> dict[str, RunStanding]:
-        """How the scripts do there, by path."""
         from coursebuild.core.run.script_server import ScriptServer
 
         options_there = replace(self.options, interpreter=interpreter)
@@ -177,7 +170,6 @@ class _Comparison(Struct):
         return run_standings(self.course, self.runs_here, runs)
 
     def _compare_models(self, interpreter: Interpreter) -> tuple[ModelLine, ...]:
-        """Whether the models and MJCF blocks that compile here do so there."""
         from coursebuild.core.run import mjcf
 
         texts = mjcf_texts(self.course)
@@ -195,7 +187,7 @@ class _Comparison(Struct):
         with self.options.progress.stage(f"compiling models with MuJoCo {self.version}"):
             results_there = compile_all(texts_to_compile, python=interpreter.python)
         places = [(model.source.path, 1) for model in models]
-        places += [(text.block.span.path, text.block.span.line) for text in good]
+        places += [(text.place.path, text.place.line) for text in good]
         return tuple(
             ModelLine(path, line, mjcf.readable_error(result.error))
             for (path, line), result in zip(places, results_there, strict=True)

@@ -1,14 +1,7 @@
 """`coursebuild update` and `extract`: what scripts print, and what they are, into the lessons.
 
-Entry points: `update(options, names, dry_run=…)` brings recorded outputs up to date, by span;
-`extract(options, adopt=…)` writes the scripts to `examples/`, or brings edits made there back.
-Of an update:
-
-1. Every chosen script runs once, and none that has a remembered result.
-2. The new outputs become edits; each lesson is written whole or not at all, and only if nobody
-   changed it meanwhile.
-3. The bound numbers of the updated lessons are checked: where a new output makes prose false, a
-   diagnostic says what is printed now in place of the number.
+Each lesson is written whole or not at all, and only if nobody changed it meanwhile. Where a new
+output makes a bound number false, a diagnostic says what is printed now in its place.
 
 What is written was printed by one run. Whether another prints the same, and which digits hold, is
 found out later: by `serve` when it is idle, and by `check --sensitivity`.
@@ -94,7 +87,6 @@ class _Updater:
         """The scripts that have an output or a figure to bring up to date."""
 
     def update(self, began: float) -> Report:
-        """Run the scripts, write what they print, and report on the lessons as they are then."""
         runs = run(self.course, self.scripts, self.options)
         edits, refusals = self._make_edits(runs)
         self._add_source_parts(edits)
@@ -135,7 +127,6 @@ class _Updater:
     def _make_edits(
         self, runs: Sequence[ScriptRun]
     ) -> tuple[dict[Source, list[Edit]], list[Diagnostic]]:
-        """Make the edits, by lesson; a diagnostic for each output that cannot be written."""
         # Of paths that several scripts have, nobody knows whose output is recorded.
         repeated_paths = {
             d.span.text.strip("\"'")
@@ -172,7 +163,6 @@ class _Updater:
             del edits[source]
 
     def _write(self, edits: Mapping[Source, list[Edit]]) -> tuple[list[str], list[Diagnostic]]:
-        """Write the lessons; a remark for each, and a diagnostic for each that was not written."""
         root, verb = self.options.root, "would update" if self.dry_run else "updated"
         remarks: list[str] = []
         failures: list[Diagnostic] = []
@@ -195,7 +185,6 @@ class _Updater:
     # --- the lessons as they are then
 
     def _diagnose_updated(self, new_course: Course, runs: Sequence[ScriptRun]) -> list[Diagnostic]:
-        """Find what is wrong with the scripts of the lessons as they are now."""
         paths = {extraction.path for extraction in self.scripts}
 
         def verdicts(course: Course) -> list[Verdict]:

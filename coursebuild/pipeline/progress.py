@@ -1,12 +1,7 @@
 """Messages about long work while it runs: a live line on a terminal, plain lines elsewhere.
 
-Entry point: `Progress(stream, quiet=…)`. Everything goes to standard error, so that standard output
-holds only results. Verdicts on scripts belong to the results, and are not printed here.
-
-1. On a terminal one line says what runs and for how long. It is updated while the work goes on, and
-   erased at its end.
-2. Elsewhere a line says what begins, and one line for each script how it ended and how long it
-   took, so that a log shows where the time goes and what hangs.
+Everything goes to standard error, so that standard output holds only results. Elsewhere than on a
+terminal, lines for each script show in a log where the time goes and what hangs.
 """
 
 from __future__ import annotations

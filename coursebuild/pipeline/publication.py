@@ -1,11 +1,7 @@
 """`coursebuild build` and `export`: verify the course, and write its site or a file of it.
 
-Entry points: `build(options, out)`; `export(options, name, lesson, out)`, where features have the
-exporters. Nothing is written where something is wrong.
-
-An export is a file or an archive, written in one step, without holding the archive in memory. The
-same files give the same bytes: entries are sorted by path and have the same date. Files that are
-compressed already are stored.
+Nothing is written where something is wrong. An export is written in one step, without holding an
+archive in memory, and the same files give the same bytes.
 """
 
 from __future__ import annotations
@@ -214,26 +210,20 @@ def check_target(root: Path, out: Path, mark: str, *, archive: bool) -> None:
         )
     if place.is_dir():
         raise PublishRefusedError(f"{out} is a folder", help="name a file, such as `course.zip`")
-    is_export = _holds_file if archive else _begins_with
-    if os.path.lexists(place) and not is_export(place, mark):
+    if os.path.lexists(place) and not _has_mark(place, mark, archive=archive):
         raise PublishRefusedError(
             f"{out} exists and is not such an export", help="move it away, or name another file"
         )
 
 
-def _holds_file(place: Path, name: str) -> bool:
+def _has_mark(place: Path, mark: str, *, archive: bool) -> bool:
     try:
-        with zipfile.ZipFile(place) as archive:
-            return name in archive.namelist()
-    except (OSError, zipfile.BadZipFile, ValueError):
-        return False
-
-
-def _begins_with(place: Path, mark: str) -> bool:
-    try:
+        if archive:
+            with zipfile.ZipFile(place) as entries:
+                return mark in entries.namelist()
         with place.open("rb") as file:
             return mark.encode() in file.read(1000)
-    except OSError:
+    except (OSError, zipfile.BadZipFile, ValueError):
         return False
 
 

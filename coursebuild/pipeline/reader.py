@@ -1,10 +1,7 @@
 """From text to parsed and typeset document, its summary and its page.
 
-Entry point: `Reader`, a context manager.
-
-1. `read_documents` gives the summaries of texts: what the rest of the course must know of them.
-   Those of texts that were read before come from the store. The others are read here, or by worker
-   processes where there are many.
+1. `read_documents` gives the summaries of texts, from the store where they were read before. The
+   others are read here, or by worker processes where there are many.
 2. `draw` draws pages. Whoever has read a document, this process or a worker, keeps it packed, with
    its formulas, and draws its page. A worker is a copy of this process with the same reader.
 3. A document that an earlier build has read is parsed again when its page is drawn; its MathML
@@ -186,7 +183,6 @@ class Reader:
         source: Source,
         parse: Callable[[Source], Parsed[Value | None]],
     ) -> Parsed[Value | None]:
-        """Return what is stored for a text; parse it where nothing is."""
         key = step_key(kind, source.path, source.text)
 
         def read(data: bytes) -> Parsed[Value | None] | None:
@@ -242,7 +238,6 @@ class Reader:
         return parsed_documents
 
     def _find_summary(self, text: SourceText) -> DocumentSummary | None:
-        """Find the summary of a text, in memory or in the store."""
         key, summary = self._summaries.get(text.source.path, ("", None))
         if key == text.key:
             return summary
@@ -326,7 +321,7 @@ class Reader:
 
     def draw_page(self, request: PageRequest) -> DrawnPage:
         """Draw a page here, and store it."""
-        from coursebuild.core.pages.article import draw
+        from coursebuild.core.pages.page_writer import draw
 
         with self._lock:
             whole = None if request.text is None else self._whole_document(request.text)
@@ -357,7 +352,6 @@ class Reader:
         return PageWriter(renderer, inputs.document_inputs, Place(inputs.head.path), whole.document)
 
     def _renderer_for(self, request: PageRequest, whole: _WholeDocument | None) -> Renderer:
-        """Return a renderer with words, templates, and the formulas of a document."""
         kind = request.language, request.templates, request.is_manual
         if kind not in self._renderers:
             assets = Assets(template_texts(), {}, prepared_folder())
@@ -410,7 +404,7 @@ _UNPACKABLE = (pickle.PicklingError, AttributeError, TypeError, ValueError, Recu
 
 _HEAVY = (
     "coursebuild.core.run.v8",
-    "coursebuild.core.pages.article",
+    "coursebuild.core.pages.page_writer",
     "coursebuild.core.pages.listings",
     "coursebuild.core.pages.document_inputs",
     "coursebuild.core.pages.page_list",

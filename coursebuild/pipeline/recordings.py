@@ -1,9 +1,5 @@
 """Recorded runs and figures: what scripts gave once, in files of the course.
 
-Entry points: `recorded_runs`, which take the place of runs, `check_recorded_runs`, `record_runs`,
-which `update --long` calls; of figures `read_recorded`, `find_figures`, `write_figures`; of all
-drawings of a course `check_drawings`.
-
 The fence of a script that takes long says `record=once`. `content/reports/NAME.run.json` holds what
 it printed, when and on which machine, with the state of every file of the project that it read. As
 long as these files, its text and its options are unchanged, the recorded run counts as if the

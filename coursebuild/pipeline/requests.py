@@ -1,9 +1,5 @@
 """What a `Reader` is asked for and what it answers, with keys and fingerprints.
 
-Entry points: `SourceText` is asked for a `DocumentSummary`, `PageRequest` for a `DrawnPage`;
-`document_fingerprint`, `notes_fingerprint`, `course_fingerprint` and `results_fingerprint`, hashes
-of what other pages can see of a document, a course or its results.
-
 A sentence added to a document moves all that follows it, but other pages do not show where in a
 file something stands. So a value is hashed without its spans, and with the text of its excerpts.
 Where its hash is unchanged, so is whatever other pages made from it, and a course in which nothing

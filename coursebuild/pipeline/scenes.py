@@ -1,13 +1,7 @@
 """The models of a course that can be measured, with their declarations.
 
-Entry points: `find_scenes(root, names)`, `scene_digest`.
-
-1. A scene is a file of `models/` that no other file includes, or one that was named.
-2. A model that does not compile or has wrong declarations is a diagnostic; the other scenes are
-   measured all the same.
-3. Measurements depend on the model with all files that it includes, on its scenarios, and on the
-   file with its exact motion. The digest is of these, but not of the machine or of the other
-   declarations.
+A scene is a file of `models/` that no other file includes, or one that was named. A model that does
+not compile or has wrong declarations is a diagnostic; the other scenes are measured all the same.
 """
 
 from __future__ import annotations
@@ -70,9 +64,18 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Parsed[tuple[CourseS
     """
     read = read_course(root)
     models = {model.name: model for model in read.value.models}
-    selection = (
-        _find_models(names, models) if names else _find_main_models(root, list(models.values()))
-    )
+    if names:
+        selection = _find_models(names, models)
+    else:
+        selection = list(models.values())
+        parts = {
+            path for m in selection for path in model_files(root, m.source.path, m.source.text)
+        }
+        selection = [
+            m
+            for m in selection
+            if m.source.path not in parts and not INCLUDED_ROOT.match(m.source.text)
+        ]
     declarations, diagnostics = _read_declarations(read.value, selection, all_models=not names)
     diagnostics += [d for d in read.diagnostics if d.span.path.startswith("models/")]
     scenes: list[CourseScene] = []
@@ -166,16 +169,6 @@ def _find_models(names: Sequence[str], models: dict[str, MjcfModel]) -> list[Mjc
             raise UsageError(f"no model is called `{name}`", help=help)
         chosen_names.add(known_name)
     return [models[name] for name in sorted(chosen_names)]
-
-
-def _find_main_models(root: Path, models: Sequence[MjcfModel]) -> list[MjcfModel]:
-    """Find the models that are not part of others."""
-    parts = {
-        path for model in models for path in model_files(root, model.source.path, model.source.text)
-    }
-    return [
-        m for m in models if m.source.path not in parts and not INCLUDED_ROOT.match(m.source.text)
-    ]
 
 
 # --- declarations

@@ -1,8 +1,5 @@
 """Writes the scripts of a course to `examples/`, and runs those that must run.
 
-Entry points: `extract_scripts`, `run`, `recorded_outputs`, `script_lines`; `measure_sensitivity`,
-for `check --sensitivity` and `update`.
-
 A script that was edited by hand in `examples/` is reported and not run. Of the others, those run
 that have no remembered result which still holds, the longest first.
 """
@@ -88,7 +85,6 @@ _OBSTACLES = {
 def _diagnose_blocked(
     blocked_file: BlockedFile, extraction: Extraction | None, course: Course
 ) -> Diagnostic:
-    """Why a file in `examples/` was left alone, and how to go on."""
     message = _OBSTACLES[blocked_file.obstacle].format(path=blocked_file.path)
     if extraction is None:
         help = "move the file away, or bring it back into a lesson"
@@ -202,7 +198,6 @@ def _run(
     run_store: RunStore,
     records: _Records,
 ) -> dict[str, ScriptRun]:
-    """Run scripts, the longest first, and remember what they did."""
     if not jobs_to_run:
         return {}
     from coursebuild.core.run.script_server import ScriptServer
@@ -372,7 +367,6 @@ def measure_sensitivity(
 def _run_perturbed(
     course: Course, scripts: Sequence[Extraction], options: Options, numbers: Sequence[int]
 ) -> dict[str, list[ScriptRun]]:
-    """Run scripts with moved states or shorter timesteps; return the runs by path."""
     runs: dict[str, list[ScriptRun]] = {script.path: [] for script in scripts}
     if not scripts:
         return runs

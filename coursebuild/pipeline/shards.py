@@ -1,10 +1,8 @@
 """`check --shard 2/8`: divides the scripts and labs of a course among several machines.
 
-Entry points: `Shard`, `read_shard`, `read_timings`, `write_timings`.
-
 Every machine computes the whole split by itself, so it must follow from what all machines have: the
-names of the scripts and labs, and times from files that are given to all. (Stores and shared caches
-differ from machine to machine: by their times, a script could fall between two shards.)
+names of the scripts and labs, and times from files that are given to all. Stores and shared caches
+differ from machine to machine: by their times, a script could fall between two shards.
 """
 
 from __future__ import annotations
@@ -12,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import heapq
 import json
+import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -58,7 +57,7 @@ def split(names: Iterable[str], count: int, seconds: Mapping[str, float]) -> dic
     Without times all names count the same, in the order of their hashes: neighbours in a lesson,
     which are often alike, go to different parts.
     """
-    sorted_names = sorted(set(names), key=_hash)
+    sorted_names = sorted(set(names), key=lambda name: hashlib.sha256(os.fsencode(name)).digest())
     known_times = sorted(seconds[name] for name in sorted_names if name in seconds)
     median = known_times[len(known_times) // 2] if known_times else 1.0
     loads = [(0.0, 0, part) for part in range(1, count + 1)]
@@ -68,10 +67,6 @@ def split(names: Iterable[str], count: int, seconds: Mapping[str, float]) -> dic
         parts[name] = part
         heapq.heappush(loads, (load + seconds.get(name, median), number + 1, part))
     return parts
-
-
-def _hash(name: str) -> bytes:
-    return hashlib.sha256(name.encode("utf-8", "surrogateescape")).digest()
 
 
 def read_shard(text: str | None, timings: Sequence[str]) -> Shard | None:

@@ -1,7 +1,5 @@
 """The recorded reports that pages may show, and warnings about those that no longer fit.
 
-Entry points: `shown_reports(root, course)`; `read_record`, for one. Nothing is measured here.
-
 A report fits if it is of the model as it is now, with its files and scenarios, and of the version
 of MuJoCo that is installed. Any other is left out of the site, with a warning.
 """
@@ -73,7 +71,6 @@ class _Collector:
         return Parsed(Reports(scenes, diets, cases, engines), tuple(self._diagnostics))
 
     def _read_for_model(self, kind: ReportKind[_Scene], name: str) -> dict[str, _Scene]:
-        """Read the report on a model; return it by the model's name, if it fits."""
         path, model = kind.path(name), self._models.get(name)
         if model is None:
             closest = nearest(name, self._models)

@@ -1,18 +1,12 @@
 """From a course, its results and its summaries to the files of its site.
 
-Entry point: `Site`, with its `files`; `page_request`, what a page is drawn from.
-
 1. Every page has inputs, all that it shows of the course, and a key: a hash of its inputs, of its
    document's text, and of the tool. Where nothing has changed of what the inputs are made of, the
    key is that of the last build, and the inputs are not made.
-2. The records of the pages of the last build are stored together, so that unchanged pages need not
-   be loaded. Records of pages that were drawn earlier come from the store with their pages; a page
-   that is not there is drawn.
-3. The records say whether all links lead somewhere, and which characters and styles pages use:
-   which fonts and which style sheet they share.
-4. Every file has a key, a hash of all that its bytes depend on. `core.engine.publish` makes it only
-   where it was not published under this key. A page's body is loaded then, and put into its frame:
-   not all bodies of a large course may fit into memory.
+2. The records of the last build's pages are stored together, so that unchanged pages need not be
+   loaded. They say whether all links lead somewhere, and which characters and styles pages use.
+3. Every file has a key, too. `core.engine.publish` makes it only where it was not published under
+   this key. A page's body is loaded then: not all bodies of a large course may fit into memory.
 """
 
 from __future__ import annotations
@@ -40,7 +34,6 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Names, compressed_files
-from coursebuild.core.pages.common_files import PageFacts, common_characters, common_files
 from coursebuild.core.pages.context import NotedPage, SiteContext
 from coursebuild.core.pages.frame import (
     FrameInputs,
@@ -52,7 +45,12 @@ from coursebuild.core.pages.frame import (
 )
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
-from coursebuild.core.pages.record import PageRecord
+from coursebuild.core.pages.record import (
+    PageFacts,
+    PageRecord,
+    common_characters,
+    common_files,
+)
 from coursebuild.core.pages.references import Reference, has_anchor
 from coursebuild.core.registry import features
 from coursebuild.core.syntax.document import parse_document
@@ -146,7 +144,6 @@ class Site:
     def _draw_changed(
         self, pages: Iterable[PageEntry], last_pages: Mapping[str, _IndexEntry]
     ) -> dict[str, _IndexEntry]:
-        """Return the pages by site path, in order; draw those that are not stored."""
         known_pages: dict[str, _IndexEntry | None] = {}
         pending: deque[tuple[PageEntry, str, str]] = deque()
         library = self._library
@@ -185,7 +182,6 @@ class Site:
         return {path: entry for path, entry in known_pages.items() if entry is not None}
 
     def _load(self, path: str) -> DrawnPage:
-        """Return a page of the site, from the store."""
         if self._latest is None or self._latest[0] != path:
             entry = self._pages[path]
             page = self._reader.find_page(entry.key)
@@ -195,7 +191,6 @@ class Site:
         return self._latest[1]
 
     def _page_files(self) -> Iterator[CachedFile]:
-        """The pages in their frames."""
         frame = PageFrame(FrameInputs.of(self._library, self.names), self._library.assets)
         frame_key = step_key("frame", frame.inputs)
 
@@ -261,7 +256,6 @@ class Site:
 
     @functools.cached_property
     def _added_files(self) -> tuple[list[SiteFile], FileList | None]:
-        """The files of all features, and the list of all files, if one makes it."""
         files: list[SiteFile] = []
         file_list: FileList | None = None
         for feature in features():
@@ -275,7 +269,6 @@ class Site:
         return files, file_list
 
     def _context(self, feature: str) -> SiteContext:
-        """Return what a feature makes its files from."""
         return SiteContext(
             self._library,
             self._library.assets,
@@ -311,7 +304,6 @@ class Site:
         return tuple(diagnostics)
 
     def _are_links_sound(self) -> bool:
-        """Whether all links of the pages lead to pages or other files of the site."""
         ids = {path: frozenset(entry.record.ids) for path, entry in self._pages.items()}
         paths = {file.path for file in self.files}
         links = set[Reference]().union(*(entry.record.references for entry in self._pages.values()))
@@ -355,8 +347,6 @@ def page_request(entry: PageEntry, library: Library) -> PageRequest:
 
 
 def _cut_font(store: Store, job: FontJob) -> bytes:
-    """Return a cut font: delivered with the tool, stored, or cut now."""
-
     def make() -> bytes:
         from coursebuild.core.pages.fonts import subset_font
 

@@ -1,8 +1,5 @@
 """Reads and checks the files of a course's theme.
 
-Entry points: `load_theme`; `template_copies`, templates as a course begins with them;
-`template_diagnostic`, for a template that fails.
-
 A copied template names in its first line the text that it was copied from, by some digits of its
 hash. Where the tool has another text by now, the author gets a warning.
 """
@@ -100,7 +97,6 @@ def _check_files(theme: Theme) -> Iterator[Diagnostic]:
 
 
 def _originals() -> dict[str, str]:
-    """The templates of the tool, by name."""
     return {name: text for name, text in template_texts() if name.endswith(".html")}
 
 
@@ -146,7 +142,6 @@ def template_diagnostic(course: Course, failure: TemplateFailure) -> Diagnostic:
 
 
 def _diagnose_template(source: Source, line: int, message: str) -> Diagnostic:
-    """The diagnostic of a template that is wrong at a line."""
     start = source.line_starts[min(line, len(source.line_starts)) - 1]
     span = source.span(start, start + len(source.line_text(line).rstrip()))
     return diagnose("template-broken", span, message[:1].lower() + message[1:].rstrip("."))

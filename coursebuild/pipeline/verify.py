@@ -1,21 +1,14 @@
 """Course → Results: run the scripts, compare, compile the models, try the labs.
 
-Entry point: `verify(course, options, documents)`.
-
-1. Scripts are written to `examples/`, and those of the chosen documents run (`scripts`).
-2. Recorded outputs and bound numbers are compared with the runs.
-3. Models and MJCF blocks are compiled in a child process, which is not started for a course that
-   has none.
-4. Features' trials, such as those of labs, are run while the scripts run.
-
-Documents may be summaries. Formulas are not checked here: see `pipeline.reader`.
+Models and MJCF blocks are compiled in a child process, and features' trials, such as those of labs,
+are run while the scripts run. Documents may be summaries. Formulas are checked by the reader.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
 from operator import itemgetter
@@ -48,7 +41,13 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
-from coursebuild.pipeline.scripts import extract_scripts, find_module, run, script_lines
+from coursebuild.pipeline.scripts import (
+    ExtractedScripts,
+    extract_scripts,
+    find_module,
+    run,
+    script_lines,
+)
 from coursebuild.report import ScriptLine
 
 if TYPE_CHECKING:
@@ -86,11 +85,10 @@ def verify(
 ) -> Verification:
     """Verify a course, or only what stands in the documents with these paths.
 
-    `static`: with the static forms of labs, which only a build needs. `shard`: only this part of
-    the scripts and labs. `repeat`: what is recorded from a script's only run must be borne out by
-    another, now. `evidence`: the lines by which bound numbers held before. A preview has
-    `known_runs`, by path, that are known to hold, and `other_runs` of the same scripts, and repeats
-    nothing here.
+    `static`: with the static forms of labs, which only a build needs. `repeat`: what is recorded
+    from a script's only run must be borne out by another, now. `evidence`: the lines by which bound
+    numbers held before. A preview has `known_runs`, by path, that are known to hold, and
+    `other_runs` of the same scripts, and repeats nothing here.
     """
     options.store.listen(options.progress.say)
     options = options.for_course(course)
@@ -98,68 +96,24 @@ def verify(
     # A preview holds the lock for no longer, so that other commands need not wait for its scripts.
     with project_lock(options.root) if is_preview else contextlib.nullcontext():
         extracted_scripts = extract_scripts(course, options)
-    extractions, trials = _select(course, extracted_scripts.runnable, documents, shard)
+    scripts, trials = _select(course, extracted_scripts.runnable, documents, shard)
     models, model_diagnostics = compile_models(course, options)
-    run_store = options.run_store()
-    run_scripts = functools.partial(
-        run,
-        course,
-        extractions,
-        options,
-        run_store=run_store,
-        known_runs=known_runs,
-        only_recorded=not is_preview,
-    )
-    trial_runs = RunStore(options.root, options.store)  # another thread uses it
+    say, trial_store = options.progress.say, RunStore(options.root, options.store)
     context = TrialContext(
-        options.root,
-        course,
-        dict(models),
-        trial_runs,
-        model_diagnostics,
-        static,
-        options.progress.say,
+        options.root, course, dict(models), trial_store, model_diagnostics, static, say
     )
+    runner = _ScriptRunner(course, options, extracted_scripts, scripts, known_runs)
     runs, (trial_results, trial_diagnostics) = _run_with_trials(
-        run_scripts, trials, context, options.progress
+        runner.run, trials, context, options.progress
     )
-
-    def judge_runs() -> tuple[tuple[Verdict, ...], list[Diagnostic], tuple[ScriptLine, ...]]:
-        verdicts, read = compare_all(course, runs), functools.partial(read_recorded, options.root)
-        figure_diagnostics = list(figure_findings(course, runs, read))
-        drifted_figures = [diagnostic.span for diagnostic in figure_diagnostics]
-        lines = script_lines(extractions, runs, verdicts, course, drifted_figures)
-        return verdicts, figure_diagnostics, lines
-
-    verdicts, figure_diagnostics, lines = judge_runs()
     if not is_preview:
-        doubtful_paths = {
-            line.path for line in lines if _is_doubtful(line, run_store, repeat=repeat)
-        }
-        scripts = [e for e in extractions if e.path in doubtful_paths and not e.script.once]
-        other_runs = {run.path: run for run in runs if run.path in doubtful_paths}
-        if scripts:
-            fresh_store = options.run_store(fresh=True)
-            again = run(course, scripts, options, "running scripts again", fresh_store)
-            runs = tuple({run.path: run for run in (*runs, *again)}.values())
-            verdicts, figure_diagnostics, lines = judge_runs()
+        runs, other_runs = runner.run_doubtful(runs, repeat=repeat)
+    verdicts, figure_diagnostics, lines = runner.judge(runs)
     diagnostics = (
         *extracted_scripts.diagnostics,
         *model_diagnostics,
         *trial_diagnostics,
-        *check_recorded_runs(extractions, options),
-        *script_findings(
-            course,
-            extractions,
-            runs,
-            verdicts,
-            evidence,
-            extracted_scripts.extractions,
-            other_runs,
-            [f"models/{name}.xml" for name, model in models if model.error],
-            functools.partial(find_module, options.root),
-        ),
-        *repeat_findings(course, extractions, run_store.differing_runs),
+        *runner.find_mistakes(runs, verdicts, evidence, other_runs, models),
         *check_runs(course, runs),
         *_diagnose_nothing(course, () if shard is not None else runs),
         *figure_diagnostics,
@@ -172,13 +126,94 @@ def verify(
     return Verification(results, diagnostics, lines)
 
 
+class _ScriptRunner:
+    """Runs the chosen scripts, and compares what they do with what is recorded."""
+
+    def __init__(
+        self,
+        course: Course,
+        options: Options,
+        extracted_scripts: ExtractedScripts,
+        scripts: Sequence[Extraction],
+        known_runs: Mapping[str, ScriptRun] | None,
+    ) -> None:
+        self.course, self.options, self.scripts = course, options, scripts
+        self.extracted_scripts, self.known_runs = extracted_scripts, known_runs
+        self.store = options.run_store()
+
+    def run(self) -> tuple[ScriptRun, ...]:
+        return run(
+            self.course,
+            self.scripts,
+            self.options,
+            run_store=self.store,
+            known_runs=self.known_runs,
+            only_recorded=self.known_runs is None,
+        )
+
+    def run_doubtful(
+        self, runs: tuple[ScriptRun, ...], *, repeat: bool
+    ) -> tuple[tuple[ScriptRun, ...], dict[str, ScriptRun]]:
+        """Run once more the scripts of which one run does not say enough.
+
+        An output that has drifted though nobody edited its script may vary by itself: that is tried
+        where it is quick, and was not tried before. With `repeat`, it is tried in any case, and
+        what was recorded from the only run must be borne out. Also return the runs before.
+        """
+        doubtful_paths = set[str]()
+        for line in self.judge(runs)[2]:
+            is_new = not line.cached and line.path not in self.store.edited_paths
+            is_quick = is_new and line.seconds < _QUICK
+            if (line.status == "drift" and (repeat or is_quick)) or (repeat and line.unrepeated):
+                doubtful_paths.add(line.path)
+        other_runs = {run.path: run for run in runs if run.path in doubtful_paths}
+        scripts = [e for e in self.scripts if e.path in doubtful_paths and not e.script.once]
+        if scripts:
+            store = self.options.run_store(fresh=True)
+            again = run(self.course, scripts, self.options, "running scripts again", store)
+            runs = tuple({run.path: run for run in (*runs, *again)}.values())
+        return runs, other_runs
+
+    def judge(
+        self, runs: Sequence[ScriptRun]
+    ) -> tuple[tuple[Verdict, ...], list[Diagnostic], tuple[ScriptLine, ...]]:
+        """Return verdicts on recorded outputs, diagnostics of figures, and lines of a report."""
+        verdicts = compare_all(self.course, runs)
+        read = functools.partial(read_recorded, self.options.root)
+        figure_diagnostics = list(figure_findings(self.course, runs, read))
+        drifted_figures = [diagnostic.span for diagnostic in figure_diagnostics]
+        lines = script_lines(self.scripts, runs, verdicts, self.course, drifted_figures)
+        return verdicts, figure_diagnostics, lines
+
+    def find_mistakes(
+        self,
+        runs: Sequence[ScriptRun],
+        verdicts: Sequence[Verdict],
+        evidence: BindingEvidence | None,
+        other_runs: Mapping[str, ScriptRun] | None,
+        models: Iterable[tuple[str, CompileResult]],
+    ) -> Iterator[Diagnostic]:
+        yield from check_recorded_runs(self.scripts, self.options)
+        yield from script_findings(
+            self.course,
+            self.scripts,
+            runs,
+            verdicts,
+            evidence,
+            self.extracted_scripts.extractions,
+            other_runs,
+            [f"models/{name}.xml" for name, model in models if model.error],
+            functools.partial(find_module, self.options.root),
+        )
+        yield from repeat_findings(self.course, self.scripts, self.store.differing_runs)
+
+
 def _run_with_trials(
     run_scripts: Callable[[], tuple[ScriptRun, ...]],
     trials: Sequence[tuple[Trials, Trial]],
     context: TrialContext,
     progress: Progress,
 ) -> tuple[tuple[ScriptRun, ...], TrialOutcome]:
-    """Run scripts here and trials in a thread meanwhile; return the results of both."""
     if not trials:
         return run_scripts(), ((), ())
     groups = groupby(trials, key=itemgetter(0))
@@ -201,21 +236,7 @@ def _run_with_trials(
             raise
 
 
-def _is_doubtful(line: ScriptLine, run_store: RunStore, *, repeat: bool) -> bool:
-    """Whether one run of a script does not say enough, so that it should run once more.
-
-    An output that has drifted though nobody edited its script may vary by itself: that is tried
-    where it is quick, and was not tried before. With `repeat`, it is tried in any case, and what
-    was recorded from the only run must be borne out.
-    """
-    if repeat:
-        return line.status == "drift" or line.unrepeated
-    is_new = not line.cached and line.path not in run_store.edited_paths
-    return line.status == "drift" and is_new and line.seconds < _QUICK
-
-
 def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Diagnostic]:
-    """Diagnose that there is nothing to publish, or that nothing was verified."""
     place = course.map.span(0, 0)
     if not course.is_manual and all(lesson.status == "planned" for lesson in course.lessons):
         message = "the course has no written lesson"

@@ -1,8 +1,5 @@
 """Who may use the preview, and what is served at an address.
 
-Entry points: `Access`; `Answers.find`: files of the site, which come from a `Session`, with what
-the preview adds to pages. Who may use it: its own pages, and whoever opens one of its addresses.
-
 1. A page of another origin may link to the preview and do nothing else. Browsers say where a
    request comes from (`Sec-Fetch-Site`, `Origin`), and are told to show answers to nobody else.
 2. A host name may be made to point at this machine (DNS rebinding), an address may not. So only
@@ -179,7 +176,6 @@ class Answers:
         return _MESSAGE_PAGE.format(words.language, *texts).encode()
 
     def _add_preview(self, page: bytes, name: str, state: str) -> bytes:
-        """Return a page with the preview's style sheet and script, and the texts of that."""
         texts = {k: text for k, text in self._words.texts.items() if k.startswith("preview.")}
         words = escape(json.dumps(texts, ensure_ascii=False))
         attributes = f'data-page="{escape(name)}" data-state="{state}" data-words="{words}"'

@@ -1,17 +1,12 @@
 """A course that follows its files: events of the file system become saves, and saves pages.
 
-Entry point: `LiveCourse`. A thread of its own takes saves; the main thread does the rest of a build
-(`rebuild`).
+An editor may save in several steps: empty the file, then fill it; or write a new file, then move it
+to the place of the old one. They count as one save, which is complete when nothing has happened for
+some milliseconds. For many files at once, as when a branch is switched, the wait is longer; so it
+is for a file that is missing or empty, which may be so only between two steps.
 
-1. An editor may save in several steps: empty the file, then fill it; or write a new file, then move
-   it to the place of the old one. They count as one save, which is complete when nothing has
-   happened for some milliseconds.
-2. For many files at once, as when a branch is switched, the wait is longer.
-3. So it is for a file that is missing or empty, which may be so only between two steps.
-
-`FolderWatcher` watches by `watchfiles`; caches and editors' own files are ignored. The course's
-folders, and those that its scripts import from, are watched with everything in them, including
-folders that are made later. Files elsewhere, such as pages in `docs/guide.md`, are polled.
+The course's folders, and those that its scripts import from, are watched by `watchfiles` with
+everything in them. Files elsewhere, such as pages in `docs/guide.md`, are polled.
 """
 
 from __future__ import annotations
@@ -146,7 +141,6 @@ class FolderWatcher:
         return folders
 
     def _find_changed_files(self) -> set[str]:
-        """Find the polled files that have changed since the last look."""
         files = self._polled_files  # `watch_also` replaces the dictionary
         changed_files = {path for path, before in files.items() if self._file_state(path) != before}
         files.update((path, self._file_state(path)) for path in changed_files)
@@ -272,20 +266,16 @@ class LiveCourse:
 def _wait_until_complete(
     root: Path, watcher: FolderWatcher, paths: frozenset[str]
 ) -> frozenset[str]:
-    """Wait until a save is complete; return all its paths."""
     began = now = time.monotonic()
     while True:
-        is_part = len(paths) > MAX_SINGLE_READS or _is_any_empty(root, paths)
+        is_part = len(paths) > MAX_SINGLE_READS
+        try:
+            is_part |= any((root / path).stat().st_size == 0 for path in paths)
+        except OSError:
+            is_part = True
         remaining = began + LONGEST - now
         later = watcher.get(min(LONG_QUIET if is_part else QUIET, remaining))
         if not later:
             return paths
         paths |= later
         now = time.monotonic()
-
-
-def _is_any_empty(root: Path, paths: Iterable[str]) -> bool:
-    try:
-        return any((root / path).stat().st_size == 0 for path in paths)
-    except OSError:
-        return True

@@ -1,14 +1,7 @@
 """Messages for an open page: what is wrong, and what its author may accept there.
 
-Entry points: `page_news(session, path)`, as JSON; `accept(session, path, ids)`.
-
-1. The mistakes of the course: first those that keep the page from being drawn, then others of its
-   document. Each says whether the page shows it in its place, and has the fix that its edits are.
-2. For each script of the page its state; for each recorded output or figure that differs, both
-   versions; for each bound number that does not hold, the right one.
-3. The scripts that run now, with how long they took the last time.
-4. An offer's id is made from what the file holds and what it would hold. It is accepted only as
-   long as both are unchanged: nothing is ever written that the author has not seen.
+An offer's id is made from what the file holds and what it would hold. It is accepted only as long
+as both are unchanged: nothing is ever written that the author has not seen.
 """
 
 from __future__ import annotations
@@ -169,7 +162,6 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
 
 
 def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, Any]:
-    """Describe a mistake for the page of a document with this path."""
     span = diagnostic.span
     line = span.source.line_text(span.line)
     end = len(line) if span.end_line > span.line else span.end_column - 1
@@ -192,7 +184,6 @@ def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, A
 
 
 def _offer_fix(session: Session, diagnostic: Diagnostic) -> dict[str, Any]:
-    """Describe the fix of a mistake: the first line that it writes, and the offer."""
     sources = {edit.span.source for edit in diagnostic.edits}
     if len(sources) != 1 or not may_edit(session.root, diagnostic.edits[0].span.path):
         return {}

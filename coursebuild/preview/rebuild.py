@@ -1,18 +1,12 @@
 """The rest of a build, in the background after each save: whatever a page need not wait for.
 
-Entry point: `BackgroundRebuild.follow()`, which the main thread runs, so that Ctrl-C ends scripts
-as in any other command.
+When nothing was saved for a moment, everything is read, verified, drawn, and the mistakes that are
+new or gone are printed. When nothing more is to do, scripts that do not print what is recorded run
+once more, as their output may vary by itself. So do those whose only run was recorded; before that,
+with their initial states moved, to see which digits hold. Other commands need not wait for this.
 
-1. When nothing was saved for a moment, everything is read.
-2. Scripts and labs that have no remembered result run, and models are compiled (`verify`).
-3. The files of the site are made: changed pages, fonts, the search.
-4. New mistakes are printed, and those that are gone.
-5. When nothing more is to do, scripts that do not print what is recorded run once more, as their
-   output may vary by itself. So do those whose only run was recorded; before that, with their
-   initial states moved, to see which digits hold. Other commands need not wait for this.
-
-A save in between begins this anew. In steps 2 to 4 a running script is stopped only if it was
-edited, in step 5 in any case.
+A save in between begins this anew. A running script is stopped then only if it was edited; one that
+runs once more is stopped in any case.
 """
 
 from __future__ import annotations
@@ -105,7 +99,6 @@ class BackgroundRebuild:
                 self._finish(text)
 
     def _wait(self) -> None:
-        """Wait until there is something to do and nobody is saving."""
         session = self._session
         with session.condition:
             session.condition.wait_for(
@@ -166,7 +159,6 @@ class BackgroundRebuild:
             raise SupersededError
 
     def _finish(self, trouble: str = "") -> None:
-        """End the work; print mistakes that are new."""
         session = self._session
         with session.condition:
             if session.edits != self._edits and not trouble:
@@ -178,7 +170,6 @@ class BackgroundRebuild:
             self._print_changes(report_now(session))
 
     def _print_changes(self, report: Report) -> None:
-        """Print the mistakes that are new, and those that are gone."""
         now, before = report.diagnostics, self._printed
         self._printed = now
         new = subtract_diagnostics(now, before or ())
@@ -287,7 +278,6 @@ class BackgroundRebuild:
             self._edits = -1  # all that depends on it is made anew
 
     def _find_noise(self, course: Course, run_all: RunAll) -> None:
-        """Find digits that do not hold, of the scripts whose initial states were moved."""
         history = self._session.runs
         options = replace(self._options.for_course(course), jobs=1, run_all=run_all)
         runs = [run for run in history.last_results.runs if run.path in self._measured]

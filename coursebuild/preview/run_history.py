@@ -1,7 +1,7 @@
 """What running a course has shown so far, for a preview.
 
-Entry point: `RunHistory`. A script is known by its text and by how it is run: what another text
-printed is not shown. Callers hold the session's lock.
+A script is known by its text and by how it is run: what another text printed is not shown. Callers
+hold the session's lock.
 """
 
 from __future__ import annotations

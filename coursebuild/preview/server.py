@@ -1,26 +1,21 @@
 """The preview's web server: serves a site from memory and sends news to open pages.
 
-Entry point: `PreviewServer`.
-
-1. `Access` decides whose requests are answered. Without `--host` the server listens on the loopback
-   interface only.
-2. Files come from a `Session`; nothing is read from disk here.
-3. Pages get another script and style sheet. The script listens to `/.coursebuild/events`: `page` is
+1. Pages get another script and style sheet. The script listens to `/.coursebuild/events`: `page` is
    a digest of the page as it is now, `news` its messages. Both are sent whenever a page connects,
    so that a page that was disconnected misses nothing.
-4. A published site's service worker is replaced by one that removes itself: a browser may have seen
+2. A published site's service worker is replaced by one that removes itself: a browser may have seen
    such a site at this address before.
-5. `POST /.coursebuild/accept` accepts outputs, figures and numbers for the author;
-   `POST /.coursebuild/open` opens a place where something is wrong in the author's editor: that of
+3. `POST /.coursebuild/open` opens a place where something is wrong in the author's editor: that of
    `$VISUAL` or `$EDITOR` if it opens a window, as the terminal is the preview's; otherwise the
    first installed one that is known. Where there is none, pages link to `vscode://file/…`.
-6. Where a request ends is never in doubt: a proxy before the preview may send those of others over
+4. Where a request ends is never in doubt: a proxy before the preview may send those of others over
    the same connection. So a head is read strictly, and a connection goes on only after a request
    without a body that was answered.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
 import json
 import os
@@ -108,7 +103,14 @@ class PreviewServer(ThreadingHTTPServer):
         """The addresses of the preview: one for this machine, then one for others."""
         hosts = [str(self._address)]
         if self._address.is_unspecified:
-            hosts = ["127.0.0.1", *_outer_address()]
+            hosts = ["127.0.0.1"]
+            # The address at which other machines reach this one, if any; nothing is sent
+            with (
+                socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe,
+                contextlib.suppress(OSError),
+            ):
+                probe.connect(("192.0.2.1", 9))
+                hosts.append(probe.getsockname()[0])
         names = [f"[{host}]" if ":" in host else host for host in hosts]
         query = f"?token={self.access.token}" if self.access.token else ""
         return [f"http://{host}:{self._port}/{query}" for host in names]
@@ -127,16 +129,6 @@ class PreviewServer(ThreadingHTTPServer):
         if self._thread.ident is not None:  # otherwise `shutdown` would wait forever
             self.shutdown()
         self.server_close()
-
-
-def _outer_address() -> list[str]:
-    """Find the address at which other machines reach this one, if any; nothing is sent."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(("192.0.2.1", 9))
-        except OSError:
-            return []
-        return [probe.getsockname()[0]]
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -183,7 +175,6 @@ class _Handler(BaseHTTPRequestHandler):
         return is_read
 
     def do_GET(self) -> None:
-        """Answer with a file, or with the stream of events."""
         try:
             parts = urlsplit(self.path)
             path, query = parts.path, parse_qs(parts.query)
@@ -199,7 +190,6 @@ class _Handler(BaseHTTPRequestHandler):
     do_HEAD = do_GET
 
     def do_POST(self) -> None:
-        """Accept what a page offers, or open a place in an editor."""
         body = self._read_body()
         if not self._is_allowed():
             return
@@ -364,7 +354,6 @@ def open_in_editor(session: Session, place: str) -> str:
 
 
 def _find_editor() -> list[str]:
-    """Find the words that start the editor."""
     for command in (os.environ.get("VISUAL"), os.environ.get("EDITOR"), *_EDITORS):
         words = shlex.split(command or "")
         if words and _name(words[0]) in _EDITORS and shutil.which(words[0]):

@@ -1,14 +1,8 @@
 """A course in memory that follows its files, with its site as it is now.
 
-Entry point: `Session`.
-
-1. `edit(paths)` takes saves of documents: only these are read and checked.
-2. `read()` reads everything, after other changes and to be sure.
-3. `take_results` takes the results of running the course, which `runs` knows; `make_site` makes all
-   files of its site.
-4. `find(path)` returns a file.
-
-`condition` is the lock of everything here; whoever waits for news waits on it.
+`edit` takes saves of documents: only these are read and checked. `read` reads everything, after
+other changes and to be sure. `condition` is the lock of everything here; whoever waits for news
+waits on it.
 """
 
 from __future__ import annotations
@@ -231,7 +225,6 @@ class Session:
         return changed_owners
 
     def _check(self, document: Document) -> tuple[Diagnostic, ...]:
-        """Check a document, given the other documents."""
         assert self.course is not None and self._targets is not None
         return check_document(self.course, document, self._targets)
 
@@ -291,7 +284,6 @@ class Session:
         return not is_same
 
     def _show(self, course: Course) -> None:
-        """Draw pages of this course from now on, with what is known of it."""
         results, trials = self.runs.results(course), self.runs.trials
         self._template_diagnostics = ()
         self.library = make_library(course, results, self._assets, self._reports, trials)
@@ -362,7 +354,6 @@ class Session:
                 return None
 
     def _take_template_failure(self, failure: TemplateFailure) -> None:
-        """Diagnose a template of the course that fails."""
         with self.condition:
             assert self.course is not None
             diagnostics = (template_diagnostic(self.course, failure),)
@@ -371,7 +362,6 @@ class Session:
                 self.notify()
 
     def _is_sound(self, document: Document) -> bool:
-        """Whether there are no errors in a document, so that its page can be drawn."""
         diagnostics = self._diagnostics_by_file.get(document.source.path, ())
         return not has_errors(diagnostics) and not has_errors(self._check(document))
 
@@ -382,7 +372,6 @@ def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
 
 
 def _replace_owners(course: Course, new_owners: Iterable[Owner]) -> Course:
-    """Return the course with lessons and pages replaced by those with the same ids."""
     lessons = {owner.id: owner for owner in new_owners if isinstance(owner, Lesson)}
     pages = {owner.id: owner for owner in new_owners if isinstance(owner, Page)}
     levels = tuple(

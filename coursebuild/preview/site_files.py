@@ -1,12 +1,7 @@
 """The files of the site of a course as it is now; pages are drawn on demand.
 
-Entry point: `Files`.
-
-1. `make` makes all files of the site as a build does. The contents of most are made on demand.
-2. A page that has changed since is drawn on demand. A page whose document has a mistake stays as
-   it was.
-
-Callers hold the session's lock, except for `make`.
+A page whose document has a mistake stays as it was. Callers hold the session's lock, except for
+`make`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Diagnostics and verdicts as text, and for machines: JSON, JUnit XML, SARIF 2.1.0, CI annotations.
-
-Entry points: `Report`, `render_report(report, format, style)`; `FORMATS`, those for machines.
-"""
+"""Diagnostics and verdicts as text, and for machines: JSON, JUnit, SARIF 2.1.0, CI annotations."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What scripts do with another version of MuJoCo: values, and as text and JSON.
-
-Entry points: `ComparisonReport`, `comparison_text`, `comparison_json`.
-"""
+"""What scripts do with another version of MuJoCo: values, and as text and JSON."""
 
 from __future__ import annotations
 
@@ -47,7 +44,6 @@ class ScriptComparison(Struct, frozen=True):
 
     path: str
     lesson: str
-    """Id of its lesson or page."""
     status: str
     """`same`, `changed`, `fails` (both by MuJoCo), `unclear`, `drifted` or `uncompared`."""
     reason: str = ""
@@ -55,7 +51,6 @@ class ScriptComparison(Struct, frozen=True):
     changes: tuple[Change, ...] = ()
     diff: str = ""
     failure: Diagnostic | None = None
-    """How it failed with the other version."""
 
 
 class ModelLine(Struct, frozen=True):
@@ -71,9 +66,7 @@ class ComparisonReport(Struct, frozen=True):
     """What scripts and models do with the other version."""
 
     engine: str
-    """The version of MuJoCo here."""
     version: str
-    """The other version."""
     python: str
     scripts: tuple[ScriptComparison, ...]
     models: tuple[ModelLine, ...]
@@ -87,7 +80,16 @@ def comparison_json(report: ComparisonReport) -> str:
     return json_text(
         {
             **plain(report, version="against"),
-            "scripts": [_script_value(script) for script in report.scripts],
+            "scripts": [
+                {
+                    **plain(script, reason="why"),
+                    "by_mujoco": script.status in ("changed", "fails"),
+                    "changes": [plain(change) for change in script.changes],
+                    "failure": (failure := script.failure)
+                    and {**plain(failure), "said": failure.label},
+                }
+                for script in report.scripts
+            ],
             "names": [plain(name) for name in report.names],
             "summary": {
                 **_count(report.scripts),
@@ -98,21 +100,8 @@ def comparison_json(report: ComparisonReport) -> str:
     )
 
 
-def _script_value(script: ScriptComparison) -> dict[str, object]:
-    failure = script.failure
-    return {
-        **plain(script, reason="why"),
-        "by_mujoco": script.status in ("changed", "fails"),
-        "changes": [plain(change) for change in script.changes],
-        "failure": None if failure is None else {**plain(failure), "said": failure.label},
-    }
-
-
 def comparison_text(report: ComparisonReport, style: Style, *, quiet: bool = False) -> str:
-    """As text: what changed first, number by number, then the rest and the sums.
-
-    `quiet`: without the scripts that do the same.
-    """
+    """As text: what changed first, then the rest, unless `quiet` and the same, and the sums."""
     differing = [s for s in report.scripts if s.changes or s.diff or s.failure is not None]
     parts = ["\n".join(_script(s, report.version, style)) + "\n" for s in differing]
     lines = [
@@ -132,7 +121,19 @@ def comparison_text(report: ComparisonReport, style: Style, *, quiet: bool = Fal
     ]
     if lines:
         parts.append("".join(f"{line}\n" for line in lines))
-    parts.append(_summary(report, len(lost)) + "\n")
+    counts = (
+        f"{count} {_STATUSES[status].format(report.version)}"
+        for status, count in _count(report.scripts).items()
+        if count
+    )
+    sums = ", ".join(counts) or "nothing to compare"
+    total = f"{plural(len(report.scripts), 'script')}: {sums}"
+    if report.models:
+        texts = plural(len(report.models), "MJCF text")
+        verb = "compiles" if len(report.models) == 1 else "compile"
+        total += f"; {len(report.models) - len(lost)} of {texts} {verb} there"
+    head = f"MuJoCo {report.version} against {report.engine}, Python {report.python}"
+    parts.append(f"{head}: {total}\n")
     return "\n".join(parts)
 
 
@@ -155,7 +156,22 @@ def _script(script: ScriptComparison, version: str, style: Style) -> list[str]:
         lines.append(visible(f"  {span.path}:{span.line}: {message}{label}"))
     changes = sorted(script.changes, key=lambda change: (change.span.path, change.span.start))
     for change in changes[:_MOST_CHANGES]:
-        lines.append(visible(f"  {location(change.span)}: {_change(change, engine)}"))
+        first_lines = (text.strip().split("\n")[0] for text in (change.recorded, change.printed))
+        recorded, printed = (shorten(line, _WIDTH) for line in first_lines)
+        match change.kind:
+            case DriftKind.ROUNDING | DriftKind.NUMERIC:
+                distance = closeness(change)
+                text = f"recorded {recorded}; {engine} printed {printed}"
+                text += f" ({distance})" if distance else ""
+            case DriftKind.TEXT:
+                text = f"recorded `{recorded}`; {engine} printed `{printed}`"
+            case DriftKind.MISSING:
+                count = plural(change.recorded.count("\n") + 1, "line")
+                text = f"{engine} did not print {count} from `{recorded}` on"
+            case DriftKind.EXTRA:
+                count = plural(change.printed.count("\n") + 1, "more line")
+                text = f"{engine} printed {count} here: `{printed}`"
+        lines.append(visible(f"  {location(change.span)}: {text}"))
     if len(changes) > _MOST_CHANGES:
         lines.append(f"  and {plural(len(changes) - _MOST_CHANGES, 'more difference')}")
     if script.diff:
@@ -164,39 +180,6 @@ def _script(script: ScriptComparison, version: str, style: Style) -> list[str]:
     return lines
 
 
-def _change(change: Change, engine: str) -> str:
-    first_lines = (text.strip().split("\n")[0] for text in (change.recorded, change.printed))
-    recorded, printed = (shorten(line, _WIDTH) for line in first_lines)
-    distance = closeness(change)
-    match change.kind:
-        case DriftKind.ROUNDING | DriftKind.NUMERIC:
-            return f"recorded {recorded}; {engine} printed {printed}{distance and f' ({distance})'}"
-        case DriftKind.TEXT:
-            return f"recorded `{recorded}`; {engine} printed `{printed}`"
-        case DriftKind.MISSING:
-            lines = change.recorded.count("\n") + 1
-            return f"{engine} did not print {plural(lines, 'line')} from `{recorded}` on"
-        case DriftKind.EXTRA:
-            lines = change.printed.count("\n") + 1
-            return f"{engine} printed {plural(lines, 'more line')} here: `{printed}`"
-
-
-def _summary(report: ComparisonReport, lost: int) -> str:
-    parts = [
-        f"{count} {_STATUSES[status].format(report.version)}"
-        for status, count in _count(report.scripts).items()
-        if count
-    ]
-    lines = f"{plural(len(report.scripts), 'script')}: {', '.join(parts) or 'nothing to compare'}"
-    if report.models:
-        texts = plural(len(report.models), "MJCF text")
-        verb = "compiles" if len(report.models) == 1 else "compile"
-        lines += f"; {len(report.models) - lost} of {texts} {verb} there"
-    head = f"MuJoCo {report.version} against {report.engine}, Python {report.python}"
-    return f"{head}: {lines}"
-
-
 def _count(scripts: Iterable[ScriptComparison]) -> dict[str, int]:
-    """How many scripts have each status."""
     counts = Counter(script.status for script in scripts)
     return {status: counts[status] for status in _STATUSES}

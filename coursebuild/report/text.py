@@ -1,13 +1,7 @@
 """Diagnostics as text for people: message, place, the line with the wrong part marked, help.
 
-Entry points: `to_text(report, style)`, `diagnostic_paragraphs(diagnostics, style)`,
-`diagnostic_text(diagnostic, style)`; `sensitivity_text`; for any text `Style`, `visible`, `clip`,
-`Column`, `table`.
-
-1. The frame shows the first line of the span; carets mark the part of it that is wrong.
-2. Columns are those of a terminal: tabs are expanded, wide characters take two cells, control
-   characters are shown.
-3. A line too long for the screen is cut around the marked part.
+Columns are those of a terminal: tabs are expanded, wide characters take two cells, control
+characters are shown. A line too long for the screen is cut around the marked part.
 """
 
 from __future__ import annotations
@@ -64,25 +58,24 @@ class Style(Struct, frozen=True):
 
 def visible(text: str) -> str:
     """Return a text with symbols for control characters, so that it cannot change the terminal."""
-    return "".join(map(_show_char, text))
+    parts: list[str] = []
+    for char in text:
+        code = ord(char)
+        if char == "\t":
+            char = " " * TAB
+        elif code < 0x20:
+            char = chr(0x2400 + code)
+        elif code == 0x7F:
+            char = "\u2421"
+        elif unicodedata.category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp") and char != "\u200d":
+            char = "\ufffd"
+        parts.append(char)
+    return "".join(parts)
 
 
 def visible_lines(text: str) -> str:
     """Do the same for a text of several lines."""
     return "\n".join(visible(line) for line in text.split("\n"))
-
-
-def _show_char(char: str) -> str:
-    code = ord(char)
-    if char == "\t":
-        return " " * TAB
-    if code < 0x20:
-        return chr(0x2400 + code)
-    if code == 0x7F:
-        return "\u2421"
-    if unicodedata.category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp") and char != "\u200d":
-        return "\ufffd"
-    return char
 
 
 def clip(text: str, room: int) -> str:
@@ -107,10 +100,7 @@ class Column(Struct, frozen=True):
 
 
 def table(columns: Sequence[Column], width: int | None = None) -> list[str]:
-    """Return the titles and the rows as lines, no wider than `width` where that is possible.
-
-    Columns without any text are left out.
-    """
+    """The titles and rows of columns with text as lines, no wider than `width` where possible."""
     filled_columns = [
         (column, [column.title, *map(visible, column.cells)])
         for column in columns
@@ -124,23 +114,19 @@ def table(columns: Sequence[Column], width: int | None = None) -> list[str]:
         candidate = visible_columns | {n}
         if width is None or sum(widths[m] + len(_GAP) for m in candidate) - len(_GAP) <= width:
             visible_columns = candidate
-    padded_columns = [
-        [_pad(text, widths[n], left=filled_columns[n][0].left) for text in filled_columns[n][1]]
-        for n in sorted(visible_columns)
-    ]
+    padded_columns: list[list[str]] = []
+    for n in sorted(visible_columns):
+        column, texts = filled_columns[n]
+        pads = (" " * (widths[n] - cells(text)) for text in texts)
+        pairs = zip(texts, pads, strict=True)
+        padded_columns.append([text + pad if column.left else pad + text for text, pad in pairs])
     return [_GAP.join(row).rstrip() for row in zip(*padded_columns, strict=True)]
-
-
-def _pad(text: str, width: int, *, left: bool) -> str:
-    pad = " " * (width - cells(text))
-    return text + pad if left else pad + text
 
 
 # --- the terminal
 
 
 _MOST_OF_A_RULE = 20
-"""Diagnostics of one rule in one file that are shown."""
 
 
 def to_text(report: Report, style: Style) -> str:
@@ -250,25 +236,19 @@ def _frame(span: Span, room: int) -> tuple[str, int, int]:
     start = span.column - 1
     end = len(line) if span.end_line > span.line else span.end_column - 1
     end = max(min(end, len(line)), start)
-    first, last = _window(line, start, end, room)
+    first, last = 0, len(line)
+    # Characters may have no width: a long line may fit.
+    if len(line) > 2 * room or cells(line) > room:
+        nearby = line[max(0, start - room) : start + room]
+        room //= 2 if cells(nearby) > len(nearby) else 1
+        if end > room - room // 4:
+            first = max(0, min(start - room // 4, len(line) - room))
+        last = min(len(line), first + room)
     before = "…" if first else ""
     after = "…" if last < len(line) else ""
     at = len(before) + cells(line[first:start])
     width = max(1, cells(line[start : min(end, last)]))
     return before + visible(line[first:last]) + after, at, width
-
-
-def _window(line: str, start: int, end: int, room: int) -> tuple[int, int]:
-    """Return the part of the line to show: all of it if it fits, else a part around the marks."""
-    # Characters may have no width: a long line may fit.
-    if len(line) <= 2 * room and cells(line) <= room:
-        return 0, len(line)
-    nearby = line[max(0, start - room) : start + room]
-    room //= 2 if cells(nearby) > len(nearby) else 1
-    first = max(0, min(start - room // 4, len(line) - room))
-    if end <= room - room // 4:
-        first = 0
-    return first, min(len(line), first + room)
 
 
 # --- sensitivity
@@ -288,28 +268,25 @@ def sensitivity_text(sensitivities: Sequence[Sensitivity], style: Style) -> str:
         f"digits that repeat when initial states are moved by {PERTURBATION:.0e} (relative), and",
         "digits that are converged: half and a quarter of the timestep bear them out",
     ]
-    for sensitivity in sensitivities:
-        lines += _sensitivity_lines(sensitivity, style)
+    for s in sensitivities:
+        if s.standing is not Standing.MEASURED:
+            lines.append(f"{style.paint('not asked', FAINT)} {s.path}  {_REASONS[s.standing]}")
+            continue
+        repeat = s.numbers - sum(doubt.repeat < doubt.digits for doubt in s.doubts)
+        converged = s.numbers - sum(doubt.converged != doubt.digits for doubt in s.doubts)
+        verdict = "chaotic" if s.chaotic else "some" if s.doubts or s.flips else "all"
+        colour = GREEN if verdict == "all" else YELLOW
+        parts = [f"of {plural(s.numbers, 'number')} {repeat} repeat in full"]
+        parts.append(s.unhalved or f"{converged} are converged in full")
+        if (size := s.amplification) is not None:
+            factor = f"{size:.0e}" if size >= 1e3 else f"{size:.2g}"
+            factor = factor if math.isfinite(size) else "without bounds, many"
+            parts.append(f"states end {factor} times as far apart as they began")
+        lines.append(f"{style.paint(f'{verdict:<9}', colour)} {s.path}  {', '.join(parts)}")
+        rows: list[Doubt | Flip] = [*s.doubts, *s.flips]
+        rows.sort(key=lambda row: (row.span.path, row.span.start))
+        lines += (f"  {_row_text(row)}" for row in rows)
     return "".join(line + "\n" for line in lines)
-
-
-def _sensitivity_lines(s: Sensitivity, style: Style) -> list[str]:
-    if s.standing is not Standing.MEASURED:
-        return [f"{style.paint('not asked', FAINT)} {s.path}  {_REASONS[s.standing]}"]
-    repeat = s.numbers - sum(doubt.repeat < doubt.digits for doubt in s.doubts)
-    converged = s.numbers - sum(doubt.converged != doubt.digits for doubt in s.doubts)
-    verdict = "chaotic" if s.chaotic else "some" if s.doubts or s.flips else "all"
-    colour = GREEN if verdict == "all" else YELLOW
-    parts = [f"of {plural(s.numbers, 'number')} {repeat} repeat in full"]
-    parts.append(s.unhalved or f"{converged} are converged in full")
-    if (size := s.amplification) is not None:
-        factor = f"{size:.0e}" if size >= 1e3 else f"{size:.2g}"
-        factor = factor if math.isfinite(size) else "without bounds, many"
-        parts.append(f"states end {factor} times as far apart as they began")
-    head = f"{style.paint(f'{verdict:<9}', colour)} {s.path}  {', '.join(parts)}"
-    rows: list[Doubt | Flip] = [*s.doubts, *s.flips]
-    rows.sort(key=lambda row: (row.span.path, row.span.start))
-    return [head, *(f"  {_row_text(row)}" for row in rows)]
 
 
 def _row_text(row: Doubt | Flip) -> str:

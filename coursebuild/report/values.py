@@ -1,7 +1,4 @@
-"""What a report holds, and values as JSON.
-
-Entry points: `Report`; `summary_line(report)`, its last line as text; `plain`, `json_text`.
-"""
+"""What a report holds, and values as JSON."""
 
 from __future__ import annotations
 
@@ -9,17 +6,15 @@ import json
 import math
 from collections.abc import Mapping
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import TrialLine
+from coursebuild.core.scripts.sensitivity import Sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Span
-
-if TYPE_CHECKING:
-    from coursebuild.core.scripts.sensitivity import Sensitivity
 
 
 class ScriptLine(Struct, frozen=True):
@@ -33,11 +28,9 @@ class ScriptLine(Struct, frozen=True):
     seconds: float
     cached: bool
     missing: tuple[str, ...] = ()
-    """The modules that a skipped script lacks."""
     unproven_outputs: int = 0
     """Outputs and figures that are recorded of a script that was not run."""
     unproven_numbers: int = 0
-    """Numbers bound to these outputs."""
     unrepeated: bool = False
     """Whether what is recorded of it was recorded from its only run."""
 
@@ -76,7 +69,6 @@ class Report(Struct, frozen=True):
     scripts: tuple[ScriptLine, ...]
     summary: Summary
     remarks: tuple[str, ...] = ()
-    """What was done, such as the files written; a line for each."""
     labs: tuple[TrialLine, ...] = ()
     depends: tuple[str, ...] | None = None
     """Files outside the course's own folders that the report depends on, absolute or relative to
@@ -142,10 +134,9 @@ def json_text(value: object) -> str:
 
 
 def plain(value: object, **names: str) -> Any:
-    """Convert a value to dictionaries, lists, texts and numbers; infinities and NaN to `None`.
+    """Convert a value to what JSON holds; infinities and NaN to `None`.
 
-    A struct becomes an object of its fields, some under other `names`. In the place of its `span`
-    stand the path, the lines and the columns.
+    A struct becomes an object of its fields, some under other `names`; its `span` becomes a place.
     """
     match value:
         case Diagnostic():

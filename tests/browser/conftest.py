@@ -24,7 +24,6 @@ def sites(built_courses: BuiltCourses) -> Iterator[Sites]:
 
 @pytest.fixture(scope="session")
 def course(sites: Sites) -> Site:
-    """A course of one lesson with labs."""
     return sites["labs"]
 
 
@@ -35,13 +34,11 @@ def base(course: Site) -> str:
 
 @pytest.fixture(scope="session")
 def quizzes(sites: Sites) -> str:
-    """The address of a site with every kind of question."""
     return sites["quizzes"].url()
 
 
 @pytest.fixture(scope="session")
 def site(sites: Sites) -> str:
-    """The address of a site with questions, and a reader's way through it."""
     return sites["reader"].url()
 
 
@@ -57,7 +54,6 @@ def scorm(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
 
 @pytest.fixture
 def context(browsers: Mapping[str, Browser]) -> Iterator[BrowserContext]:
-    """A window of a desk's size."""
     with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
         yield context
 

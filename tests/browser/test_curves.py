@@ -17,7 +17,6 @@ PLOT, BALL = 0, 1
 
 @pytest.fixture(scope="module")
 def curves(sites: Sites) -> Site:
-    """A course whose labs all go without an engine."""
     return sites["curves"]
 
 
@@ -27,7 +26,6 @@ def page(curves: Site, open_address: Callable[[str], Page]) -> Page:
 
 
 def lab(page: Page, number: int) -> Locator:
-    """A lab that has started."""
     place = page.locator(".lab").nth(number)
     place.scroll_into_view_if_needed()
     expect(place).to_have_class(re.compile("lab-on"))

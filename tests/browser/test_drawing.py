@@ -52,7 +52,6 @@ def ready(page: Page, number: int) -> None:
 def drawn_page(
     browsers: Mapping[str, Browser], sites: Mapping[str, Site]
 ) -> Iterator[tuple[Page, list[str]]]:
-    """The page, and what it says to the console."""
     with browsers["webgl"].new_context(viewport=WINDOW) as context:
         page, console = watch_page(context)
         page.goto(sites["drawing"].url(LESSON))

@@ -29,7 +29,6 @@ def page(browsers: Mapping[str, Browser], base: str) -> Iterator[Page]:
 
 
 def editor_of(page: Page) -> tuple[Locator, Locator]:
-    """The lab with the lesson's model, and its text."""
     lab_element = page.locator(".lab").nth(EDITED_LAB)
     return lab_element, lab_element.get_by_label("The model, as MJCF")
 

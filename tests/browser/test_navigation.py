@@ -18,7 +18,6 @@ FORMULAS, LAST = "lessons/1.1-one.html", "lessons/1.3-three.html"
 
 @pytest.fixture(scope="session")
 def base(sites: Mapping[str, Site]) -> str:
-    """The address of a course of three lessons."""
     return sites["navigation"].url()
 
 
@@ -51,7 +50,6 @@ def test_the_anchor_of_a_formula_is_seen_when_it_is_pointed_at_or_focused(
 
 
 def large_enough(controls: Locator) -> bool:
-    """For a finger."""
     box = controls.bounding_box()
     return box is not None and min(box["width"], box["height"]) >= 24
 

@@ -87,7 +87,6 @@ def settled_page(context: BrowserContext, host: Host, path: str = "") -> tuple[P
 
 
 def visited(page: Page, host: Host, path: str) -> None:
-    """Open a page and wait until it has told the worker of its visit by itself."""
     page.add_init_script(COUNT_VISIT_MESSAGES)
     page.goto(host.url + path)
     until(page, "window.toldOfVisits > 0")
@@ -99,7 +98,6 @@ def see(page: Page, text: str) -> None:
 
 
 def build_edited(offline_course: Folder, site: Path, *edits: tuple[str, str, str]) -> None:
-    """Another build of the course in the place of the one that is served."""
     for path, old, new in edits:
         offline_course.replace(path, old, new)
     try:

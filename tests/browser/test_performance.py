@@ -161,7 +161,6 @@ DRAW_PICTURES = """(n) => new Promise((done) => {
 
 
 def run(context: BrowserContext, base: str) -> tuple[Page, list[str]]:
-    """The swing with its plot, running for a while."""
     page, console = watch_page(context)
     page.goto(base + PAGE)
     swing = lab(page)
@@ -274,7 +273,6 @@ def scores(report: dict[str, Any]) -> dict[str, int]:
 
 
 def lost(report: dict[str, Any], category: str) -> list[tuple[str, float, str]]:
-    """What costs points."""
     return [
         (ref["id"], audit["score"], audit.get("displayValue", ""))
         for ref in report["categories"][category]["auditRefs"]

@@ -35,7 +35,6 @@ def nasty(sites: Mapping[str, Site]) -> str:
 
 
 def printed(page: Page) -> list[str]:
-    """The text of each sheet."""
     reader = PdfReader(io.BytesIO(page.pdf(format="A4")))
     return [sheet.extract_text() for sheet in reader.pages]
 

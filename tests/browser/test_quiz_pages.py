@@ -231,7 +231,6 @@ def test_half_typed_answer_survives_the_author(
 
 
 def shifted(page: Page) -> list[str]:
-    """The order after its first item was moved."""
     before = items(page)
     question(page, ORDER).get_by_role("button", name="Move down").first.click()
     after = [before[1], before[0], *before[2:]]

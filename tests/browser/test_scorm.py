@@ -29,7 +29,6 @@ PLATFORM = fixture_text("documents/platform.html")
 
 @pytest.fixture(scope="module")
 def platform(scorm: Path) -> Iterator[str]:
-    """The address of a platform that has the package."""
     if not RUNTIME.is_file():
         pytest.fail("scorm-again is not installed: run python site/bundle.py packages")
     shutil.copy(RUNTIME, scorm / "runtime.js")

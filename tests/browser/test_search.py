@@ -23,7 +23,6 @@ SHOWS_QUERY = "(q) => document.querySelector('.search-dialog').dataset.shown ===
 
 @pytest.fixture
 def site(sites: Mapping[str, Site]) -> str:
-    """The address of a course of three lessons and many short ones."""
     return sites["search"].url()
 
 

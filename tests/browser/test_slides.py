@@ -20,8 +20,6 @@ pytestmark = pytest.mark.browser
 
 @pytest.fixture
 def export(built_courses: BuiltCourses, tmp_path: Path) -> Callable[[str], Path]:
-    """Writes the slides of the first lesson of a course."""
-
     def export(name: str) -> Path:
         out = tmp_path / f"{name}.html"
         result = built_courses[name].main("export", "slides", "1.1", "--quiet", "--out", str(out))

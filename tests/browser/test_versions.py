@@ -10,33 +10,13 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import ROOT, Folder
 from support.static_host import Host
 
 pytestmark = pytest.mark.browser
 
-MAP = """
-[course]
-title = "A manual"
-version = "{version}"
-
-[[page]]
-id = "home"
-title = "A manual"
-file = "home.md"
-
-[[page]]
-id = "{page}"
-title = "A page"
-file = "page.md"
-section = "Reference"
-
-[[page]]
-id = "rules"
-title = "Rules"
-file = "rules.md"
-section = "Reference"
-"""
+MAP = fixture_text("documents/versions.toml")
 
 
 @pytest.fixture(scope="module")

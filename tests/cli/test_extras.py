@@ -3,82 +3,25 @@
 from __future__ import annotations
 
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder
 
-MOTION = """\
-## Ball
-
-```lab ode
-{"title": "A ball", "t": {"max": 1, "unit": "s"},
- "states": {"h": {"start": 1, "rate": "v"}, "v": {"start": 0, "rate": "-9.81"}},
- "plots": [{"ylabel": "height (m)", "traces": [{"label": "height", "expr": "h"}]}]}
-```
-"""
-PICTURE = """\
-## Dot
-
-```python file=examples/dot.py figure=dot.png
-import struct
-import zlib
-from pathlib import Path
-
-
-def chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-
-header = struct.pack(">IIBBBBB", 1, 1, 8, 0, 0, 0, 0)
-chunks = chunk(b"IHDR", header), chunk(b"IDAT", zlib.compress(bytes(2))), chunk(b"IEND", b"")
-Path("dot.png").write_bytes(bytes.fromhex("89504e470d0a1a0a") + b"".join(chunks))
-```
-
-Figure: ![A dot](dot.png) A dot.
-"""
-FORMULA = """\
-## Sine
-
-```lab plot
-{"title": "A sine", "x": {"max": 6},
- "plots": [{"ylabel": "height (m)", "traces": [{"label": "height", "expr": "sin(x)"}]}]}
-```
-"""
+LESSONS = tomllib.loads(fixture_text("documents/extras.toml"))
 
 
 @pytest.mark.engine
 @pytest.mark.parametrize(
     ("package", "lesson", "command", "message"),
     [
-        (
-            "scipy",
-            MOTION,
-            "check",
-            "a trial of a lab's equations needs the package scipy\n"
-            "  help: run `pip install 'coursebuild[measure]'`\n",
-        ),
-        (
-            "scipy",
-            FORMULA,
-            "bench",
-            "`coursebuild bench` needs the package scipy\n"
-            "  help: run `pip install 'coursebuild[measure]'`\n",
-        ),
-        (
-            "scipy",
-            FORMULA,
-            "stability",
-            "`coursebuild stability` needs the package scipy\n"
-            "  help: run `pip install 'coursebuild[measure]'`\n",
-        ),
-        (
-            "PIL",
-            PICTURE,
-            "update",
-            "`dot.png` needs the package Pillow: run `pip install 'coursebuild[figures]'`\n",
-        ),
+        ("scipy", "motion", "check", "a trial of a lab's equations needs the package scipy"),
+        ("scipy", "formula", "bench", "`coursebuild bench` needs the package scipy"),
+        ("scipy", "formula", "stability", "`coursebuild stability` needs the package scipy"),
+        ("PIL", "picture", "update", "`dot.png` needs the package Pillow"),
     ],
 )
 def test_command_names_the_extra_that_it_needs(
@@ -91,10 +34,13 @@ def test_command_names_the_extra_that_it_needs(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     folder = Folder(tmp_path / "course")
-    folder.fill([lesson], stores)
+    folder.fill([LESSONS[lesson]], stores)
     monkeypatch.setitem(sys.modules, package, None)
     result = folder.main(command, "--quiet")
-    assert message in result.out + result.err
+    advice = "\n  help: run `pip install 'coursebuild[measure]'`\n"
+    if package == "PIL":
+        advice = ": run `pip install 'coursebuild[figures]'`\n"
+    assert message + advice in result.out + result.err
     assert result.status == 1
 
 
@@ -103,7 +49,7 @@ def test_lab_of_formulas_and_build_need_no_extra(
     tmp_path: Path, stores: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = Folder(tmp_path / "course")
-    folder.fill([FORMULA], stores)
+    folder.fill([LESSONS["formula"]], stores)
     for package in ("scipy", "matplotlib", "PIL", "pygls", "fsspec"):
         monkeypatch.setitem(sys.modules, package, None)
     result = folder.main("build")

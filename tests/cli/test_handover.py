@@ -7,6 +7,7 @@ import fcntl
 import os
 import pty
 import re
+import shlex
 import shutil
 import signal
 import socket
@@ -20,6 +21,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.cli.handover import ask_preview, hand_over, receive, send, socket_place
+from support.fixture_cases import fixture_text
 from support.preview_process import Preview, serve_preview
 from support.scratch_course import (
     FIRST,
@@ -49,6 +51,11 @@ def runtime() -> Iterator[str]:
     shutil.rmtree(folder)
 
 
+@pytest.fixture
+def slow(make: Make) -> Folder:
+    return make(SLOW)
+
+
 @contextlib.contextmanager
 def preview_of(folder: Folder, runtime: str, *arguments: str) -> Iterator[Preview]:
     with serve_preview(folder, *arguments, env={"XDG_RUNTIME_DIR": runtime}) as preview:
@@ -68,29 +75,6 @@ def normalize(result: CommandResult, folder: Folder) -> tuple[int, str, str]:
     return result.status, plain(result.out), plain(result.err)
 
 
-COMMANDS = (
-    ("export", "page"),
-    ("build", "--out", "elsewhere"),
-    ("DRIFT",),
-    ("check",),
-    ("check", "-v", "1.2"),
-    ("check", "--format", "json"),
-    ("check", "9.9"),
-    ("check", "--nonsense"),
-    ("-C", "content", "check"),
-    ("new", "lesson", "1.3", "Third"),
-    ("new", "lesson", "1.3", "Third"),
-    ("fmt", "--check"),
-    ("fmt",),
-    ("SLIP",),
-    ("check", "--fix"),
-    ("undo",),
-    ("check", "--fix"),
-    ("extract", "-q"),
-    ("rename", "1.2", "1.4"),
-    ("update", "--dry-run"),
-    ("update",),  # after this, the preview runs the script again
-)
 EDITS = {"DRIFT": ("2.5\n```", "2.4\n```"), "SLIP": ("```text\n2.4", "```tetx\n2.4")}
 
 
@@ -103,7 +87,8 @@ def test_commands_do_what_they_do_without_a_preview(make: Make, runtime: str) ->
     env = {"XDG_RUNTIME_DIR": runtime}
     with preview_of(served, runtime) as preview:
         preview.wait_for_line("checked: ")
-        for words in COMMANDS:
+        lines = fixture_text("scripts/commands_beside_preview.txt").splitlines()
+        for words in (shlex.split(line) for line in lines if not line.startswith("#")):
             if words[0] in EDITS:
                 for folder in (alone, served):
                     folder.replace(folder.lesson(), *EDITS[words[0]])
@@ -185,36 +170,30 @@ def test_commands_at_once_are_all_done(make: Make, runtime: str) -> None:
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_the_command_and_not_the_preview(
-    make: Make, runtime: str, number: int, status: int
+    slow: Folder, runtime: str, number: int, status: int
 ) -> None:
-    folder = make(SLOW)
-    with preview_of(folder, runtime) as preview:
-        preview.wait_for_line("running examples/slow.py")
-        with started_check(folder, runtime, preview) as process:
+    with preview_of(slow, runtime) as preview:
+        with started_check(slow, runtime, preview) as process:
             process.send_signal(number)
             assert process.wait(300) == status
             assert process.stderr is not None
             last = process.stderr.read().splitlines()[-1]
             assert last == {130: b"interrupted", 143: b"terminated"}[status]
         preview.wait_for_line(f"done: `coursebuild check`, exit status {status} (")
-        folder.write("go", "")
+        slow.write("go", "")
         preview.wait_for_line("checked: everything holds")
 
 
-def test_a_command_ends_with_whoever_asked_for_it(make: Make, runtime: str) -> None:
-    folder = make(SLOW)
-    with preview_of(folder, runtime) as preview:
-        preview.wait_for_line("running examples/slow.py")
-        with started_check(folder, runtime, preview) as process:
+def test_a_command_ends_with_whoever_asked_for_it(slow: Folder, runtime: str) -> None:
+    with preview_of(slow, runtime) as preview:
+        with started_check(slow, runtime, preview) as process:
             process.kill()
         preview.wait_for_line("done: `coursebuild check`, exit status 143 (")
 
 
-def test_a_command_whose_process_is_killed_says_so(make: Make, runtime: str) -> None:
-    folder = make(SLOW)
-    with preview_of(folder, runtime) as preview:
-        preview.wait_for_line("running examples/slow.py")
-        with started_check(folder, runtime, preview) as process:
+def test_a_command_whose_process_is_killed_says_so(slow: Folder, runtime: str) -> None:
+    with preview_of(slow, runtime) as preview:
+        with started_check(slow, runtime, preview) as process:
             (server,) = (p for p in children(preview.process.pid) if is_copy(p, preview))
             (supervisor,) = children(server)
             (job,) = children(supervisor)
@@ -225,37 +204,32 @@ def test_a_command_whose_process_is_killed_says_so(make: Make, runtime: str) -> 
                 process.stderr.read()
             )
             wait_until(lambda: not Path(f"/proc/{job}/cwd").exists(), "the command's end")
-        folder.write("go", "")
-        assert folder.run("check", env={"XDG_RUNTIME_DIR": runtime}).status == 0
+        slow.write("go", "")
+        assert slow.run("check", env={"XDG_RUNTIME_DIR": runtime}).status == 0
 
 
-def test_a_command_goes_on_after_the_preview(make: Make, runtime: str) -> None:
-    folder = make(SLOW)
-    with preview_of(folder, runtime) as preview:
-        preview.wait_for_line("running examples/slow.py")
-        with started_check(folder, runtime, preview) as process:
+def test_a_command_goes_on_after_the_preview(slow: Folder, runtime: str) -> None:
+    with preview_of(slow, runtime) as preview:
+        with started_check(slow, runtime, preview) as process:
             (server,) = (p for p in children(preview.process.pid) if is_copy(p, preview))
             preview.process.kill()
-            folder.write("go", "")
+            slow.write("go", "")
             assert process.wait(300) == 0
         preview.process.wait()
         wait_until(lambda: not Path(f"/proc/{server}/cwd").exists(), "the server's end")
-        result = folder.run("check", "1.1", env={"XDG_RUNTIME_DIR": runtime})
+        result = slow.run("check", "1.1", env={"XDG_RUNTIME_DIR": runtime})
         assert (result.status, "preview" in result.err) == (0, False)  # its socket means nothing
-    wait_until_alone(folder)
+    wait_until_alone(slow)
 
 
 @contextlib.contextmanager
 def started_check(
     folder: Folder, runtime: str, preview: Preview
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """A check that waits for a script."""
-    process = folder.start(
-        "check",
-        env={"XDG_RUNTIME_DIR": runtime},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-    )
+    """A check that waits for a script that the preview runs."""
+    preview.wait_for_line("running examples/slow.py")
+    streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+    process = folder.start("check", env={"XDG_RUNTIME_DIR": runtime}, **streams)
     with kill_at_end(process):
         assert process.stderr is not None
         while b"waiting for its result" not in process.stderr.readline():
@@ -309,15 +283,13 @@ def test_a_second_preview_says_where_the_first_is(make: Make, runtime: str) -> N
         preview.wait_for_line("done: `coursebuild check 1.1`, exit status 0 (")
 
 
-def test_the_server_refuses_what_is_no_command_for_it(make: Make, runtime: str) -> None:
+def test_the_server_refuses_what_is_no_command_for_it(
+    make: Make, runtime: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = make(FIRST)
-    os.environ["XDG_RUNTIME_DIR"], before = runtime, os.environ.get("XDG_RUNTIME_DIR")
-    try:
+    with monkeypatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", runtime)
         place = socket_place(str(folder.root)) or ""
-    finally:
-        os.environ.pop("XDG_RUNTIME_DIR")
-        if before is not None:
-            os.environ["XDG_RUNTIME_DIR"] = before
     with preview_of(folder, runtime) as preview:
         preview.wait_for_line("checked: ")
         assert Path(place).lstat().st_mode & 0o777 == 0o600
@@ -333,13 +305,14 @@ def test_the_server_refuses_what_is_no_command_for_it(make: Make, runtime: str) 
                 connection.connect(place)
                 send(connection, request)
                 assert receive(connection) == {"refusal": refusal}
-        for garbage in (
+        garbage_parts = (
             b"",
             b"\0",
             b"\0\0\0\2{]",
             b"\xff\xff\xff\xff{}",
             b"GET / HTTP/1.1\r\n\r\n",
-        ):
+        )
+        for garbage in garbage_parts:
             with socket.socket(socket.AF_UNIX) as connection:
                 connection.connect(place)
                 connection.sendall(garbage)

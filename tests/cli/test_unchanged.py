@@ -5,13 +5,12 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from coursebuild.cli.unchanged import Watcher, unchanged
-from support.run_code import run_code
+from support.run_code import program, run_code
 from support.scratch_course import FIRST, Folder, Make
 from support.workflows import git
 
@@ -41,10 +40,10 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return root
 
 
-def keep(root: Path, message: str = ALL_IS_WELL, during: Callable[[Path], object] = bool) -> bool:
-    """Whether a command could record the state when its work was done."""
+def keep(root: Path, message: str = ALL_IS_WELL, during: str = "") -> bool:
+    """Whether a command could record the state when its work was done, and something changed."""
     watcher = Watcher(str(root), COMMAND)
-    during(root)
+    change(root, during)
     return watcher.keep(message, ["data/d.csv", "data/not-there.csv"], ["public", "examples"])
 
 
@@ -59,77 +58,61 @@ def test_the_last_message_is_repeated(root: Path) -> None:
         assert [last_message(root), last_message(root)] == [text, text]
 
 
-def rewrite(path: str) -> Callable[[Path], None]:
-    def change(root: Path) -> None:
-        before = (root / path).read_bytes()
-        (root / path).write_bytes(before[:-1] + b"!")  # as long as it was
-
-    return change
-
-
-def replace(root: Path) -> None:
-    """Put another file of the same name, size and time in its place."""
-    status = (root / MODEL).stat()
-    new = root / "models/new"
-    new.write_bytes((root / MODEL).read_bytes())
-    os.utime(new, ns=(status.st_atime_ns, status.st_mtime_ns))
-    new.replace(root / MODEL)
-
-
-def put_the_time_back(root: Path) -> None:
-    """Change the text, but neither its length nor its time."""
-    before = (root / MODEL).stat()
-    rewrite(MODEL)(root)
-    os.utime(root / MODEL, ns=(before.st_atime_ns, before.st_mtime_ns))
-
-
-def link_away(root: Path) -> None:
-    (root / MODEL).rename(root.with_name("away.xml"))
-    (root / MODEL).symlink_to(root.with_name("away.xml"))
-
-
-def install(root: Path) -> None:
-    packages = root.parent / "site-packages"
-    (packages / "numpy-2.0.dist-info").rename(packages / "numpy-2.1.dist-info")
-
-
-def file_for_folder(root: Path) -> None:
-    (root / "examples/a.py").unlink()
-    (root / "examples/a.py").mkdir()
-
-
-def add(root: Path) -> None:
-    (root / "content/lessons/1.2-b.md").touch()
-
-
-def remove(root: Path) -> None:
-    (root / MODEL).unlink()
-
-
 REWRITTEN_PATHS = (LESSON, MODEL, "data/d.csv", "public/index.html", "examples/a.py")
-CHANGES: dict[str, Callable[[Path], object]] = {
-    **{path: rewrite(path) for path in REWRITTEN_PATHS},
-    "touched": lambda root: os.utime(root / "content/course.toml"),
-    "a file more": add,
-    "a folder more": lambda root: (root / "content/new").mkdir(),
-    "removed": remove,
-    "renamed": lambda root: (root / LESSON).rename(root / "content/lessons/1.1-b.md"),
-    "what a script looked for": lambda root: (root / "data/not-there.csv").touch(),
-    "what a script read": lambda root: (root / "data/d.csv").unlink(),
-    "replaced": replace,
-    "the time put back": put_the_time_back,
-    "a link in its place": link_away,
-    "a package": install,
-    "the site": lambda root: (root / "public").rename(root / "elsewhere"),
-    "in the site": lambda root: (root / "public/note.txt").touch(),
-    "a folder in its place": file_for_folder,
-}
+CHANGES = (
+    *REWRITTEN_PATHS,
+    *("touched", "a file more", "a folder more", "removed", "renamed", "replaced"),
+    *("what a script looked for", "what a script read", "the time put back"),
+    *("a link in its place", "a folder in its place", "a package", "the site", "in the site"),
+)
 
 
-@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
-def test_any_change_is_seen(root: Path, change: Callable[[Path], object]) -> None:
+def change(root: Path, kind: str) -> None:
+    model = root / MODEL
+    times = model.stat().st_atime_ns, model.stat().st_mtime_ns
+    match kind:
+        case path if path in REWRITTEN_PATHS:
+            (root / path).write_bytes((root / path).read_bytes()[:-1] + b"!")  # as long as it was
+        case "touched":
+            os.utime(root / "content/course.toml")
+        case "a file more":
+            (root / "content/lessons/1.2-b.md").touch()
+        case "a folder more":
+            (root / "content/new").mkdir()
+        case "removed":
+            model.unlink()
+        case "renamed":
+            (root / LESSON).rename(root / "content/lessons/1.1-b.md")
+        case "replaced":  # by another file of the same name, size and time
+            model.with_name("new").write_bytes(model.read_bytes())
+            os.utime(model.with_name("new"), ns=times)
+            model.with_name("new").replace(model)
+        case "what a script looked for":
+            (root / "data/not-there.csv").touch()
+        case "what a script read":
+            (root / "data/d.csv").unlink()
+        case "the time put back":  # the text changed, but not its length
+            change(root, MODEL)
+            os.utime(model, ns=times)
+        case "a link in its place":
+            model.rename(root.with_name("away.xml"))
+            model.symlink_to(root.with_name("away.xml"))
+        case "a folder in its place":
+            (root / "examples/a.py").unlink()
+            (root / "examples/a.py").mkdir()
+        case "a package":
+            package = root.parent / "site-packages/numpy-2.0.dist-info"
+            package.rename(package.with_name("numpy-2.1.dist-info"))
+        case "the site":
+            (root / "public").rename(root / "elsewhere")
+        case "in the site":
+            (root / "public/note.txt").touch()
+
+
+@pytest.mark.parametrize("kind", CHANGES)
+def test_any_change_is_seen(root: Path, kind: str) -> None:
     assert keep(root)
-    change(root)
+    change(root, kind)
     assert last_message(root) is None
 
 
@@ -150,11 +133,9 @@ def test_what_is_no_part_of_the_course_is_not_looked_at(root: Path) -> None:
     assert last_message(root) == ALL_IS_WELL
 
 
-@pytest.mark.parametrize("change", [add, remove, rewrite(MODEL), rewrite("data/d.csv")])
-def test_what_changes_during_the_work_is_not_kept(
-    root: Path, change: Callable[[Path], None]
-) -> None:
-    assert not keep(root, during=change)
+@pytest.mark.parametrize("kind", ["a file more", "removed", MODEL, "data/d.csv"])
+def test_what_changes_during_the_work_is_not_kept(root: Path, kind: str) -> None:
+    assert not keep(root, during=kind)
     assert last_message(root) is None
 
 
@@ -171,7 +152,7 @@ def test_a_store_that_is_warned_of_is_warned_of_again(root: Path) -> None:
 
 
 def test_what_the_work_writes_may_be_new(root: Path) -> None:
-    assert keep(root, during=rewrite("public/index.html"))
+    assert keep(root, during="public/index.html")
     assert last_message(root) == ALL_IS_WELL
 
 
@@ -216,13 +197,7 @@ def test_a_note_that_cannot_be_written_costs_only_time(
 
 
 def test_looking_imports_next_to_nothing() -> None:
-    code = (
-        "import sys; before = set(sys.modules); import coursebuild.cli, coursebuild.cli.unchanged\n"
-        "print(sorted(m for m in sys.modules if m.startswith('coursebuild.')))\n"
-        "large = {'argparse', 'contextlib', 'pathlib', 'typing'}\n"
-        "print(sorted(large & set(sys.modules) - before))\n"
-    )
-    process = run_code(code)
+    process = run_code(program("imports_of_looking"))
     assert process.stdout.splitlines() == [
         "['coursebuild.cli', 'coursebuild.cli.output', 'coursebuild.cli.unchanged', "
         "'coursebuild.core', 'coursebuild.core.files', 'coursebuild.core.files.course_root', "
@@ -242,13 +217,9 @@ def aged(folder: Folder) -> None:
 def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: Make) -> None:
     folder = make(FIRST)
     aged(folder)
-    code = (
-        "import sys; from coursebuild.cli import main; status = main(sys.argv[1:]);"
-        "heavy = {'argparse', 'msgspec', 'coursebuild.core.model', 'coursebuild.pipeline'};"
-        "print(sorted(heavy & set(sys.modules)), file=sys.stderr); sys.exit(status)"
-    )
+    heavy = "argparse msgspec coursebuild.core.model coursebuild.pipeline"
     for _ in range(2):
-        result = run_code(code, "-C", folder.root, "check")
+        result = run_code(program("imports_of_a_command"), heavy, "-C", folder.root, "check")
         assert result.returncode == 0
     assert result.stdout == (
         "ok       examples/one.py  cached\n\n"
@@ -262,15 +233,12 @@ def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: 
 def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
     """A formula that the lesson had before is not typeset again."""
     folder = make(FIRST)
-    code = (
-        "import sys; from coursebuild.cli import main; status = main(sys.argv[1:]);"
-        "rare = {'mujoco', 'numpy', 'fontTools', 'coursebuild.core.run.v8'};"
-        "print(sorted(rare & set(sys.modules)), file=sys.stderr); sys.exit(status)"
-    )
+    rare = "mujoco numpy fontTools coursebuild.core.run.v8"
 
     def loaded_after(edit: bytes) -> str:
         folder.write(folder.lesson(), folder.read(folder.lesson()) + edit)
-        result = run_code(code, "-C", folder.root, "build", "-q")
+        code = program("imports_of_a_command")
+        result = run_code(code, rare, "-C", folder.root, "build", "-q")
         assert result.returncode == 0
         return result.stderr
 

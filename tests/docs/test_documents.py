@@ -33,7 +33,6 @@ PICTURE_LIMIT = 300_000  # bytes
 
 @pytest.fixture
 def course(tmp_path: Path, stores: Path) -> Folder:
-    """The small course that the README shows."""
     folder = Folder(tmp_path / "course")
     write_files(folder.root, FENCES)
     folder.borrow(stores)
@@ -142,7 +141,6 @@ def test_every_document_is_a_page_of_the_manual_without_mistakes() -> None:
 
 
 def git(*words: str) -> str:
-    """What Git says of docs/."""
     return subprocess.run(["git", *words], cwd=DOCS, capture_output=True, text=True).stdout
 
 
@@ -188,7 +186,6 @@ def test_the_picture_can_be_taken_again(built_courses: BuiltCourses, tmp_path: P
 
 
 def rows(path: Path) -> list[list[str]]:
-    """The cells of the first table of a document."""
     lines = path.read_text(encoding="utf-8").split("\n\n")
     table = next(block for block in lines if block.startswith("| "))
     return [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()[2:]]

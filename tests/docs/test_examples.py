@@ -24,6 +24,7 @@ from coursebuild.cli.commands import known_commands, parser_of
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.schemas import json_schema
 from coursebuild.core.text.source import Source
+from support.fixture_cases import fixture_text
 from support.markdown_files import PAGES, ROOT, Fence, fences
 from support.scratch_course import Folder
 from support.workflows import commit, git
@@ -63,36 +64,7 @@ FENCES = [
     )
 ]
 
-MAP = """
-[course]
-title = "Swings"
-
-[[level]]
-id = "1"
-title = "First"
-
-[[level.lesson]]
-id = "1.1"
-slug = "pendulum"
-title = "A pendulum"
-status = "complete"
-
-[[level.lesson]]
-id = "1.2"
-slug = "lab"
-title = "A lab"
-status = "complete"
-
-[[level]]
-id = "4"
-title = "Fourth"
-
-[[level.lesson]]
-id = "4.2"
-slug = "mass"
-title = "Mass"
-status = "complete"
-"""
+MAP = fixture_text("documents/swings.toml")
 SCRIPT = "## A script\n\n```python file=examples/{}.py\nprint(2)\n```\n\n```output\n2\n```\n"
 LAB = """
 ## A lab
@@ -173,7 +145,6 @@ def test_every_command_runs(swings: Folder, tmp_path: Path) -> None:
 
 
 def prepare(folder: Folder, words: list[str]) -> None:
-    """Make what a command names in a copy of the course."""
     line = " ".join(words)
     for start, commands in BEFORE.items():
         for command in commands if line.startswith(start) else ():
@@ -242,7 +213,6 @@ def test_the_site_is_put_on_a_branch_by_its_lines(swings: Folder, tmp_path: Path
 
 
 def without_required(schema: Any) -> Any:
-    """A schema for a part of a file."""
     if isinstance(schema, dict):
         return {k: without_required(value) for k, value in schema.items() if k != "required"}
     return [without_required(x) for x in schema] if isinstance(schema, list) else schema

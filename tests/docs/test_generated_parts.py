@@ -27,8 +27,6 @@ _PART = re.compile(r"(<!-- generated: ([^>\n]+) -->\n).*?(<!-- end -->)", re.DOT
 
 
 def regenerate(text: str) -> str:
-    """Return a page with its generated parts made anew."""
-
     def part(match: re.Match[str]) -> str:
         name, *words = match[2].split()
         body = _MAKERS[name](text, *words)
@@ -77,7 +75,6 @@ def _fields(
 
 
 def _describe(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
-    """Return the description of the structure that a field holds."""
     match = re.search(r'"\$ref": "#/\$defs/(\w+)"', json.dumps(schema))
     meaning = definitions[match[1]]["description"].partition("\n")[0] if match else ""
     return meaning[:1].lower() + meaning[1:].rstrip(".")

@@ -15,14 +15,11 @@ from support.scratch_course import GOOD, Folder
 
 @pytest.fixture(scope="session")
 def make() -> Make:
-    """Makes courses that are drawn without being built."""
     return Make(read_assets())
 
 
 @pytest.fixture
 def make_course(tmp_path: Path, stores: Path) -> Callable[..., Folder]:
-    """Makes a course of these lessons, with a model and a picture."""
-
     def make(*lessons: str) -> Folder:
         folder = Folder(tmp_path / "a cöurse")
         folder.fill(lessons, stores)
@@ -34,7 +31,6 @@ def make_course(tmp_path: Path, stores: Path) -> Callable[..., Folder]:
 
 @pytest.fixture(scope="session")
 def zoo(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
-    """A course with every kind of question, and a level whose lesson is planned."""
     folder = Folder(tmp_path_factory.mktemp("zoo") / "a cöurse")
     folder.fill([GOOD + SCRIPT + quiz("1.1-check", *ANY.values()), "## Two\n\nText.\n"], stores)
     furnish(folder)

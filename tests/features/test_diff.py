@@ -53,7 +53,6 @@ HERE = Path(__file__).parent
 
 @pytest.fixture
 def course(tmp_path: Path, stores: Path) -> Folder:
-    """A course below the root of a repository."""
     folder = Folder(tmp_path / "repository" / "a cöurse")
     folder.fill([OLD], stores)
     folder.write("models/ball.xml", MODEL % "0.1")

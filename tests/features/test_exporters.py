@@ -18,7 +18,6 @@ MAP = "content/course.toml"
 
 @pytest.fixture
 def course(tmp_path: Path, stores: Path) -> Folder:
-    """A course with the exporter that the docs show."""
     page = fences(DOCS / "how-to/features.md")
     [code] = (fence.text for fence in page if "Exporter(" in fence.text)
     folder = Folder(tmp_path / "a course")

@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
+import ast
 import json
 from importlib.metadata import version
-from typing import Any
+from pathlib import Path
 
-import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.course import Launch
 from coursebuild.features.notebook import launch_services
+from support.fixture_cases import check_lines, fixture_text
 from support.rendered_course import MAP, Make
 
-LESSON = """## Part
-
-```python file=examples/a.py
-import numpy
-
-print("one")
-```
-
-Output:
-
-```text
-one
-```
-"""
+LESSON = fixture_text("documents/launched.md")
 PATH = "lessons/0.1-falling.ipynb"
 ALL = Launch(
     repository="https://github.com/some-one/My.Course",
@@ -42,73 +30,11 @@ def addresses(make: Make, launch: Launch) -> list[str]:
     return [address for _, address in launch_services(course, PATH)]
 
 
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
-        (
-            {},
-            [
-                "https://colab.research.google.com/github/some-one/My.Course/blob/gh-pages/"
-                "lessons/0.1-falling.ipynb",
-                "https://mybinder.org/v2/gh/some-one/My.Course/gh-pages"
-                "?labpath=lessons%2F0.1-falling.ipynb",
-                "https://hub.example.edu/hub/user-redirect/git-pull"
-                "?repo=https%3A%2F%2Fgithub.com%2Fsome-one%2FMy.Course&branch=gh-pages"
-                "&urlpath=lab%2Ftree%2FMy.Course%2Flessons%2F0.1-falling.ipynb",
-                "https://codespaces.new/some-one/My.Course/tree/gh-pages",
-            ],
-        ),
-        (
-            {
-                "repository": "https://github.com/some-one/My.Course.git/",
-                "branch": "féte/a&b#1+2%",
-                "folder": "my docs/é?",
-            },
-            [
-                "https://colab.research.google.com/github/some-one/My.Course/blob/"
-                "f%C3%A9te%2Fa%26b%231%2B2%25/my%20docs/%C3%A9%3F/lessons/0.1-falling.ipynb",
-                "https://mybinder.org/v2/gh/some-one/My.Course/f%C3%A9te/a%26b%231%2B2%25"
-                "?labpath=my%20docs%2F%C3%A9%3F%2Flessons%2F0.1-falling.ipynb",
-                "https://hub.example.edu/hub/user-redirect/git-pull"
-                "?repo=https%3A%2F%2Fgithub.com%2Fsome-one%2FMy.Course"
-                "&branch=f%C3%A9te%2Fa%26b%231%2B2%25"
-                "&urlpath=lab%2Ftree%2FMy.Course%2Fmy%2520docs%2F%25C3%25A9%253F%2F"
-                "lessons%2F0.1-falling.ipynb",
-                "https://codespaces.new/some-one/My.Course/tree/f%C3%A9te/a%26b%231%2B2%25",
-            ],
-        ),
-        (
-            {
-                "repository": "https://gitlab.com/group/sub/course",
-                "colab": False,
-                "codespaces": False,
-                "jupyterhub": None,
-            },
-            [
-                "https://mybinder.org/v2/gl/group%2Fsub%2Fcourse/gh-pages"
-                "?labpath=lessons%2F0.1-falling.ipynb"
-            ],
-        ),
-        (
-            {
-                "repository": "http://git.example.org:8080/~a/course.git",
-                "binder": "https://binder.example.org/hub/",
-                "colab": False,
-                "codespaces": False,
-            },
-            [
-                "https://binder.example.org/hub/v2/git/"
-                "http%3A%2F%2Fgit.example.org%3A8080%2F~a%2Fcourse/gh-pages"
-                "?labpath=lessons%2F0.1-falling.ipynb",
-                "https://hub.example.edu/hub/user-redirect/git-pull"
-                "?repo=http%3A%2F%2Fgit.example.org%3A8080%2F~a%2Fcourse&branch=gh-pages"
-                "&urlpath=lab%2Ftree%2Fcourse%2Flessons%2F0.1-falling.ipynb",
-            ],
-        ),
-    ],
-)
-def test_addresses_of_services(make: Make, changes: dict[str, Any], expected: list[str]) -> None:
-    assert addresses(make, replace(ALL, **changes)) == expected
+def test_addresses_of_services(make: Make, rewriting: bool) -> None:
+    def convert(fields: str) -> list[str]:
+        return addresses(make, replace(ALL, **ast.literal_eval(fields)))
+
+    check_lines(Path(__file__).with_name("launch.md"), convert, rewriting=rewriting)
 
 
 def cells(data: bytes) -> list[str]:

@@ -14,5 +14,5 @@
 
 `corpus/` holds, in a file for each target, short inputs that reached code which none before them
 had reached; `--keep` adds those of a run. `NAME-found.json` there has inputs that showed a mistake.
-`oss_fuzz/` has the same targets as OSS-Fuzz asks for them.
+`seeds/` has first inputs as texts, `oss_fuzz/` the same targets as OSS-Fuzz asks for them.
 """

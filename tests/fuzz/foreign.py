@@ -18,7 +18,6 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import UsageError
@@ -35,7 +34,7 @@ from coursebuild.features.references.bibtex import check_identifier, read_works
 from coursebuild.features.references.csl import StyleFailure, format_works
 from coursebuild.pipeline.options import Options
 from coursebuild.preview.session import Session
-from fuzz.texts import FIXTURES, MAP, PATH, ROOT, describe
+from fuzz.texts import FIXTURES, MAP, PATH, ROOT, describe, seed_texts
 from support.fixture_cases import read_cases
 from support.random_lessons import KINDS
 
@@ -88,16 +87,7 @@ def figures() -> Iterator[bytes]:
         yield path.read_bytes()[:3000]
     for case in read_cases(FIXTURES / "rules/figure-unreadable.md"):
         yield from (text.encode() for text in re.findall(r"<svg.*?</svg>", case.input, re.DOTALL))
-    inner = (
-        b"<style>a{fill:url(#b)}</style><g id='b'/><use href='#b'/>",
-        b"<defs><clipPath id='c'><rect width='1'/></clipPath></defs><g clip-path='url(#c)'/>",
-        b"<image href='data:image/png;base64,AA=='/><metadata><a/></metadata><!-- a -->",
-        b"<a href='java&#115;cript:1'/>",
-        b"<style>@im\\70ort 'x';</style><rect style='fill:u\\72l(//x)' onclick='1'/>",
-        b"<animate attributeName='href' to='//x'/><text x='1e999 -.5' dy='nan'>a</text>",
-        b"<g>" * 60 + b"</g>" * 60,
-    )
-    for part in inner:
+    for part in (*seed_texts("figure"), b"<g>" * 60 + b"</g>" * 60):
         yield _DRAWING.replace(b"</svg>", part + b"</svg>")
     yield b"<?xml version='1.0' encoding='utf-16'?><!DOCTYPE svg [<!ENTITY a 'b'>]>" + _DRAWING
     yield _DRAWING.decode().encode("utf-16")
@@ -149,24 +139,8 @@ def sources(data: bytes) -> None:
 
 def source_lists() -> Iterator[bytes]:
     style = (Path(csl.__file__).parent / "style.csl").read_bytes()
-    entries = _SOURCES.split(b"\n\n")
-    yield from (_SOURCES, *entries, _SOURCES + _STYLE + style)
-
-
-_SOURCES = rb"""
-@string{sp = "Springer"}
-
-@book{euler1758, author = {Euler, Leonhard and van der Berg, Jr, A. and {The Group}},
-  title = {Du mouvement {\'e} $x^2$ \textbf{b}}, year = 1758, publisher = sp # " Verlag",
-  edition = {2nd}, pages = {1--2}, isbn={978-3-16-148410-0}}
-
-@article{a:b, title="Quoted {""} <script>", doi = {10.1000/abc\_d}, month = jan, year = {c. 2000},
-  author = {et al. and others and \input{x}}, url={https://example.org/~a}, crossref={euler1758}}
-
-% words between entries
-@comment{more of them}
-@preamble{"\newcommand{\a}{b}"}
-"""
+    (works,) = seed_texts("sources")
+    yield from (works, *works.split(b"\n\n"), works + _STYLE + style)
 
 
 # --- courses of other tools
@@ -232,65 +206,21 @@ def folders() -> Iterator[bytes]:
                 f"-- {path.relative_to(top)} --\n".encode() + path.read_bytes() for path in group
             )
     text = b"-- a/1.md --\n# One\n\nText, [a link](../b.md).\n-- b.md --\nB\n"
-    for settings in (
-        b"-- _toc.yml --\nroot: b\nparts:\n- caption: A\n  chapters:\n  - file: a/1\n",
-        b"-- myst.yml --\nproject:\n  toc: [{file: b}, {title: A, children: [{file: a/1}]}]\n",
-        b"-- _quarto.yml --\nbook:\n  chapters: [b.md, {part: A, chapters: [a/1.md]}]\n",
-        b"-- mkdocs.yml --\ndocs_dir: .\nnav: [B: b.md, A: [a/1.md]]\nx: !!python/name:a.b\n",
-        b"-- mkdocs.yml --\nnav: &a [*a, !!int '', !!bool x, !!timestamp x, {? [1] : 2}]\n",
-        b"-- course.json --\n"
-        b'{"levels":[{"id":"1","lessons":[{"id":"1.1","file":"a/1.md","minutes":"5"}]}]}\n',
-        b"-- c.md -> ../secret.md --\n-- d -> a --\n-- e.md -> /etc/passwd --\n",
-        b"-- x.md -> b.md --\n-- y.md -> x.md --\n-- z -> z --\n-- a/a -> .. --\n",
-        b"-- 2.md --\n---\ntitle: [a, b]\ndate: 2020-13-01\n---\n# T {#t}\n",
-        b"-- 3.qmd --\n```{python}\n#| eval: false\n1+\n```\n::: {.callout-tip}\nx\n:::\n",
-    ):
+    for settings in seed_texts("folder"):
         yield settings + text
 
 
 def dialects() -> Iterator[bytes]:
     for path in sorted((ROOT / "tests/features/importer").glob("*/source/**/*.*md")):
         yield path.read_bytes()
-    yield from (
-        b"```{python}\n-1\n```\n",
-        b"$$a$$ (eq)\n\\[b\\]\n\n\\begin{align}c\\label{d}\\end{align}\n",
-        b"{ref}`a <b>` @sec-a [@b; c] {{d}} ![e](f.png){width=1} \\(g\\) $h$1\n",
-        b'(a)=\n# H\n\n:::{note} T\n:name: x\nb\n:::\n!!! tip "T"\n    b\n??? note\n    c\n',
-        b"```{figure} a.png\n:alt: b\n\ncaption\n```\n",
-        b"```{code-cell} ipython3\n:tags: [x]\n%m\na\n```\n",
-    )
+    yield from seed_texts("dialect")
 
 
 # --- messages of an editor
 
 _URI = b"file:///COURSE/"
 """Stands in inputs for the folder of the course."""
-_LESSON = """## One {#one}
-
-The [mass]{term} is $m${symbol="mass" unit="kg"}, as in [one](lesson:1.1#one),
-`1.5`{out}, Lesson 1.1.
-
-$$E = m$$ {#eq:energy}
-
-```python file=examples/a.py
-import mujoco
-model = mujoco.MjModel.from_xml_string("<mujoco/>")
-print(model.opt.timestep)
-```
-
-Output:
-
-```text
-0.002
-```
-
-> [!note] N
-> [energy](#eq:energy)
-
-```quiz
-{"question": "a", "answers": [{"text": "b", "correct": true}]}
-```
-"""
+_LESSON = next(seed_texts("messages")).decode()
 
 
 class _Client:
@@ -373,58 +303,9 @@ def messages(data: bytes) -> None:
 
 
 def conversations() -> Iterator[bytes]:
-    def message(method: str, id: int | None = None, **params: Any) -> bytes:
-        value = {"jsonrpc": "2.0", "method": f"textDocument/{method}", "params": params}
-        return json.dumps(value if id is None else {**value, "id": id}).encode()
-
+    """Messages about files of several kinds: `FILE` is the file, `"TEXT"` what is in it."""
+    _, *seeds = seed_texts("messages")
     for path in (PATH, "content/course.toml", "content/none.md", "../x", "models/a.xml"):
-        uri = _URI.decode() + path
-        document = {"uri": uri}
-        item = {**document, "languageId": "markdown", "version": 1}
-        start, far = {"line": 0, "character": 0}, {"line": 2**31 - 1, "character": 2**31 - 1}
-        place = {"line": 2, "character": 5}
-        opening = message(
-            "didOpen", textDocument={**item, "text": _LESSON if path == PATH else MAP}
-        )
-        changed = {**document, "version": 2}
-        typed = '## A\n\n[x](lesson:\n\n```quiz\n{"q'
-        change = message("didChange", textDocument=changed, contentChanges=[{"text": typed}])
-        requests = [
-            message(method, number, textDocument=document, position=position)
-            for number, (method, position) in enumerate(
-                (method, position)
-                for method in ("hover", "definition", "completion", "prepareRename")
-                for position in (place, far)
-            )
-        ]
-        whole = [
-            message(method, 9, textDocument=document, **params)
-            for method, params in (
-                ("rename", {"position": place, "newName": "a b{"}),
-                (
-                    "codeAction",
-                    {"range": {"start": far, "end": start}, "context": {"diagnostics": []}},
-                ),
-                ("formatting", {"options": {"tabSize": 2, "insertSpaces": True}}),
-                ("documentSymbol", {}),
-                ("foldingRange", {}),
-            )
-        ]
-        closing = message("didClose", textDocument=document)
-        yield b"\n".join((opening, *requests[:4]))
-        yield b"\n".join((opening, change, *requests[4:], closing))
-        yield b"\n".join((*whole, opening, *whole))
-        part = {"range": {"start": place, "end": far}, "text": "x"}
-        yield b"\n".join(
-            (
-                change,
-                message("didChange", textDocument=changed, contentChanges=[part]),
-                message("didChange", textDocument=changed, contentChanges=[]),
-                closing,
-                *requests[:2],
-            )
-        )
-    yield b'{"jsonrpc":"2.0","id":1,"method":"initialize","params":{"capabilities":{"general":{' + (
-        b'"positionEncodings":["utf-8"]}}}}\n{"jsonrpc":"2.0","method":"initialized","params":{}}\n'
-    )
-    yield b'[]\n{"jsonrpc":"2.0","id":1,"result":null}\n{"jsonrpc":"1.0"}\n7\nnull'
+        text = json.dumps(_LESSON if path == PATH else MAP).encode()
+        for seed in seeds:
+            yield seed.replace(b"FILE", _URI + path.encode()).replace(b'"TEXT"', text)

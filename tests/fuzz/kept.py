@@ -28,7 +28,7 @@ from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source
 from coursebuild.core.values import DAMAGE, decode, encode
 from coursebuild.features.lab.export.script import LabExport
-from coursebuild.features.search.index import IndexPlan, join_slices, read_slices, sort_terms
+from coursebuild.features.search import IndexPlan, join_slices, read_slices, sort_terms
 from fuzz.texts import PATH, lessons
 from support.random_lessons import KINDS
 from support.search_shards import read_shard

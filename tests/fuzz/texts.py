@@ -48,6 +48,12 @@ lesson = [{ id = "1.1", slug = "one", title = "One", status = "complete" }]
 """
 
 
+def seed_texts(name: str) -> Iterator[bytes]:
+    """The texts of a file in `seeds`, between which is a line of `=`."""
+    path = Path(__file__).parent / f"seeds/{name}.txt"
+    yield from path.read_bytes().split(b"=====\n")
+
+
 # --- lessons
 
 

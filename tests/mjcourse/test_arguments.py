@@ -2,11 +2,13 @@
 
 import inspect
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mjcourse import spatial
+from support.fixture_cases import check_lines
 from support.run_code import run_code
 
 SHAPES: dict[tuple[int, ...], str] = {
@@ -57,6 +59,17 @@ def answer(name: str, **replacements: object) -> str:
     except (TypeError, ValueError) as error:
         return f"{type(error).__name__}: {error}"
     return "nothing"
+
+
+def test_values_that_a_routine_cannot_take_are_named(rewriting: bool) -> None:
+    scope = {**vars(np), **vars(spatial)}
+
+    def convert(call: str) -> list[str]:
+        with pytest.raises(ValueError) as caught:
+            eval(call, scope)
+        return [str(caught.value)]
+
+    check_lines(Path(__file__).with_name("errors.md"), convert, rewriting=rewriting)
 
 
 def test_a_bad_shape_says_what_was_expected_and_what_came() -> None:

@@ -66,19 +66,6 @@ def exact_capsule(m: mpmath.mpf, r: mpmath.mpf, h: mpmath.mpf) -> hp.Vector:
     return diagonal(*(m * moment / (middle + ends) for moment in (transverse, transverse, axial)))
 
 
-def test_negative_sizes_are_errors() -> None:
-    with pytest.raises(ValueError, match=r"^half_sizes has a negative entry$"):
-        spatial.box_inertia(1.0, [0.1, -0.1, 0.1])
-    with pytest.raises(ValueError, match=r"^semi_axes at index \(1,\) has a negative entry$"):
-        spatial.ellipsoid_inertia(1.0, [[1, 1, 1], [1, 1, -1]])
-    with pytest.raises(ValueError, match=r"^radius is negative$"):
-        spatial.sphere_inertia(1.0, -0.1)
-    with pytest.raises(ValueError, match=r"^half_length at index \(0,\) is negative$"):
-        spatial.cylinder_inertia(1.0, 0.1, [-1, 1])
-    with pytest.raises(ValueError, match=r"^radius is negative$"):
-        spatial.capsule_inertia(1.0, -0.1, 0.1)
-
-
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(41)
@@ -148,29 +135,6 @@ def test_a_hole_is_a_part_of_negative_mass() -> None:
     assert mass == parts[0] == 7
     np.testing.assert_allclose(com, parts[1], rtol=1e-14)
     np.testing.assert_allclose(inertia, parts[2], rtol=1e-13)
-
-
-def test_composition_errors() -> None:
-    eye = np.eye(3)
-    with pytest.raises(ValueError, match=r"^mass must have shape \(\.\.\., n\), got \(\)$"):
-        spatial.compose_inertia(1.0, [[0, 0, 0]], [eye])
-    with pytest.raises(ValueError, match=r"^com must have shape \(\.\.\., n, 3\), got \(3,\)$"):
-        spatial.compose_inertia([1.0], [0, 0, 0], [eye])
-    with pytest.raises(
-        ValueError, match=r"^inertia must have shape \(\.\.\., n, 3, 3\), got \(3, 3\)$"
-    ):
-        spatial.compose_inertia([1.0], [[0, 0, 0]], eye)
-    with pytest.raises(
-        ValueError,
-        match=r"^leading shapes do not broadcast: mass \(3,\), com \(2,\), inertia \(2,\)$",
-    ):
-        spatial.compose_inertia([1, 2, 3], np.zeros((2, 3)), np.zeros((2, 3, 3)))
-    with pytest.raises(ValueError, match=r"^a body needs at least one part, got none$"):
-        spatial.compose_inertia(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3)))
-    with pytest.raises(ValueError, match=r"^total mass is not positive$"):
-        spatial.compose_inertia([1.0, -1.0], np.zeros((2, 3)), np.zeros((2, 3, 3)))
-    with pytest.raises(ValueError, match=r"^total mass at index \(1,\) is not positive$"):
-        spatial.compose_inertia([[1.0], [0.0]], np.zeros((1, 3)), np.zeros((1, 3, 3)))
 
 
 def test_rotation_of_a_tensor_to_eight_ulp(rng: np.random.Generator) -> None:
@@ -317,16 +281,8 @@ def test_nan_stays_in_its_entry() -> None:
     assert spatial.is_physical_inertia(tensors).tolist() == [True, False, False]
 
 
-def test_an_unsymmetric_tensor_is_an_error() -> None:
-    skewed = np.eye(3)
-    skewed[0, 1] = 1e-6
-    text = r"^inertia is not symmetric to 1e-09 of its largest entry$"
-    with pytest.raises(ValueError, match=text):
-        spatial.principal_axes(skewed)
-    with pytest.raises(ValueError, match=r"^inertia at index \(1,\) is not symmetric to 1e-09"):
-        spatial.principal_axes([np.eye(3), skewed * 1e-300])
-    skewed[0, 1] = 1e-12
-    moments, _ = spatial.principal_axes(skewed)
+def test_rounding_makes_no_tensor_unsymmetric() -> None:
+    moments, _ = spatial.principal_axes(np.eye(3) + 1e-12 * np.eye(3, k=1))
     np.testing.assert_allclose(moments, 1, atol=1e-12)
 
 

@@ -2,7 +2,6 @@ import itertools
 
 import mpmath
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
@@ -106,36 +105,6 @@ def test_a_bad_quaternion_is_nan_and_the_others_are_not() -> None:
         ):
             assert np.isnan(actual[1]).all()
             assert np.isfinite(actual[[0, 2]]).all()
-
-
-def test_a_zero_quaternion_is_an_error() -> None:
-    for call in (
-        spatial.quat_normalize,
-        lambda q: spatial.quat_rotate(q, [1, 2, 3]),
-        spatial.quat_to_mat,
-        spatial.quat_to_rotvec,
-        spatial.quat_to_euler,
-        lambda q: spatial.quat_integrate(q, [1, 2, 3], 0.1),
-        lambda q: spatial.inertia_from_principal([1, 2, 3], q),
-    ):
-        with pytest.raises(ValueError, match=r"^quat is zero and has no direction$"):
-            call([0.0, -0.0, 0.0, 0.0])
-        at = r"^quat at index \(1, 0\) is zero and has no direction$"
-        with pytest.raises(ValueError, match=at):
-            call([[[1, 0, 0, 0]], [[0, 0, 0, 0]]])
-
-
-def test_a_zero_quaternion_is_named_by_its_argument() -> None:
-    argument, zero = [1, 0, 0, 0], [0, 0, 0, 0]
-    for call in (spatial.quat_sub, spatial.angular_distance):
-        with pytest.raises(ValueError, match=r"^a is zero and has no direction$"):
-            call(zero, argument)
-        with pytest.raises(ValueError, match=r"^b is zero and has no direction$"):
-            call(argument, zero)
-    with pytest.raises(ValueError, match=r"^b is zero and has no direction$"):
-        spatial.quat_slerp(argument, zero, 0.5)
-    with pytest.raises(ValueError, match=r"^axis is zero and has no direction$"):
-        spatial.axis_angle_to_quat([0, 0, 0], 1.0)
 
 
 ENTRY = st.floats(-1e3, 1e3, allow_subnormal=False).map(lambda x: x if abs(x) > 1e-150 else 0.0)

@@ -131,9 +131,8 @@ def test_costs_are_of_the_whole_scenario(monkeypatch: pytest.MonkeyPatch) -> Non
         mujoco.mj_resetDataKeyframe(model, data, 0)
         real(model, data, steps)
         ends.append(steps * price[integrator] + 1e4 * abs(float(data.qpos[0])))
-    assert [timing.nanoseconds.value for timing in timings] == pytest.approx(ends, rel=1e-4), (
-        "its own end"
-    )
+    nanoseconds = [timing.nanoseconds.value for timing in timings]
+    assert nanoseconds == pytest.approx(ends, rel=1e-4), "each to its own end"
     assert timings[0].ratio.value == pytest.approx(ends[0] / ends[1], rel=1e-4)
 
 
@@ -178,10 +177,6 @@ def rows_with_front(*points: Point) -> tuple[WorkPrecisionRow, ...]:
     return front(rows)
 
 
-def are_on_front(*points: Point) -> list[bool]:
-    return [row.front for row in rows_with_front(*points)]
-
-
 def test_cheaper_and_more_accurate_is_better() -> None:
     rows = rows_with_front((1, 1e-3), (0.5, 1e-5), (0.1, 0.3), (4, 1e-3), None)
     assert [row.front for row in rows] == [False, True, True, False, False]
@@ -190,13 +185,20 @@ def test_cheaper_and_more_accurate_is_better() -> None:
     assert [row.dominated_by for row in rows] == [3, 3, 3, None], "it is on the front"
 
 
-def test_small_differences_are_none() -> None:
-    assert are_on_front((1, 1e-3), (1.02, 1e-3)) == [True, True]
-    assert are_on_front((1, 1e-3), (1.02, 1.04e-3)) == [True, True]
-    assert are_on_front((1, 1e-3), (1.2, 1e-3)) == [True, False]
-    assert are_on_front((1, 1e-3), (1, 1.06e-3)) == [True, False]
-    assert are_on_front((1, 1e-3), (0.98, 1.5e-3)) == [True, False], "its cost is no better"
-    assert are_on_front((1, 1e-3), (0.5, 1.04e-3)) == [False, True]
+def test_small_differences_are_none_and_lost_runs_are_on_no_front() -> None:
+    own_point = (1, 1e-3)
+    for points, on_front in (
+        ((own_point, (1.02, 1e-3)), [True, True]),
+        ((own_point, (1.02, 1.04e-3)), [True, True]),
+        ((own_point, (1.2, 1e-3)), [True, False]),
+        ((own_point, (1, 1.06e-3)), [True, False]),
+        ((own_point, (0.98, 1.5e-3)), [True, False]),  # its cost is no better
+        ((own_point, (0.5, 1.04e-3)), [False, True]),
+        (((1, 0.0), (2, 0.0), (0.5, 1e-12)), [True, False, True]),
+        ((None, None), [False, False]),
+        ((), []),
+    ):
+        assert [row.front for row in rows_with_front(*points)] == on_front, points
 
 
 def test_costs_that_timing_cannot_tell_apart_are_equal() -> None:
@@ -204,12 +206,6 @@ def test_costs_that_timing_cannot_tell_apart_are_equal() -> None:
     for high, is_cheaper in ((0.79, True), (0.8, False), (0.9, False)):
         rival = FrontPoint(Interval(0.7, 0.6, high), 1e-3)
         assert rival.is_cheaper(own_point) == rival.beats(own_point) == is_cheaper, high
-
-
-def test_errors_of_zero_and_nothing_at_all() -> None:
-    assert are_on_front((1, 0.0), (2, 0.0), (0.5, 1e-12)) == [True, False, True]
-    assert are_on_front() == []
-    assert are_on_front(None, None) == [False, False]
 
 
 OWN_BEST = "no other setting is cheaper without being less accurate"
@@ -268,12 +264,8 @@ def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:
 
 
 def test_errors_that_do_not_fall_or_belong_to_no_stable_run_are_luck() -> None:
-    assert [bool(row.lucky) for row in ladder(8e-3, 4e-3, 2e-3, 1e-3)] == [
-        True,
-        False,
-        False,
-        False,
-    ]
+    lucky = [bool(row.lucky) for row in ladder(8e-3, 4e-3, 2e-3, 1e-3)]
+    assert lucky == [True, False, False, False]
     rows = ladder(8e-3, 1e-4, 2e-3, 1e-3)
     assert rows[0].lucky == "it is beyond its largest stable timestep, 2.5 ms"
     assert rows[1].lucky == "its error rises with shorter timesteps"
@@ -307,9 +299,7 @@ def test_verdicts_claim_only_what_holds() -> None:
     assert verdict(front(large), [False] * 2).better == 1
     text = verdict(front(large), [False] * 2, Quantity("seen", "", 1e-6)).text
     assert "errs 1e+03 times less, or more: " in text
-    judgement = verdict(
-        front(large), [False] * 2, holds=lambda setting: setting.integrator != "RK4"
-    )
+    judgement = verdict(front(large), [False] * 2, holds=lambda s: s.integrator != "RK4")
     assert judgement.better is None and "no difference that holds" in judgement.text
 
 

@@ -98,10 +98,8 @@ def test_an_activation_at_its_limit_is_a_jump() -> None:
     assert (reference.kind, reference.states.act[-1, 0]) == ("self", 0.3)
     unseen = replace(pilot, jumps=())  # as of something that is not looked for
     reference = find_reference(model, unseen, quick=True)
-    assert reference.kind == "self"
-    assert (
-        reference.note == "no integration: the engine with small steps converges to something else"
-    )
+    note = "no integration: the engine with small steps converges to something else"
+    assert (reference.kind, reference.note) == ("self", note)
 
 
 def test_an_activation_that_looks_ahead_by_a_timestep() -> None:
@@ -161,22 +159,12 @@ def test_a_closed_form_comes_first_and_is_refused_where_it_is_of_something_else(
     reference = reference_of(spring(100), text)
     assert (reference.kind, reference.second) == ("closed", "Bulirsch–Stoer over mj_forward")
     assert reference.agreement < 1e-11
+    message_of_form = "the closed form of `damped-spring-0.1` is not this scene's motion"
+    fast, coin = text.replace("[5]", "[5.1]"), text.replace("damped-spring-0.1", "coin")
     for model, toml, message in (
-        (
-            spring(101),
-            text,
-            "the closed form of `damped-spring-0.1` is not this scene's motion",
-        ),
-        (
-            spring(100),
-            text.replace("[5]", "[5.1]"),
-            "the scenario starts differently from",
-        ),
-        (
-            pendulum(),
-            text.replace("damped-spring-0.1", "coin"),
-            "the model has different joints",
-        ),
+        (spring(101), text, message_of_form),
+        (spring(100), fast, "the scenario starts differently from"),
+        (pendulum(), coin, "the model has different joints"),
     ):
         with pytest.raises(SceneError) as caught:
             reference_of(model, toml)

@@ -20,7 +20,6 @@ from coursebuild.numerics.linearization import Theory, find_rest, find_theory
 from coursebuild.numerics.pilot import run_pilot
 from coursebuild.numerics.problem import STANDARD, Integrator, Scenario, Setup
 from coursebuild.numerics.problems import all_problems
-from coursebuild.numerics.problems.oscillators import rk4_factor, rk4_limit
 from coursebuild.numerics.reports.scene_report import StableRow
 from coursebuild.numerics.reports.shown_errors import limit_text, map_text
 from coursebuild.numerics.scene import scenes
@@ -62,9 +61,7 @@ def test_limits_are_those_of_theory() -> None:
 def test_a_boundary_is_found_beside_theory() -> None:
     problem = replace(all_problems()["damped-spring-0.1"], search=(0.1, 1.0), span=200.0)
     lines = {line.integrator: line for line in boundaries(problem)}
-    assert {integrator.value for integrator in Integrator} == set(lines), (
-        "joints with damping know eulerdamp"
-    )
+    assert {integrator.value for integrator in Integrator} == set(lines), "damping: eulerdamp"
     for integrator in (Integrator.EULER, Integrator.EULER_EXPLICIT, Integrator.RK4):
         line = lines[integrator.value]
         assert line.largest is not None and line.difference is not None
@@ -84,9 +81,7 @@ def test_where_all_or_none_is_stable() -> None:
     assert (line.largest, line.difference, line.tried) == (0.0, None, 0)
     assert boundaries(replace(problem, search=None)) == ()
     undamped = replace(all_problems()["damped-spring-0"], search=(0.1, 0.3), span=10.0)
-    assert Integrator.EULER_EXPLICIT.value not in {
-        boundary_line.integrator for boundary_line in boundaries(undamped)
-    }
+    assert Integrator.EULER_EXPLICIT.value not in {row.integrator for row in boundaries(undamped)}
 
 
 DISCRETE = "implicit in positions and velocities"
@@ -143,9 +138,8 @@ def test_energy_counts_up_to_the_first_loss_only() -> None:
     def row_of(rises: float) -> StableRow:
         def run(_: int, step: float, __: float) -> StabilityTrial:
             status = RunStatus.DIVERGED if step > 30 else RunStatus.OK
-            return StabilityTrial(
-                step, status, 1.0, 9.0 if rises < step < 30 or step > 300 else 1.0
-            )
+            energy = 9.0 if rises < step < 30 or step > 300 else 1.0
+            return StabilityTrial(step, status, 1.0, energy)
 
         setup = Setup(scenario=Scenario(5.0, 5.0), energy=1.0, kinetic=1.0)
         laboratory = Laboratory(run, 5.0, 1)
@@ -312,9 +306,3 @@ def test_growth_beyond_the_boundary_is_that_of_theory() -> None:
     endless = replace(endless, span=100 * z)
     trial = attempt(endless, Integrator.EULER_EXPLICIT, z / 10)
     assert trial.growth == pytest.approx(root, rel=1e-8)
-
-
-def test_the_polynomial_of_runge_and_kutta() -> None:
-    assert rk4_limit(0.0) == pytest.approx(2 * math.sqrt(2), rel=1e-12)
-    assert rk4_limit(1.0) == pytest.approx(2.785293563405282, rel=1e-9)
-    assert abs(rk4_factor(2j * math.sqrt(2))) == pytest.approx(1.0, rel=1e-15)

@@ -98,9 +98,8 @@ def test_a_block_without_friction_slides_as_far_as_it_goes() -> None:
     floor = '<worldbody><geom type="plane" size="1 1 1" condim="1"/><body pos="0 0 0.1">'
     box = '<freejoint/><geom type="box" size="0.1 0.1 0.1" condim="1"/></body></worldbody>'
     toml = TOML.replace("[-1]", "[1, 0, 0, 0, 0, 0]").replace('measure = "body:ball"\n', "")
-    (row,) = run_sweep(
-        'vary = { "option.timestep" = [0.002] }', f"<mujoco>{floor}{box}</mujoco>", toml=toml
-    ).rows
+    vary = 'vary = { "option.timestep" = [0.002] }'
+    (row,) = run_sweep(vary, f"<mujoco>{floor}{box}</mujoco>", toml=toml).rows
     assert row.slip == pytest.approx(0.4, rel=0.02)
 
 
@@ -169,19 +168,14 @@ def test_every_value_is_a_dot_in_the_plot(narrow: bool) -> None:
     texts = [element.text for element in root.iter("text")]
     assert {"geom.solref[0]", "option.cone", "diverged", "as the model is", "depth (m)"} <= {*texts}
     assert len(list(root.iter("circle"))) == 2, "around the own value, and in the key"
-    description = root.find("desc")
-    assert description is not None and "option.cone elliptic: depth (m) diverged" in (
-        description.text or ""
-    )
+    assert "option.cone elliptic: depth (m) diverged" in root.findtext("desc", "")
 
 
 def test_a_figure_that_left_its_band_is_told() -> None:
     old, new = table(*ROWS), table(replace(ROWS[0], penetration=2e-4), *ROWS[1:])
 
-    def departures(
-        recorded: SweepReport, measured_sweep: SweepReport
-    ) -> list[tuple[str, str, str]]:
-        pair = (replace(scene(), sweeps=(sweep,)) for sweep in (recorded, measured_sweep))
+    def departures(*sweeps: SweepReport) -> list[tuple[str, str, str]]:
+        pair = (replace(scene(), sweeps=(sweep,)) for sweep in sweeps)
         departed = scene_departures(*pair, BenchTable())
         return [(departure.setting, departure.figure, departure.measured) for departure in departed]
 

@@ -94,9 +94,8 @@ def test_a_scene_that_blows_up_under_its_own_setting() -> None:
     assert (own_row.position, own_row.velocity, own_row.seen) == (None, None, None)
     assert own_row.growth is None or own_row.growth > 1
     assert not report.verdict.on_front
-    assert report.verdict.text.startswith(
-        "the scene does not run under its own setting, Euler at 8 ms: "
-    )
+    text = "the scene does not run under its own setting, Euler at 8 ms: "
+    assert report.verdict.text.startswith(text)
     limits = {line.integrator: line.largest for line in report.stable}
     for name in ("Euler", "implicit", "implicitfast"):
         # Below 2/ω it swings within bounds, but just below with any multiple of its energy.
@@ -246,6 +245,8 @@ def test_a_block_that_sticks_creeps_alike_in_each_measurement() -> None:
     assert report.notes == (
         "the same motion to the bit, and no time saved, with 4 iterations",
         "errors follow no power of the timestep, because of contact",
+        "what sticks creeps by 0.000511 m under the scene's own setting: dry friction would hold "
+        "it still, and that of the engine is soft",
         "beyond 0.01 s refsafe softens constraints: stable, but another model",
     )
     settings = [line.setting for line in report.rows]
@@ -280,12 +281,8 @@ def test_the_error_of_a_pyramid_is_among_what_is_seen() -> None:
     exact = (slope - 0.3 * 9 / 2**0.5 - (slope - 0.3 * 9)) * time**2 / 2  # half is enough
     assert own_row.model_error == pytest.approx(exact, rel=0.02)
     assert own_row.seen is not None and own_row.seen > 10
-    (round_one,) = (
-        line
-        for line in report.rows
-        if (line.setting.integrator, line.setting.timestep, line.setting.cone)
-        == ("Euler", 0.004, "elliptic")
-    )
+    round_setting = replace(own_row.setting, cone="elliptic")
+    (round_one,) = (line for line in report.rows if line.setting == round_setting)
     assert round_one.seen is not None and round_one.seen < own_row.seen / 5
     assert report.verdict.noticeable is True
 

@@ -45,8 +45,6 @@ def packages() -> Path:
 
 @pytest.fixture(scope="session")
 def run() -> Run:
-    """Runs a command in a folder and returns its result; PATH can be replaced."""
-
     def run_command(
         *command: object, cwd: Path, path: Path | str | None = None
     ) -> subprocess.CompletedProcess[str]:

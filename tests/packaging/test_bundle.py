@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from support.fixture_cases import fixture_text
+
 pytestmark = pytest.mark.site
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -177,21 +179,7 @@ def test_several_at_once_do_the_work_once(project: Path) -> None:
     assert leftovers(project) == []
 
 
-KILL_AT_STEP = """
-import os, runpy, signal, sys
-last = int(sys.argv.pop(1))
-step = 0
-def count(event, args):
-    global step
-    if event in ("os.rename", "subprocess.Popen"):
-        step += 1
-        if step == last:
-            os.kill(os.getpid(), signal.SIGKILL)
-sys.dont_write_bytecode = True
-sys.argv[0] = "site/bundle.py"
-sys.addaudithook(count)
-runpy.run_path("site/bundle.py", run_name="__main__")
-"""
+KILL_AT_STEP = fixture_text("scripts/kill_at_step.txt")
 
 
 def test_killed_at_a_step_it_leaves_a_whole_bundle_or_none(run: Run, project: Path) -> None:

@@ -35,7 +35,6 @@ def versions(root: Path, name: str) -> dict[str, str]:
 
 
 def declared_requirements(pyproject: dict) -> list[str]:
-    """The requirements of the package, and those of work on it."""
     project, groups = pyproject["project"], pyproject["dependency-groups"]
     extras = project["optional-dependencies"].values()
     lines = [*project["dependencies"], *(line for extra in extras for line in extra)]

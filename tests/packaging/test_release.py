@@ -29,7 +29,6 @@ OWNER_PLACES = ("README.md", "docs/explanation/dependencies.md")
 
 @pytest.fixture
 def repository(tmp_path: Path) -> Path:
-    """A repository of the files that have a version."""
     for path in (*PLACES, *OWNER_PLACES, "docs/release.py", "CHANGELOG.md"):
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / path, tmp_path / path)
@@ -39,7 +38,6 @@ def repository(tmp_path: Path) -> Path:
 
 
 def release(root: Path, *arguments: object) -> str:
-    """Run the script; return what it says of a failure."""
     words = [sys.executable, "-B", root / "docs/release.py", *arguments]
     result = subprocess.run(words, cwd=root, capture_output=True, text=True)
     assert bool(result.returncode) == bool(result.stderr), result.stderr

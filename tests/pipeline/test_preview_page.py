@@ -2,43 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.lab_page import wait_for_condition
-from support.preview_process import Preview, serve_preview
-from support.scratch_course import GOOD, ROOT, WAIT_FOR_GO, Folder, Make, block
+from support.preview_page import LESSON, PreviewPage, lesson_page
+from support.preview_process import serve_preview
+from support.scratch_course import GOOD, ROOT, WAIT_FOR_GO, Make, block
 from support.static_host import Host
 from support.waiting import wait_for_file
-
-
-class PreviewPage:
-    def __init__(self, browser: Browser, preview: Preview, path: str, **options: object) -> None:
-        self.context = browser.new_context(**options)
-        self.page = self.context.new_page()
-        self.console: list[str] = []
-        self.page.on("console", lambda message: self.console.append(message.text))
-        self.page.on("pageerror", lambda error: self.console.append(str(error)))
-        self.page.goto(f"http://127.0.0.1:{preview.port}/{path}")
-        # A page that is loaded again loses this.
-        self.page.evaluate("window.same = true")
-
-    def __enter__(self) -> PreviewPage:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.context.close()
-
-    def check_unbroken(self) -> None:
-        """It is still the same document, and nothing went wrong in it."""
-        assert self.page.evaluate("window.same")
-        assert self.console == []
 
 
 def see(locator: Locator) -> None:
@@ -47,19 +24,6 @@ def see(locator: Locator) -> None:
 
 def texts(page: Page, text: str) -> None:
     expect(page.locator(".prose")).to_contain_text(text)
-
-
-LESSON = "lessons/1.1-one.html"
-
-
-@contextlib.contextmanager
-def lesson_page(folder: Folder, browser: Browser) -> Iterator[Page]:
-    """The page of a lesson, which stays the same document, with nothing that goes wrong in it."""
-    with serve_preview(folder) as preview:
-        preview.wait_for_line("checked: ")
-        with PreviewPage(browser, preview, LESSON) as preview_page:
-            yield preview_page.page
-            preview_page.check_unbroken()
 
 
 FILLER = "".join(f"Paragraph {n}.\n\n" for n in range(80))

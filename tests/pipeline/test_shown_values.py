@@ -303,7 +303,7 @@ def test_each_field_of_the_frame_is_shown_and_in_its_key() -> None:
 
 AUTHOR = {
     "coursebuild/core/syntax/course_schema.py": (
-        '    licence: Annotated[\n        str, Meta(description="its name',
+        '    licence: Annotated[str, describe("its name',
         '    author: str = ""\n',
     ),
     "coursebuild/core/syntax/coursemap.py": (

@@ -61,14 +61,6 @@ def test_frame_label_help_and_notes() -> None:
     )
 
 
-def test_tabs_wide_characters_and_controls_keep_the_marks_in_place() -> None:
-    source, a, b = at("\t量x\x1b[31mwrong", "wrong")
-    assert render(diagnose("math-syntax", source.span(a, b), "m")).split("\n")[3:5] == [
-        "  1 |     量x␛[31mwrong",
-        "    |             ^^^^^",
-    ]
-
-
 def test_only_what_could_change_the_terminal_is_hidden() -> None:
     assert visible("a\0\x1b\x7f\x85\u202e\u2028\ufeffb") == "a␀␛␡\ufffd\ufffd\ufffd\ufffdb"
     family = "👩\u200d👧"  # joined to one picture
@@ -86,15 +78,15 @@ def test_text_is_cut_where_its_room_ends() -> None:
         assert clip(text, 4) == visible_part, text
 
 
-def test_a_span_over_several_lines_marks_the_rest_of_its_first() -> None:
-    source, _, _ = at("abc def\nghi", "def")
-    lines = render(diagnose("fence-unclosed", source.span(4, 11), "m")).split("\n")
-    assert lines[3:5] == ["  1 | abc def", "    |     ^^^"]
-
-
-def test_an_empty_span_and_the_end_of_the_text_get_one_mark() -> None:
-    source = Source("a.md", "abc")
-    assert render(diagnose("fence-unclosed", source.span(3, 3), "m")).split("\n")[4] == "    |    ^"
+def test_marks_stand_below_what_is_wrong() -> None:
+    """Tabs, wide characters and controls keep them in place; an empty span has one."""
+    for text, start, end, line, marks in (
+        ("\t量x\x1b[31mwrong", 8, 13, "    量x␛[31mwrong", "            ^^^^^"),
+        ("abc def\nghi", 4, 11, "abc def", "    ^^^"),
+        ("abc", 3, 3, "abc", "   ^"),
+    ):
+        diagnostic = diagnose("math-syntax", Source("a.md", text).span(start, end), "m")
+        assert render(diagnostic).split("\n")[3:5] == [f"  1 | {line}", f"    | {marks}"]
 
 
 def test_a_long_line_is_cut_around_the_marked_part() -> None:

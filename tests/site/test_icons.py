@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
+from support.fixture_cases import fixture_text
 from support.model_files import read_png
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,15 +32,7 @@ def icons() -> Any:
 
 @pytest.mark.browser
 def test_icons_are_what_a_browser_draws(icons: Any, browsers: Mapping[str, Browser]) -> None:
-    draw = """async ([svg, side]) => {
-      const image = new Image()
-      image.src = URL.createObjectURL(new Blob([svg], { type: 'image/svg+xml' }))
-      await image.decode()
-      const canvas = new OffscreenCanvas(side, side)
-      const context = canvas.getContext('2d')
-      context.drawImage(image, 0, 0, side, side)
-      return [...context.getImageData(0, 0, side, side).data]
-    }"""
+    draw = fixture_text("scripts/draw_icon.js")
     shapes = icons.shapes(ICON)
     with browsers["plain"].new_context() as context:
         page = context.new_page()

@@ -15,6 +15,7 @@ import pytest
 
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine
+from support.fixture_cases import fixture_tables
 
 pytestmark = pytest.mark.engine
 
@@ -36,76 +37,12 @@ def model(body: str, option: str = "", extra: str = "") -> str:
     return f"<mujoco><option {option}/><worldbody>{body}</worldbody>{extra}</mujoco>"
 
 
-TUMBLE = model(
-    '<body><freejoint/><geom type="box" size=".1 .05 .02" mass="1"/></body>',
-    'integrator="{}" gravity="0 0 0"',
-)
-MODELS = {
-    **{
-        f"tumbling, {name}": (TUMBLE.format(name), "data.qvel.set([0, 0, 0, 0.001, 6, 0])", None)
-        for name in ("Euler", "RK4", "implicit", "implicitfast", "discrete")
-    },
-    "stack, pyramidal": (model(GROUND + STACK), None, None),
-    "stack, elliptic, PGS": (
-        model(GROUND + STACK, 'cone="elliptic" solver="PGS" noslip_iterations="3"'),
-        None,
-        None,
-    ),
-    "stack, CG": (model(GROUND + STACK, 'solver="CG" integrator="implicitfast"'), None, None),
-    "arm, actuators, tendon, sensors": (
-        model(
-            ARM,
-            'integrator="implicitfast"',
-            """<tendon><spatial name="t" limited="true" range="0 .8">
-            <site site="s"/><site site="e"/></spatial></tendon>
-            <actuator><position joint="a" kp="20" kv="2"/><motor joint="b" gear="2"/>
-            <muscle tendon="t" lengthrange=".1 .7"/><velocity joint="a" kv=".1"/></actuator>
-            <sensor><jointpos joint="a"/><tendonpos tendon="t"/><accelerometer site="e"/>
-            </sensor>""",
-        ),
-        None,
-        "data.ctrl[0] = Math.round(3 * data.time) % 2; data.ctrl[1] = -0.1 * data.sensordata[1];"
-        "data.ctrl[2] = 0.5; data.xfrc_applied[8] = data.time > 0.5 ? 1 : 0",
-    ),
-    "a controller that moves the state": (
-        model(ARM),
-        None,
-        "if (data.time > 0.3 && data.time < 0.31) data.qvel[0] = 1;"
-        "if (data.time > 0.6) data.time += 1",
-    ),
-    "mesh, height field, ellipsoid": (
-        """<mujoco><asset><mesh name="m" vertex="0 0 0 .2 0 0 0 .2 0 0 0 .2"/>
-        <hfield name="h" nrow="3" ncol="3" size="2 2 .2 .1" elevation="0 1 0 1 0 1 0 1 0"/></asset>
-        <worldbody><geom type="hfield" hfield="h"/>
-        <body pos="0 0 .5"><freejoint/><geom type="mesh" mesh="m"/></body>
-        <body pos=".5 .3 .6"><freejoint/><geom type="ellipsoid" size=".1 .2 .15"/></body>
-        <body pos="-.5 .3 .6"><freejoint/><geom type="cylinder" size=".1 .1"/></body>
-        </worldbody></mujoco>""",
-        None,
-        None,
-    ),
-    "cloth on a ball": (
-        model(
-            '<geom size=".2"/><flexcomp name="cloth" type="grid" count="6 6 1" spacing=".1 .1 .1"'
-            ' pos="0 0 .4" dim="2" radius=".01" mass="1"><edge equality="true"/></flexcomp>',
-            'solver="CG" timestep=".005"',
-        ),
-        None,
-        None,
-    ),
-    "equality, friction loss, limits, mocap": (
-        model(
-            '<body name="hand" mocap="true" pos="0 0 1">'
-            '<geom size=".02" contype="0" conaffinity="0"/></body>'
-            '<body name="load" pos="0 0 .8"><freejoint/><geom size=".05"/></body>'
-            '<body pos="1 0 1"><joint type="ball" frictionloss=".1" range="0 .5" limited="true"/>'
-            '<geom type="capsule" size=".02" fromto="0 0 0 .3 0 .1"/></body>',
-            "",
-            '<equality><connect body1="hand" body2="load" anchor="0 0 -.1"/></equality>',
-        ),
-        None,
-        "data.mocap_pos[0] = 0.25 * Math.round(4 * data.time)",
-    ),
+PARTS = {"{STACK}": STACK, "{GROUND}": GROUND, "{ARM}": ARM}
+MODELS = fixture_tables("parity")
+TUMBLE = MODELS.pop("tumbling")
+MODELS |= {
+    f"tumbling, {name}": {**TUMBLE, "xml": TUMBLE["xml"].replace("{INTEGRATOR}", name)}
+    for name in ("Euler", "RK4", "implicit", "implicitfast", "discrete")
 }
 
 
@@ -139,7 +76,9 @@ LIBM = {
 @pytest.mark.parametrize("name", MODELS)
 def test_the_same_motion(name: str, engines: tuple[NativeEngine, LabEngine]) -> None:
     native, browser = engines
-    xml, setup, controller = MODELS[name]
+    xml, setup, controller = (MODELS[name].get(key) for key in ("xml", "setup", "controller"))
+    for part, content in PARTS.items():
+        xml = xml.replace(part, content)
     mjb = native.save("models/m.xml", xml)
     assert native.save("models/m.xml", xml) == mjb, "the same bytes each time"
     reply = browser.trial(lab(setup, controller), mjb, 60.0)

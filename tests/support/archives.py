@@ -91,7 +91,6 @@ def packaging_schema() -> etree.XMLSchema:
 
 @functools.cache
 def mathml_dtd() -> etree.DTD:
-    """MathML 2.0, as published in 2001."""
     return etree.DTD(file=str(files("Bio.Entrez") / "DTDs" / "mathml2.dtd"))
 
 
@@ -107,7 +106,6 @@ def formula_mistakes(node: etree._Element) -> list[str]:
 
 
 def mistakes(schema: etree.XMLSchema, data: bytes) -> list[str]:
-    """Return a schema's errors in a document."""
     schema.validate(etree.fromstring(data))
     return [error.message for error in schema.error_log]
 

@@ -19,10 +19,7 @@ _CONTRAST = ("color-contrast", "color-contrast-enhanced")
 
 
 def violations(page: Page, selector: str | None = None) -> list[Any]:
-    """Return axe's violations in light colours, and those of contrast in dark ones.
-
-    Text must have a contrast of 7 : 1, which is more than axe demands by default.
-    """
+    """Return axe's violations in light colours, and those of contrast, 7 : 1, in dark ones."""
     if not page.evaluate("'axe' in window"):
         page.evaluate(_AXE.read_text(encoding="utf-8"))
     results: list[Any] = []

@@ -70,7 +70,6 @@ def interval(value: float) -> Interval:
 def diverged_row(
     integrator: str = "Euler", timestep: float = 0.1, **overrides: Any
 ) -> WorkPrecisionRow:
-    """Return a row that diverged, and so was not timed."""
     missing = dict.fromkeys(("position", "velocity", "cost", "seconds"))
     fields = {"status": "diverged", "reasons": ("the state is not finite",), **missing, **overrides}
     return row(integrator, timestep, **fields)

@@ -1,8 +1,4 @@
-"""Courses that are built once for all processes of a test run, and sites of them on a host.
-
-The pages of a site are listed from its files, so that a new kind of page is tested as soon as there
-is one.
-"""
+"""Courses that are built once for all processes of a test run, and sites of them on a host."""
 
 from __future__ import annotations
 
@@ -101,7 +97,6 @@ class Sites(dict[str, Site]):
 
 
 def course_copy(name: str, root: Path, stores: Path) -> Folder:
-    """Copy a course in `tests/courses`, for a test that changes it."""
     folder = Folder(Path(shutil.copytree(ROOT / "tests/courses" / name / "course", root)))
     folder.borrow(stores)
     return folder

@@ -65,18 +65,15 @@ class Course:
         self.folder.write(self.path(id), text)
 
     def edit(self, id: str, old: str, new: str) -> None:
-        """Edit a lesson, if it has the old text."""
         text = self.folder.text(self.path(id))
         self.write(id, text.replace(old, new, 1))
 
     def apply(self, edit: Edit, id: str, word: str) -> None:
-        """Apply an edit to a lesson, if it exists."""
         if (self.folder.root / self.path(id)).exists() or edit in (plan, remove, turn, retitle):
             edit(self, id, word)
             self.save()
 
     def save(self) -> None:
-        """Write the map."""
         parts = [HEAD, self.extra]
         for level, title in self.levels.items():
             parts.append(f'[[level]]\nid = "{level}"\ntitle = "{title}"\n')
@@ -91,7 +88,6 @@ class Course:
 
 
 def drawn_pages(folder: Folder) -> set[str]:
-    """Return the pages that a build draws anew."""
     options = folder.options()
     with Reader(options) as reader:
         report, site = make_files(options, reader, lambda lib: Site(lib, reader, options))
@@ -129,7 +125,6 @@ def script(course: Course, id: str, text: str) -> None:
 
 
 def plan(course: Course, id: str, text: str) -> None:
-    """Make a lesson planned, or write it."""
     if id in course.planned:
         course.planned.discard(id)
         n = course.ids.index(id) + 1 if id in course.ids else 9
@@ -140,7 +135,6 @@ def plan(course: Course, id: str, text: str) -> None:
 
 
 def remove(course: Course, id: str, text: str) -> None:
-    """Remove a lesson, or add it at the end of its level."""
     if id in course.ids:
         course.ids.remove(id)
         (course.folder.root / course.path(id)).unlink(missing_ok=True)
@@ -165,12 +159,10 @@ def term(course: Course, id: str, text: str) -> None:
 
 
 def label(course: Course, id: str, text: str) -> None:
-    """Label a formula and refer to it, if it has no label."""
     course.edit(id, "\n$$\n\n[^n]:", "\n$$ {#eq:e}\n\nBy [](#eq:e) $\\dot q$.\n\n[^n]:")
 
 
 def ask(course: Course, id: str, text: str) -> None:
-    """Add a quiz to a lesson, or change its question."""
     path = course.folder.root / course.path(id)
     if "```quiz" in path.read_text(encoding="utf-8"):
         course.edit(id, '"why', '"why-not')
@@ -191,7 +183,6 @@ def picture(course: Course, id: str, text: str) -> None:
 
 
 def breakage(course: Course, id: str, text: str) -> None:
-    """Make a mistake that prevents builds, or correct it."""
     course.extra = "" if course.extra else '[[silence]]\nrule = "no-such-rule"\nreason = "x"\n'
 
 

@@ -77,7 +77,6 @@ class Editor:
         self._do(self.client.text_document_did_save, params)
 
     def leave(self, path: str) -> None:
-        """Close a file, without saving it."""
         params = types.DidCloseTextDocumentParams(self.identifier(path))
         self._do(self.client.text_document_did_close, params)
         del self.texts[path]
@@ -128,7 +127,6 @@ class Editor:
         return {a.title: a for a in self.request("code_action", params)}
 
     def apply_edits(self, edits: dict[str, list[types.TextEdit]]) -> dict[str, str]:
-        """Return the texts of files after edits, by path."""
         texts = {}
         for uri, file_edits in edits.items():
             path = self.places.path(uri)
@@ -164,7 +162,6 @@ class Editor:
             return self.diagnostics.get(path, [])
 
     def wait_for(self, answer: Callable[[], T]) -> T:
-        """Ask again until the answer is truthy; return it."""
         until = time.monotonic() + 120
         while not (result := answer()):
             assert time.monotonic() < until, self.diagnostics

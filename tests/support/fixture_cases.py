@@ -1,16 +1,19 @@
 """Fixture files: cases of `title / . / input / . / expected / .`, with empty lines between them.
 
-Entry points: `check_cases(path, render)`; `read_cases(path)`, and `rewrite(path, cases)`, which
-writes them again. Lines before a title that are empty or begin with `#` are for readers of the
-file. `check_text(path, text)` is for a file that only holds an expected text, `fixture_text` for
-one that only holds an input, such as a whole lesson.
+Entry points: `check_cases(path, render)`, `read_cases(path)` and `rewrite(path, cases)`. Lines
+before a title that are empty or begin with `#` are for readers of the file. `check_lines(path,
+convert)` is for inputs of a line each, with what becomes of them indented below; short cases, of a
+line each, may be rows of tables (`fixture_tables`).
 """
 
 from __future__ import annotations
 
+import ast
 import re
+import tomllib
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -32,7 +35,6 @@ class Case(Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """The case in the format of the file."""
         parts = (f"{self.title}\n", self.input, self.expected)
         return self.remarks + "".join(f"{part}.\n" for part in parts)
 
@@ -48,12 +50,22 @@ def check_cases(path: Path, render: Callable[[Case], str], *, rewriting: bool) -
         assert now.expected == case.expected, f"{path.name}:{case.line}: {case.title}"
 
 
-def read_cases(path: Path) -> list[Case]:
-    """The cases of a fixture file.
+def check_lines(path: Path, convert: Callable[[str], Iterable[str]], *, rewriting: bool) -> None:
+    """Compare what becomes of each line of input; a quoted line is a literal of Python."""
 
-    Raises:
-        ValueError: the file ends inside a case, or two cases have the same title.
-    """
+    def render(case: Case) -> str:
+        lines: list[str] = []
+        for line in case.input.splitlines():
+            text = ast.literal_eval(line) if line[0] in "'\"" else line
+            outputs = (r if r.isprintable() else repr(r) for r in convert(text))
+            lines += [line, *(f"  {output}".rstrip() for output in outputs)]
+        return "".join(f"{line}\n" for line in lines)
+
+    check_cases(path, render, rewriting=rewriting)
+
+
+def read_cases(path: Path) -> list[Case]:
+    """The cases of a fixture file; `ValueError` for a case without an end, or a title twice."""
     lines = text_lines(path.read_text(encoding="utf-8"))
     cases: list[Case] = []
     at = 0
@@ -78,13 +90,11 @@ def read_cases(path: Path) -> list[Case]:
 
 
 def rewrite(path: Path, cases: Iterable[Case]) -> None:
-    """Write a fixture file anew."""
     text = "".join(case.text for case in cases)
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def check_text(path: Path, text: str, *, rewriting: bool) -> None:
-    """Compare a text with that of a file, or rewrite the file."""
     if rewriting:
         path.write_text(text, encoding="utf-8", newline="\n")
     assert text == path.read_text(encoding="utf-8"), path.name
@@ -98,3 +108,8 @@ def fixture_text(name: str) -> str:
 def text_lines(text: str) -> list[str]:
     """Split at LF alone: a form feed in a lesson is no line end."""
     return _LINE.findall(text)
+
+
+def fixture_tables(name: str) -> dict[str, Any]:
+    """The tables of cases in a file of `tests/fixtures/tables`, by their names."""
+    return tomllib.loads(fixture_text(f"tables/{name}.toml"))

@@ -1,8 +1,7 @@
 """Exact answers to sixty digits, and errors in units of the last place.
 
 Every reference takes doubles, reads them as the exact numbers that they are, and follows the
-textbook formula; with mpmath's unbounded exponents none of the cases that are hard in doubles is
-hard here.
+textbook formula.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -67,7 +66,6 @@ def log(q: Sequence[mpmath.mpf]) -> Vector:
 
 
 def matrix(q: Sequence[mpmath.mpf]) -> Vector:
-    """The rotation matrix, row by row."""
     w, x, y, z = unit(q)
     return [
         1 - 2 * (y * y + z * z),
@@ -98,7 +96,6 @@ def rotate(q: Sequence[mpmath.mpf], vector: Sequence[mpmath.mpf]) -> Vector:
 
 
 def ulps_of(size: mpmath.mpf, actual: ArrayLike, expected: Iterable[mpmath.mpf]) -> float:
-    """The largest error, in ulp of one common size."""
     pairs = zip(exact(actual), expected, strict=True)
     return _largest(abs(g - w) / (ULP * size) for g, w in pairs)
 

@@ -43,7 +43,7 @@ READY = (
     "coursebuild.pipeline.site",
     "coursebuild.pipeline.outputs",
     "coursebuild.core.syntax.document",
-    "coursebuild.core.pages.article",
+    "coursebuild.core.pages.page_writer",
     "coursebuild.core.pages.document_inputs",
     "coursebuild.core.pages.page_list",
     "coursebuild.features.authoring.commands.rename",
@@ -65,7 +65,6 @@ class Doom:
         self.calls: list[str] = []
 
     def meets(self, name: str) -> bool:
-        """Count a call; return whether it is the fatal one."""
         self.calls.append(name)
         return len(self.calls) == self.fatal
 
@@ -130,7 +129,6 @@ class Fault(Doom):
         raise OSError(number, os.strerror(number))
 
     def caller(self) -> str:
-        """Return the place in the tool that makes the call."""
         frame = sys._getframe(2)
         while not frame.f_code.co_filename.startswith(TOOL):
             if "importlib" in frame.f_code.co_filename or frame.f_back is None:

@@ -28,7 +28,6 @@ def course(root: Path, stores: Path, *lessons: str) -> Folder:
 
 
 def run_check(folder: Folder, *names: str, status: int | None = None) -> dict[str, Any]:
-    """The JSON report of `check`, with its exit status."""
     result = folder.main("check", *names, "--format", "json")
     assert status is None or result.status == status, result.out + result.err
     return {"status": result.status, **json.loads(result.out)}

@@ -13,31 +13,20 @@ import numpy as np
 from playwright.sync_api import BrowserContext, Locator, Page, Request, Route, expect
 
 from support.chromium import SLOW
+from support.fixture_cases import fixture_text
 
 PAGE = "lessons/1.1-one.html"
 """The page of the course in `tests/courses/labs`."""
 SWING, AUTO, ALL, TWINS, EDITED_LAB = 0, 1, 2, 3, 4
 """The index of each lab on the page."""
 
-MOUNT = """async (number) => {
-  const place = document.querySelectorAll('.lab')[number]
-  const copy = place.cloneNode(true)
-  place.replaceWith(copy)
-  copy.id = 'tried'
-  const script = new URL(copy.dataset.script, document.baseURI).href
-  const { mountLab } = await import(script)
-  window.made = await mountLab(copy, (key) => key)
-  copy.querySelector('.lab-view').scrollIntoView({ block: 'center' })
-}"""
+MOUNT = fixture_text("scripts/mount_lab.js")
 """Mounts a lab in a copy of its element that the page's own script does not know, and stores it as
 `window.made`, so that a test can inspect more than its picture."""
 
 
 def watch_page(context: BrowserContext) -> tuple[Page, list[str]]:
-    """Open a page; also returns the list that collects its console messages and errors.
-
-    A request aborted because the next page was opened is not a failure.
-    """
+    """Open a page, with a list of its console messages and its errors but for aborted requests."""
     page, console = context.new_page(), list[str]()
 
     def on_failure(request: Request) -> None:
@@ -58,11 +47,7 @@ def fetch_text(route: Route) -> str:
 
 def until(page: Page, true: str, argument: object = None) -> None:
     """Wait until a script returns a true value; Playwright's own needs the forbidden `eval`."""
-    for _ in range(SLOW // 25):
-        if page.evaluate(true, argument):
-            return
-        page.wait_for_timeout(25)
-    raise AssertionError(f"never true: {true}")
+    wait_for_condition(page, lambda: bool(page.evaluate(true, argument)), true)
 
 
 def becomes(page: Page, value: Callable[[], object], expected: object) -> None:
@@ -76,10 +61,7 @@ def becomes(page: Page, value: Callable[[], object], expected: object) -> None:
 
 
 def wait_until_settled(page: Page) -> None:
-    """Wait until the page's script has run, its fonts are loaded, and the browser is idle.
-
-    A browser that is never idle, or draws nothing, calls nobody back without a limit.
-    """
+    """Wait until the page's script has run, its fonts are loaded, and the browser is idle."""
     expect(page.locator("[data-tools] select").first).to_be_attached()
     until(page, "document.fonts.status === 'loaded'")
     page.evaluate("() => new Promise((done) => requestIdleCallback(done, { timeout: 10000 }))")
@@ -102,15 +84,7 @@ def reach(page: Page, number: int, state: str) -> None:
     )
 
 
-NOTE_CHANGES = """element => {
-  const noted = element.noted = new Set()
-  const note = (changes) => {
-    changes.forEach(({ oldValue }) => noted.add(oldValue))
-    noted.add(element.dataset.state ?? element.textContent)
-  }
-  const states = { attributeFilter: ['data-state'], attributeOldValue: true }
-  new MutationObserver(note).observe(element, { ...states, childList: true })
-}"""
+NOTE_CHANGES = fixture_text("scripts/note_changes.js")
 
 
 def note_changes(element: Locator) -> None:
@@ -134,21 +108,19 @@ def readout(lab: Locator, label: str) -> str:
 
 
 def shows(lab: Locator, label: str, text: str) -> None:
-    """Wait until a readout shows a text."""
     wait_for_condition(lab.page, lambda: readout(lab, label) == text)
 
 
-def wait_for_condition(page: Page, true: Callable[[], bool]) -> None:
+def wait_for_condition(page: Page, true: Callable[[], bool], name: str = "it") -> None:
     """Wait until a condition holds, with a limit that is generous enough for a slow machine."""
-    for _ in range(SLOW // 50):
+    for _ in range(SLOW // 25):
         if true():
             return
-        page.wait_for_timeout(50)
-    raise AssertionError("the condition never held")
+        page.wait_for_timeout(25)
+    raise AssertionError(f"never true: {name}")
 
 
 def wait_for_change(page: Page, view: Locator, before: bytes) -> bytes:
-    """Wait until the picture differs from `before`; returns the new one."""
     for _ in range(SLOW // 100):
         now = view.screenshot()
         if now != before:
@@ -158,7 +130,6 @@ def wait_for_change(page: Page, view: Locator, before: bytes) -> bytes:
 
 
 def wait_until_still(page: Page, view: Locator) -> bytes:
-    """Wait until the picture stops changing; returns it."""
     before = view.screenshot()
     for _ in range(SLOW // 300):
         page.wait_for_timeout(300)

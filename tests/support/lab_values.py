@@ -32,7 +32,6 @@ def make_lab(text: str | None = None, /, **fields: Any) -> Lab:
 
 
 def lab_of(text: str) -> Lab:
-    """The only lab of a lesson with this text."""
     source = Source("content/lessons/4.2-x.md", text)
     result = parse_document(source, frozenset(), lesson=True)
     assert result.diagnostics == (), [d.message for d in result.diagnostics]
@@ -41,7 +40,6 @@ def lab_of(text: str) -> Lab:
 
 
 def request(lab: Lab) -> dict[str, Any]:
-    """The request that the trial of a lab gets."""
     module = compile_lab(lab, "4.2-lab-1")
     return {"config": module.config, "code": module.literal, "seconds": lab.verify.seconds}
 
@@ -77,7 +75,6 @@ class Bench(Engines):
         return {**self.native.parity(mjb, run, horizon), "run": run, "mjb": mjb}
 
     def save_model(self, lab: Lab) -> bytes:
-        """The bytes of the lab's compiled model."""
         assert lab.xml is not None
         return self.native.save("models/x.xml", lab.xml.text)
 

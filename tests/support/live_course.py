@@ -77,7 +77,6 @@ def live() -> Iterator[Callable[[Folder], Live]]:
 
 
 def share(folder: Folder, trials: Path) -> None:
-    """Share the stores of lab trials with other courses."""
     for name in TRIALS:
         (trials / name).mkdir(parents=True, exist_ok=True)
         (folder.root / ".coursebuild" / name).symlink_to(trials / name)

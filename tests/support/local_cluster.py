@@ -1,8 +1,4 @@
-"""A Dask scheduler and its workers, for tests.
-
-Entry point: `local_cluster(folder, count, path)`. As a program it is that cluster: it says the
-scheduler's address, and ends when its input does.
-"""
+"""A Dask scheduler and its workers; as a program it is that cluster until its input ends."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Courses made from texts, without files, and the diagnostics of checks as short lines.
-
-Entry points: `make_course`; `rules_and_texts`, the rule of each diagnostic and its source text.
-"""
+"""Courses made from texts, without files, and the diagnostics of checks as short lines."""
 
 from __future__ import annotations
 
@@ -46,11 +43,7 @@ def make_course(
     declaration_texts: Mapping[str, str] | None = None,
     files: Iterable[str] = (),
 ) -> Course:
-    """A course of two written lessons, a planned lesson and a page.
-
-    `models` and `declaration_texts` are the texts of `models/NAME.xml` and `models/NAME.toml`, by
-    name.
-    """
+    """A course of two written lessons, a planned lesson and a page, with models by their names."""
     course = parse_course_map(Source("content/course.toml", MAP)).value
     assert course is not None
     texts = {"1.1": first, "1.2": second, "about": page_text}
@@ -96,12 +89,10 @@ def document(path: str, text: str, kinds: frozenset[str] = KINDS) -> Document:
 
 
 def rules_and_texts(diagnostics: Iterable[Diagnostic]) -> list[str]:
-    """The rule of each diagnostic, and the source text that it points at."""
     return [f"{d.rule}: {d.span.text}" for d in diagnostics]
 
 
 def messages(diagnostics: Iterable[Diagnostic]) -> list[str]:
-    """The message of each diagnostic, with its help."""
     return [d.message + (f" [{d.help}]" if d.help else "") for d in diagnostics]
 
 

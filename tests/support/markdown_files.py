@@ -1,6 +1,5 @@
 """Reading the documents of the repository: fences with their info strings, and links.
 
-Entry points: `PAGES`; `fences`, `code_spans`, `links` and `anchors` of a path; `write_files`.
 markdown-it reads them, with none of coursebuild's rules, so that the tests do not rely on what they
 test.
 """
@@ -43,11 +42,9 @@ class Fence:
         return f"{self.page}-{self.line}"
 
     def is_(self, flag: str) -> bool:
-        """Whether the info string has a flag."""
         return flag in self.words
 
     def value(self, key: str) -> str | None:
-        """The value of `key=value` in the info string."""
         values = (word.partition("=")[2] for word in self.words if word.startswith(f"{key}="))
         return next(values, None)
 
@@ -67,13 +64,11 @@ def fences(path: Path) -> list[Fence]:
 
 
 def code_spans(path: Path) -> list[str]:
-    """The inline code (between backticks) in the prose of a document."""
     inlines = (child for token in _tokens(path) for child in token.children or ())
     return [child.content for child in inlines if child.type == "code_inline"]
 
 
 def links(path: Path) -> Iterator[str]:
-    """The destinations of a document's links and images, in order."""
     for token in _tokens(path):
         for child in token.children or ():
             if child.type == "link_open":

@@ -66,7 +66,6 @@ class Fake:
 
 
 def bench_course(tmp_path: Path) -> Path:
-    """A course with one model."""
     root = tmp_path / "a cöurse"
     write(root / "content" / "course.toml", "")
     write(root / "models" / "box.xml", BOX)

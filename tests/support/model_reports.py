@@ -10,7 +10,6 @@ from coursebuild.numerics.reports.case_report import (
     BoundaryLine,
     CaseReport,
     ErrorLine,
-    FigureLine,
     ReferenceLine,
     StepCost,
 )
@@ -23,7 +22,7 @@ from coursebuild.numerics.reports.diet_report import (
     ModelPlace,
     Saving,
 )
-from coursebuild.numerics.reports.scene_report import OrderRow, SceneCard, SceneReport
+from coursebuild.numerics.reports.scene_report import FigureLine, OrderRow, SceneCard, SceneReport
 from support.bench_reports import FIRST, MACHINE, awkward, swing
 from support.bench_reports import row as row
 from support.bench_reports import scenario as scenario
@@ -76,7 +75,6 @@ def diet(*findings: Finding) -> DietReport:
 
 
 def run(**overrides: object) -> ErrorLine:
-    """A run of a hard case that is well."""
     fields: dict[str, object] = {
         "integrator": "Euler",
         "timestep": 0.01,
@@ -143,7 +141,6 @@ def case(name: str = "spring", number: int = 5, **overrides: object) -> CaseRepo
 
 
 def reports() -> Reports:
-    """All of it."""
     kept_finding = finding(
         "geom-far", kept="it is the horizon", proof="", label="equal within tolerance"
     )

@@ -30,10 +30,7 @@ class Mortals:
     def run(
         self, folder: Folder, *arguments: str, fatal: int = 0, fault: str = "", patience: int = 0
     ) -> tuple[int, list[str]]:
-        """The exit status, and the names of the calls where it got through.
-
-        A command that takes longer than the `patience`, in seconds, ends by a signal.
-        """
+        """The exit status, that of a signal after `patience` seconds, and the calls that worked."""
         assert self.process.stdin is not None and self.process.stdout is not None
         request = {"folder": str(folder.root), "arguments": arguments, "fatal": fatal}
         request |= {"exchanges": self.exchanges, "fault": fault, "patience": patience}

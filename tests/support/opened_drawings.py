@@ -1,8 +1,7 @@
 """Drawings opened at their own address in Chromium, and what they then ask for.
 
-Entry points: `Drawings`; `published_files`, what a site would hold of a file. All other hosts are
-one, which answers nothing and counts who comes: a script that runs, a picture, a style sheet, a
-frame, a connection made ahead.
+All other hosts are one, which answers nothing and counts who comes: a script that runs, a picture,
+a style sheet, a frame, a connection made ahead.
 """
 
 from __future__ import annotations

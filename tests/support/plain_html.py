@@ -40,7 +40,6 @@ MARKUP_RULES = (
 
 
 def plain_html(document: model.Document) -> str:
-    """A document, its footnotes last."""
     footnotes = PlainWriter().render_footnotes(document.footnotes)
     return plain_blocks(document.blocks) + str(footnotes)
 

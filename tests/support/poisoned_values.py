@@ -39,7 +39,6 @@ def mutate(value: Any, chance: random.Random) -> Any:
 
 
 def mutations(text: bytes, count: int) -> Iterator[bytes]:
-    """As many changes of a JSON text."""
     value, chance = json.loads(text), random.Random(21)
     for _ in range(count):
         yield json.dumps(mutate(value, chance)).encode()

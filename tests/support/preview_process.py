@@ -78,7 +78,6 @@ class Preview:
             return response.status, dict(response.getheaders()), response.read()
 
     def exchange(self, request: bytes) -> bytes:
-        """All that the server answers to some bytes until it closes the connection."""
         address = ("127.0.0.1", self.port)
         with socket.create_connection(address, timeout=120) as link, contextlib.suppress(OSError):
             answer = b""
@@ -99,7 +98,6 @@ class Preview:
 
     @contextlib.contextmanager
     def events(self, page: str = "lessons/1.1-one.html") -> Iterator[Events]:
-        """The events that the server sends to an open page."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=120) as link:
             request = f"GET {PREFIX}events?page={page} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}"
             link.sendall(f"{request}\r\n\r\n".encode())
@@ -123,7 +121,6 @@ class Events:
         self.news: dict[str, Any] = {}
 
     def until(self, good: Callable[[Events], bool]) -> Events:
-        """Read events until a condition holds."""
         while not (self.hello and self.news and good(self)):
             name, data = next(self.stream, ("", ""))
             assert name, f"the stream ended; the last events were {self.state} {self.news}"

@@ -58,6 +58,5 @@ ANY: dict[str, dict[str, Any]] = {
 
 
 def furnish(folder: Folder) -> None:
-    """Give a course a model and a picture."""
     folder.write("models/ball.xml", MODEL)
     folder.write("content/lessons/sketch.svg", SVG)

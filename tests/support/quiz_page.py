@@ -43,7 +43,6 @@ def question(page: Page, number: int) -> Locator:
 
 
 def answer_field(page: Page, number: int) -> Locator:
-    """Where an answer is written."""
     return question(page, number).get_by_role("textbox", name=ANSWER_LABEL)
 
 
@@ -56,7 +55,6 @@ def press(page: Page, number: int, name: str = "Check") -> None:
 
 
 def stored_answer(page: Page, number: int) -> dict[str, Any] | None:
-    """What is kept of a question."""
     key = question(page, number).get_attribute("data-question")
     text = page.evaluate(f"localStorage[({KEY})()] ?? null")
     entry = json.loads(text)["answers"].get("check", {}).get(key) if text else None
@@ -73,7 +71,6 @@ def texts(locator: Locator) -> list[str]:
 
 
 def answer_all(page: Page) -> None:
-    """Some right, some wrong, some unreadable."""
     question(page, MCQ).get_by_role("radio").first.check()
     question(page, SEVERAL).get_by_role("checkbox").nth(0).check()
     question(page, SEVERAL).get_by_role("checkbox").nth(2).check()

@@ -11,17 +11,8 @@ from types import MappingProxyType
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core import model
 from coursebuild.core.engine.store import Store
-from coursebuild.core.model import (
-    Course,
-    Math,
-    MathBlock,
-    MjcfModel,
-    Recording,
-    Script,
-    document_blocks,
-    document_inlines,
-)
 from coursebuild.core.model.results import (
     CompileResult,
     FileFacts,
@@ -58,7 +49,6 @@ BOX = '<mujoco model="box">\n  <worldbody/>\n</mujoco>\n'
 
 
 def read_assets() -> Assets:
-    """The templates of this checkout and its bundle."""
     templates, dist = ROOT / "templates", ROOT / "site" / "dist"
     assert (dist / "fonts" / "fonts.json").is_file(), "no bundle: run `python site/bundle.py`"
     return Assets(
@@ -78,16 +68,14 @@ def read_assets() -> Assets:
 class RenderedCourse(Struct, frozen=True):
     """A course, prepared results of running it, and the tool's own files."""
 
-    course: Course
+    course: model.Course
     results: Results
     assets: Assets
 
     def library(self, reports: Reports | None = None) -> Library:
-        """The course as its pages look it up."""
         return make_library(self.course, self.results, self.assets, reports or Reports())
 
     def page(self, lesson: str = "0.1") -> PageContext:
-        """The context of a lesson's page."""
         library = self.library()
         entry = library.lessons[lesson]
         assert entry.document is not None
@@ -96,7 +84,6 @@ class RenderedCourse(Struct, frozen=True):
         return PageWriter(library.renderer, inputs, place, entry.document)
 
     def html(self, lesson: str = "0.1") -> str:
-        """The text of a lesson as HTML."""
         page = self.page(lesson)
         return f"{page.blocks(page.document.blocks)}\n{page.footnotes()}"
 
@@ -149,7 +136,9 @@ class Make(Struct, frozen=True):
         texts = {"0.1": text, "1.1": "Text.", "about": "About it.", **texts}
         documents = documents_of(map_result.value, texts)
         rendered = with_documents(map_result.value, documents)
-        rendered = replace(rendered, models=(MjcfModel("box", Source("models/box.xml", BOX)),))
+        rendered = replace(
+            rendered, models=(model.MjcfModel("box", Source("models/box.xml", BOX)),)
+        )
         results = results_of(rendered, runs or {}, status)
         typeset = known_mathml(dict(results.formulas))
         summarized = {
@@ -159,22 +148,22 @@ class Make(Struct, frozen=True):
         return RenderedCourse(with_documents(rendered, summarized), results, self.assets)
 
 
-def results_of(course: Course, runs: Mapping[str, ScriptRun], status: str) -> Results:
+def results_of(course: model.Course, runs: Mapping[str, ScriptRun], status: str) -> Results:
     """Scripts that are not in `runs` printed `one`, `two`; a formula is rendered as its TeX."""
     script_runs: list[ScriptRun] = []
     verdicts: list[Verdict] = []
     formulas: dict[Formula, str] = {}
     for document in course.documents:
-        for block in document_blocks(document):
-            if isinstance(block, Script):
+        for block in model.document_blocks(document):
+            if isinstance(block, model.Script):
                 default_run = ScriptRun(block.path, Outcome.OK, 0, "one\ntwo\n", "", 0.1)
                 script_runs.append(runs.get(block.path, default_run))
-            elif isinstance(block, Recording):
+            elif isinstance(block, model.Recording):
                 verdicts.append(Verdict(block, course.comparison_of(block), status))
-            elif isinstance(block, MathBlock):
+            elif isinstance(block, model.MathBlock):
                 formulas[Formula(block.tex.text, True)] = mathml(block.tex.text, "display")
-        for inline in document_inlines(document):
-            if isinstance(inline, Math):
+        for inline in model.document_inlines(document):
+            if isinstance(inline, model.Math):
                 formulas[Formula(inline.tex.text, inline.display)] = mathml(
                     inline.tex.text, "inline"
                 )

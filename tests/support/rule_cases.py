@@ -1,7 +1,5 @@
 """Scratch courses, written out of the input of a fixture, and what is found in them.
 
-Entry points: `Layout.of` (an input as files), `parts` (the same as texts), `Workshop` (checks).
-
 An input is the text of `content/lessons/1.1-first.md`, or several files, each after a line `=== …`:
 
     === PATH                  a text file
@@ -36,7 +34,7 @@ from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.verify import compile_models
-from support.fixture_cases import text_lines
+from support.fixture_cases import fixture_text, text_lines
 from support.lab_values import OpenEngines, try_labs
 
 FIRST = "content/lessons/1.1-first.md"
@@ -44,40 +42,9 @@ SECOND = "content/lessons/1.2-second.md"
 MAP = "content/course.toml"
 
 DEFAULTS = {
-    MAP: """\
-[course]
-title = "A scratch course"
-
-[[level]]
-id = "1"
-title = "The only level"
-
-[[level.lesson]]
-id = "1.1"
-slug = "first"
-title = "The first lesson"
-status = "complete"
-
-[[level.lesson]]
-id = "1.2"
-slug = "second"
-title = "The second lesson"
-status = "complete"
-""",
+    MAP: fixture_text("documents/scratch_map.toml"),
     FIRST: "## The first lesson\n\nIt begins.\n",
-    SECOND: """\
-## The second lesson
-
-```python file=examples/second.py
-print("it runs")
-```
-
-Output:
-
-```text
-it runs
-```
-""",
+    SECOND: fixture_text("documents/scratch_lesson.md"),
 }
 
 _HEADER = re.compile(r"=== (?:(crlf|bytes|link|folder|without|later) )?(\S.*)")
@@ -122,7 +89,6 @@ class Layout:
                 raise ValueError(f"no kind of file {unknown!r}")
 
     def write(self, root: Path) -> None:
-        """Put all but the later files into a folder, which is made."""
         root.mkdir(parents=True, exist_ok=True)
         for folder in self.folders:
             (root / folder).mkdir(parents=True)
@@ -143,7 +109,6 @@ def write_file(path: Path, data: bytes) -> None:
 
 
 def parts(text: str) -> Iterator[tuple[str, str, str]]:
-    """The kind, the path and the body of each file."""
     if not _HEADER.match(text):
         yield "", FIRST, text
         return

@@ -5,9 +5,18 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
+from support.fixture_cases import fixture_text
+
 ROOT = Path(__file__).parents[2]
+
+
+def program(name: str) -> str:
+    """One of the programs that tests start."""
+    text: str = tomllib.loads(fixture_text("scripts/programs.toml"))[name]
+    return text
 
 
 def run_code(

@@ -11,6 +11,7 @@ import pytest
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import script_server
 from coursebuild.core.run.script_server import ScriptServer
+from support.fixture_cases import fixture_text
 from support.waiting import wait_for_file, wait_until
 
 SOURCE_TREE = Path(script_server.__file__).parents[3]
@@ -18,20 +19,7 @@ Run = Callable[..., ScriptRun]
 both_ways = pytest.mark.parametrize("server", ["forking", "spawning"], indirect=True)
 """Scripts are run forked from a server, and each with an interpreter of its own: a smoke test."""
 forked_or_not = pytest.mark.parametrize("fork", [True, False], ids=["forked", "spawned"])
-TOOL = """
-import sys
-from pathlib import Path
-from coursebuild.core.run import script_server
-from coursebuild.core.run.script_server import ScriptServer
-from coursebuild.core.model.results import ScriptJob
-try:
-    with ScriptServer(fork=sys.argv[2] == "True") as server:
-        job = ScriptJob("examples/x.py", (), 60.0, ())
-        for run in server.run(Path(sys.argv[1]), [job], parallel=2):
-            print(run.outcome, run.stdout)
-except KeyboardInterrupt:
-    print("interrupted")
-"""
+TOOL = fixture_text("scripts/run_one.txt")
 """A command that runs a script; its arguments: a folder, and whether forked."""
 
 
@@ -71,7 +59,6 @@ def wait_for(path: Path) -> int:
 
 
 def wait_until_ended(pid: int) -> bool:
-    """Wait until a process has ended."""
     wait_until(lambda: not is_alive(pid), f"the end of process {pid}")
     return True
 

@@ -6,15 +6,7 @@ from decimal import Decimal
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import (
-    Comparison,
-    Course,
-    Document,
-    Filter,
-    Mode,
-    Recording,
-    find_blocks,
-)
+from coursebuild.core import model
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits, update_body
@@ -22,38 +14,33 @@ from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source, Span
-from support.made_courses import with_documents
+from support.made_courses import LESSON, with_documents
 
-EXACT = Comparison()
-DIGITS = Comparison(Mode.DIGITS)
-VOLATILE = Comparison(Mode.VOLATILE)
-ELLIPSIS = Comparison(ellipsis=True)
-DIGITS_ELLIPSIS = Comparison(Mode.DIGITS, ellipsis=True)
-LESSON = """
-[[level.lesson]]
-id = "{}"
-slug = "{}"
-title = "T"
-status = "complete"
-"""
+EXACT = model.Comparison()
+DIGITS = model.Comparison(model.Mode.DIGITS)
+VOLATILE = model.Comparison(model.Mode.VOLATILE)
+ELLIPSIS = model.Comparison(ellipsis=True)
+DIGITS_ELLIPSIS = model.Comparison(model.Mode.DIGITS, ellipsis=True)
 
 
-def tolerance(rtol: str = "0", atol: str = "0") -> Comparison:
-    return Comparison(Mode.TOLERANCE, Decimal(rtol), Decimal(atol))
+def tolerance(rtol: str = "0", atol: str = "0") -> model.Comparison:
+    return model.Comparison(model.Mode.TOLERANCE, Decimal(rtol), Decimal(atol))
 
 
 # --- lessons
 
 
-def document(text: str, path: str = "content/lessons/4.2-mass.md") -> Document:
+def document(text: str, path: str = "content/lessons/4.2-mass.md") -> model.Document:
     return parse_document(Source(path, text), frozenset(), lesson=True).value
 
 
-def recordings(document: Document) -> tuple[Recording, ...]:
-    return tuple(find_blocks(document, Recording))
+def recordings(document: model.Document) -> tuple[model.Recording, ...]:
+    return tuple(model.find_blocks(document, model.Recording))
 
 
-def recording(body: str, *, prefix: str = "", eol: str = "\n", fence: str = "```") -> Recording:
+def recording(
+    body: str, *, prefix: str = "", eol: str = "\n", fence: str = "```"
+) -> model.Recording:
     """A lesson with one script and one recorded fence, its lines after `prefix`, ended by `eol`."""
     lines = ["```python file=examples/a.py", "print(1)", "```", "Output:", "", f"{fence}text"]
     lines += [*(body.split("\n") if body else ()), fence, "After.", ""]
@@ -61,20 +48,21 @@ def recording(body: str, *, prefix: str = "", eol: str = "\n", fence: str = "```
     return recordings(document(text))[0]
 
 
-def table(rows: str) -> Recording:
-    """A lesson with one script and one recorded table."""
+def table(rows: str) -> model.Recording:
     text = f"```python file=examples/a.py\nprint(1)\n```\n\nOutput:\n\n{rows}\n\nAfter.\n"
     return recordings(document(text))[0]
 
 
 def course(
-    *documents: Document, comparison: Comparison = EXACT, filters: tuple[Filter, ...] = ()
-) -> Course:
+    *documents: model.Document,
+    comparison: model.Comparison = EXACT,
+    filters: tuple[model.Filter, ...] = (),
+) -> model.Course:
     """A course of these lessons; ids are taken from the file names."""
     text = '[course]\ntitle = "T"\n[[level]]\nid = "1"\ntitle = "One"\n'
     for document in documents:
         id, _, slug = document.source.path.rpartition("/")[2].removesuffix(".md").partition("-")
-        text += LESSON.format(id, slug)
+        text += LESSON.format(id, slug, "complete")
     course_map = parse_course_map(Source("content/course.toml", text)).value
     assert course_map is not None
     pairs = zip(course_map.lessons, documents, strict=True)
@@ -94,8 +82,6 @@ def make_run(
 
 
 def describe(diagnostic: Diagnostic) -> str:
-    """The whole text of a diagnostic, with its places."""
-
     def place(span: Span | None) -> str:
         return "" if span is None else f" at {span.line}:{span.column} `{span.first_line().text}`"
 
@@ -116,15 +102,15 @@ def describe(diagnostic: Diagnostic) -> str:
 def verdict(
     recorded: str,
     printed: str,
-    comparison: Comparison = EXACT,
-    filters: tuple[Filter, ...] = (),
+    comparison: model.Comparison = EXACT,
+    filters: tuple[model.Filter, ...] = (),
     **lesson: str,
 ) -> Verdict:
     comparison = replace(comparison, course_filters=filters)
     return compare(recording(recorded, **lesson), comparison, printed)
 
 
-def matches(recorded: str, printed: str, comparison: Comparison = EXACT) -> bool:
+def matches(recorded: str, printed: str, comparison: model.Comparison = EXACT) -> bool:
     result = verdict(recorded, printed, comparison)
     assert result.status in ("verified", "drift")
     assert bool(result.changes) == (result.status == "drift")
@@ -142,11 +128,11 @@ def change_values(change: Change) -> tuple[str, str, str]:
 
 
 def update(
-    lesson: Recording,
+    lesson: model.Recording,
     printed: str,
-    comparison: Comparison = EXACT,
-    filters: tuple[Filter, ...] = (),
-) -> Recording:
+    comparison: model.Comparison = EXACT,
+    filters: tuple[model.Filter, ...] = (),
+) -> model.Recording:
     """The recording after its update; a second update has nothing to do."""
     comparison = replace(comparison, course_filters=filters)
     edit = update_body(lesson, comparison, printed)
@@ -164,15 +150,14 @@ def update(
 def body(
     recorded: str,
     printed: str,
-    comparison: Comparison = EXACT,
-    filters: tuple[Filter, ...] = (),
+    comparison: model.Comparison = EXACT,
+    filters: tuple[model.Filter, ...] = (),
     **lesson: str,
 ) -> str:
-    """The text of a recorded output after its update."""
     return update(recording(recorded, **lesson), printed, comparison, filters).body_span.text
 
 
-def refusal_text(recorded: str, printed: str, comparison: Comparison = EXACT) -> str:
+def refusal_text(recorded: str, printed: str, comparison: model.Comparison = EXACT) -> str:
     refusal = update_body(recording(recorded), comparison, printed)
     assert isinstance(refusal, Diagnostic), refusal
     return describe(refusal)

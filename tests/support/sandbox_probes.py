@@ -1,9 +1,6 @@
-"""What a hostile script tries in the sandbox, and how that must end.
+"""What a hostile script tries in the sandbox, and how that must end: see `fixtures/sandbox.toml`.
 
-Entry points: `ATTEMPTS`, expressions of which one script tries all; `EXCESSES`, scripts that take
-too much; `surroundings`, what they would find outside; `attempts_script`, `answers`.
-
-The cases are `fixtures/sandbox.toml`. Used by the tests and by `benchmarks/attacks.py`.
+`ATTEMPTS` are expressions of which one script tries all, `EXCESSES` scripts that take too much.
 """
 
 from __future__ import annotations
@@ -29,29 +26,6 @@ SECRET = "hush"
 """What nobody in the sandbox may print."""
 KEY_NAME = "coursebuild-probe"
 _KEYRING = -3  # the session's; see keyctl(2)
-CALLS = {
-    name: numbers[platform.machine() != "x86_64"]
-    for name, numbers in {
-        "add_key": (248, 217),
-        "request_key": (249, 218),
-        "keyctl": (250, 219),
-        "process_vm_readv": (310, 270),
-        "pidfd_getfd": (438, 438),
-        "bpf": (321, 280),
-        "userfaultfd": (323, 282),
-        "perf_event_open": (298, 241),
-        "io_uring_setup": (425, 425),
-        "open_tree": (428, 428),
-        "fsopen": (430, 430),
-        "mount_setattr": (442, 442),
-        "memfd_secret": (447, 447),
-        "clone": (56, 220),
-        "clone3": (435, 435),
-        "kexec_load": (246, 104),
-        "finit_module": (313, 273),
-    }.items()
-}
-"""The numbers of system calls on this machine."""
 _HELPERS = fixture_text("scripts/probe_helpers.txt")
 """What a script defines that tries the attempts."""
 
@@ -71,6 +45,10 @@ class Excess(Struct, frozen=True):
 _CASES = tomllib.loads(
     Path(__file__).parents[1].joinpath("fixtures/sandbox.toml").read_text(encoding="utf-8")
 )
+CALLS: dict[str, int] = {
+    name: numbers[platform.machine() != "x86_64"] for name, numbers in _CASES["calls"].items()
+}
+"""The numbers of system calls on this machine."""
 ATTEMPTS = msgspec.convert(_CASES["attempts"], dict[str, str | tuple[str, ...]])
 """What a script tries, and how the result begins: that of an attempt, or the name of its error."""
 EXCESSES = msgspec.convert(_CASES["excesses"], dict[str, Excess])
@@ -79,10 +57,7 @@ EXCESSES = msgspec.convert(_CASES["excesses"], dict[str, Excess])
 
 @contextlib.contextmanager
 def surroundings(root: Path, home: Path) -> Iterator[Mapping[str, object]]:
-    """What scripts would find outside; the values of the names in `ATTEMPTS`.
-
-    Nobody talked to the sockets and pipes in the end.
-    """
+    """What scripts would find outside, by the names in `ATTEMPTS`, and what nobody may touch."""
     (home / "secret").write_text(SECRET)
     (root / "lesson.md").write_text("as it was")
     abstract = f"\0coursebuild-{os.getpid()}"

@@ -1,7 +1,4 @@
-"""The sandbox of this machine, or how it is refused.
-
-Entry point: `require_sandbox`.
-"""
+"""The sandbox of this machine, or how it is refused."""
 
 from __future__ import annotations
 

@@ -10,7 +10,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ from coursebuild.cli import main
 from coursebuild.core.engine.store import HASH, Store
 from coursebuild.core.files.trust import make_store
 from coursebuild.pipeline.options import Options
+from support.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
 SLUGS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
@@ -60,7 +60,6 @@ class Folder:
     root: Path
 
     def fill(self, lessons: Sequence[str | bytes], stores: Path) -> None:
-        """Write the map and the lessons 1.1, 1.2 and so on."""
         self.write("content/course.toml", course_map(len(lessons)))
         for number, text in enumerate(lessons, 1):
             self.write(self.lesson(number), text)
@@ -74,7 +73,6 @@ class Folder:
         self.tmp.mkdir(exist_ok=True)
 
     def copy(self, course: Path) -> None:
-        """Copy what the author of a course wrote."""
         for name in ("content", "models", "docs", "lib", "runs", "matplotlibrc"):
             if (course / name).is_dir():
                 shutil.copytree(course / name, self.root / name)
@@ -143,7 +141,6 @@ class Folder:
     # --- commands
 
     def options(self, jobs: int = 1) -> Options:
-        """To call a command as a function."""
         root = self.root.resolve()
         return Options(root, jobs, Store(root))
 
@@ -254,15 +251,11 @@ def processes(folder: Folder) -> list[str]:
 
 def wait_until_alone(folder: Folder) -> None:
     """Nothing of a course runs any more."""
-    until = time.monotonic() + 300
-    while left := processes(folder):
-        assert time.monotonic() < until, f"still running: {left}"
-        time.sleep(0.02)
+    wait_until(lambda: not processes(folder), f"the end of all that runs in {folder.root}")
 
 
 @contextlib.contextmanager
 def kill_at_end(process: subprocess.Popen[bytes]) -> Iterator[subprocess.Popen[bytes]]:
-    """A process that is gone afterwards, however the test ends."""
     try:
         yield process
     finally:
@@ -274,7 +267,6 @@ def kill_at_end(process: subprocess.Popen[bytes]) -> Iterator[subprocess.Popen[b
 
 
 def without_seconds(text: str) -> str:
-    """A report with its times taken out."""
     return re.sub(r"\d+\.\d\d s", "# s", text)
 
 

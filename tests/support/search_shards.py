@@ -6,7 +6,6 @@ _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
 
 
 def read_shard(shard: str) -> dict[str, list[tuple[int, int]]]:
-    """The pages and weights of each term."""
     pages_by_term: dict[str, list[tuple[int, int]]] = {}
     for line in shard.split("\n") if shard else ():
         term, _, digits = line.partition(" ")

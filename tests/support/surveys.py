@@ -65,7 +65,6 @@ def open_files(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
 
 
 def parse_declared(text: str) -> Declarations:
-    """The declarations of a TOML text."""
     result = parse_declarations(Source("models/a.toml", text))
     assert result.value is not None, result.diagnostics
     return result.value
@@ -112,11 +111,9 @@ def findings_by_kind(survey: Survey) -> dict[str, Finding]:
 
 
 def names(finding: Finding) -> list[str]:
-    """The names of the elements that a finding is about."""
     return [place.name for place in finding.places]
 
 
 def fixed_text(survey: Survey, path: str = PATH) -> str:
-    """The file after all proved edits."""
     files = {content.path: content.data for content in survey.text.documents}
     return (files | survey.text.files(survey.edits))[path].decode()

@@ -1,7 +1,4 @@
-"""A document as text: one line per node with its span, then the diagnostics.
-
-Spans are `line:column-line:column`, from 1, the end exclusive.
-"""
+"""A document as text: a line per node with its span, `line:column-line:column`; diagnostics."""
 
 from __future__ import annotations
 
@@ -83,7 +80,6 @@ def _node(node: Block | Inline | ListItem, depth: int) -> Iterator[str]:
 
 
 def _value(name: str, value: object) -> str:
-    """The text that a field adds to its node's line."""
     if isinstance(value, Span):
         return f"{name}={format_span(value)}"
     if isinstance(value, Excerpt):

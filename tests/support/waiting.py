@@ -16,5 +16,4 @@ def wait_until(happened: Callable[[], object], event: str) -> None:
 
 
 def wait_for_file(path: Path, size: int = 0) -> None:
-    """Wait until a file is there, and has so many bytes."""
     wait_until(lambda: path.exists() and path.stat().st_size >= size, str(path))

@@ -1,8 +1,7 @@
 """Workflows of GitHub, run step by step on this machine.
 
-Entry points: `Runner`; `git` and `commit`. What the actions of others do is done here in a few
-lines; `pip`, `npx`, `rsync` and `sudo` are programs that only note how they were called. An action
-or an expression that is not known fails the test.
+What the actions of others do is done here in a few lines; `pip`, `npx`, `rsync` and `sudo` are
+programs that only note how they were called. An action or an expression that is not known fails.
 """
 
 from __future__ import annotations
@@ -80,7 +79,6 @@ class Runner:
         return steps_by_job
 
     def action(self, place: Path, steps: list[dict[str, Any]], **inputs: str) -> list[Step]:
-        """Run the steps of an action in a folder."""
         values = {f"inputs.{name}": value for name, value in inputs.items()}
         return [self._command(place, step, values) for step in steps if "run" in step]
 
@@ -195,7 +193,6 @@ def git(place: Path, *arguments: str) -> str:
 
 
 def commit(place: Path) -> None:
-    """Commit all changes."""
     git(place, "add", "-A")
     git(place, "commit", "-q", "-m", "a change")
 

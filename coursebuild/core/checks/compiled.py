@@ -1,15 +1,6 @@
-"""What MuJoCo says about models and MJCF blocks, as diagnostics at the right line.
+"""What MuJoCo says about models, MJCF blocks and declared scenarios, at the right line.
 
-Entry points: `mjcf_texts(course)` (what to compile), `check_compiled(course, models, texts)`.
-
-1. `mjcf_texts` makes a whole model of each `mjcf` block and of each block of a feature that holds
-   a model, and counts the lines put before the author's.
-2. `check_compiled` compares the results of the compiler with what the lesson says, and lets
-   features check the names that they use. A file that only other models include need not compile
-   by itself.
-3. The scenarios declared for a model are compared with it: the model has what they name, states and
-   commands have as many numbers as it takes, and its timestep divides the times at which the state
-   is sampled and commands change.
+A file that only other models include need not compile by itself.
 """
 
 from __future__ import annotations
@@ -33,7 +24,7 @@ from coursebuild.core.model import (
     find_blocks,
 )
 from coursebuild.core.model.results import CompileResult, ModelFacts
-from coursebuild.core.model.scenarios import DURATION, MOST_STEPS, DeclaredSweep
+from coursebuild.core.model.scenarios import DURATION, MOST_STEPS, DeclaredSweep, is_multiple
 from coursebuild.core.registry import features, kind_of_block
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -51,14 +42,43 @@ INCLUDED_ROOT = re.compile(r"\s*+(?:<(?:\?.*?\?|!--.*?--)>\s*+)*+<mujocoinclude\
 """How a file begins that is meant to be included by others."""
 
 
+_OPENING = re.compile(r"MISMATCHED_ELEMENT.*Line number=(\d+): XMLElement name=(\S+)")
+
+
 class MjcfText(Struct, frozen=True):
     """A text to compile, and where it comes from."""
 
-    block: Mjcf | FeatureBlock
+    block: Mjcf | FeatureBlock | MjcfModel
     code: Excerpt
     text: str
-    lines_before: int
+    lines_before: int = 0
     """Lines of `text` that are not the author's."""
+
+    @property
+    def subject(self) -> str:
+        """What messages call it."""
+        if isinstance(self.block, MjcfModel):
+            return f"the model `{self.block.name}`"
+        if isinstance(self.block, FeatureBlock):
+            return f"the model in this {kind_of_block(self.block).name}"
+        return "this block"
+
+    @property
+    def place(self) -> Span:
+        if isinstance(self.block, MjcfModel):
+            return self.block.source.span(0, 0)
+        return self.block.span.first_line()
+
+    def line_span(self, line: int | None) -> Span:
+        """The span of a line that MuJoCo names."""
+        return line_span(self.code, line, self.lines_before, self.place)
+
+    def diagnose(
+        self, message: str, place: Span, help: str = "", notes: Sequence[Note] = ()
+    ) -> Diagnostic:
+        """The diagnostic of what the compiler says of it."""
+        rule = "model-error" if isinstance(self.block, MjcfModel) else "mjcf-error"
+        return diagnose(rule, place, f"{self.subject} {message}", help=help, notes=notes)
 
 
 def mjcf_texts(course: Course) -> tuple[MjcfText, ...]:
@@ -76,9 +96,9 @@ def mjcf_texts(course: Course) -> tuple[MjcfText, ...]:
                 text = f"{opening}\n{block.code.text}\n{closing}"
                 texts.append(MjcfText(block, block.code, text, 1))
             elif isinstance(block, Mjcf):
-                texts.append(MjcfText(block, block.code, block.code.text, 0))
+                texts.append(MjcfText(block, block.code, block.code.text))
             elif isinstance(block, FeatureBlock) and (code := block.mjcf()) is not None:
-                texts.append(MjcfText(block, code, code.text, 0))
+                texts.append(MjcfText(block, code, code.text))
     return tuple(texts)
 
 
@@ -109,19 +129,19 @@ def check_compiled(
         result = models[model.name]
         if result.error and model.name not in included:
             diagnostics.append(diagnose_model(model, result, readable, course.models))
-        elif not result.error and (fault := _find_fault(model.source.excerpt(), 0)) is not None:
-            message = f"the model `{model.name}` holds {fault[1]}"
-            diagnostics.append(diagnose("model-error", fault[0], message, help=_FAULT_HELP))
+        elif not result.error:
+            diagnostics += _find_fault(_text_of(model))
     facts: dict[tuple[str, int], ModelFacts] = {}
     for text, result in texts:
         diagnostics += _check_text(text, result, readable, course.models)
         if result.facts is not None:
-            facts[_block_key(text.block)] = result.facts
+            facts[text.place.path, text.place.start] = result.facts
 
     def find_facts(block: FeatureBlock) -> ModelFacts | None:
         names = (*block.models(), *block.mentioned_models())
         candidates = (models[name].facts for name in names if name in models)
-        return next(candidates, None) or facts.get(_block_key(block))
+        # Features may hold another object for the same block.
+        return next(candidates, None) or facts.get((block.span.path, block.span.start))
 
     for feature in features():
         if feature.check_models is not None:
@@ -140,35 +160,46 @@ def diagnose_model(
     models: Sequence[MjcfModel] = (),
 ) -> Diagnostic:
     """The diagnostic of a model that does not compile; `models` may be included by it."""
-    span = line_span(model.source.excerpt(), result.line, 0, model.source.span(0, 0))
-    if result.timeout:
-        return _diagnose_timeout(span, f"the model `{model.name}`", result)
-    message = f"the model `{model.name}` does not compile: {readable(result.error)}"
-    notes, help = _note_opening(model.source.excerpt(), 0, result.error), ""
-    text, closing = model.source.text, "</mujoco>\n"
+    text, closing, help = model.source.text, "</mujoco>\n", ""
     if closing.rstrip() not in text:
         with contextlib.suppress(expat.ExpatError):
             closing = closing if text.endswith("\n") else f"\n{closing}"
             expat.ParserCreate().Parse(f"{text}{closing}".encode(), True)
             edit = Edit(model.source.span(len(text), len(text)), closing)
             help = Fix("end it with `</mujoco>`", edits=(edit,), safe=True)
-    span, help = _propose_name(result, Excerpt.of_span(model.source.span()), 0, models) or (
-        span,
-        help,
-    )
-    return diagnose("model-error", span, message, help=help, notes=notes)
+    return _diagnose_failure(_text_of(model), result, readable, models, help)
+
+
+def _text_of(model: MjcfModel) -> MjcfText:
+    return MjcfText(model, Excerpt.of_span(model.source.span()), model.source.text)
+
+
+def _diagnose_failure(
+    text: MjcfText,
+    result: CompileResult,
+    readable: Callable[[str], str],
+    models: Sequence[MjcfModel],
+    help: str,
+) -> Diagnostic:
+    if result.timeout:
+        help = "make it smaller, or set `models` in `[limits]` of the map: seconds for all models"
+        message = f"{text.subject} {result.error}"
+        return diagnose("model-timeout", text.line_span(result.line), message, help=help)
+    opening = _OPENING.search(result.error)
+    notes = []
+    if opening is not None:
+        notes = [Note(f"<{opening[2]}> begins here", text.line_span(int(opening[1])))]
+    place, help = _propose_name(result, text, models) or (text.line_span(result.line), help)
+    return text.diagnose(f"does not compile: {readable(result.error)}", place, help, notes)
 
 
 def _propose_name(
-    result: CompileResult, code: Excerpt, offset: int, models: Sequence[MjcfModel]
+    result: CompileResult, text: MjcfText, models: Sequence[MjcfModel]
 ) -> tuple[Span, Fix] | None:
-    """Where a name is misspelt that the compiler does not know, and the fix.
-
-    `code` begins at this offset of the text that was compiled; the name may also be in a model that
-    it includes.
-    """
+    """Where a name is misspelt that the compiler does not know, also in another model, and how."""
     if (misspelling := result.misspelling) is None:
         return None
+    code, offset = text.code, text.text.index("\n") + 1 if text.lines_before else 0
     if misspelling.path:
         sources = (m.source for m in models if m.source.path == misspelling.path)
         code, offset = next((Excerpt.of_span(s.span()) for s in sources), code), 0
@@ -184,11 +215,6 @@ def _propose_name(
     return place, fix
 
 
-def _diagnose_timeout(span: Span, subject: str, result: CompileResult) -> Diagnostic:
-    help = "make it smaller, or set `models` in `[limits]` of the map: seconds for all models"
-    return diagnose("model-timeout", span, f"{subject} {result.error}", help=help)
-
-
 def diagnose_orphan_scenarios(source: Source, models: Collection[str]) -> Diagnostic:
     """The diagnostic of a file of scenarios without its model; `models` are the paths of all."""
     model = source.path.removesuffix(".toml") + ".xml"
@@ -196,11 +222,6 @@ def diagnose_orphan_scenarios(source: Source, models: Collection[str]) -> Diagno
     help = f"is it `{likely}`?" if likely is not None else "put it beside its model"
     message = f"there is no model {model} to which these scenarios belong"
     return diagnose("scenario-model", source.span(0, 0), message, help=help)
-
-
-def _block_key(block: Mjcf | FeatureBlock) -> tuple[str, int]:
-    """A key for a block: features may hold another object for the same one."""
-    return block.span.path, block.span.start
 
 
 def line_span(code: Excerpt, line: int | None, lines_before: int, fallback: Span) -> Span:
@@ -212,11 +233,8 @@ def line_span(code: Excerpt, line: int | None, lines_before: int, fallback: Span
     return row.slice(indent, len(row.text.rstrip())).span() if row.text.strip() else row.span()
 
 
-_FAULT_HELP = "write `<` before an element and `<!-- … -->` around a comment, or delete it"
-
-
-def _find_fault(code: Excerpt, lines_before: int, text: str = "") -> tuple[Span, str] | None:
-    """Where XML is broken or holds words between elements, which MuJoCo may pass over."""
+def _find_fault(text: MjcfText) -> Iterator[Diagnostic]:
+    """Report where XML is broken or holds words between elements, which MuJoCo may pass over."""
     parser = expat.ParserCreate()
     faults = list[tuple[int, str]]()
 
@@ -227,22 +245,13 @@ def _find_fault(code: Excerpt, lines_before: int, text: str = "") -> tuple[Span,
 
     parser.CharacterDataHandler = read_words
     try:
-        parser.Parse(text or code.text, True)
+        parser.Parse(text.text, True)
     except expat.ExpatError as error:
         faults.append((error.lineno, f"broken XML: {expat.ErrorString(error.code)}"))
-    if not faults:
-        return None
-    line, message = faults[0]
-    return line_span(code, line, lines_before, code.span()), message
-
-
-def _note_opening(code: Excerpt, lines_before: int, error: str) -> tuple[Note, ...]:
-    """Where the element begins that MuJoCo says is not closed."""
-    match = re.search(r"MISMATCHED_ELEMENT.*Line number=(\d+): XMLElement name=(\S+)", error)
-    if match is None:
-        return ()
-    place = line_span(code, int(match[1]), lines_before, code.span())
-    return (Note(f"<{match[2]}> begins here", place),)
+    for line, fault in faults[:1]:
+        place = line_span(text.code, line, text.lines_before, text.code.span())
+        help = "write `<` before an element and `<!-- … -->` around a comment, or delete it"
+        yield text.diagnose(f"holds {fault}", place, help)
 
 
 def _check_text(
@@ -251,41 +260,25 @@ def _check_text(
     readable: Callable[[str], str],
     models: Sequence[MjcfModel],
 ) -> Iterator[Diagnostic]:
-    block = text.block
-    subject = "this block"
-    if isinstance(block, FeatureBlock):
-        subject = f"the model in this {kind_of_block(block).name}"
-    if result.timeout:
-        yield _diagnose_timeout(block.span.first_line(), subject, result)
-        return
-    if isinstance(block, Mjcf) and block.error is not None:
-        span = block.error_span or block.span.first_line()
-        place = line_span(text.code, result.line, text.lines_before, block.span.first_line())
+    block, help = text.block, ""
+    if isinstance(block, Mjcf) and block.error is not None and not result.timeout:
+        place = block.error_span or text.place
         if not result.error:
             message = f"this block must fail with `{block.error}`, and it compiles"
             help = "fix the block, or remove `error=`"
-            yield diagnose("mjcf-compiles", span, message, help=help)
+            yield diagnose("mjcf-compiles", place, message, help=help)
         elif " ".join(block.error.split()) not in " ".join(result.error.split()):
             message = f"the message of the compiler does not contain `{block.error}`"
-            note = Note(f"it says: {result.error}", place)
-            yield diagnose("mjcf-message", span, message, notes=[note])
-        elif (fault := _find_fault(text.code, text.lines_before, text.text)) is not None:
-            message = f"{subject} holds {fault[1]}"
-            yield diagnose("mjcf-error", fault[0], message, help=_FAULT_HELP)
-        return
-    if result.error:
-        span = line_span(text.code, result.line, text.lines_before, block.span.first_line())
-        help = ""
+            note = Note(f"it says: {result.error}", text.line_span(result.line))
+            yield diagnose("mjcf-message", place, message, notes=[note])
+        else:
+            yield from _find_fault(text)
+    elif result.error:
         if isinstance(block, Mjcf) and block.fragment is None and "<mujoco" not in text.text:
             help = 'if it is a part of a model say so: `fragment="worldbody"`'
-        offset = text.text.index("\n") + 1 if text.lines_before else 0
-        span, help = _propose_name(result, text.code, offset, models) or (span, help)
-        message = f"{subject} does not compile: {readable(result.error)}"
-        notes = _note_opening(text.code, text.lines_before, result.error)
-        yield diagnose("mjcf-error", span, message, help=help, notes=notes)
-    elif (fault := _find_fault(text.code, text.lines_before, text.text)) is not None:
-        message = f"{subject} holds {fault[1]}"
-        yield diagnose("mjcf-error", fault[0], message, help=_FAULT_HELP)
+        yield _diagnose_failure(text, result, readable, models, help)
+    else:
+        yield from _find_fault(text)
 
 
 _RULE = "scenario-model"
@@ -307,7 +300,13 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
         rows = (
             ("qpos", "`qpos`", scenario.qpos or None, facts.nq, "positions (`nq`)"),
             ("qvel", "`qvel`", scenario.qvel or None, facts.nv, "velocities (`nv`)"),
-            ("controls", "a command", next(iter(scenario.controls), None), facts.nu, "actuators"),
+            (
+                "controls",
+                "a command",
+                next(iter(scenario.controls), None),
+                facts.nu,
+                "controls (`nu`)",
+            ),
         )
         for name, subject, values, count, noun in rows:
             if values is not None and len(values) != count:
@@ -320,7 +319,13 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
                 help = did_you_mean(measure.name, [name for name in model_names if name])
                 yield diagnose(_RULE, scenario.place("measure"), message, help=help)
         yield from _check_horizon_error(scenario, facts.sizes)
-        yield from _check_timestep(scenario, facts)
+        step, lengths = facts.timestep, ("sample", "hold", "duration")
+        name = next((n for n in lengths if getattr(scenario, n) is not None), "")
+        length = getattr(scenario, name, step)
+        if not is_multiple(length, step):
+            message = f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
+            help = f"a multiple near it is {max(round(length / step), 1) * step:.12g}"
+            yield diagnose(_RULE, scenario.place(name), message, help=help)
     for sweep in declarations.sweeps:
         yield from _check_sweep(sweep, declarations.scenarios, facts)
 
@@ -346,24 +351,6 @@ def _check_horizon_error(
             )
             help = f"state one from {least} to {most}"
             yield diagnose(_RULE, place, message, help=help)
-
-
-def _check_timestep(scenario: DeclaredScenario, facts: ModelFacts) -> Iterator[Diagnostic]:
-    step = facts.timestep
-    lengths = (
-        ("sample", scenario.sample),
-        ("hold", scenario.hold),
-        ("duration", scenario.duration),
-    )
-    for name, length in lengths:
-        if length is not None:
-            count = round(length / step)
-            if abs(count * step - length) > 1e-9 * length:
-                message = f"the model's timestep, {step:g} s, does not divide `{name}`"
-                message += f" ({length:g} s)"
-                help = f"a multiple near it is {max(count, 1) * step:.12g}"
-                yield diagnose(_RULE, scenario.place(name), message, help=help)
-            return
 
 
 MAX_SWEEP_STEPS = 2_000_000

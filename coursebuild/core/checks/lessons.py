@@ -1,14 +1,9 @@
-"""Check a whole course: lessons, links, mentions, terms, formulas and the rules of features.
-
-Entry points: `check_course`; `check_document`, the same for one document; `document_formulas`, and
-`check_formulas`, which reports those that do not parse or look mistyped.
-"""
+"""Check a whole course: lessons, terms, formulas and the rules of features."""
 
 from __future__ import annotations
 
-import functools
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from coursebuild.core.checks.links import LinkTargets, check_links, link_targets
 from coursebuild.core.model import (
@@ -88,31 +83,24 @@ def _check_core_rules(
 
 
 def _check_features(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:
-    """Yield what features find wrong in some documents of a course."""
     for feature in features():
-        if feature.check is not None:
-            try:
-                yield from feature.check(course, documents)
-            except Exception as error:
-                path = _find_failing(functools.partial(feature.check, course), documents)
-                error.add_note(f"it fails for {path}" if path else "it fails for no text alone")
-                raise
-
-
-def _find_failing(
-    check: Callable[[Collection[Document]], Iterable[Diagnostic]], documents: Iterable[Document]
-) -> str:
-    """The path of the first document whose check raises an exception; empty if none does."""
-    for document in documents:
+        if feature.check is None:
+            continue
         try:
-            tuple(check((document,)))
-        except Exception:
-            return document.source.path
-    return ""
+            yield from feature.check(course, documents)
+        except Exception as error:
+            note = "it fails for no text alone"
+            for document in documents:
+                try:
+                    tuple(feature.check(course, (document,)))
+                except Exception:
+                    note = f"it fails for {document.source.path}"
+                    break
+            error.add_note(note)
+            raise
 
 
 def _check_unproven(course: Course) -> Iterator[Diagnostic]:
-    """Report scripts that the map lets pass unproven and that are not there, or always run."""
     scripts = {s.path: s for document in course.documents for s in document_scripts(document)}
     first: dict[str, Span] = {}
     for entry in course.unproven:
@@ -155,6 +143,22 @@ _PAIR = re.compile(
     r"|\][^()\[\]]*[,;][^()\[\]]*\[|\[[^()\[\]]*\]"
 )
 """Brackets with none between them that belong together; those of an interval may differ."""
+_SLIPS = (
+    (r"(?:^|[(\[=+,;&-])\s*(')", "this prime follows nothing", "write the letter before it"),
+    (r"[-+=/]\s*(_)\w(?![\w^{(])", "this index follows nothing", "write the letter before it"),
+    (
+        r"(?<=[\w)}\]'])\s*(--|\+\s*\+|=\s*=|\\cdot\s*\\cdot\b)(?=\s*[\w\\({])",
+        "an operator stands here twice",
+        "delete one of the two",
+    ),
+    (
+        r"(?:[-+*/]|\\cdot)\s*(\d+\.\.\d+)|(?<![\w.])(\.\d+\.)(?![\d.])"
+        r"|[=+*/<>-]\s*(\d+ +\d{1,2})(?=\s*(?:$|[=+*/)<>,;-]))",
+        "this is no number",
+        "write one point, or a comma between two numbers",
+    ),
+)
+"""What no formula has, with what is wrong and how to mend it."""
 _JOINT = re.compile(
     rf"[A-Za-z]{{0,2}}?({'|'.join(sorted(_COMMANDS, key=len, reverse=True))})[A-Za-z]{{0,2}}"
 )
@@ -238,9 +242,11 @@ def _check_letters(tex: Excerpt, commands: frozenset[str]) -> Iterator[Diagnosti
         yield diagnose(
             "math-command", place, message, help=Fix(help, None if is_string else proposal)
         )
-    if (prime := re.search(r"(?:^|[(\[=+,;&-])\s*(')", text)) is not None:
-        message, help = "this prime follows nothing", "write the letter before it"
-        yield diagnose("math-syntax", tex.span(*prime.span(1)), message, help=help)
+    for pattern, message, help in _SLIPS:
+        if (slip := re.search(pattern, text)) is not None:
+            yield diagnose(
+                "math-syntax", tex.span(*slip.span(slip.lastindex or 0)), message, help=help
+            )
     if (at := text.find("`")) >= 0:
         message, help = "a backtick would be shown in this formula", Fix("delete it", "", safe=True)
         yield diagnose("math-syntax", tex.span(at, at + 1), message, help=help)

@@ -1,11 +1,4 @@
-"""Check that every link, mention and image of the sources leads somewhere.
-
-Entry points: `link_targets(course)`; `check_links`, for one document.
-
-1. Collect what can be linked to: lessons, levels, pages, models, scripts, files, and the anchors of
-   each document.
-2. Walk each document's inlines and compare.
-"""
+"""Check that every link, mention and image of the sources leads somewhere."""
 
 from __future__ import annotations
 
@@ -17,38 +10,7 @@ from urllib.parse import SplitResult, unquote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.model import (
-    Course,
-    Document,
-    ExampleTarget,
-    HtmlBlock,
-    Image,
-    LessonTarget,
-    LevelTarget,
-    Link,
-    MjcfModel,
-    ModelTarget,
-    PageTarget,
-    RawInline,
-    Target,
-    Term,
-    TermTarget,
-    UrlTarget,
-    block_inlines,
-    computed_once,
-    document_anchors,
-    document_blocks,
-    document_scripts,
-    find_inlines,
-    is_comment,
-    line_anchor,
-    linked_lines,
-    listing_anchor,
-    local_file,
-    model_anchors,
-    resolve,
-    walk_inlines,
-)
+from coursebuild.core import model
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -63,36 +25,38 @@ from coursebuild.core.text.diagnostics import (
 from coursebuild.core.text.source import Span
 
 _HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
+_LESSON_NAME = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
+"""A file name or an address that begins with the id of a lesson, as in `4.2-inertia.md`."""
+_ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
+"""The fragment by which a site of a single page names a lesson, as in `#/lesson/4.2`."""
 
 
 class LinkTargets(Struct, frozen=True):
     """Everything that a link may lead to."""
 
-    lessons: Mapping[str, Document | None]
+    lessons: Mapping[str, model.Document | None]
     levels: frozenset[str]
-    pages: Mapping[str, Document | None]
-    models: Mapping[str, MjcfModel]
+    pages: Mapping[str, model.Document | None]
+    models: Mapping[str, model.MjcfModel]
     scenarios: Mapping[str, tuple[str, ...]]
-    """Those that models declare, by the model's name."""
     scripts: frozenset[str]
     files: frozenset[str]
     terms: Mapping[str, Span]
-    """The first definition of each, by its id."""
 
 
-def link_targets(course: Course) -> LinkTargets:
+def link_targets(course: model.Course) -> LinkTargets:
     """What the course offers as targets."""
     scripts: set[str] = set()
     terms: dict[str, Span] = {}
     for document in course.documents:
-        scripts.update(script.path for script in document_scripts(document))
-        for term in find_inlines(document, Term):
+        scripts.update(script.path for script in model.document_scripts(document))
+        for term in model.find_inlines(document, model.Term):
             terms.setdefault(term.id, term.span)
     return LinkTargets(
         {lesson.id: lesson.document for lesson in course.lessons},
         frozenset(level.id for level in course.levels),
         {page.id: page.document for page in course.pages},
-        {model.name: model for model in course.models},
+        {mjcf.name: mjcf for mjcf in course.models},
         {d.model: tuple(scenario.name for scenario in d.scenarios) for d in course.declarations},
         frozenset(scripts),
         frozenset(course.files),
@@ -100,111 +64,182 @@ def link_targets(course: Course) -> LinkTargets:
     )
 
 
-def anchors(document: Document) -> Mapping[str, Span]:
-    """The ids that a link may name in a document, and the spans to which they lead.
-
-    For lines of scripts, see `_check_anchor`. They are kept with the document.
-    """
+def anchors(document: model.Document) -> Mapping[str, Span]:
+    """The ids that a link may name in a document, but for lines of scripts, and their spans."""
 
     def collect() -> dict[str, Span]:
-        return {id: span for id, _, span in document_anchors(document)}
+        return {id: span for id, _, span in model.document_anchors(document)}
 
-    return computed_once(document, "anchors", collect)
+    return model.computed_once(document, "anchors", collect)
 
 
-def check_links(course: Course, document: Document, targets: LinkTargets) -> Iterator[Diagnostic]:
+def check_links(
+    course: model.Course, document: model.Document, targets: LinkTargets
+) -> Iterator[Diagnostic]:
     """Report each link, mention or image of a document that leads nowhere."""
+    checker = _Checker(course, document, targets)
     recorded_spans = {figure.span for figure in recorded_figures(document)}
-    for block in document_blocks(document):
-        if isinstance(block, HtmlBlock):
-            yield from _check_html(block, course, document, targets)
-        for inline in walk_inlines(block_inlines(block)):
-            if isinstance(inline, Link):
-                target = resolve(inline.target, course, document.source.path)
-                yield from _check_link(inline, target, document, targets)
-            elif isinstance(inline, Image) and inline.url_span not in recorded_spans:
-                place, subject = inline.url_span, "the image "
-                yield from _check_media(subject, inline.url, place, document, targets)
-            elif isinstance(inline, RawInline):
-                yield from _check_html(inline, course, document, targets)
+    for block in model.document_blocks(document):
+        if isinstance(block, model.HtmlBlock):
+            yield from checker.check_html(block)
+        for inline in model.walk_inlines(model.block_inlines(block)):
+            if isinstance(inline, model.Link):
+                target = model.resolve(inline.target, course, document.source.path)
+                yield from checker.check_target(inline.target_span, target)
+            elif isinstance(inline, model.Image) and inline.url_span not in recorded_spans:
+                yield from checker.check_media("the image ", inline.url, inline.url_span)
+            elif isinstance(inline, model.RawInline):
+                yield from checker.check_html(inline)
 
 
-def _check_html(
-    html: HtmlBlock | RawInline, course: Course, document: Document, targets: LinkTargets
-) -> Iterator[Diagnostic]:
-    """Check raw HTML: what the course allows, links to this page, and the files that it shows."""
-    if course.html == "none" and not (is_comment(html) or html.html.startswith("</")):
-        message, help = "the course allows no raw HTML", "write it in Markdown"
-        yield diagnose("html-forbidden", html.span, message, help=help)
-    elif course.html == "safe":
-        help = 'if you trust everyone who writes the course, set `html = "trusted"` in its map'
-        for part in html.forbidden:
-            yield diagnose("html-forbidden", part.span, part.message, help=help)
-    span = html.span
-    for link in _HTML_ANCHOR.finditer(span.text):
-        place = Span(span.source, span.start + link.start(1), span.start + link.end(1))
-        yield from _check_url(place, link[1], document, targets)
-    for media in html.media:
-        parts = urlsplit_or_none(media.url)
-        if parts is None or (parts.scheme != "data" and (parts.netloc or parts.path)):
-            yield from _check_media("", media.url, media.span, document, targets)
+class _Checker(Struct, frozen=True):
+    """Checks links of one document."""
 
+    course: model.Course
+    document: model.Document
+    targets: LinkTargets
 
-def _check_link(
-    link: Link, target: Target, document: Document, targets: LinkTargets
-) -> Iterator[Diagnostic]:
-    span = link.target_span
-    if isinstance(target, UrlTarget):
-        yield from _check_url(span, target.url, document, targets)
-        return
-    lacks = "is not in the course map"
-    names: Collection[str]
-    match target:
-        case LessonTarget(id=name):
-            rule, names, missing = "link-lesson", targets.lessons, f"lesson {name} {lacks}"
-        case LevelTarget(id=name):
-            rule, names, missing = "link-level", targets.levels, f"level {name} {lacks}"
-        case PageTarget(id=name):
-            rule, names, missing = "link-page", targets.pages, f"no page `{name}` in the course map"
-        case ModelTarget(name=name):
-            rule, names, missing = "link-model", targets.models, f"no model `{name}` in models/"
-        case ExampleTarget(path=name):
-            missing = f"no lesson has a script `{name}`"
-            rule, names = "link-example", targets.scripts
-        case TermTarget(id=name):
-            missing = f"no lesson defines the term `{name}`"
-            rule, names = "link-term", targets.terms
-        case _:
-            assert_never(target)
-    if name not in names:
-        if isinstance(target, LessonTarget) and target.id in targets.levels:
-            help = f"{target.id} is a level: {_link_help('level', target.id)}"
-            help = Fix(help, edits=_rename_kind(span, "Lesson", "Level"))
-        elif isinstance(target, LevelTarget) and target.id in targets.lessons:
-            help = f"{target.id} is a lesson: {_link_help('lesson', target.id)}"
-            help = Fix(help, edits=_rename_kind(span, "Level", "Lesson"))
-        else:
-            help = _suggest_lesson(target, targets) or did_you_mean(name, names)
-        yield diagnose(rule, span, missing, help=help)
-    elif isinstance(target, ModelTarget):
-        if target.anchor:
+    def check_html(self, html: model.HtmlBlock | model.RawInline) -> Iterator[Diagnostic]:
+        if self.course.html == "none" and not (
+            model.is_comment(html) or html.html.startswith("</")
+        ):
+            message, help = "the course allows no raw HTML", "write it in Markdown"
+            yield diagnose("html-forbidden", html.span, message, help=help)
+        elif self.course.html == "safe":
+            help = 'if you trust everyone who writes the course, set `html = "trusted"` in its map'
+            for part in html.forbidden:
+                yield diagnose("html-forbidden", part.span, part.message, help=help)
+        span = html.span
+        for link in _HTML_ANCHOR.finditer(span.text):
+            place = Span(span.source, span.start + link.start(1), span.start + link.end(1))
+            yield from self.check_url(place, link[1])
+        for media in html.media:
+            parts = urlsplit_or_none(media.url)
+            if parts is None or (parts.scheme != "data" and (parts.netloc or parts.path)):
+                yield from self.check_media("", media.url, media.span)
+
+    def check_target(self, span: Span, target: model.Target) -> Iterator[Diagnostic]:
+        if isinstance(target, model.UrlTarget):
+            yield from self.check_url(span, target.url)
+            return
+        targets, lacks = self.targets, "is not in the course map"
+        names: Collection[str]
+        match target:
+            case model.LessonTarget(id=name):
+                rule, names, missing = "link-lesson", targets.lessons, f"lesson {name} {lacks}"
+            case model.LevelTarget(id=name):
+                rule, names, missing = "link-level", targets.levels, f"level {name} {lacks}"
+            case model.PageTarget(id=name):
+                missing = f"no page `{name}` in the course map"
+                rule, names = "link-page", targets.pages
+            case model.ModelTarget(name=name):
+                rule, names, missing = "link-model", targets.models, f"no model `{name}` in models/"
+            case model.ExampleTarget(path=name):
+                missing = f"no lesson has a script `{name}`"
+                rule, names = "link-example", targets.scripts
+            case model.TermTarget(id=name):
+                missing = f"no lesson defines the term `{name}`"
+                rule, names = "link-term", targets.terms
+            case _:
+                assert_never(target)
+        if name not in names:
+            if isinstance(target, model.LessonTarget) and name in targets.levels:
+                help = f"{name} is a level: {_link_help('level', name)}"
+                help = Fix(help, edits=_rename_kind(span, "Lesson", "Level"))
+            elif isinstance(target, model.LevelTarget) and name in targets.lessons:
+                help = f"{name} is a lesson: {_link_help('lesson', name)}"
+                help = Fix(help, edits=_rename_kind(span, "Level", "Lesson"))
+            elif isinstance(target, model.LessonTarget):
+                help = self.suggest_lesson(name) or did_you_mean(name, names)
+            else:
+                help = did_you_mean(name, names)
+            yield diagnose(rule, span, missing, help=help)
+        elif isinstance(target, model.ModelTarget) and target.anchor:
             # The ids that `templates/model.html` writes. Only scenarios that `models/NAME.toml`
             # declares have one, as others are unknown before they are measured.
             source, scenarios = targets.models[name].source, targets.scenarios.get(name, ())
-            ids = {*model_anchors(scenarios), listing_anchor(source.path)}
+            ids = {*model.model_anchors(scenarios), model.listing_anchor(source.path)}
             listings = {source.path: source.text.rstrip()}
             page_name = f"the page of the model `{name}`"
             yield from _check_anchor(span, target.anchor, page_name, ids, listings)
-    elif isinstance(target, LessonTarget):
-        lesson = targets.lessons[name]
-        yield from _check_document_anchor(span, target.anchor, lesson, f"lesson {name}")
-    elif isinstance(target, PageTarget):
-        page = targets.pages[name]
-        yield from _check_document_anchor(span, target.anchor, page, f"page `{name}`")
+        elif isinstance(target, model.LessonTarget):
+            lesson = targets.lessons[name]
+            yield from _check_document_anchor(span, target.anchor, lesson, f"lesson {name}")
+        elif isinstance(target, model.PageTarget):
+            page = targets.pages[name]
+            yield from _check_document_anchor(span, target.anchor, page, f"page `{name}`")
+
+    def suggest_lesson(self, name: str) -> str:
+        """A help: the lesson whose file or slug a link names, or those of its level."""
+        lessons = self.targets.lessons
+        match = _LESSON_NAME.fullmatch(name)
+        paths = ((id, d.source.path) for id, d in lessons.items() if d is not None)
+        ids = [id for id, path in paths if path.endswith(f"-{name}.md")]
+        if match and match[1] in lessons:
+            ids = [match[1]]
+        if len(ids) == 1:
+            return Fix(f"did you mean `lesson:{ids[0]}`?", ids[0], name, safe=True)
+        level = name.rpartition(".")[0]
+        ids_of_level = [id for id in lessons if level and id.rpartition(".")[0] == level]
+        names = ", ".join(f"`{id}`" for id in ids_of_level)
+        return f"level {level} has {names}" if names else ""
+
+    def check_url(self, span: Span, url: str) -> Iterator[Diagnostic]:
+        parts = urlsplit_or_none(url)
+        if parts is None:
+            yield diagnose("link-file", span, f"`{url}` is not a readable address")
+        elif parts.path and not (parts.scheme or parts.netloc):
+            yield from self.check_file(url, span)
+        elif not (parts.scheme or parts.netloc):
+            route = _ROUTE.fullmatch(unquote(parts.fragment))
+            targets = self.targets
+            ids = {"lesson": targets.lessons, "level": targets.levels, "page": targets.pages}
+            if route is None or route[2] not in ids[route[1]]:
+                fragment, document = parts.fragment, self.document
+                yield from _check_document_anchor(span, fragment, document, "this page")
+                return
+            message = f"`{url}` is an address of another tool"
+            help = _link_help(route[1], route[2])
+            if route[1] != "level":
+                help = Fix(help, f"{route[1]}:{route[2]}", safe=True)
+            yield diagnose("link-anchor", span, message, help=help)
+
+    def check_file(self, url: str, span: Span) -> Iterator[Diagnostic]:
+        path = model.local_file(url, self.document.source.path)
+        if path not in self.targets.files:
+            help = self.suggest_file(path, url.partition("#")[0])
+            yield diagnose("link-file", span, f"no file `{path}`", help=help)
+
+    def suggest_file(self, path: str, address: str) -> str:
+        targets, name = self.targets, posixpath.basename(path)
+        match = _LESSON_NAME.fullmatch(name)
+        if name.endswith((".md", ".html")) and match and match[1] in targets.lessons:
+            new = f"lesson:{match[1]}"
+            return Fix(f"link to the lesson by its id: `{new}`", new, address, safe=True)
+        if name.endswith(".md"):
+            return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
+        if name.endswith(".xml") and name[:-4] in targets.models:
+            new = f"model:{name[:-4]}"
+            return Fix(f"link to a model by its name: `{new}`", new, address, safe=True)
+        files = {posixpath.basename(f): f for f in targets.files if not f.endswith(".md")}
+        likely = nearest(name, files)
+        if likely is None:
+            return "files that pages may use lie in content/"
+        new = posixpath.relpath(files[likely], posixpath.dirname(self.document.source.path))
+        fix = propose(name, likely, files)
+        return Fix(f"did you mean `{files[likely]}`?", fix.new and new, address, safe=fix.safe)
+
+    def check_media(self, subject: str, url: str, span: Span) -> Iterator[Diagnostic]:
+        parts = urlsplit_or_none(url)
+        if parts is None or parts.scheme or parts.netloc:
+            message = f"{subject}`{url}` is not a file of the course"
+            help = "put the file into content/ and name it relative to the lesson"
+            yield diagnose("image-remote", span, message, help=help)
+        else:
+            yield from self.check_file(url, span)
 
 
 def _link_help(kind: str, id: str) -> str:
-    """How to write a link to a lesson, a level or a page."""
     if kind == "level":
         return f"write `Level {id}` in the text, which becomes a link"
     if kind == "lesson":
@@ -219,35 +254,14 @@ def _rename_kind(span: Span, old: str, new: str) -> tuple[Edit, ...]:
     return (Edit(place, new),) if place.text == old else ()
 
 
-_LESSON_NAME = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
-"""A file name or an address that begins with the id of a lesson, as in `4.2-inertia.md`."""
-
-
-def _suggest_lesson(target: Target, targets: LinkTargets) -> str:
-    """A help: the lesson whose file or slug the link names, or those of its level."""
-    if not isinstance(target, LessonTarget):
-        return ""
-    match = _LESSON_NAME.fullmatch(target.id)
-    if match and match[1] in targets.lessons:
-        return Fix(f"did you mean `lesson:{match[1]}`?", match[1], target.id, safe=True)
-    paths = ((id, d.source.path) for id, d in targets.lessons.items() if d is not None)
-    ids = [id for id, path in paths if path.endswith(f"-{target.id}.md")]
-    if len(ids) == 1:
-        return Fix(f"did you mean `lesson:{ids[0]}`?", ids[0], target.id, safe=True)
-    level = target.id.rpartition(".")[0]
-    ids_of_level = [id for id in targets.lessons if level and id.rpartition(".")[0] == level]
-    names = ", ".join(f"`{id}`" for id in ids_of_level)
-    return f"level {level} has {names}" if names else ""
-
-
 def _check_document_anchor(
-    span: Span, anchor: str | None, document: Document | None, page_name: str
+    span: Span, anchor: str | None, document: model.Document | None, page_name: str
 ) -> Iterator[Diagnostic]:
     if anchor and document is None:
         message = f"{page_name} is planned, so it has no anchor `#{anchor}` yet"
         yield diagnose("link-anchor", span, message, help="link to the lesson itself")
     elif anchor and document is not None:
-        listings = {script.path: script.code.text for script in document_scripts(document)}
+        listings = {script.path: script.code.text for script in model.document_scripts(document)}
         yield from _check_anchor(span, anchor, page_name, anchors(document), listings)
 
 
@@ -258,8 +272,8 @@ def _check_anchor(
     name = unquote(anchor)
     if name in ids:
         return
-    listing, first, last = linked_lines(name) or ("", 0, 0)
-    path = next((p for p in listings if line_anchor(p, first) == f"{listing}.L{first}"), None)
+    listing, first, last = model.linked_lines(name) or ("", 0, 0)
+    path = next((p for p in listings if model.line_anchor(p, first) == f"{listing}.L{first}"), None)
     if path is None:
         help = did_you_mean(anchor, ids)
     else:
@@ -272,77 +286,6 @@ def _check_anchor(
     notes = [] if place is None else [Note(f"`#{near}` is here", place.first_line())]
     message = f"{page_name} has no anchor `#{anchor}`"
     yield diagnose("link-anchor", span, message, help=help, notes=notes)
-
-
-def _check_url(
-    span: Span, url: str, document: Document, targets: LinkTargets
-) -> Iterator[Diagnostic]:
-    parts = urlsplit_or_none(url)
-    if parts is None:
-        yield diagnose("link-file", span, f"`{url}` is not a readable address")
-        return
-    if parts.scheme or parts.netloc:
-        return
-    if not parts.path:
-        route = _ROUTE.fullmatch(unquote(parts.fragment))
-        ids = {"lesson": targets.lessons, "level": targets.levels, "page": targets.pages}
-        if route is not None and route[2] in ids[route[1]]:
-            message = f"`{url}` is an address of another tool"
-            help = _link_help(route[1], route[2])
-            if route[1] != "level":
-                help = Fix(help, f"{route[1]}:{route[2]}", safe=True)
-            yield diagnose("link-anchor", span, message, help=help)
-            return
-        yield from _check_document_anchor(span, parts.fragment, document, "this page")
-        return
-    yield from _check_file(url, span, document, targets)
-
-
-_ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
-"""The fragment by which a site of a single page names a lesson, as in `#/lesson/4.2`."""
-
-
-def _check_file(
-    url: str, span: Span, document: Document, targets: LinkTargets
-) -> Iterator[Diagnostic]:
-    path = local_file(url, document.source.path)
-    if path not in targets.files:
-        help = _suggest_file(path, url, document.source.path, targets)
-        yield diagnose("link-file", span, f"no file `{path}`", help=help)
-
-
-def _suggest_file(path: str, url: str, source_path: str, targets: LinkTargets) -> str:
-    name = posixpath.basename(path)
-    match = _LESSON_NAME.fullmatch(name)
-    if name.endswith((".md", ".html")) and match and match[1] in targets.lessons:
-        help, new = "link to the lesson by its id: `{}`", f"lesson:{match[1]}"
-        return Fix(help.format(new), new, url.partition("#")[0], safe=True)
-    if name.endswith(".md"):
-        return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
-    if name.endswith(".xml") and name[:-4] in targets.models:
-        help, new = "link to a model by its name: `{}`", f"model:{name[:-4]}"
-        return Fix(help.format(new), new, url.partition("#")[0], safe=True)
-    files = {posixpath.basename(file): file for file in targets.files if not file.endswith(".md")}
-    likely = nearest(name, files)
-    if likely is None:
-        return "files that pages may use lie in content/"
-    new = posixpath.relpath(files[likely], posixpath.dirname(source_path))
-    fix = propose(name, likely, files)
-    help = f"did you mean `{files[likely]}`?"
-    return Fix(help, fix.new and new, url.partition("#")[0], safe=fix.safe)
-
-
-def _check_media(
-    subject: str, url: str, span: Span, document: Document, targets: LinkTargets
-) -> Iterator[Diagnostic]:
-    """Check that a file that a page shows is one of the course."""
-    parts = urlsplit_or_none(url)
-    if parts is None or parts.scheme or parts.netloc:
-        message = f"{subject}`{url}` is not a file of the course"
-        help = "put the file into content/ and name it relative to the lesson"
-        yield diagnose("image-remote", span, message, help=help)
-    else:
-        yield from _check_file(url, span, document, targets)
 
 
 def urlsplit_or_none(url: str) -> SplitResult | None:

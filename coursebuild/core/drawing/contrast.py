@@ -1,7 +1,4 @@
-"""The contrast of colours with their background, by WCAG 2.2.
-
-Entry points: `contrast`; `legible`, the nearest colour with enough of it. Colours are `#rrggbb`.
-"""
+"""The contrast of colours, given as `#rrggbb`, with their background, by WCAG 2.2."""
 
 from __future__ import annotations
 

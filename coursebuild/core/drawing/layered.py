@@ -1,7 +1,5 @@
 """Layouts of directed acyclic graphs in layers, with predecessors above.
 
-Entry points: `layered_layout(count, edges, passing)`, `transitive_reduction(nodes, edges)`.
-
 The method is that of Sugiyama, Tagawa and Toda (IEEE Trans. Syst., Man, Cybern. 11(2), 1981):
 
 1. A node is one layer below the lowest of its predecessors; one without any is just above the
@@ -27,7 +25,6 @@ from typing import TypeAlias
 from msgspec import Struct
 
 _Point: TypeAlias = int | tuple[int, int, int]
-"""A node, or an edge where it crosses a layer."""
 
 _SWEEPS = 12
 _PASSES = 40
@@ -79,13 +76,7 @@ def transitive_reduction(
 
 @functools.lru_cache(maxsize=256)
 def layered_layout(count: int, edges: tuple[tuple[int, int], ...], passing: float) -> Layout:
-    """Lay out a graph; layouts are kept, since many graphs are alike.
-
-    Args:
-        count: how many nodes there are; their order breaks ties.
-        edges: edges between these nodes, by their numbers from 0, without cycles.
-        passing: the room for an edge that crosses a layer, in widths of a node.
-    """
+    """Lay out a graph without cycles; an edge that crosses a layer is `passing` wide there."""
     layers = _assign_layers(count, edges)
     rows: list[list[_Point]] = [[] for _ in range(max(layers, default=-1) + 1)]
     for node, layer in enumerate(layers):

@@ -1,7 +1,5 @@
 """SVG that draws, and does nothing else.
 
-Entry point: `read_svg`.
-
 1. A drawing may hold the elements, attributes and styles listed here. They are judged as browsers
    read them: by namespace, with references and escapes decoded.
 2. It refers to parts of itself, and to pixels that it holds, and to nothing else.
@@ -99,7 +97,6 @@ _PROPERTIES = frozenset(
     "ascent-override descent-override font-display line-gap-override size-adjust src "
     "unicode-range".split()
 )
-"""Properties of CSS, also as attributes."""
 _VENDOR = re.compile(r"^-(?:webkit|moz|ms|o|inkscape)-")
 _AT_RULES = {"@media": True, "@supports": True, "@keyframes": True, "@font-face": False}
 """Whether they hold rules, or declarations."""

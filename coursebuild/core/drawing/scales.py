@@ -1,9 +1,4 @@
-"""The scales of axes: the places of ticks, and their texts; text in drawings.
-
-Entry points: `Scale`, from values to places; `ticks`, `tick_texts` (linear); `log_ticks`, `log`
-(logarithmic); `number_text`, `typeset_number`; `markup_text`, what markup can hold of a text;
-`text_width`, `shorten_to_width`; `separate_labels`.
-"""
+"""The scales of axes: the places of ticks, and their texts; text in drawings."""
 
 from __future__ import annotations
 
@@ -17,7 +12,6 @@ from itertools import pairwise
 from msgspec import Struct
 
 _LARGEST = 290.0
-"""Greater powers of ten are drawn as this one."""
 
 
 class Scale(Struct, frozen=True):
@@ -104,15 +98,10 @@ def typeset_number(text: str) -> str:
 
 
 def log_ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
-    """Ticks of a logarithmic axis: the exponent of each, and its text.
+    """Ticks of a logarithmic axis between two exponents: the exponent of each, and its text.
 
     They are powers of ten; with twos and fives between them if those are few; round numbers if even
     these are few.
-
-    Args:
-        low: the exponent at one end.
-        high: the exponent at the other, larger.
-        most: how many ticks have room.
     """
     first, last = math.ceil(low - 1e-9), math.floor(high + 1e-9)
     decade_ticks = (
@@ -135,10 +124,7 @@ def log_ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
 
 
 def _decades(low: int, high: int, most: int) -> list[int]:
-    """Exponents from `low` to `high`, at most `most`: all, or every second, third, fifth and so on.
-
-    There is always at least one.
-    """
+    """Exponents from `low` to `high`, 1 to `most` of them: all, or every second, third, fifth."""
     step = 1
     while high // step - -(-low // step) + 1 > max(most, 1):
         power: int = 10 ** (len(str(step)) - 1)
@@ -160,7 +146,6 @@ def _scaled(mantissa: int, exponent: int) -> str:
 
 
 _CACHE_SIZE = 1024
-"""How many texts are remembered: drawings share many, in several sizes."""
 _NO_MARKUP = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 """Includes lone surrogates, which stand for bytes that are not text."""
 _NARROW = frozenset("ijl.,:;'|!()[] ·ft")
@@ -199,13 +184,9 @@ def shorten_to_width(text: str, room: float, size: float) -> str:
 
 
 def separate_labels(desired: Sequence[float], gap: float, top: float, bottom: float) -> list[float]:
-    """Places for labels as near as possible to the desired ones, in order, at least `gap` apart.
+    """Places for labels in order, at least `gap` apart, as near as possible to the desired ones.
 
-    Args:
-        desired: where the labels belong, rising.
-        gap: the least distance from one label to the next.
-        top: the least place of the first.
-        bottom: the greatest place of the last; if there is too little room, the first go above top.
+    If there is too little room, the first go above `top`.
     """
     places: list[float] = []
     for y in desired:

@@ -1,13 +1,12 @@
 """The state of a file or folder as a short text: the same text means the same content.
 
-Entry points: `file_state`, `folder_state`, `modules_in`; `changed_since` with a time of a `Clock`.
-
-The state of a file is its SHA-256, that of a folder a hash of the names in it; a path where nothing
-is has the state `absent`.
+That of a file is its SHA-256, that of a folder a hash of the names in it; a path where nothing is
+has the state `absent`.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -63,7 +62,6 @@ def _known_sha256(path: str, signature: tuple[int, ...]) -> str:
 
 def folder_state(path: str) -> str:
     """The state of what should be a folder: the names in it, and which are folders."""
-    digest = hashlib.sha256()
     try:
         with os.scandir(path) as entries:
             names = sorted((os.fsencode(e.name), e.is_dir()) for e in entries)
@@ -73,9 +71,8 @@ def folder_state(path: str) -> str:
         return ABSENT
     except OSError as error:
         return f"unreadable: {reason(error)}"
-    for name, is_folder in names:
-        digest.update(name + (b"/\0" if is_folder else b"\0"))
-    return digest.hexdigest()
+    parts = (name + (b"/\0" if is_folder else b"\0") for name, is_folder in names)
+    return hashlib.sha256(b"".join(parts)).hexdigest()
 
 
 def modules_in(folder: str, names: Iterable[str]) -> str:
@@ -104,15 +101,13 @@ class Clock:
 
     def now(self) -> int:
         """The time now, ns: every later change has this time or a later one."""
-        if self._store.set_aside:
-            return time.time_ns() - _LAG
-        try:
-            if not self._path.exists():
-                make_store(str(self._path.parent), str(self._store.root))
-            self._path.touch()
-            return self._path.stat().st_ctime_ns
-        except OSError:
-            return time.time_ns() - _LAG
+        with contextlib.suppress(OSError):
+            if not self._store.set_aside:
+                if not self._path.exists():
+                    make_store(str(self._path.parent), str(self._store.root))
+                self._path.touch()
+                return self._path.stat().st_ctime_ns
+        return time.time_ns() - _LAG
 
     def tick(self) -> None:
         """Wait until `now` gives a later time than all changes so far have."""

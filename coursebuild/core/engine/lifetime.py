@@ -1,7 +1,5 @@
 """Processes that end with the one that started them, however that ends.
 
-Entry points: `end_with_parent`, for a process itself; `bound_command`, for other programs.
-
 On Linux the system ends them, also in the middle of a computation. It does so when the *thread*
 ends that started them, so they are for work that this thread waits for. Elsewhere, and where a
 process has something to clean up, as those that run scripts have, it ends when it sees its input

@@ -1,12 +1,8 @@
 """The manifest of the last published site: the key and the stat of each file.
 
-Entry points: `Manifest.read(root, place)`, `Manifest.write`; `marker`, the list of files that a
-site itself carries; `holds` and `foreign_files`, which keep publishing from overwriting the files
-of others.
-
-The manifest is an entry of the course's store, not a file of the site, since it changes from build
-to build. It is believed only of a file that is, by size, modification time and inode, the one that
-was written. Where it is missing or damaged, everything is made again.
+It is an entry of the course's store, not a file of the site, since it changes from build to build.
+It is believed only of a file that is, by size, modification time and inode, the one that was
+written. Where it is missing or damaged, everything is made again.
 """
 
 from __future__ import annotations
@@ -120,7 +116,6 @@ def foreign_files(place: Path) -> list[str]:
 
 
 def _files(folder: Path) -> list[str]:
-    """The paths of all files in a folder except junk."""
     paths: list[str] = []
     folders = [""]
     for prefix in folders:

@@ -1,17 +1,12 @@
 """Work spread over forked copies of this process.
 
-Entry points: `Workers`, a context manager; `can_fork`, whether there can be any.
+A worker is forked with everything that this process has read and imported, applies one function to
+one task at a time, and remembers what it likes between tasks. A task may be reserved for the worker
+that remembers its document; that of a worker that died is done in this process. Workers are killed
+when the work is over, however it ends, and when this process is: they have nothing to save.
 
-1. A worker is forked with everything that this process has read and imported, and applies one
-   function to one task at a time. What it remembers between tasks stays in it.
-2. `map` gives each task to the worker it is reserved for, or else to the first idle one, and yields
-   the results in the order of the tasks. Tasks are made while workers do earlier ones.
-3. The task of a worker that died is done in this process. An exception in a worker is raised here.
-4. Workers are killed when the work is over, however it ends, and when this process is: they have
-   nothing to save.
-
-Python's own `ProcessPoolExecutor` cannot reserve a task for the worker that remembers its document,
-gives up all tasks when one worker dies, and forks with a thread of its own beside it.
+Python's own `ProcessPoolExecutor` cannot reserve a task, gives up all tasks when one worker dies,
+and forks with a thread of its own beside it.
 """
 
 from __future__ import annotations

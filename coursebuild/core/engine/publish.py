@@ -1,7 +1,5 @@
 """Publishing a site: written whole beside the old one, then swapped in, or not at all.
 
-Entry points: `check_output_folder`, which says early whether a site may go somewhere; `publish`.
-
 1. The place is checked: it is neither the project nor a folder of the author's, and holds no file
    that we did not put there. One build publishes to a place at a time.
 2. The site is filled into a slot: a folder beside the place, on the same file system, which holds
@@ -31,17 +29,8 @@ from collections.abc import Callable, Container, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from msgspec import Struct
-
-from coursebuild.core.engine.manifest import (
-    KIND,
-    MARKER,
-    Manifest,
-    ManifestEntry,
-    foreign_files,
-    holds,
-    marker,
-)
+from coursebuild.core.engine import manifest
+from coursebuild.core.engine.manifest import MARKER, Manifest, ManifestEntry
 from coursebuild.core.engine.page_pool import Workers, can_fork
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, reason
 from coursebuild.core.files.locks import folder_lock
@@ -57,11 +46,7 @@ _AUTHOR_FOLDERS = ("content", "features", "models", "examples", ".coursebuild", 
 
 
 def check_output_folder(root: Path, out: Path) -> Path:
-    """Return where the site goes: `out`, or the folder it links to; undo a killed build.
-
-    Raises:
-        PublishRefusedError: a site must not go there.
-    """
+    """Where the site goes: `out`, or the folder it links to; undo a killed build."""
     place = Path(os.path.realpath(out))
     with folder_lock(place.parent):
         _check_place(Path(os.path.realpath(root)), out, place)
@@ -77,18 +62,12 @@ def publish(
     jobs: int = 1,
     stage: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> tuple[str, ...]:
-    """Replace the site at `out` by these files.
+    """Replace the site at `out` by these files; return the paths of those that were written.
 
-    Args:
-        root: the course folder.
-        out: where the site goes; a link to a folder stays one.
-        files: each path once; POSIX, relative, without `..`.
-        file_list: a file that lists all the others.
-        jobs: how many copies of this process, at most, make and write files where there are many.
-        stage: a context that is entered while the files are made.
-
-    Returns:
-        The paths of the files that were written, sorted; the others have not changed.
+    They are sorted; the others have not changed. Paths are POSIX, relative, without `..`, each
+    once. `out` may be a link to a folder, and stays one. `file_list` lists all the others. `jobs`
+    is how many copies of this process, at most, make and write files where there are many; `stage`
+    is entered meanwhile.
 
     Raises:
         PublishRefusedError: a site must not go there.
@@ -102,17 +81,25 @@ def publish(
         place.parent.mkdir(parents=True, exist_ok=True)
         with folder_lock(place.parent):
             _check_place(root, out, place)
-            site = new_site(Manifest.read(root, place), files, file_list)
+            site = _NewSite(Manifest.read(root, place), files, file_list)
             if site.is_there():
                 return ()
             slot = _sibling(place, "new")
             try:
                 open_slot(root, slot)
                 entries, paths = site.fill(slot, jobs, stage)
-                if not holds(slot, entries):
+                if not manifest.holds(slot, entries):
                     message = f"another process is changing what is being written to {place}"
                     raise EffectError(message)
-                _swap(slot, place)
+                slot.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o755)
+                if not os.path.lexists(place):
+                    slot.rename(place)
+                elif not exchange(slot, place):
+                    old = _sibling(place, "old")
+                    remove(old)
+                    place.rename(old)
+                    slot.rename(place)
+                    old.rename(slot)
             finally:
                 _recover(place)
                 put_away(root, slot)
@@ -122,64 +109,41 @@ def publish(
         raise EffectError(f"the site cannot be written to {out}: {reason(error)}") from None
 
 
-def _swap(slot: Path, place: Path) -> None:
-    """Move the new site to the place, with the permissions of the old one, which goes the way."""
-    slot.chmod(stat.S_IMODE(place.stat().st_mode) if place.exists() else 0o755)
-    if not os.path.lexists(place):
-        slot.rename(place)
-    elif not exchange(slot, place):
-        old = _sibling(place, "old")
-        remove(old)
-        place.rename(old)
-        slot.rename(place)
-        old.rename(slot)
-
-
 # --- the place
 
 
 def _check_place(root: Path, out: Path, place: Path) -> None:
     path = Path(os.path.normpath(root / out))
+
+    def refuse(problem: str, help: str = "") -> PublishRefusedError:
+        return PublishRefusedError(f"{out} {problem}", help=help)
+
     if path.is_relative_to(root) and not place.is_relative_to(root):
-        raise PublishRefusedError(
-            f"{out} is a link that leads out of the project",
-            help="such a link may come with a course: name the folder itself with `--out`",
-        )
+        help = "such a link may come with a course: name the folder itself with `--out`"
+        raise refuse("is a link that leads out of the project", help)
     if root.is_relative_to(place):
         relation = "is the project itself" if place == root else "holds the project"
-        raise PublishRefusedError(
-            f"{out} {relation}", help="publish to a folder of its own, such as `public`"
-        )
+        raise refuse(relation, "publish to a folder of its own, such as `public`")
     for name in _AUTHOR_FOLDERS:
         if place.is_relative_to(os.path.realpath(root / name)):
-            raise PublishRefusedError(
-                f"{out} lies in {name}/ of the project, which cannot hold a site"
-            )
+            raise refuse(f"lies in {name}/ of the project, which cannot hold a site")
     _recover(place)
     if os.path.lexists(place) and not place.is_dir():
-        raise PublishRefusedError(f"{out} is not a folder")
+        raise refuse("is not a folder")
     if os.path.ismount(place):
-        raise PublishRefusedError(
-            f"{out} is a mount point, which cannot be swapped", help="publish to a folder inside it"
-        )
+        raise refuse("is a mount point, which cannot be swapped", "publish to a folder inside it")
     try:
-        foreign = foreign_files(place)
+        foreign = manifest.foreign_files(place)
     except OSError as error:
         raise EffectError(f"{out} cannot be read: {reason(error)}") from None
     if foreign:
-        rest = f" and {len(foreign) - 3} more" if len(foreign) > 3 else ""
-        raise PublishRefusedError(
-            f"{out} holds files that coursebuild did not put there: {', '.join(foreign[:3])}{rest}",
-            help="move them away, or publish to another folder",
-        )
+        names = ", ".join(foreign[:3]) + (f" and {len(foreign) - 3} more" if foreign[3:] else "")
+        problem = f"holds files that coursebuild did not put there: {names}"
+        raise refuse(problem, "move them away, or publish to another folder")
 
 
 def exchange(a: Path, b: Path) -> bool:
-    """Swap two folders in one step; return `False` where the system or file system cannot.
-
-    Raises:
-        OSError: the system can, but refused.
-    """
+    """Swap two folders in one step; return `False` where the system or file system cannot."""
     try:
         native = getattr(ctypes.CDLL(None, use_errno=True), _EXCHANGE[sys.platform])
     except (KeyError, OSError, AttributeError):
@@ -209,7 +173,6 @@ def _sibling(place: Path, suffix: str) -> Path:
 
 # --- the slot
 
-
 _NO_PATH = re.compile(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
 """What no path may have: an empty part, `.` or `..`, a control character, a backslash."""
 _MIN_FOR_COPIES = 128
@@ -220,15 +183,38 @@ _MAX_COPIES = 4
 """The most copies: more would wait for the disk."""
 
 
-class NewSite(Struct, frozen=True):
-    """The site to be published, and the manifest of the one that is there."""
+class _NewSite:
+    """The site to be published, and the manifest of the one that is there.
 
-    old: Manifest
-    files: Mapping[str, SiteFile]
-    """By path, without the file list."""
-    file_list: FileList | None
-    keys: Mapping[str, str]
-    """The key of each file by its path, that of the file list included."""
+    Raises:
+        ValueError: a path is not valid in a site, or two files have the same.
+    """
+
+    def __init__(
+        self, old: Manifest, files: Iterable[SiteFile], file_list: FileList | None
+    ) -> None:
+        self.old = old
+        self.file_list = file_list
+        self.files: dict[str, SiteFile] = {}
+        """By path, without the file list."""
+        self.keys: dict[str, str] = {}
+        """The key of each file by its path, that of the file list included."""
+        for file in files:
+            path = file.path
+            if _NO_PATH.search(path) or path == MARKER:
+                raise ValueError(f"{path!r} is not a path that a site may have")
+            if path in self.files or (file_list is not None and path == file_list.path):
+                raise ValueError(f"the site has two files {path}")
+            self.files[path] = file
+            if isinstance(file, OutputFile):
+                self.keys[path] = f"={hashlib.sha256(file.data).hexdigest()}"
+            else:
+                self.keys[path] = file.key
+        if file_list is not None:
+            # Of the keys of all files, since the list names all of them.
+            lines = (file_list.key, *(f"{key} {path}" for path, key in self.keys.items()))
+            data = "\n".join(lines).encode("utf-8", "surrogatepass")
+            self.keys[file_list.path] = hashlib.sha256(data).hexdigest()
 
     def is_there(self) -> bool:
         """Whether the published site is already this one, whole and without other files."""
@@ -238,8 +224,8 @@ class NewSite(Struct, frozen=True):
         try:
             return (
                 all(self.old.is_whole(path, key) for path, key in self.keys.items())
-                and holds(place, self.keys)
-                and (place / MARKER).read_bytes() == marker(self.keys)
+                and manifest.holds(place, self.keys)
+                and (place / MARKER).read_bytes() == manifest.marker(self.keys)
             )
         except OSError:
             return False
@@ -276,11 +262,10 @@ class NewSite(Struct, frozen=True):
             facts = [FileFacts(path, e.digest, e.size) for path, e in sorted(entries.items())]
             path = self.file_list.path
             entries[path] = self._write(slot, OutputFile(path, self.file_list.make(facts)))
-        _write_file(f"{slot}/{MARKER}", marker(entries))
+        _write_file(f"{slot}/{MARKER}", manifest.marker(entries))
         return entries, new_paths
 
     def _link(self, path: str, entry: ManifestEntry, slot: Path) -> bool:
-        """Link a file of the old site into the slot, if it has not changed."""
         target = f"{slot}/{path}"
         try:
             os.link(f"{self.old.place}/{path}", target, follow_symlinks=False)
@@ -300,37 +285,10 @@ class NewSite(Struct, frozen=True):
 
 
 def _write_file(path: str, data: bytes) -> str:
-    """Write a new file; return the hash of its bytes."""
     with open(path, "xb") as file:  # noqa: PTH123 - thousands of them
         file.write(data)
         os.fchmod(file.fileno(), 0o644)  # whatever the umask is
     return hashlib.sha256(data).hexdigest()
-
-
-def new_site(old: Manifest, files: Iterable[SiteFile], file_list: FileList | None) -> NewSite:
-    """The site of these files, to be published over the one of a manifest.
-
-    Raises:
-        ValueError: a path is not valid in a site, or two files have the same.
-    """
-    by_path: dict[str, SiteFile] = {}
-    keys: dict[str, str] = {}
-    for file in files:
-        path = file.path
-        if _NO_PATH.search(path) or path == MARKER:
-            raise ValueError(f"{path!r} is not a path that a site may have")
-        if path in by_path or (file_list is not None and path == file_list.path):
-            raise ValueError(f"the site has two files {path}")
-        by_path[path] = file
-        if isinstance(file, OutputFile):
-            keys[path] = f"={hashlib.sha256(file.data).hexdigest()}"
-        else:
-            keys[path] = file.key
-    if file_list is not None:
-        # Of the keys of all files, since the list names all of them.
-        text = "\n".join((file_list.key, *(f"{key} {path}" for path, key in keys.items())))
-        keys[file_list.path] = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
-    return NewSite(old, by_path, file_list, keys)
 
 
 def open_slot(root: Path, slot: Path) -> None:
@@ -356,7 +314,7 @@ def put_away(root: Path, slot: Path) -> None:
 
 
 def _spare(root: Path) -> Path:
-    return Path(find_store(str(root))[0], KIND, "spare")
+    return Path(find_store(str(root))[0], manifest.KIND, "spare")
 
 
 def _remove_stale(
@@ -364,11 +322,8 @@ def _remove_stale(
 ) -> dict[str, ManifestEntry]:
     """Remove everything from a folder but intact files and needed folders; return these files.
 
-    Args:
-        folder: its path, with a slash behind it.
-        prefix: its path in the site, likewise.
-        old_entries: the entries of the files that may stay, by path.
-        folders: the folders that may stay.
+    `folder` and `prefix`, its path in the site, end with a slash. `old_entries` are those of the
+    files that may stay, `folders` the folders.
     """
     intact: dict[str, ManifestEntry] = {}
     with os.scandir(folder) as entries:

@@ -1,7 +1,4 @@
-"""The place where a store shares results with other machines: a folder, or what fsspec reaches.
-
-Entry point: `shared_place(address, key)` returns the `SharedPlace` that a `Store` uses.
-"""
+"""The place where a store shares results with other machines: a folder, or what fsspec reaches."""
 
 from __future__ import annotations
 
@@ -57,7 +54,7 @@ class FolderFiles:
             return []
 
 
-class RemoteFiles:
+class _RemoteFiles:
     """A place that fsspec reaches, with the interface of `FolderFiles`."""
 
     def __init__(self, files: Any, top: str) -> None:
@@ -65,7 +62,6 @@ class RemoteFiles:
         self.top = top.rstrip("/")
 
     def read(self, path: str) -> bytes | None:
-        """A file's bytes; `None` if there is none."""
         try:
             data: bytes = self.files.cat_file(f"{self.top}/{path}")
         except (FileNotFoundError, NotADirectoryError):
@@ -73,7 +69,6 @@ class RemoteFiles:
         return data
 
     def write(self, path: str, data: bytes) -> None:
-        """Make or replace a file."""
         full = f"{self.top}/{path}"
         try:
             self.files.pipe_file(full, data)
@@ -82,7 +77,6 @@ class RemoteFiles:
             self.files.pipe_file(full, data)
 
     def names(self, folder: str) -> list[str]:
-        """The names in a folder; none if there is none."""
         try:
             paths = self.files.ls(f"{self.top}/{folder}", detail=False)
         except (FileNotFoundError, NotADirectoryError):
@@ -94,7 +88,7 @@ class SharedPlace(Struct, frozen=True):
     """A place of shared entries; they lie under the same names as in a store."""
 
     address: str
-    files: FolderFiles | RemoteFiles
+    files: FolderFiles | _RemoteFiles
     key: bytes = b""
     """The team's, with which entries are signed; mostly empty."""
 
@@ -130,7 +124,7 @@ def shared_place(address: str, key: bytes = b"") -> SharedPlace:
         raise EffectError(f"the cache {address} needs a package: {in_words(error)}") from None
     except ValueError as error:
         raise EffectError(f"there is no such place as {address}: {in_words(error)}") from None
-    return SharedPlace(address, RemoteFiles(files, top), key)
+    return SharedPlace(address, _RemoteFiles(files, top), key)
 
 
 def in_words(error: Exception) -> str:

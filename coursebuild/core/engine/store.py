@@ -1,22 +1,14 @@
 """Results that are expensive to make and depend on nothing but their key, kept in `.coursebuild/`.
 
-Entry point: `Store`, with `get` and `put`, or both in one, `get_or_make`; `get_value` and
-`put_value` for JSON. The words are those of `core.engine`.
-
 1. An entry lies at `.coursebuild/KIND/KEY`, or `KIND/GROUP/KEY` where several results belong
    together. It is sealed under its name with the user's key (see `core.files.trust`), and the
    reader says which type the data must have. What somebody else wrote, or damaged, is not there.
-2. It is written under a temporary name and then renamed, so that other processes see whole entries
-   only.
+2. It is renamed when it is whole. Nothing is lost when the folder is deleted.
 3. Results of scripts and trials can be shared: they are also looked for in the shared place, if
-   there is one, and sent there. Everything else is made on this machine.
-4. Reading waits for the shared place; up to four threads write while the work goes on. If it cannot
-   be reached or takes too long, that is reported once, and it is left alone for a while: it costs
-   time, but is never an error.
-5. Now and then, as a command ends, the entries used longest ago are removed until the rest is
-   within the limit.
-
-Nothing is lost when the folder is deleted.
+   there is one, and sent there. Reading waits for it; up to four threads write while the work goes
+   on. If it cannot be reached or takes too long, that is reported once, and it is left alone for a
+   while: it costs time, but is never an error.
+4. Now and then, as a command ends, the entries used longest ago are removed, down to the limit.
 """
 
 from __future__ import annotations
@@ -34,17 +26,8 @@ from typing import TypeVar
 import msgspec
 
 from coursebuild.core.engine.shared_place import SharedPlace, in_words
+from coursebuild.core.files import trust
 from coursebuild.core.files.errors import reason
-from coursebuild.core.files.trust import (
-    FOLDER,
-    TEMPORARY,
-    find_store,
-    make_store,
-    replace_file,
-    seal,
-    store_key,
-    unseal,
-)
 from coursebuild.core.values import DAMAGE
 
 Value = TypeVar("Value")
@@ -88,11 +71,11 @@ class Store:
         fresh: bool = False,
         timeout: float = _TIMEOUT,
     ) -> None:
-        folder, self.set_aside = find_store(str(root))
+        folder, self.set_aside = trust.find_store(str(root))
         """Why the folder `.coursebuild` of the course is not used; mostly empty."""
         self.folder = Path(folder)
         self.root = root
-        self._key = store_key(str(root))
+        self._key = trust.store_key(str(root))
         self.shared = shared
         self.size = size
         self.fresh = fresh
@@ -153,7 +136,7 @@ class Store:
                 entry = file.read()
         except OSError:
             return None
-        value = _value(unseal(name, entry, self._key), read)
+        value = _value(trust.unseal(name, entry, self._key), read)
         if value is not None and time.time() - modified > _USE_INTERVAL:
             with contextlib.suppress(OSError):
                 os.utime(path)  # entries used lately are pruned last
@@ -167,7 +150,7 @@ class Store:
             return
         if self._writers.acquire(timeout=self._timeout):
             # A thread each, since an idle one would keep this process from forking.
-            work = (self.shared, name, seal(name, data, self.shared.seal_key))
+            work = (self.shared, name, trust.seal(name, data, self.shared.seal_key))
             threading.Thread(target=self._send, args=work, name="shared", daemon=True).start()
         else:
             self._fail(self.shared, f"no answer within {self._timeout:g} s")
@@ -229,7 +212,6 @@ class Store:
         self._bytes_written = 0
 
     def _say(self, line: str) -> None:
-        """Send a message, unless it was sent before."""
         with self._lock:
             if line in self._messages:
                 return
@@ -243,7 +225,7 @@ class Store:
         entry = self._ask(shared, lambda: shared.files.read(shared.path(name)))
         if entry is None:
             return None
-        data = unseal(name, entry, shared.seal_key)
+        data = trust.unseal(name, entry, shared.seal_key)
         value = _value(data, read)
         if data is None or value is None:
             self._say(f"{_short(name)} in the shared cache is damaged: it is made again")
@@ -252,17 +234,17 @@ class Store:
         return value
 
     def _write(self, name: str, data: bytes) -> None:
-        path, entry = self.folder / name, seal(name, data, self._key)
+        path, entry = self.folder / name, trust.seal(name, data, self._key)
         try:
             try:
-                replace_file(str(path), entry)
+                trust.replace_file(str(path), entry)
             except FileNotFoundError:
-                make_store(str(self.folder), str(self.root))
+                trust.make_store(str(self.folder), str(self.root))
                 path.parent.mkdir(parents=True, exist_ok=True)
-                replace_file(str(path), entry)
+                trust.replace_file(str(path), entry)
         except OSError as error:
             if self._key:  # else it was said at the beginning
-                self._say(f"results cannot be kept in {FOLDER}: {reason(error)}")
+                self._say(f"results cannot be kept in {trust.FOLDER}: {reason(error)}")
             return
         with self._lock:
             self._bytes_written += len(entry)
@@ -320,7 +302,6 @@ def _value(data: bytes | None, read: Callable[[bytes], Value | None]) -> Value |
 
 
 def _short(name: str) -> str:
-    """An entry's name in messages."""
     kind, _, key = name.partition("/")
     return f"the entry {kind}/{key[:12]}…" if len(key) > 12 else f"the entry {name}"
 
@@ -362,5 +343,5 @@ def _entries(folder: str, long_ago: float) -> Iterator[tuple[float, str, int]]:
                 status = entry.stat(follow_symlinks=False)
                 if HASH.fullmatch(entry.name):
                     yield status.st_mtime, entry.path, status.st_size
-                elif entry.name.startswith(TEMPORARY) and status.st_mtime < long_ago:
+                elif entry.name.startswith(trust.TEMPORARY) and status.st_mtime < long_ago:
                     os.unlink(entry.path)  # noqa: PTH108

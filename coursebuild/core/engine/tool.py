@@ -1,11 +1,8 @@
 """Digests of the tool: of its code, its templates and what it bundles.
 
-Entry points: `tool_digest()`; `typesetter_digest()`, of what typesets formulas; `code_digest`, of
-parts of the code, by content; `step_key`, the keys of what the tool makes.
-
-A digest covers the packages that the tool and its features may import (`package_versions`), by
-name and version. Of files it covers sizes and times, so that none has to be read; a tool that was
-installed again therefore makes everything again, even if it is the same.
+A digest covers the packages that the tool and its features may import, by name and version. Of
+files it covers sizes and times, so that none has to be read; a tool that was installed again
+therefore makes everything again, even if it is the same.
 """
 
 from __future__ import annotations
@@ -59,7 +56,13 @@ def package_versions(
 def _package_versions(
     names: frozenset[str], modules: frozenset[str], path: tuple[str, ...]
 ) -> tuple[str, ...]:
-    folders = _dist_info_folders(path)
+    folders: dict[str, str] = {}  # by name of the package
+    for folder in path:
+        with contextlib.suppress(OSError):
+            for entry in sorted(os.listdir(folder or ".")):  # noqa: PTH208
+                if entry.endswith(".dist-info"):
+                    name = _normalize(entry.partition("-")[0])
+                    folders.setdefault(name, os.path.join(folder, entry))  # noqa: PTH118
     pending = [(_normalize(name), frozenset[str]()) for name in names]
     if not all(name in folders for name, _ in pending):
         return tuple(sorted(os.path.basename(folder) for folder in folders.values()))  # noqa: PTH119
@@ -78,19 +81,6 @@ def _package_versions(
     # One that is missing may be installed next.
     places = (folders.get(name, name) for name in sorted(extras_by_name))
     return tuple(map(os.path.basename, places))
-
-
-@functools.lru_cache(maxsize=8)
-def _dist_info_folders(path: tuple[str, ...]) -> dict[str, str]:
-    """The `.dist-info` folders that Python finds, by name of the package."""
-    folders: dict[str, str] = {}
-    for folder in path:
-        with contextlib.suppress(OSError):
-            for entry in sorted(os.listdir(folder or ".")):  # noqa: PTH208
-                if entry.endswith(".dist-info"):
-                    name = _normalize(entry.partition("-")[0])
-                    folders.setdefault(name, os.path.join(folder, entry))  # noqa: PTH118
-    return folders
 
 
 def _normalize(name: str) -> str:
@@ -126,18 +116,13 @@ def _lines_of(path: str) -> Iterator[str]:
 
 
 def _digest(*folders: str) -> str:
-    own_packages = package_versions(frozenset({"coursebuild"}))
-    digest = hashlib.sha256(
-        "\0".join((sys.version, *own_packages, "")).encode("utf-8", "surrogateescape")
-    )
-    for folder in folders:
-        for line in _lines(folder, ""):
-            digest.update(line.encode("utf-8", "surrogateescape"))
-    return digest.hexdigest()
+    versions = (sys.version, *package_versions(frozenset({"coursebuild"})), "")
+    lines = (line for folder in folders for line in _lines(folder, ""))
+    text = "\0".join(versions) + "".join(lines)
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 def _lines(folder: str, inner: str) -> Iterator[str]:
-    """A line for each file, sorted, with its path inside the folder."""
     with os.scandir(folder) as entries:
         ordered = sorted(entries, key=lambda entry: entry.name)
     for entry in ordered:
@@ -151,10 +136,7 @@ def _lines(folder: str, inner: str) -> Iterator[str]:
 
 
 def step_key(name: str, *values: object) -> str:
-    """The key of what a step of this name makes from these values.
-
-    The tool's digest is part of it, so a new tool makes everything again.
-    """
+    """The key of what a step makes from these values; with a new tool, another one."""
     return fingerprint((tool_digest(), name, values))
 
 
@@ -175,10 +157,8 @@ def code_digest(*parts: str, root: Path = Path(_CORE).parents[1]) -> str:
     try:
         for place in (root / part for part in parts):
             for path in (place,) if place.is_file() else sorted(place.rglob("*.py")):
-                name = path.relative_to(root).as_posix()
-                content = path.read_bytes()
-                digest.update(f"{name}\0{len(content)}\0".encode())
-                digest.update(content)
+                name, content = path.relative_to(root).as_posix(), path.read_bytes()
+                digest.update(f"{name}\0{len(content)}\0".encode() + content)
     except OSError as error:
         raise EffectError(f"the tool's own code cannot be read: {reason(error)}") from None
     return digest.hexdigest()

@@ -1,7 +1,6 @@
 """The features of a course's own: Python files that its map names, run in this process.
 
-Entry points: `load_course_features`; `features_digest`. Whoever calls it has to know that this code
-may run: see `pipeline.load`.
+Whoever loads them has to know that this code may run: see `pipeline.load`.
 """
 
 from __future__ import annotations
@@ -38,14 +37,12 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
         except EffectError as error:
             tell(entry, error.message, "write it, as `coursebuild new feature NAME` does")
             continue
-        modules: set[str] = set()
         with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
             for node in ast.walk(ast.parse(code)):
                 if isinstance(node, ast.Import):
-                    modules.update(alias.name.partition(".")[0] for alias in node.names)
+                    imports.update(alias.name.partition(".")[0] for alias in node.names)
                 elif isinstance(node, ast.ImportFrom) and node.module:
-                    modules.add(node.module.partition(".")[0])
-        imports |= modules
+                    imports.add(node.module.partition(".")[0])
         # An unchanged file is not run again: that would define its classes anew, and blocks read
         # earlier would no longer be instances of them.
         last = _last.get(entry.path)
@@ -77,7 +74,6 @@ _last: dict[str, tuple[bytes, Feature | str]] = {}
 
 
 def _run(path: str, code: bytes) -> Feature | str:
-    """The feature of a file, or a message that says why there is none."""
     name = f"course_{path.removesuffix('.py').replace('/', '.')}"
     module = sys.modules[name] = ModuleType(name)  # where decoding looks for its classes
     module.__file__ = path
@@ -90,8 +86,6 @@ def _run(path: str, code: bytes) -> Feature | str:
         place = f" at line {lines[-1]}" if lines else ""
         return f"{path} fails{place}: {type(error).__name__}: {error}"
     feature = getattr(module, "FEATURE", None)
-    return (
-        feature
-        if isinstance(feature, Feature)
-        else f"{path} has no FEATURE of the type `coursebuild.core.features.Feature`"
-    )
+    if isinstance(feature, Feature):
+        return feature
+    return f"{path} has no FEATURE of the type `coursebuild.core.features.Feature`"

@@ -1,7 +1,6 @@
 """Where a course is, and what decides its results beside its files.
 
-Entry points: `find_course_root`; `is_dropping`, for names that are not files of a course. A run
-with nothing to do loads this module, so it works by strings and stat alone.
+A run with nothing to do loads this module, so it works by strings and stat alone.
 """
 
 from __future__ import annotations

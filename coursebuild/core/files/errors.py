@@ -1,7 +1,7 @@
 """What can go wrong outside the course: full disks, places that must not be replaced.
 
-Entry point: `EffectError`. The pipeline turns it into one message and an exit status; it is never a
-bug of the tool, and never a mistake inside a lesson (those are diagnostics).
+A command turns it into one message and an exit status; it is never a bug of the tool, and never a
+mistake inside a lesson (those are diagnostics).
 """
 
 from __future__ import annotations
@@ -43,11 +43,7 @@ class UsageError(Exception):
 
 
 def require(package: str, extra: str, purpose: str) -> None:
-    """Do nothing where a package of an extra is installed.
-
-    Raises:
-        EffectError: it is not; `purpose` is what needs it, as in "the language server".
-    """
+    """Raise an `EffectError`, unless a package of an extra is installed that `purpose` needs."""
     if find_spec(package) is None:
         help = f"run `pip install 'coursebuild[{extra}]'`"
         raise EffectError(f"{purpose} needs the package {package}", help=help)
@@ -71,12 +67,9 @@ def lacking(error: MemoryError | OSError | RuntimeError) -> EffectError | None:
 
 
 _HELP = {
+    **dict.fromkeys((errno.ENFILE, errno.ENOMEM, errno.ENOSPC, errno.EDQUOT), ""),
     errno.EMFILE: "`ulimit -n 256` raises the limit",
-    errno.ENFILE: "",
-    errno.ENOMEM: "",
     errno.EAGAIN: "`ulimit -u` says how many processes there may be",
-    errno.ENOSPC: "",
-    errno.EDQUOT: "",
     errno.EFBIG: "`ulimit -f` says how large a file may be",
 }
 """The errors of resources that can run out, with how to get more."""

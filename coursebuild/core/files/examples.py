@@ -1,15 +1,11 @@
 """Writing the lessons' scripts to `examples/`, but never over a file that somebody changed there.
 
-Entry point: `write_examples`.
-
 1. The manifest `examples/.extracted.json` holds the SHA-256 of what was last written to each path.
    A file with such a hash is ours; any other content is somebody's, and is reported with a diff,
-   never overwritten.
+   never overwritten. If the manifest is lost or damaged, the tool only becomes more careful.
 2. Before a file changes, the manifest gets its new hash beside the old one; afterwards it keeps the
    new one only. If the tool is killed in between, the file has one of the two.
 3. A script that no lesson has any more is removed if it is ours.
-
-If the manifest is lost or damaged, the tool only becomes more careful.
 """
 
 from __future__ import annotations
@@ -26,13 +22,8 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from coursebuild.core.files.errors import (
-    EffectError,
-    FileChangedError,
-    OutsideProjectError,
-    lacking,
-    reason,
-)
+from coursebuild.core.files import errors
+from coursebuild.core.files.errors import EffectError, FileChangedError, OutsideProjectError
 from coursebuild.core.files.write import remove_leftovers, resolve_inside, write_atomic
 
 FOLDER = "examples"
@@ -77,11 +68,9 @@ class ExamplesReport(Struct, frozen=True):
 
 
 def write_examples(root: Path, scripts: Mapping[str, bytes]) -> ExamplesReport:
-    """Bring `examples/` up to date.
+    """Bring `examples/` up to date with every script of the course, by its path below it.
 
-    Args:
-        root: the course folder; the caller holds its lock.
-        scripts: every script of the course by its path, POSIX, below `examples/`.
+    The caller holds the lock of the course's folder.
 
     Raises:
         EffectError: the folder cannot be written, or leads out of the project.
@@ -98,7 +87,7 @@ def write_examples(root: Path, scripts: Mapping[str, bytes]) -> ExamplesReport:
         return _Update(root, hashes_by_path, scripts).run()
     except OSError as error:
         place = os.path.relpath(error.filename, root) if error.filename else FOLDER
-        raise EffectError(f"{place} cannot be written: {reason(error)}") from None
+        raise EffectError(f"{place} cannot be written: {errors.reason(error)}") from None
 
 
 class _Update:
@@ -125,14 +114,12 @@ class _Update:
         (self.root / FOLDER).mkdir(exist_ok=True)
         folders = {FOLDER, *(path.rpartition("/")[0] for path in self.scripts)}
         remove_leftovers(self.root / folder for folder in folders)
-        before = {
-            path: tuple(
-                dict.fromkeys((*self.manifest.get(path, ()), *self.known_hashes.get(path, ())))
-            )
-            for path in self.manifest.keys() | set(self.removed)
-        }
         if self.written or self.removed:
-            _save_manifest(self.root, before)
+            hashes = {path: self.manifest.get(path, ()) for path in (*self.manifest, *self.removed)}
+            for path, new_hashes in hashes.items():
+                all_hashes = (*new_hashes, *self.known_hashes.get(path, ()))
+                hashes[path] = tuple(dict.fromkeys(all_hashes))
+            _save_manifest(self.root, hashes)
         for path in list(self.written):
             new, old = self.scripts[path], self.current[path]
             try:
@@ -145,15 +132,12 @@ class _Update:
         for path in list(self.removed):
             self._remove(path)
         _save_manifest(self.root, self.manifest)
+        blocked = tuple(sorted(self.blocked, key=lambda b: b.path))
         return ExamplesReport(
-            tuple(self.written),
-            tuple(self.unchanged),
-            tuple(self.removed),
-            tuple(sorted(self.blocked, key=lambda b: b.path)),
+            tuple(self.written), tuple(self.unchanged), tuple(self.removed), blocked
         )
 
     def _plan(self, path: str) -> None:
-        """Decide what to do about a script that a lesson has or had."""
         new, known_hashes = self.scripts.get(path), self.known_hashes.get(path)
         obstacle, current = self._look(path)
         if new is None and (obstacle is not None or current is None):
@@ -239,8 +223,6 @@ def _hash(data: bytes) -> str:
 
 
 class _Manifest(Struct, frozen=True):
-    """The hashes that each extracted file may have, by path."""
-
     version: int
     files: dict[str, tuple[str, ...]]
 
@@ -250,7 +232,9 @@ def _load_manifest(root: Path) -> dict[str, tuple[str, ...]]:
     try:
         files = msgspec.json.decode((root / MANIFEST).read_bytes(), type=_Manifest).files
     except OSError as error:
-        if lacking(error):  # an empty manifest would make all files look edited, now and later
+        if errors.lacking(
+            error
+        ):  # an empty manifest would make all files look edited, now and later
             raise
         return {}
     except ValueError:
@@ -270,7 +254,6 @@ def _save_manifest(root: Path, manifest: Mapping[str, tuple[str, ...]]) -> None:
             current = None
         if current == data:
             return
-        # Without locks, another run may write it at the same time.
-        with contextlib.suppress(FileChangedError):
+        with contextlib.suppress(FileChangedError):  # by another run, where there are no locks
             write_atomic(root, MANIFEST, data, expected=current, durable=False)
             return

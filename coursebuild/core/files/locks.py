@@ -1,10 +1,5 @@
 """Locks that vanish with the process that holds them, and temporary folders, which are locked.
 
-Entry points: `project_lock`, held by a command that writes into a course; `claim` and `unclaim`, of
-work that no other process should do at the same time; `folder_lock`, held while a site is swapped;
-`try_lock` and `is_abandoned`, which tell whether the writer of a temporary file
-is alive; `temporary_folder`, `remove_folder`.
-
 A lock is an flock: killing its holder frees it at once, so no lock can be stale. Where a file
 system has none, as on some network drives, it is filelock's file that names its holder; the next
 run takes over that of a process which is gone from this machine. Where the folder cannot be
@@ -55,21 +50,16 @@ def try_lock(fd: int) -> bool | None:
 def is_abandoned(fd: int) -> bool:
     """Whether the writer of a temporary file, who would hold it locked, is gone."""
     locked = try_lock(fd)
-    if locked is None:
-        return time.time() - os.fstat(fd).st_mtime > _LONG_AGO
-    return locked
+    return time.time() - os.fstat(fd).st_mtime > _LONG_AGO if locked is None else locked
 
 
 @contextlib.contextmanager
 def project_lock(
     root: Path, on_wait: Callable[[str], None] | None = None, *, name: str = "lock"
 ) -> Iterator[None]:
-    """Hold a lock of a course folder.
+    """Hold a lock of a course folder, which is a file of this name in its store.
 
-    Args:
-        root: the course folder; the lock is a file of its store.
-        on_wait: is called once, with a message, if another run has the lock for more than a moment.
-        name: the name of the lock's file.
+    `on_wait` is called once, with a message, if another run has the lock for more than a moment.
     """
     root = root.resolve()
     path = Path(find_store(str(root))[0], name)
@@ -183,7 +173,6 @@ def _waiting_message(holder: str) -> str:
 
 # --- temporary folders
 
-
 _PREFIX = "coursebuild.tmp."
 _NAME = re.compile(re.escape(_PREFIX) + r"[a-z0-9_]{8}")
 _OPEN_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -192,11 +181,7 @@ _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 @contextlib.contextmanager
 def temporary_folder() -> Iterator[str]:
-    """A new folder, removed at the end with everything in it.
-
-    Raises:
-        EffectError: there is no place for it.
-    """
+    """A new folder, removed at the end with all in it; an `EffectError` without a place."""
     import tempfile  # not above: processes that run scripts import this module, and not that
 
     try:
@@ -239,13 +224,9 @@ def _remove_abandoned(place: str) -> None:
 
 def remove_folder(folder: str) -> None:
     """Remove a temporary folder, even if a script has removed permissions in it."""
-    try:
+    with contextlib.suppress(OSError):
         os.rmdir(folder)  # noqa: PTH106 (mostly it is empty)
         return
-    except FileNotFoundError:
-        return
-    except OSError:
-        pass
     shutil.rmtree(folder, ignore_errors=True)
     if Path(folder).exists():
         with contextlib.suppress(OSError):

@@ -1,16 +1,10 @@
 """Reading a course: where it is, which files it has, what they say.
 
-Entry points: `find_root`, `read_course`, `read_bytes`.
-
-1. `content/` and `models/` are walked in sorted order, without what editors leave there (names that
-   begin with a dot, `x.md~`).
-2. Lessons, pages and models are decoded as strict UTF-8. Line ends and byte order marks stay, so
-   that edits by offset change no other byte.
-3. A file that cannot be read becomes a diagnostic. One that is not UTF-8 still becomes a source,
-   with U+FFFD for the wrong bytes, so that its other mistakes are found in the same run. Since it
-   differs from the file, no edit can be written back over that by mistake.
-4. A file that is no text at all, such as a picture, or is in UTF-16, becomes a diagnostic and
-   nothing else: any mistake found in it would be noise.
+Lessons, pages and models are decoded as strict UTF-8. Line ends and byte order marks stay, so that
+edits by offset change no other byte. A file that cannot be read becomes a diagnostic. One that is
+not UTF-8 still becomes a source, with U+FFFD for the wrong bytes, so that its other mistakes are
+found in the same run; since it differs from the file, no edit can be written back over that. A file
+that is no text at all, or is in UTF-16, is nothing else: any mistake found in it would be noise.
 """
 
 from __future__ import annotations
@@ -54,25 +48,18 @@ class CourseFiles(Struct, frozen=True):
 
 
 def find_root(path: Path | None, start: Path) -> Path:
-    """The course folder: the one named, or the nearest from `start` upwards with a course map.
-
-    Raises:
-        UsageError: the named folder is none, or there is no course here.
-    """
+    """The course folder: the one named, or the nearest from `start` upwards with a course map."""
     if path is not None:
         folder = start / path
-        if not folder.is_dir():
-            raise UsageError(
-                f"{path} is not a folder" if folder.exists() else f"there is no folder {path}"
-            )
-        return folder.resolve()
+        if folder.is_dir():
+            return folder.resolve()
+        problem = f"{path} is not a folder" if folder.exists() else f"there is no folder {path}"
+        raise UsageError(problem)
     root = find_course_root(str(start))
     if root is not None:
         return Path(root)
-    raise UsageError(
-        f"there is no {MAP} in this folder or one above it",
-        help="go to a course, or name one with `-C DIR`",
-    )
+    help = "go to a course, or name one with `-C DIR`"
+    raise UsageError(f"there is no {MAP} in this folder or one above it", help=help)
 
 
 def read_course(root: Path, open_texts: Mapping[str, str] = {}) -> Parsed[CourseFiles]:
@@ -83,19 +70,19 @@ def read_course(root: Path, open_texts: Mapping[str, str] = {}) -> Parsed[Course
     root = root.resolve()
     reader = _Reader(root, open_texts)
     files = [*reader.walk("content"), *reader.walk("models")]
-    lessons = [f for f in files if f.startswith("content/lessons/") and f.endswith(".md")]
-    pages = [f for f in files if f.startswith("content/pages/") and f.endswith(".md")]
-    models = [f for f in files if f.startswith("models/") and f.endswith(".xml")]
-    declarations = [f for f in files if f.startswith("models/") and f.endswith(".toml")]
+
+    def sources(folder: str, ending: str) -> tuple[Source, ...]:
+        return reader.sources([f for f in files if f.startswith(folder) and f.endswith(ending)])
+
     course_files = CourseFiles(
         map=reader.map(),
-        lessons=reader.sources(lessons),
-        pages=reader.sources(pages),
+        lessons=sources("content/lessons/", ".md"),
+        pages=sources("content/pages/", ".md"),
         models=tuple(
             MjcfModel(source.path.removeprefix("models/").removesuffix(".xml"), source)
-            for source in reader.sources(models)
+            for source in sources("models/", ".xml")
         ),
-        declarations=reader.sources(declarations),
+        declarations=sources("models/", ".toml"),
         files=tuple(sorted(files)),
         unreadable=tuple(sorted(reader.unreadable)),
     )
@@ -109,14 +96,9 @@ def read_bytes(root: Path, path: str) -> bytes:
         OutsideProjectError: it lies outside the project, or a link leads out of it.
         EffectError: it cannot be read.
     """
-    return _read_inside(root.resolve(), path)
-
-
-def _read_inside(root: Path, path: str) -> bytes:
-    """Like `read_bytes`, for a root without links."""
     if "\0" in path:
         raise EffectError("a path holds a null character")
-    if not Path(os.path.realpath(root / path)).is_relative_to(root):
+    if not Path(os.path.realpath(root / path)).is_relative_to(os.path.realpath(root)):
         raise OutsideProjectError(f"{path} {_OUTSIDE_REASON}")
     try:  # without waiting, even for a pipe
         fd = os.open(root / path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
@@ -150,8 +132,6 @@ def read_folder(root: Path, folder: str) -> Parsed[tuple[Source, ...]]:
 
 
 class _Reader:
-    """A reader of one course's files that collects diagnostics."""
-
     def __init__(self, root: Path, open_texts: Mapping[str, str] = {}) -> None:
         self.root = root
         self.open_texts = open_texts
@@ -159,7 +139,6 @@ class _Reader:
         self.unreadable: list[str] = []
 
     def map(self) -> Source | None:
-        """Read the course map; a missing one is a diagnostic."""
         if not (self.root / MAP).is_symlink() and not (self.root / MAP).exists():
             help = "the map names every level, lesson and page; start with `[course]`"
             message, place = f"there is no {MAP}", Source(MAP, "").span()
@@ -221,7 +200,6 @@ class _Reader:
             self._refuse(path, "is a folder" if stat.S_ISDIR(mode) else "is not a regular file")
 
     def sources(self, paths: list[str]) -> tuple[Source, ...]:
-        """Read and decode files; those that hold no text are left out."""
         sources = []
         for path in paths:
             if path in self.unreadable:
@@ -230,18 +208,13 @@ class _Reader:
                 sources.append(Source(path, self.open_texts[path]))
                 continue
             try:
-                data = _read_inside(self.root, path)
-            except OutsideProjectError:
-                self._refuse(path, _OUTSIDE_REASON)
+                source = self._decode(path, read_bytes(self.root, path))
+                sources += [] if source is None else [source]
             except EffectError as error:
                 self._refuse(path, error.message.removeprefix(f"{path} "))
-            else:
-                source = self._decode(path, data)
-                sources += [] if source is None else [source]
         return tuple(sources)
 
     def _decode(self, path: str, data: bytes) -> Source | None:
-        """Decode a file; `None` where it is not text."""
         is_text = not data.startswith(_UTF16) and data.count(0) <= len(data) * _MAX_NUL_SHARE
         # Text with many zeros is not text, even if it is UTF-8.
         position, problem = -1 if is_text else data.find(b"\0"), "is not text"

@@ -1,14 +1,12 @@
 """Files that come with the tool and are not Python.
 
-Entry points: `assets_dir`, the folder of what is bundled for browsers, and `Bundle`, its files;
-`templates_dir`, the folder of the pages' templates, and `template_texts`; `rules_page`, the page of
-all rules; `locked_requirements`, what the tool was tested with; `prepared_file`, by its key, and
-`prepared_folder`.
+An installed package holds all of them; in a source tree they are in `site/dist`, `templates`,
+`docs` and its root. Where a folder is missing, each function raises an `EffectError`: a source tree
+was not built, or the installation is broken.
 
-An installed package holds all of them. In a source tree they are in `site/dist`, `templates`,
-`docs` and its root. The modules `site/prepare_*.py` make the prepared files (fonts cut to their
-usual characters, templates, copies) when site/dist is made. A file whose input has changed since
-then has another key, is not found, and is made during the build.
+The modules `site/prepare_*.py` make the prepared files (fonts cut to their usual characters,
+templates, copies) when site/dist is made. A file whose input has changed since then has another
+key, is not found, and is made during the build.
 """
 
 from __future__ import annotations
@@ -23,47 +21,27 @@ from typing import Any
 from coursebuild.core.files.errors import EffectError
 
 _PACKAGE = Path(__file__).resolve().parents[2]
-_TREE = _PACKAGE.parent
 
 
 def assets_dir() -> Path:
-    """The bundled scripts, styles and fonts.
-
-    Raises:
-        EffectError: this is a source tree where they have not been built.
-    """
-    problem = "the browser's files are not built"
-    return _find_folder(_PACKAGE / "assets", _TREE / "site" / "dist", problem)
+    """The bundled scripts, styles and fonts."""
+    return _find_folder("assets", "site/dist", "the browser's files are not built")
 
 
 def templates_dir() -> Path:
-    """The templates of the pages.
-
-    Raises:
-        EffectError: the installation is broken.
-    """
-    problem = "the page templates are missing"
-    return _find_folder(_PACKAGE / "templates", _TREE / "templates", problem)
+    """The templates of the pages."""
+    return _find_folder("templates", "templates", "the page templates are missing")
 
 
 def rules_page() -> str:
-    """The Markdown page with a section and an example for each rule.
-
-    Raises:
-        EffectError: the installation is broken.
-    """
-    problem = "the page of rules is missing"
-    folder = _find_folder(_PACKAGE / "docs", _TREE / "docs/reference", problem)
+    """The Markdown page with a section and an example for each rule."""
+    folder = _find_folder("docs", "docs/reference", "the page of rules is missing")
     return (folder / "rules.md").read_text(encoding="utf-8")
 
 
 def locked_requirements() -> str:
-    """The packages that the tool was tested with, each with its hashes, as pip reads them.
-
-    Raises:
-        EffectError: the installation is broken.
-    """
-    folder = _find_folder(_PACKAGE / "locks", _TREE, "the locked requirements are missing")
+    """The packages that the tool was tested with, each with its hashes, as pip reads them."""
+    folder = _find_folder("locks", ".", "the locked requirements are missing")
     return (folder / "requirements.txt").read_text(encoding="utf-8")
 
 
@@ -91,8 +69,6 @@ class Bundle(Mapping[str, bytes]):
 
 
 def _paths(folder: Path) -> list[str]:
-    """The files below a folder by path relative to it, sorted."""
-
     def fail(error: OSError) -> None:
         raise error
 
@@ -112,18 +88,15 @@ def template_texts() -> tuple[tuple[str, str], ...]:
     )
 
 
-def _find_folder(installed: Path, in_tree: Path, problem: str) -> Path:
-    for folder in (installed, in_tree):
+def _find_folder(installed: str, in_tree: str, problem: str) -> Path:
+    for folder in (_PACKAGE / installed, _PACKAGE.parent / in_tree):
         if folder.is_dir():
             return folder
-    raise EffectError(
-        f"{problem}: there is no {installed}",
-        help="in a source tree, run `make site`; otherwise install coursebuild again",
-    )
+    help = "in a source tree, run `make site`; otherwise install coursebuild again"
+    raise EffectError(f"{problem}: there is no {_PACKAGE / installed}", help=help)
 
 
 # --- what is prepared when the tool is made
-
 
 PREPARED = "prepared"
 """Its name in the folder of the bundled files."""
@@ -143,9 +116,6 @@ def prepared_file(kind: str, key: str) -> bytes | None:
 @functools.cache
 def _read_list(name: str) -> dict[str, Any]:
     """The list of one kind of prepared files; empty in a bundle that was made without them."""
-    try:
-        text = (prepared_folder() / name).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return {}
-    files: dict[str, Any] = json.loads(text)
+    path = prepared_folder() / name
+    files: dict[str, Any] = json.loads(path.read_bytes()) if path.exists() else {}
     return files

@@ -1,8 +1,5 @@
 """What the tool believes of its own: data that this user's tool wrote, and nothing else.
 
-Entry points: `find_store`, the folder in which what is made for a course is kept; `make_store`;
-`seal` and `unseal`; `state_folder`.
-
 1. A key lies in the user's own state folder, never in a course. It is made when it is first needed.
    With `COURSEBUILD_STORE_KEY` in the environment it is made of that secret, so that a store can
    travel from machine to machine.
@@ -79,8 +76,26 @@ def store_key(root: str) -> bytes:
     if folder is None:
         return b""
     path = os.path.join(folder, "key")
+    new = f"{path}.{os.getpid()}"
     try:
-        return _read_key(path) or _make_key(path)
+        if key := _read_key(path):
+            return key
+        os.makedirs(folder, mode=0o700, exist_ok=True)
+        descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600)
+        try:
+            os.write(descriptor, os.urandom(_SIZE))
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        try:
+            os.link(new, path)  # unlike a rename it never replaces the key of another process
+        except OSError as error:
+            # The key that is there is cut, or another user's; or the file system has no links.
+            if not isinstance(error, FileExistsError) or not _read_key(path):
+                os.replace(new, path)
+        if os.path.lexists(new):
+            os.unlink(new)
+        return _read_key(path)
     except OSError:
         return b""
 
@@ -88,29 +103,6 @@ def store_key(root: str) -> bytes:
 def _read_key(path: str) -> bytes:
     data = _read(path, _SIZE, os.geteuid())
     return data if len(data) == _SIZE else b""
-
-
-def _make_key(path: str) -> bytes:
-    """Make the key's file, unless another process does so now; return what is in it."""
-    os.makedirs(os.path.dirname(path), mode=0o700, exist_ok=True)
-    new = f"{path}.{os.getpid()}"
-    descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600)
-    try:
-        os.write(descriptor, os.urandom(_SIZE))
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-    try:
-        os.link(new, path)  # unlike a rename it never replaces the key of another process
-    except FileExistsError:
-        if not _read_key(path):  # cut, or another user's
-            os.replace(new, path)
-            return _read_key(path)
-    except OSError:  # a file system without links
-        os.replace(new, path)
-        return _read_key(path)
-    os.unlink(new)
-    return _read_key(path)
 
 
 def _read(path: str, limit: int, user: int | None = None) -> bytes:
@@ -138,11 +130,8 @@ def find_store(root: str) -> tuple[str, str]:
     folder = os.path.join(root, FOLDER)
     key = store_key(root)
     if not key:
-        reason = (
-            "needs a key of its user's own, and there is nowhere to keep it: "
-            f"set HOME, XDG_STATE_HOME or {_SECRET}"
-        )
-        return _NOWHERE, reason
+        reason = "needs a key of its user's own, and there is nowhere to keep it"
+        return _NOWHERE, f"{reason}: set HOME, XDG_STATE_HOME or {_SECRET}"
     reason = _strangeness(root, folder, key)
     if not reason:
         return folder, ""
@@ -176,11 +165,7 @@ def _strangeness(root: str, folder: str, key: bytes) -> str:
 
 
 def make_store(folder: str, root: str) -> None:
-    """Make the folder that `find_store` has found, with the mark of its owner.
-
-    Raises:
-        OSError: it cannot be made.
-    """
+    """Make the folder that `find_store` has found, with the mark of its owner."""
     os.makedirs(folder, exist_ok=True)
     for name, data in ((_OWNER, seal(_OWNER, b"", store_key(root))), (".gitignore", b"*\n")):
         path = os.path.join(folder, name)
@@ -230,8 +215,22 @@ def _is_tracked(root: str) -> bool:
 
 def _names(index: bytes, target: bytes) -> bool:
     """Whether an index (gitformat-index(5)) has an entry of this name, or below it."""
-    if index[4:8] == b"\0\0\0\4":
-        index = _names_of_version_4(index)
+    if index[4:8] == b"\0\0\0\4":  # where each begins with a part of the one before: spell them out
+        at, name, names = 12, b"", []
+        try:
+            for _ in range(int.from_bytes(index[8:12], "big")):
+                at += 64 if index[at + 60] & 0x40 else 62
+                dropped = index[at] & 0x7F
+                while index[at] & 0x80:
+                    at += 1
+                    dropped = (dropped + 1 << 7) + (index[at] & 0x7F)
+                end = index.index(b"\0", at + 1)
+                name = name[: len(name) - dropped] + index[at + 1 : end]
+                names.append(min(len(name), 0xFFF).to_bytes(2, "big") + name + b"\0")
+                at = end + 1
+        except (IndexError, ValueError):  # damaged, or of a repository with longer hashes
+            pass
+        index = b"".join(names)
     text = index.lower()
     at = text.find(target)
     while at >= 0:
@@ -242,22 +241,3 @@ def _names(index: bytes, target: bytes) -> bool:
             return True
         at = text.find(target, at + 1)
     return False
-
-
-def _names_of_version_4(index: bytes) -> bytes:
-    """The names of an index in which each begins with a part of the one before, as others have."""
-    at, name, names = 12, b"", []
-    try:
-        for _ in range(int.from_bytes(index[8:12], "big")):
-            at += 64 if index[at + 60] & 0x40 else 62
-            dropped = index[at] & 0x7F
-            while index[at] & 0x80:
-                at += 1
-                dropped = (dropped + 1 << 7) + (index[at] & 0x7F)
-            end = index.index(b"\0", at + 1)
-            name = name[: len(name) - dropped] + index[at + 1 : end]
-            names.append(min(len(name), 0xFFF).to_bytes(2, "big") + name + b"\0")
-            at = end + 1
-    except (IndexError, ValueError):  # damaged, or of a repository with longer hashes
-        pass
-    return b"".join(names)

@@ -1,9 +1,5 @@
 """Writing files of a course: one, whole or not at all, or several together, all or none.
 
-Entry points: `write_atomic`, `check_writable`, `check_unchanged`, `remove_leftovers`;
-`change_files(root, changes)`; `undo_changes(root)`, before a command reads a course; `take_back`,
-the last changes whose journal was kept.
-
 1. The new bytes go into a temporary file in the same folder, locked as long as its writer is alive.
 2. They are synced to the disk, with the permissions and the owner of the file that they replace.
 3. If the file is still what the caller read, the temporary file is renamed over it.
@@ -49,14 +45,9 @@ def write_atomic(
 ) -> None:
     """Make `data` the content of a file of the course, or of the file that a link there leads to.
 
-    Args:
-        root: the course folder.
-        path: POSIX path relative to it.
-        data: the new content.
-        expected: the file's content when it was read; `None` if there was none, and perhaps no
-            folder either.
-        durable: whether it is an author's file, whose bytes must survive a power cut and which is
-            left alone if it is read-only. (A derived file can be made again.)
+    `expected` is the file's content when it was read; `None` if there was none, and perhaps no
+    folder either. `durable`: it is an author's file, whose bytes must survive a power cut and which
+    is left alone if it is read-only. (A derived file can be made again.)
 
     Raises:
         FileChangedError: the file has changed since; it stays as it is.
@@ -72,7 +63,15 @@ def write_atomic(
             target.parent.mkdir(parents=True, exist_ok=True)
         fd, temporary = _open_temporary(target.parent)
         try:
-            _fill(fd, data, target)
+            rest = memoryview(data)
+            while rest:
+                rest = rest[os.write(fd, rest) :]
+            with contextlib.suppress(FileNotFoundError):
+                old = target.stat()
+                with contextlib.suppress(PermissionError):  # only root may give a file away
+                    if (old.st_uid, old.st_gid) != (os.geteuid(), os.getegid()):
+                        os.fchown(fd, old.st_uid, old.st_gid)
+                os.fchmod(fd, stat.S_IMODE(old.st_mode))
             if durable:
                 os.fsync(fd)
             check_unchanged(target, path, expected)
@@ -96,11 +95,7 @@ def write_atomic(
 
 
 def resolve_inside(root: Path, path: str) -> Path:
-    """Resolve a path of the course, with all links.
-
-    Raises:
-        OutsideProjectError: it leads out of the project.
-    """
+    """Resolve a path with all links; an `OutsideProjectError` where it leads out of the course."""
     try:
         target = Path(os.path.realpath(root / path))
     except ValueError:  # NUL
@@ -141,7 +136,6 @@ def remove_leftovers(folders: Iterable[Path]) -> None:
 
 
 def _open_temporary(folder: Path) -> tuple[int, str]:
-    """Make a new locked file in a folder; return its descriptor and path."""
     while True:
         path = folder / f"{PREFIX}{os.urandom(6).hex()}"
         fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
@@ -152,39 +146,20 @@ def _open_temporary(folder: Path) -> tuple[int, str]:
         os.close(fd)
 
 
-def _fill(fd: int, data: bytes, target: Path) -> None:
-    rest = memoryview(data)
-    while rest:
-        rest = rest[os.write(fd, rest) :]
-    with contextlib.suppress(FileNotFoundError):
-        old = target.stat()
-        with contextlib.suppress(PermissionError):  # only root may give a file away
-            if (old.st_uid, old.st_gid) != (os.geteuid(), os.getegid()):
-                os.fchown(fd, old.st_uid, old.st_gid)
-        os.fchmod(fd, stat.S_IMODE(old.st_mode))
-
-
 def _move(temporary: str, target: Path, path: str, *, new: bool) -> None:
-    if new:  # a link, unlike a rename, never replaces a file that somebody just made
-        try:
+    try:
+        if new:  # a link, unlike a rename, never replaces a file that somebody just made
             os.link(temporary, target)
             return
-        except FileExistsError:
-            raise FileChangedError(
-                f"{path} was created by another program in the meantime"
-            ) from None
-        except OSError:
-            pass  # a file system without links
+    except FileExistsError:
+        raise FileChangedError(f"{path} was created by another program in the meantime") from None
+    except OSError:
+        pass  # a file system without links
     Path(temporary).replace(target)
 
 
 def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
-    """Check that a file has the expected content; `None` stands for no file.
-
-    Raises:
-        FileChangedError: it has another.
-        EffectError: it cannot be read.
-    """
+    """Raise a `FileChangedError` unless a file has this content, or there is none (`None`)."""
     try:
         current: bytes | None = target.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
@@ -199,13 +174,11 @@ def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
         raise FileChangedError(f"{path} was removed in the meantime")
     if expected is None:
         raise FileChangedError(f"{path} was created by another program in the meantime")
-    raise FileChangedError(
-        f"{path} was changed in the meantime", help="nothing was written; run the command again"
-    )
+    help = "nothing was written; run the command again"
+    raise FileChangedError(f"{path} was changed in the meantime", help=help)
 
 
 # --- several files
-
 
 _CLOSED = frozenset({".git", ".venv", FOLDER})
 """Folders of the project in which nothing is made."""
@@ -286,8 +259,7 @@ def take_back(
     current_journal = journal_path(root)
     for journal in reversed(_kept_journals(current_journal) if current_journal else []):
         try:
-            data = unseal(_NAME, journal.read_bytes(), store_key(str(root)))
-            changes = msgspec.msgpack.decode(data or b"", type=tuple[FileChange, ...])
+            changes = _unseal_changes(root, journal.read_bytes())
         except (*DAMAGE, FileNotFoundError):
             journal.unlink(missing_ok=True)
             continue
@@ -304,17 +276,19 @@ def take_back(
     return None
 
 
+def _unseal_changes(root: Path, journal: bytes) -> tuple[FileChange, ...]:
+    """The changes of a journal; one of `DAMAGE` is raised where it is damaged, or not ours."""
+    data = unseal(_NAME, journal, store_key(str(root)))
+    return msgspec.msgpack.decode(data or b"", type=tuple[FileChange, ...])
+
+
 def _kept_journals(journal: Path) -> list[Path]:
     """The journals of changes that can be taken back, the last one at the end."""
     return sorted(journal.parent.glob(f"{journal.name}.{'[0-9]' * 9}"))
 
 
 def undo_changes(root: Path, tell: Callable[[str], None] | None = None) -> None:
-    """Undo the changes of a command that was killed; `tell` gets a line that says what was undone.
-
-    Raises:
-        EffectError: a file cannot be written.
-    """
+    """Undo the changes of a command that was killed; `tell` gets a line that says which."""
     journal = journal_path(root)
     if journal is not None and journal.exists():
         with project_lock(root), project_lock(root, name=_LOCK):  # whoever is at work holds it
@@ -333,22 +307,19 @@ def journal_path(root: Path) -> Path | None:
 def _undo(root: Path, tell: Callable[[str], None] | None) -> None:
     journal = journal_path(root)
     try:
-        data = journal.read_bytes() if journal is not None else b""
+        data = None if journal is None else journal.read_bytes()
     except OSError:
         return
-    if journal is None:
+    if journal is None or data is None:
         return
-    journaled = unseal(_NAME, data, store_key(str(root)))
     try:
-        changes = msgspec.msgpack.decode(journaled or b"", type=tuple[FileChange, ...])
+        changes = _unseal_changes(root, data)
         for change in changes:
             _check_path(root, change)
     except (*DAMAGE, OutsideProjectError):
         journal.replace(journal.with_suffix(".damaged"))
-        message = (
-            "an interrupted command left a damaged journal, so nothing was undone: "
-            "check the files that it was changing"
-        )
+        message = "an interrupted command left a damaged journal, so nothing was undone"
+        message += ": check the files that it was changing"
     else:
         message = _restore(root, changes)
         remove_leftovers({(root / change.path).parent for change in changes})
@@ -370,13 +341,11 @@ def _restore(root: Path, changes: Sequence[FileChange]) -> str:
                 restored_paths.append(change.path)
             except FileChangedError:
                 edited_paths.append(change.path)
-    message = ""
-    if restored_paths:
-        message = f"undid a change that was interrupted: {', '.join(sorted(restored_paths))}"
-    if edited_paths:
-        names = ", ".join(sorted(edited_paths))
-        message += f"{'; ' if message else ''}left as edited since: {names}"
-    return message
+    outcomes = {
+        "undid a change that was interrupted": restored_paths,
+        "left as edited since": edited_paths,
+    }
+    return "; ".join(f"{verb}: {', '.join(sorted(p))}" for verb, p in outcomes.items() if p)
 
 
 def _check_path(root: Path, change: FileChange) -> Path:
@@ -396,7 +365,6 @@ def _check_path(root: Path, change: FileChange) -> Path:
 
 
 def _replace(root: Path, path: str, old: bytes | None, new: bytes | None) -> None:
-    """Replace the content `old` of a file by `new`."""
     if new is not None:
         write_atomic(root, path, new, expected=old)
         return

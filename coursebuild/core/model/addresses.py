@@ -1,10 +1,7 @@
 """Relative addresses in a document, and the anchors of listings, outputs and models.
 
-Entry points: `local_file`, `resolve`; `document_anchors`, all of a document; `listing_anchor`,
-`line_anchor`, `output_anchor` and `model_anchors`. A link to the file of a lesson or page means the
-lesson or page itself, so that the same link works on the site and where the files are read.
-
-`recorded_figures`: files of the course that scripts draw, with their data.
+A link to the file of a lesson or page means the lesson or page itself, so that the same link works
+on the site and where the files are read.
 """
 
 from __future__ import annotations
@@ -17,18 +14,7 @@ from urllib.parse import unquote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.core.model.blocks import (
-    Block,
-    Document,
-    FeatureBlock,
-    FigureName,
-    Heading,
-    HtmlBlock,
-    NumberedItem,
-    Paragraph,
-    Recording,
-    Script,
-)
+from coursebuild.core.model import blocks, walk
 from coursebuild.core.model.course import Course
 from coursebuild.core.model.inlines import (
     Image,
@@ -40,17 +26,6 @@ from coursebuild.core.model.inlines import (
     Target,
     Term,
     UrlTarget,
-)
-from coursebuild.core.model.walk import (
-    DisplayFormula,
-    block_inlines,
-    display_formulas,
-    document_blocks,
-    document_scripts,
-    find_blocks,
-    labelled_blocks,
-    output_numbers,
-    walk_inlines,
 )
 from coursebuild.core.text.source import Source, Span
 
@@ -82,7 +57,9 @@ def resolve(target: Target, course: Course, document_path: str) -> Target:
     return target
 
 
-AnchorOwner: TypeAlias = Block | Inline | Label | DisplayFormula | NumberedItem | Source
+AnchorOwner: TypeAlias = (
+    blocks.Block | Inline | Label | walk.DisplayFormula | blocks.NumberedItem | Source
+)
 """What an anchor of a document leads to; a source for the title of a page."""
 
 _HTML_ID = re.compile(r"""<[^<>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
@@ -93,12 +70,8 @@ _NO_MARKUP = re.compile(
 """Text in HTML in which no tag begins; what nothing closes goes on to the end."""
 
 
-def document_anchors(document: Document) -> Iterator[tuple[str, AnchorOwner, Span]]:
-    """The ids that a link may name in a document, with what they lead to and its place.
-
-    Ids of its title, headings, blocks of features, listings, outputs, formulas, labels and terms,
-    and those in raw HTML; not those of single lines of listings.
-    """
+def document_anchors(document: blocks.Document) -> Iterator[tuple[str, AnchorOwner, Span]]:
+    """The ids that a link may name, with what they lead to; not those of lines of listings."""
     source = document.source
     if document.title_anchor:
         yield document.title_anchor, source, source.span(0, 0)
@@ -107,22 +80,24 @@ def document_anchors(document: Document) -> Iterator[tuple[str, AnchorOwner, Spa
         at = 0 if label is None else label.start()
         yield item.id, item, source.span(at, at)
     if document.summaries is None:
-        for displayed in filter(lambda formula: formula.id, display_formulas(document)):
+        for displayed in filter(lambda formula: formula.id, walk.display_formulas(document)):
             yield displayed.id, displayed, source.span(displayed.start, displayed.start)
-        yield from ((label.id, label, block.span) for block, label in labelled_blocks(document))
-    numbers = output_numbers(document)
-    for block in document_blocks(document):
-        if isinstance(block, Heading):
+        yield from (
+            (label.id, label, block.span) for block, label in walk.labelled_blocks(document)
+        )
+    numbers = walk.output_numbers(document)
+    for block in walk.document_blocks(document):
+        if isinstance(block, blocks.Heading):
             yield block.anchor, block, block.span
-        elif isinstance(block, FeatureBlock):
+        elif isinstance(block, blocks.FeatureBlock):
             yield from ((id, block, block.span) for id in block.anchors() if id)
-        elif isinstance(block, Script):
+        elif isinstance(block, blocks.Script):
             yield listing_anchor(block.path), block, block.span
-        elif isinstance(block, Recording) and block.script is not None:
+        elif isinstance(block, blocks.Recording) and block.script is not None:
             yield output_anchor(block.script, numbers[block.span.start]), block, block.span
-        elif isinstance(block, HtmlBlock):
+        elif isinstance(block, blocks.HtmlBlock):
             yield from ((id, block, block.span) for id in _html_ids(block.html))
-        for inline in walk_inlines(block_inlines(block)):
+        for inline in walk.walk_inlines(walk.block_inlines(block)):
             if isinstance(inline, RawInline):
                 yield from ((id, inline, inline.span) for id in _html_ids(inline.html))
             elif isinstance(inline, Term):
@@ -133,17 +108,14 @@ def _html_ids(html: str) -> list[str]:
     return _HTML_ID.findall(_NO_MARKUP.sub(r"\1", html))
 
 
-def heading_anchors(document: Document) -> frozenset[str]:
+def heading_anchors(document: blocks.Document) -> frozenset[str]:
     """The anchors of a document's headings and of its title."""
-    anchors = (heading.anchor for heading in find_blocks(document, Heading))
+    anchors = (heading.anchor for heading in walk.find_blocks(document, blocks.Heading))
     return frozenset((document.title_anchor, *anchors)) - {""}
 
 
 def listing_anchor(path: str) -> str:
-    """The anchor of a listing: `l4_2_inertia.py` for the script `examples/l4_2_inertia.py`.
-
-    It has a dot, which no anchor made from a heading's text has.
-    """
+    """The anchor of a listing, `l4_2_inertia.py`; its dot is in no anchor made from a heading."""
     return re.sub(r"\s", "\u2423", path.removeprefix("examples/").removeprefix("models/"))
 
 
@@ -175,11 +147,7 @@ _LINES = re.compile(r"(?P<stem>.+)\.L(?P<first>[1-9][0-9]{0,8})(?:-L(?P<last>[1-
 
 
 def linked_lines(anchor: str) -> tuple[str, int, int] | None:
-    """The listing's stem and the first and last line that an anchor names.
-
-    `l4_2_inertia.L12-L20` gives `("l4_2_inertia", 12, 20)`; any other anchor, or a range that ends
-    before it begins, gives `None`.
-    """
+    """The listing's stem and the first and last line of an anchor, as in `l4_2_inertia.L12-L20`."""
     match = _LINES.fullmatch(anchor)
     if match is None:
         return None
@@ -193,27 +161,23 @@ class RecordedFigure(Struct, frozen=True):
 
     script: str
     name: str
-    """The name under which the script saves it."""
     path: str
-    """The file of the course that the lesson shows."""
     span: Span
-    """Where the lesson names the figure."""
 
     @property
     def has_dark(self) -> bool:
-        """Whether there is also a drawing for dark pages."""
         return self.name.endswith(".svg")
 
 
-def recorded_figures(document: Document) -> tuple[RecordedFigure, ...]:
+def recorded_figures(document: blocks.Document) -> tuple[RecordedFigure, ...]:
     """The figures of a document's scripts that its paragraphs show, each followed by its data."""
     script_by_name: dict[str, str] = {}
     figures: list[RecordedFigure] = []
-    for block in document_blocks(document):
-        if isinstance(block, Script):
+    for block in walk.document_blocks(document):
+        if isinstance(block, blocks.Script):
             script_by_name |= {figure.name: block.path for figure in block.figures}
-        elif isinstance(block, Paragraph) and block.figure:
-            inlines = walk_inlines(block_inlines(block))
+        elif isinstance(block, blocks.Paragraph) and block.figure:
+            inlines = walk.walk_inlines(walk.block_inlines(block))
             image = next(inline for inline in inlines if isinstance(inline, Image))
             path = local_file(image.url, document.source.path)
             for file in (path, f"{posixpath.splitext(path)[0]}.csv"):
@@ -223,12 +187,12 @@ def recorded_figures(document: Document) -> tuple[RecordedFigure, ...]:
     return tuple(figures)
 
 
-def unshown_figures(document: Document) -> tuple[FigureName, ...]:
+def unshown_figures(document: blocks.Document) -> tuple[blocks.FigureName, ...]:
     """The figures of a document's scripts that no paragraph below shows, and data without one."""
     shown_names = {(figure.script, figure.name) for figure in recorded_figures(document)}
     return tuple(
         figure
-        for script in document_scripts(document)
+        for script in walk.document_scripts(document)
         for figure in script.figures
         if (script.path, figure.name) not in shown_names
     )

@@ -1,7 +1,4 @@
-"""Blocks: what a document is made of.
-
-Entry points: the union `Block`, and `Document`.
-"""
+"""Blocks: what a document is made of."""
 
 from __future__ import annotations
 
@@ -13,27 +10,25 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.model.inlines import ForbiddenHtml, Inline, Label, MediaAddress
+from coursebuild.core.model.inlines import Inline, Label, Located, RawHtml
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 _TITLE = re.compile(r"\ufeff?(?:[ \t\r]*\n)*# +(.*\S)")
 
 
-class Labelled(Struct, frozen=True, kw_only=True):
+class Labelled(Located, frozen=True, kw_only=True):
     """What a label can give a number to."""
 
     label: Label | None = None
 
 
-class Heading(Struct, frozen=True):
+class Heading(Located, frozen=True):
     """A heading; `anchor` is unique in its document."""
 
-    span: Span
     level: int
     children: tuple[Inline, ...]
     anchor: str
     explicit: bool
-    """Whether the anchor was given by `{#id}`."""
     classes: tuple[str, ...] = ()
 
     @property
@@ -45,40 +40,35 @@ class Heading(Struct, frozen=True):
 class Paragraph(Labelled, frozen=True):
     """A paragraph; a `tight` one, in a tight list, gets no `<p>`."""
 
-    span: Span
     children: tuple[Inline, ...]
     tight: bool = False
     figure: bool = False
     """Whether it begins with `Figure:` and shows an image; the rest of it is the caption."""
 
 
-class ListItem(Struct, frozen=True):
+class ListItem(Located, frozen=True):
     """An item of a list; `checked` is set for task lists."""
 
-    span: Span
     blocks: tuple[Block, ...]
     checked: bool | None = None
 
 
-class ListBlock(Struct, frozen=True):
+class ListBlock(Located, frozen=True):
     """A list; `start` is the first number of an ordered one, `None` for bullets."""
 
-    span: Span
     items: tuple[ListItem, ...]
     start: int | None
 
 
-class BlockQuote(Struct, frozen=True):
+class BlockQuote(Located, frozen=True):
     """A blockquote that is not a callout."""
 
-    span: Span
     blocks: tuple[Block, ...]
 
 
-class Callout(Struct, frozen=True):
+class Callout(Located, frozen=True):
     """`> [!kind] Title`."""
 
-    span: Span
     kind: str
     kind_span: Span
     title: tuple[Inline, ...]
@@ -88,40 +78,25 @@ class Callout(Struct, frozen=True):
 
 
 class CodeBlock(Labelled, frozen=True):
-    """A fenced or indented code block that has no meaning of its own here.
+    """A code block that has no meaning of its own here; `language` is the first word of `info`."""
 
-    `info` is the raw info string, `language` its first word.
-    """
-
-    span: Span
     language: str
     info: str
     code: Excerpt
 
 
-class HtmlBlock(Struct, frozen=True):
+class HtmlBlock(RawHtml, frozen=True):
     """A block of raw HTML."""
 
-    span: Span
-    html: str
-    media: tuple[MediaAddress, ...] = ()
-    forbidden: tuple[ForbiddenHtml, ...] = ()
 
+class HtmlFlow(Located, frozen=True):
+    """HTML in a quiz text: raw tags and inlines, as math between the tags is still math."""
 
-class HtmlFlow(Struct, frozen=True):
-    """HTML in a quiz text, where math between the tags is still math.
-
-    `children` are raw tags and inlines in order, without a paragraph around them.
-    """
-
-    span: Span
     children: tuple[Inline, ...]
 
 
-class ThematicBreak(Struct, frozen=True):
+class ThematicBreak(Located, frozen=True):
     """`---`."""
-
-    span: Span
 
 
 class MathBlock(Labelled, frozen=True):
@@ -130,14 +105,12 @@ class MathBlock(Labelled, frozen=True):
     display: ClassVar[bool] = True
     meaning: ClassVar[None] = None
 
-    span: Span
     tex: Excerpt
 
 
-class Cell(Struct, frozen=True):
+class Cell(Located, frozen=True):
     """A table cell; `text` is its Markdown, with escaped pipes unescaped."""
 
-    span: Span
     text: Excerpt
     children: tuple[Inline, ...]
 
@@ -145,7 +118,6 @@ class Cell(Struct, frozen=True):
 class Table(Labelled, frozen=True):
     """A table; `align` has one entry per column."""
 
-    span: Span
     align: tuple[Literal["left", "right", "center"] | None, ...]
     header: tuple[Cell, ...]
     rows: tuple[tuple[Cell, ...], ...]
@@ -163,7 +135,6 @@ class FigureName(Struct, frozen=True):
 class Script(Labelled, frozen=True):
     """A complete script: ```` ```python file=examples/x.py ````."""
 
-    span: Span
     path: str
     path_span: Span
     code: Excerpt
@@ -180,15 +151,11 @@ class Script(Labelled, frozen=True):
     body_span: Span
     """The lines between the fences, to the start of the closing one."""
     diverges: bool = False
-    """Whether the author expects a simulation in it to diverge."""
     deep: bool = False
-    """Whether the author expects deep penetrations of bodies in it."""
     writes: tuple[str, ...] = ()
-    """Folders of the project that it may write into."""
     once: bool = False
     """Whether the course keeps its output, and it runs only on request."""
     figures: tuple[FigureName, ...] = ()
-    """The figures that it draws."""
 
 
 class Mode(enum.Enum):
@@ -250,12 +217,10 @@ class Recording(Struct, frozen=True):
     caption_span: Span
     """That of the fence's first line if there is no caption."""
     body: Excerpt | Table
-    """The text between the fences, or the table."""
     body_span: Span
     """The lines between the fences (from the start of the first to the start of the closing fence);
     for a table all of it."""
     prefix: str
-    """The text before each line in the lesson."""
     comparison: Comparison | None
     """`None`: the course's default."""
     script: str | None
@@ -265,12 +230,8 @@ class Recording(Struct, frozen=True):
 
 
 class Mjcf(Labelled, frozen=True):
-    """A model or fragment in MJCF.
+    """A model, or what belongs into the element `fragment`; it may have to fail with `error`."""
 
-    `fragment` names the element that it belongs into, `error` the message it must fail with.
-    """
-
-    span: Span
     code: Excerpt
     fragment: str | None
     error: str | None
@@ -284,28 +245,20 @@ class SourcePart(Struct, frozen=True):
     part: str
     """The name of a function, class or method; empty for the whole file."""
     place: Span
-    """Where the fence names it."""
     body_span: Span
     prefix: str
-    """The text before each line in the lesson."""
 
 
 class PlainCode(Labelled, frozen=True):
     """A Python block without `file=`, shown but not run; a `fragment` need not parse."""
 
-    span: Span
     code: Excerpt
     fragment: bool
     source: SourcePart | None = None
 
 
 class FeatureBlock(Labelled, frozen=True):
-    """A block that a feature adds; its methods answer what the rest of the tool must know.
-
-    A block without something need not override the method.
-    """
-
-    span: Span
+    """A block that a feature adds; its methods answer what the rest of the tool must know."""
 
     def child_blocks(self) -> tuple[Block, ...]:
         """The Markdown blocks in it, in the order of the page."""
@@ -367,13 +320,9 @@ Block: TypeAlias = (
 )
 
 
-class Footnote(Struct, frozen=True):
-    """A footnote that the text refers to.
+class Footnote(Located, frozen=True):
+    """A footnote that the text refers to; numbers follow the order of first reference."""
 
-    `number` is its place in the order of first reference, `references` how many there are.
-    """
-
-    span: Span
     label: str
     number: int
     references: int
@@ -384,7 +333,6 @@ class NumberedItem(Struct, frozen=True):
     """What a label has given a number, and any formula on a line of its own."""
 
     id: str
-    """Its anchor."""
     number: str = ""
     """The number among those of its kind, such as `3`; empty for a formula without a label."""
     has_margin_number: bool = False
@@ -392,7 +340,6 @@ class NumberedItem(Struct, frozen=True):
 
     @property
     def kind(self) -> str:
-        """One of `LABEL_KINDS`."""
         return self.id.partition(":")[0]
 
 

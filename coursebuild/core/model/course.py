@@ -1,7 +1,4 @@
-"""The course: its map and its look, its lessons and pages, its models.
-
-Entry point: `Course`.
-"""
+"""The course: its map and its look, its lessons and pages, its models."""
 
 from __future__ import annotations
 
@@ -14,6 +11,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import fields
 from coursebuild.core.model.blocks import Comparison, Document, Filter, Recording
+from coursebuild.core.model.fields import Slug, WebPlace, describe, matching
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.text.source import Source, Span, key_of
@@ -24,13 +22,10 @@ class ThemeFile(Struct, frozen=True):
 
     path: str
     span: Span
-    """Where the map names it."""
     data: bytes = b""
-    """Its content, once it has been read."""
 
     @property
     def ending(self) -> str:
-        """`svg`."""
         return self.path.rpartition(".")[2]
 
     @property
@@ -54,7 +49,6 @@ class Theme(Struct, frozen=True):
     icon: ThemeFile | None = None
     touch_icon: ThemeFile | None = None
     accent: str = ""
-    """The colour of links and buttons, as `#rrggbb`."""
     accent_dark: str = ""
     css: tuple[ThemeFile, ...] = ()
     fonts: tuple[FontFamily, ...] = ()
@@ -68,14 +62,12 @@ class Theme(Struct, frozen=True):
 
     @property
     def template_texts(self) -> tuple[tuple[str, str], ...]:
-        """The names and texts of its templates."""
         return tuple(
             (source.path.removeprefix(TEMPLATES), source.text) for source in self.templates
         )
 
 
 PICTURES = ("logo", "logo_dark", "icon", "touch_icon")
-"""The fields of its pictures."""
 TEMPLATES = "theme/templates/"
 
 
@@ -84,7 +76,7 @@ _LICENCE = re.compile("copyright|licen[cs]e", re.IGNORECASE)
 
 LessonId: TypeAlias = Annotated[
     str,
-    fields.matching(
+    matching(
         r"^[A-Za-z0-9]+(\.[A-Za-z0-9]+)+$",
         "letters and digits in parts joined by dots, as in `4.2` or `A.1`",
     ),
@@ -94,31 +86,29 @@ LessonId: TypeAlias = Annotated[
 class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A lesson, written or planned."""
 
-    id: Annotated[LessonId, Meta(description="its level's id, a dot and its own part")]
-    slug: Annotated[fields.Slug, Meta(description="with the id, the name of its file and page")]
-    title: Annotated[fields.Text, Meta(description="plain text")]
+    id: Annotated[LessonId, describe("its level's id, a dot and its own part")]
+    slug: Annotated[Slug, describe("with the id, the name of its file and page")]
+    title: Annotated[fields.Text, describe("plain text")]
     status: Annotated[
-        Literal["complete", "draft", "planned"],
-        Meta(description="a planned lesson has no file yet"),
+        Literal["complete", "draft", "planned"], describe("a planned lesson has no file yet")
     ]
-    summary: Annotated[str, Meta(description="one sentence, for the course map")] = ""
+    summary: Annotated[str, describe("one sentence, for the course map")] = ""
     aliases: Annotated[
-        tuple[fields.Text, ...], Meta(description="other names, by which the search finds it")
+        tuple[fields.Text, ...], describe("other names, by which the search finds it")
     ] = ()
     objectives: Annotated[
-        tuple[fields.Text, ...], Meta(description="what a learner can do afterwards")
+        tuple[fields.Text, ...], describe("what a learner can do afterwards")
     ] = ()
     prerequisites: Annotated[
-        tuple[fields.Text, ...],
-        Meta(description="ids of lessons to read first; circles are errors"),
+        tuple[fields.Text, ...], describe("ids of lessons to read first; circles are errors")
     ] = ()
     minutes: Annotated[
         Annotated[int, Meta(ge=1, le=100_000)] | None,
-        Meta(description="the time to read it and work through it, without what goes further"),
+        describe("the time to read it and work through it, without what goes further"),
     ] = None
     further: Annotated[
         Annotated[int, Meta(ge=1, le=100_000)] | None,
-        Meta(description="minutes of the sections marked `{.further}`"),
+        describe("minutes of the sections marked `{.further}`"),
     ] = None
 
 
@@ -126,14 +116,12 @@ class Lesson(LessonTable, frozen=True, kw_only=True):
     """A lesson of the map; `document` is `None` for a planned one."""
 
     span: Span
-    """Its entry in the course map."""
     prerequisite_spans: tuple[Span, ...]
     level: str
     document: Document | None
 
     @property
     def path(self) -> str:
-        """The path of its file, whether written or not."""
         return f"content/lessons/{self.id}-{self.slug}.md"
 
 
@@ -159,7 +147,6 @@ class Page(Struct, frozen=True):
     path: str
     document: Document | None
     menu: bool = True
-    """Whether it is in the menu of every page."""
     names: bool = True
     """Whether names in its inline code have to be known."""
     section: str = ""
@@ -172,7 +159,6 @@ class Page(Struct, frozen=True):
 
 
 Owner: TypeAlias = Lesson | Page
-"""The owner of a document."""
 
 
 class MjcfModel(Struct, frozen=True):
@@ -195,25 +181,24 @@ class CalloutKind(Struct, frozen=True):
     name: str
     label: str = ""
     promise: str = ""
-    """What it promises the reader."""
 
 
 class Pace(Struct, frozen=True, forbid_unknown_fields=True):
     """How fast a learner works; the minutes of lessons are checked against it."""
 
-    words: Annotated[float, Meta(gt=0, description="words of text in a minute")]
-    lines: Annotated[float, Meta(gt=0, description="lines of code or output in a minute")]
-    task: Annotated[float, Meta(ge=0, description="minutes for a question, or to try a lab")]
+    words: Annotated[float, describe("words of text in a minute", gt=0)]
+    lines: Annotated[float, describe("lines of code or output in a minute", gt=0)]
+    task: Annotated[float, describe("minutes for a question, or to try a lab", ge=0)]
 
 
 class Silence(Struct, frozen=True, forbid_unknown_fields=True):
     """A warning that is not shown."""
 
-    rule: Annotated[str, Meta(pattern=r"\S", description="the name of a warning")]
-    reason: Annotated[str, Meta(description="why")] = ""
+    rule: Annotated[str, describe("the name of a warning", pattern=r"\S")]
+    reason: Annotated[str, describe("why")] = ""
     path: Annotated[
         Annotated[str, Meta(pattern=r"\S")] | None,
-        Meta(description="only in these files; `*` and `?` stand for anything"),
+        describe("only in these files; `*` and `?` stand for anything"),
     ] = None
 
 
@@ -228,47 +213,42 @@ class Launch(Struct, frozen=True, forbid_unknown_fields=True):
     """Where readers can run the notebooks of lessons, which lie in a repository of the site."""
 
     repository: Annotated[
-        fields.WebPlace | None,
-        Meta(description="with the built site; without it, that of `[course]`"),
+        WebPlace | None, describe("with the built site; without it, that of `[course]`")
     ] = None
-    branch: Annotated[fields.Text, Meta(description="the branch with the built site")] = "gh-pages"
+    branch: Annotated[fields.Text, describe("the branch with the built site")] = "gh-pages"
     folder: Annotated[
-        str, Meta(description="the folder of the built site in it, as in `docs`; else the top")
+        str, describe("the folder of the built site in it, as in `docs`; else the top")
     ] = ""
-    colab: Annotated[bool, Meta(description="a button for Google Colab; needs GitHub")] = False
+    colab: Annotated[bool, describe("a button for Google Colab; needs GitHub")] = False
     binder: Annotated[
-        fields.WebPlace | None,
-        Meta(description="a button for this Binder, as in `https://mybinder.org`"),
+        WebPlace | None, describe("a button for this Binder, as in `https://mybinder.org`")
     ] = None
     jupyterhub: Annotated[
-        fields.WebPlace | None,
-        Meta(description="a button for this JupyterHub, which needs nbgitpuller"),
+        WebPlace | None, describe("a button for this JupyterHub, which needs nbgitpuller")
     ] = None
-    codespaces: Annotated[bool, Meta(description="a button for GitHub Codespaces")] = False
+    codespaces: Annotated[bool, describe("a button for GitHub Codespaces")] = False
 
 
 class Limits(Struct, frozen=True, forbid_unknown_fields=True):
     """How much reading and trying the course may take."""
 
     text: Annotated[
-        int, Meta(ge=1, le=100_000_000, description="characters of a lesson, page or model")
+        int, describe("characters of a lesson, page or model", ge=1, le=100_000_000)
     ] = 250_000
-    scripts: Annotated[int, Meta(ge=1, le=1 << 20, description="MiB that a script may take")] = (
-        16_384
-    )
+    scripts: Annotated[int, describe("MiB that a script may take", ge=1, le=1 << 20)] = 16_384
     memory: Annotated[
-        int, Meta(ge=1, le=1 << 20, description="MiB for compiling a model, and for trying a lab")
+        int, describe("MiB for compiling a model, and for trying a lab", ge=1, le=1 << 20)
     ] = 896
     models: Annotated[
         float,
-        Meta(
+        describe(
+            "seconds of processor time for compiling all models; one may take half",
             gt=0,
             le=100_000,
-            description="seconds of processor time for compiling all models; one may take half",
         ),
     ] = 8.0
     lab: Annotated[
-        float, Meta(gt=0, le=100_000, description="seconds of processor time for trying one lab")
+        float, describe("seconds of processor time for trying one lab", gt=0, le=100_000)
     ] = 8.0
 
 
@@ -276,7 +256,6 @@ class Course(Struct, frozen=True):
     """A whole course."""
 
     map: Source
-    """course.toml."""
     title: str
     summary: str
     language: str
@@ -284,7 +263,6 @@ class Course(Struct, frozen=True):
     repository: str
     licence: str
     engine: str | None
-    """The MuJoCo version that the course is written for."""
     engine_span: Span
     truth: float | None
     """The share of the numbers in the text that must be proven."""
@@ -305,11 +283,8 @@ class Course(Struct, frozen=True):
     packages: tuple[NamedPath, ...] = ()
     """Folders that scripts import from, after their own and before all others."""
     environment: tuple[tuple[str, str], ...] = ()
-    """Environment variables of scripts, sorted."""
     python: NamedPath | None = None
-    """The interpreter of the scripts, if not the one that runs this tool."""
     strict: bool = False
-    """Whether warnings count as errors."""
     unproven: tuple[NamedPath, ...] = ()
     """The scripts that need not have been run where warnings count as errors."""
     names: tuple[str, ...] = ()
@@ -323,7 +298,6 @@ class Course(Struct, frozen=True):
     width: int = 0
     """The columns to which `fmt` wraps text; 0 leaves the author's lines."""
     html: Literal["none", "safe", "trusted"] = "safe"
-    """The raw HTML that lessons and pages may have."""
     folds: Literal["open", "closed"] = "open"
     """Whether what authors fold is printed in full."""
     limits: Limits = Limits()
@@ -356,7 +330,6 @@ class Course(Struct, frozen=True):
 
     @property
     def lessons(self) -> tuple[Lesson, ...]:
-        """All lessons in the order of the map."""
         return tuple(lesson for level in self.levels for lesson in level.lessons)
 
     @property
@@ -375,7 +348,6 @@ class Course(Struct, frozen=True):
 
     @property
     def written_lessons(self) -> tuple[Lesson, ...]:
-        """All written lessons in the order of the map."""
         return tuple(lesson for lesson in self.lessons if lesson.document is not None)
 
     @property
@@ -385,7 +357,6 @@ class Course(Struct, frozen=True):
 
     @property
     def owned_documents(self) -> tuple[tuple[Owner, Document], ...]:
-        """Every parsed document, with its owner."""
         return tuple((o, o.document) for o in self.owners if o.document is not None)
 
     @property

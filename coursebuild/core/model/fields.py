@@ -1,11 +1,7 @@
 """Types of fields that several declarations share.
 
-Entry points: `Text`, `Blocks`, `Inlines`, `OptionalBlocks`, `Positive`, `NotNegative`, `Digits`,
-`Slug`, `WebPlace`, `matching`.
-
-`Meta` holds what a type adds to its plain Python type: bounds and patterns, which the decoder and
-the JSON Schemas both read, and in `extra` two remarks for the decoder only: `text` ("blocks" or
-"inlines": the string is Markdown) and `expects` (words for the strings that the pattern allows).
+In the `extra` of a `Meta` are two remarks for the decoder: `text` ("blocks" or "inlines": the
+string is Markdown) and `expects` (words for the strings that the pattern allows).
 """
 
 from __future__ import annotations
@@ -15,32 +11,31 @@ from typing import Annotated, Any, TypeAlias
 from msgspec import Meta
 
 NOT_BLANK = r"\S"
-"""The pattern of a text that must not be blank."""
 
 _MARKDOWN: dict[str, Any] = {"contentMediaType": "text/markdown"}
 
 Text: TypeAlias = Annotated[str, Meta(pattern=NOT_BLANK)]
-"""Plain text, not blank."""
 
 Blocks: TypeAlias = Annotated[
     str, Meta(pattern=NOT_BLANK, extra={"text": "blocks"}, extra_json_schema=_MARKDOWN)
 ]
-"""Markdown of any length."""
 
 OptionalBlocks: TypeAlias = Annotated[
     str, Meta(extra={"text": "blocks"}, extra_json_schema=_MARKDOWN)
 ]
-"""Markdown of any length, or nothing."""
 
 Inlines: TypeAlias = Annotated[
     str, Meta(pattern=NOT_BLANK, extra={"text": "inlines"}, extra_json_schema=_MARKDOWN)
 ]
-"""Markdown that fits into a line."""
 
 Positive: TypeAlias = Annotated[float, Meta(gt=0)]
 NotNegative: TypeAlias = Annotated[float, Meta(ge=0)]
 Digits: TypeAlias = Annotated[int, Meta(ge=0, le=15)]
-"""Decimal places."""
+
+
+def describe(description: str, **bounds: Any) -> Meta:
+    """What a field is for, as editors show it, and what else a `Meta` holds."""
+    return Meta(description=description, **bounds)
 
 
 def matching(pattern: str, expects: str) -> Meta:

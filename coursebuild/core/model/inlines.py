@@ -1,7 +1,4 @@
-"""Inlines: the content of a paragraph, a heading or a cell.
-
-Entry points: the union `Inline`; `plain_text`, `without_links`.
-"""
+"""Inlines: the content of a paragraph, a heading or a cell."""
 
 from __future__ import annotations
 
@@ -13,50 +10,57 @@ from msgspec import Struct
 from coursebuild.core.text.source import Excerpt, Span
 
 
-class Text(Struct, frozen=True):
-    """Plain text, entities decoded."""
+class Located(Struct, frozen=True):
+    """What stands somewhere in a source."""
 
     span: Span
+
+
+class Parent(Located, frozen=True):
+    """An inline around others."""
+
+    children: tuple[Inline, ...]
+
+
+class RawHtml(Located, frozen=True):
+    """HTML as its author wrote it."""
+
+    html: str
+    media: tuple[MediaAddress, ...] = ()
+    forbidden: tuple[ForbiddenHtml, ...] = ()
+
+
+class Text(Located, frozen=True):
+    """Plain text, entities decoded."""
+
     text: str
 
 
-class Emphasis(Struct, frozen=True):
+class Emphasis(Parent, frozen=True):
     """`*text*`."""
 
-    span: Span
-    children: tuple[Inline, ...]
 
-
-class Strong(Struct, frozen=True):
+class Strong(Parent, frozen=True):
     """`**text**`."""
 
-    span: Span
-    children: tuple[Inline, ...]
 
-
-class Strikethrough(Struct, frozen=True):
+class Strikethrough(Parent, frozen=True):
     """`~~text~~`."""
 
-    span: Span
-    children: tuple[Inline, ...]
 
-
-class CodeSpan(Struct, frozen=True):
+class CodeSpan(Located, frozen=True):
     """Inline code."""
 
-    span: Span
     text: str
     literal: bool = False
     """Whether `{code}` after it says that it names nothing."""
 
 
-class NumberBinding(Struct, frozen=True):
+class NumberBinding(Located, frozen=True):
     """`` `+6.6 %`{out} ``: a number that a script must have printed, or one with a source."""
 
-    span: Span
     text: str
     text_span: Span
-    """The text between the backticks."""
     script: str | None
     """The path given by `{out=…}`; `None`: the script of the nearest recorded output above."""
     source: str | None = None
@@ -73,10 +77,9 @@ LABEL_KINDS = {
 """What can have a label, by the prefix of the label's id."""
 
 
-class Label(Struct, frozen=True):
+class Label(Located, frozen=True):
     """`{#eq:euler}` after a formula on a line of its own, `{#fig:flip}` at the end of a caption."""
 
-    span: Span
     id: str
     """With its prefix and colon."""
     source: str | None = None
@@ -85,19 +88,16 @@ class Label(Struct, frozen=True):
     """Where the word `check` stands, which demands a proof."""
 
 
-class Meaning(Struct, frozen=True):
+class Meaning(Located, frozen=True):
     """`{symbol="angular velocity" unit="rad/s"}` after a formula: what the symbol stands for."""
 
-    span: Span
     text: str
     unit: str
-    """Empty where none is given."""
 
 
-class Math(Struct, frozen=True):
+class Math(Located, frozen=True):
     """A formula; `display` for `$$…$$`."""
 
-    span: Span
     tex: Excerpt
     display: bool
     label: Label | None = None
@@ -110,13 +110,10 @@ class Math(Struct, frozen=True):
     """What `value=…` says that the symbol is worth."""
 
 
-class Term(Struct, frozen=True):
+class Term(Parent, frozen=True):
     """`[inertia tensor]{term}`: where the text explains a term."""
 
-    span: Span
-    children: tuple[Inline, ...]
     name: str
-    """Its name in the glossary."""
     id: str
     """Its name in links, such as `inertia-tensor`."""
     renamed: bool
@@ -178,10 +175,9 @@ Target: TypeAlias = (
 )
 
 
-class Link(Struct, frozen=True):
+class Link(Located, frozen=True):
     """A link; a `mention` is a "Lesson 2.2" or "Level 18" in prose that became one."""
 
-    span: Span
     target: Target
     target_span: Span
     """Where the destination is written, or the whole link where that is not known."""
@@ -190,10 +186,9 @@ class Link(Struct, frozen=True):
     mention: bool = False
 
 
-class Image(Struct, frozen=True):
+class Image(Located, frozen=True):
     """An image; `url` as written."""
 
-    span: Span
     url: str
     alt: str
     title: str
@@ -211,42 +206,27 @@ class MediaAddress(Struct, frozen=True):
     span: Span
 
 
-class ForbiddenHtml(Struct, frozen=True):
+class ForbiddenHtml(Located, frozen=True):
     """Raw HTML that a page must not hold, unless the course trusts all of its authors."""
 
-    span: Span
     message: str
 
 
-class RawInline(Struct, frozen=True):
+class RawInline(RawHtml, frozen=True):
     """Raw inline HTML."""
 
-    span: Span
-    html: str
-    media: tuple[MediaAddress, ...] = ()
-    forbidden: tuple[ForbiddenHtml, ...] = ()
 
-
-class SoftBreak(Struct, frozen=True):
+class SoftBreak(Located, frozen=True):
     """A line end inside a paragraph."""
 
-    span: Span
 
-
-class HardBreak(Struct, frozen=True):
+class HardBreak(Located, frozen=True):
     """A forced line break."""
 
-    span: Span
 
+class FootnoteRef(Located, frozen=True):
+    """`[^label]`, with its place in the order of first reference and its own among them, from 1."""
 
-class FootnoteRef(Struct, frozen=True):
-    """`[^label]`.
-
-    `number` is its place in the order of first reference, `occurrence` counts references to it,
-    both from 1.
-    """
-
-    span: Span
     label: str
     number: int
     occurrence: int
@@ -256,7 +236,6 @@ class CitedWork(Struct, frozen=True):
     """`see @euler1758, p. 12` in a citation."""
 
     span: Span
-    """That of the key."""
     key: str
     before: str
     """What stands before it: `see`."""
@@ -264,10 +243,9 @@ class CitedWork(Struct, frozen=True):
     """The place in the work, or other words after it."""
 
 
-class Citation(Struct, frozen=True):
+class Citation(Located, frozen=True):
     """`[@euler1758, p. 12; @lagrange1788]`: sources in `content/references.bib`."""
 
-    span: Span
     works: tuple[CitedWork, ...]
 
 
@@ -299,7 +277,7 @@ def plain_text(inlines: tuple[Inline, ...]) -> str:
                 parts.append(inline.text)
             case Math():
                 parts.append(inline.tex.text)
-            case Emphasis() | Strong() | Strikethrough() | Link() | Term():
+            case Parent() | Link():
                 parts.append(plain_text(inline.children))
             case Image():
                 parts.append(inline.alt)

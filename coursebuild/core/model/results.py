@@ -1,8 +1,4 @@
-"""The results of running a course: values made by runners, read by comparisons, reports and pages.
-
-Entry points: `ScriptRun`, `Verdict`. They are part of the model because the stages that make them
-and those that read them do not import each other.
-"""
+"""The results of running a course: values made by runners, read by comparisons, reports, pages."""
 
 from __future__ import annotations
 
@@ -49,13 +45,10 @@ class ScriptJob(Struct, frozen=True):
     """From 1 on, initial states are moved a little, in one of several directions; at 0 nothing is
     changed; at −1 each step is made as two of half the timestep."""
     packages: tuple[str, ...] = ()
-    """Folders of the project that it imports from, after its own and before all others."""
     environment: tuple[tuple[str, str], ...] = ()
-    """Variables that the course sets."""
     writes: tuple[str, ...] = ()
     """Folders of the project that it may write into."""
     figures: tuple[str, ...] = ()
-    """Names of the files that it draws."""
     memory: int = Limits().scripts
     """MiB that it may take, where the system can enforce that."""
 
@@ -126,7 +119,6 @@ class Trace(Struct, frozen=True, rename={"is_perturbed": "moved"}):
     """Files of the project that it read or tried to read, without its own and those that it had
     written itself; the source in place of a compiled module."""
     folders: tuple[str, ...]
-    """Folders of the project that it listed."""
     outside: tuple[str, ...]
     """Absolute paths of files read that belong neither to the project nor to an installed package
     nor to Python."""
@@ -164,7 +156,6 @@ class ScriptRun(Struct, frozen=True):
     """The last 64 KiB, with extracted paths as the interpreter wrote them."""
     seconds: float
     missing: tuple[str, ...] = ()
-    """Modules that it requires and that are not installed."""
     cached: bool = False
     trace: Trace | None = None
     """What it read; `None` where that was not traced."""
@@ -194,10 +185,7 @@ class DriftKind(enum.Enum):
 
 
 class Change(Struct, frozen=True):
-    """One difference between a recorded output and a run.
-
-    For a number, `relative_error` and `digits` say how far apart the two values are.
-    """
+    """One difference between a recorded output and a run; for a number, how far apart they are."""
 
     kind: DriftKind
     span: Span
@@ -205,7 +193,6 @@ class Change(Struct, frozen=True):
     stand."""
     recorded: str
     printed: str
-    """What the run printed."""
     relative_error: float | None = None
     digits: int | None = None
     """Leading significant digits that agree."""
@@ -230,10 +217,7 @@ class Formula(Struct, frozen=True):
 
 
 class MathError(Struct, frozen=True):
-    """Why a formula does not parse.
-
-    `position` is an offset in code points into the TeX, `None` where unknown.
-    """
+    """Why a formula does not parse; the position is in code points of its TeX, if it is known."""
 
     message: str
     position: int | None
@@ -310,7 +294,6 @@ class TrialLine(Struct, frozen=True):
     steps_per_second: int | None = None
     """Of a simulation that ran to its end; else `None`."""
     tried: int = 0
-    """The number of things that were tried."""
     parity: str = ""
     """A comparison with native MuJoCo in words; empty where there was none."""
     cached: bool = False
@@ -327,7 +310,6 @@ class TrialResult(Struct, frozen=True):
     """The block that was tried, by which its page finds the result."""
     line: TrialLine
     output: Struct
-    """A value of the feature's own type."""
 
 
 class OutputFile(Struct, frozen=True):
@@ -345,7 +327,6 @@ class CachedFile(Struct, frozen=True):
     """A file of the site that is not made again if it was published under the same key."""
 
     path: str
-    """Its path in the site (POSIX, relative)."""
     key: str
     """A hash of all that its bytes depend on."""
     make: Callable[[], bytes]
@@ -371,14 +352,12 @@ class FileFacts(Struct, frozen=True):
     digest: str
     """SHA-256 of its bytes, in hexadecimal digits."""
     size: int
-    """Bytes."""
 
 
 class FileList(Struct, frozen=True):
     """A file of the site that is made from the facts about all others."""
 
     path: str
-    """Its path in the site (POSIX, relative)."""
     key: str
     """A hash of all that its bytes depend on besides the other files."""
     make: Callable[[Iterable[FileFacts]], bytes]
@@ -393,7 +372,6 @@ class Results(Struct, frozen=True):
     formulas: tuple[tuple[Formula, str | MathError], ...]
     """Each distinct formula of the course, with its MathML or its error."""
     models: tuple[tuple[str, CompileResult], ...]
-    """Each model of `models/` by name."""
     python: str
     """Version of the interpreter that ran the scripts."""
     engine: str

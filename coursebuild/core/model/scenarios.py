@@ -1,7 +1,6 @@
 """The content of a file `models/NAME.toml`: scenarios of the model, and findings to keep.
 
-Entry points: `Declarations`; `keyframe_scenarios`, for models without such a file; `is_multiple`,
-for times. What is left out is `None` or empty; measuring fills it in from the model.
+What is left out is `None` or empty; measuring fills it in from the model.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from typing import Annotated, Literal, TypeAlias
 from msgspec import Meta, Struct
 
 from coursebuild.core.model import fields
+from coursebuild.core.model.fields import Positive, Slug, describe, matching
 from coursebuild.core.text.source import Source, Span
 
 DURATION, MOST_STEPS = 2.0, 20_000
@@ -38,17 +38,15 @@ def is_multiple(length: float, part: float) -> bool:
 class BenchTable(Struct, frozen=True, forbid_unknown_fields=True):
     """The size from which an error is visible, and by how much it may differ."""
 
-    visible: Annotated[float, Meta(gt=0, le=1, description="share of the model's extent")] = 0.01
-    visible_angle: Annotated[
-        float, Meta(gt=0, le=180, description="degrees, for attitudes and hinges")
-    ] = 1.0
+    visible: Annotated[float, describe("share of the model's extent", gt=0, le=1)] = 0.01
+    visible_angle: Annotated[float, describe("degrees, for attitudes and hinges", gt=0, le=180)] = (
+        1.0
+    )
     band: Annotated[
-        float,
-        Meta(gt=0, le=1, description="share by which an error may differ from the recorded one"),
+        float, describe("share by which an error may differ from the recorded one", gt=0, le=1)
     ] = 0.05
     order_band: Annotated[
-        float,
-        Meta(gt=0, le=1, description="by how much a fitted order may differ from the recorded one"),
+        float, describe("by how much a fitted order may differ from the recorded one", gt=0, le=1)
     ] = 0.05
 
 
@@ -65,109 +63,96 @@ class Measured(Struct, frozen=True):
 Expected: TypeAlias = Literal[
     "restitution", "penetration", "slip", "crossing", "last", "largest", "smallest"
 ]
-"""Quantities of a motion that theory may know."""
 
 
 class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     """What happens to the model: initial state, duration, commands."""
 
-    name: Annotated[fields.Slug, Meta(description="by which reports call it")]
-    title: Annotated[fields.Text | None, Meta(description="shown over its figures")] = None
+    name: Annotated[Slug, describe("by which reports call it")]
+    title: Annotated[fields.Text | None, describe("shown over its figures")] = None
     keyframe: Annotated[
         Annotated[int, Meta(ge=0)] | fields.Text | None,
-        Meta(description="where it begins, by name or by number from 0"),
+        describe("where it begins, by name or by number from 0"),
     ] = None
     qpos: Annotated[
-        tuple[float, ...], Meta(description="positions at the beginning, instead of the keyframe's")
+        tuple[float, ...], describe("positions at the beginning, instead of the keyframe's")
     ] = ()
     qvel: Annotated[
-        tuple[float, ...],
-        Meta(description="velocities at the beginning, instead of the keyframe's"),
+        tuple[float, ...], describe("velocities at the beginning, instead of the keyframe's")
     ] = ()
-    duration: Annotated[fields.Positive | None, Meta(description="seconds")] = None
+    duration: Annotated[Positive | None, describe("seconds")] = None
     sample: Annotated[
-        fields.Positive | None,
-        Meta(description="seconds from one look at the state to the next; timesteps divide it"),
+        Positive | None,
+        describe("seconds from one look at the state to the next; timesteps divide it"),
     ] = None
     controls: Annotated[
         tuple[tuple[float, ...], ...],
-        Meta(description="commands one after the other, each a number for every actuator"),
+        describe("commands one after the other, each a number for every actuator"),
     ] = ()
-    hold: Annotated[
-        fields.Positive | None, Meta(description="seconds for which each command holds")
-    ] = None
+    hold: Annotated[Positive | None, describe("seconds for which each command holds")] = None
     measure: Annotated[
         Annotated[
-            str,
-            fields.matching(
-                r"^(body|site|sensor):\S.*$", "`body:NAME`, `site:NAME` or `sensor:NAME`"
-            ),
+            str, matching(r"^(body|site|sensor):\S.*$", "`body:NAME`, `site:NAME` or `sensor:NAME`")
         ]
         | None,
-        Meta(description="what is compared beside coordinates, as in `site:tip`"),
+        describe("what is compared beside coordinates, as in `site:tip`"),
     ] = None
     reference: Annotated[
-        Annotated[
-            str, fields.matching(r"^(ode|self|closed:\S.*)$", "`ode`, `self` or `closed:CASE`")
-        ]
+        Annotated[str, matching(r"^(ode|self|closed:\S.*)$", "`ode`, `self` or `closed:CASE`")]
         | None,
-        Meta(description="what errors are measured against, where not whichever fits"),
+        describe("what errors are measured against, where not whichever fits"),
     ] = None
     conserved: Annotated[
         tuple[Literal["energy", "angular-momentum"], ...] | None,
-        Meta(description="what does not change, where it cannot be told from the model"),
+        describe("what does not change, where it cannot be told from the model"),
     ] = None
     timesteps: Annotated[
-        tuple[fields.Positive, ...],
-        Meta(description="seconds; instead of a ladder about the model's own"),
+        tuple[Positive, ...], describe("seconds; instead of a ladder about the model's own")
     ] = ()
     limits: Annotated[
-        dict[Literal["Euler", "implicit", "implicitfast", "RK4", "discrete"], fields.Positive],
-        Meta(description="seconds, by integrator: the largest stable timestep in theory"),
+        dict[Literal["Euler", "implicit", "implicitfast", "RK4", "discrete"], Positive],
+        describe("seconds, by integrator: the largest stable timestep in theory"),
     ] = {}
     expected: Annotated[
         dict[Expected, float],
-        Meta(
-            description="in theory: of the hardest hit the speed after it over that before; "
+        describe(
+            "in theory: of the hardest hit the speed after it over that before; "
             "the deepest contact and the longest slide, m; of the sensor that `measure` names when "
             "it first changes its sign, s, its last reading, the largest and the smallest"
         ),
     ] = {}
     precision: Annotated[
-        fields.Positive | None,
-        Meta(description="by how much `NAME.exact.py` may differ from an integration"),
+        Positive | None, describe("by how much `NAME.exact.py` may differ from an integration")
     ] = None
     room: Annotated[
-        fields.Positive,
-        Meta(
-            description="a run is lost beyond so many times the values of small steps: of the "
+        Positive,
+        describe(
+            "a run is lost beyond so many times the values of small steps: of the "
             "largest kinetic energy, added to the energy; of velocity, if something drives it"
         ),
     ] = 10.0
     horizon_error: Annotated[
-        dict[Literal["rad", "m"], fields.Positive],
-        Meta(
-            description="the error at which predictions of a chaotic motion end, in rad for hinges "
+        dict[Literal["rad", "m"], Positive],
+        describe(
+            "the error at which predictions of a chaotic motion end, in rad for hinges "
             "and attitudes, in m for slides and places, as in `{ rad = 0.05, m = 0.002 }`; else "
             "0.1 rad, or a tenth of the model's extent"
         ),
     ] = {}
     stable_for: Annotated[
-        fields.Positive | None,
-        Meta(description="seconds over which a timestep has to be stable; else the duration"),
+        Positive | None,
+        describe("seconds over which a timestep has to be stable; else the duration"),
     ] = None
     energy_bound: Annotated[
-        float | None,
-        Meta(description="J; the most potential and kinetic energy that the motion can have"),
+        float | None, describe("J; the most potential and kinetic energy that the motion can have")
     ] = None
     search: Annotated[
-        tuple[fields.Positive, fields.Positive] | None,
-        Meta(description="seconds; the timesteps between which the largest stable one is sought"),
+        tuple[Positive, Positive] | None,
+        describe("seconds; the timesteps between which the largest stable one is sought"),
     ] = None
 
     @property
     def observable(self) -> Measured | None:
-        """The quantity that `measure` names."""
         match (self.measure or "").split(":", 1):
             case ["body" | "site" | "sensor" as kind, name]:
                 return Measured(kind, name)
@@ -185,9 +170,7 @@ class DeclaredScenario(ScenarioTable, frozen=True, kw_only=True):
     """A scenario that an author declared, or that a model without declarations has."""
 
     span: Span
-    """Its table."""
     places: tuple[tuple[str, Span], ...] = ()
-    """The place of each given field."""
 
     def place(self, name: str) -> Span:
         """The span of a field's value, or of the table if the field is not given."""
@@ -210,7 +193,7 @@ class Variation(Struct, frozen=True):
 
 SweepFigure: TypeAlias = Literal[
     "change", "figure", "penetration", "slip", "restitution",
-    "residual", "iterations", "cost", "throughput",
+    "residual", "iterations", "cost", "throughput"
 ]  # fmt: skip
 _SHARE = r"±\s*(\d+(?:\.\d+)?)\s*%"
 """How a sweep names a share of the model's own value."""
@@ -219,21 +202,19 @@ _SHARE = r"±\s*(\d+(?:\.\d+)?)\s*%"
 class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters of the model at other values, one at a time."""
 
-    name: Annotated[fields.Slug, Meta(description="by which reports call it")]
+    name: Annotated[Slug, describe("by which reports call it")]
     vary: Annotated[
         dict[
             str,
             tuple[float | str | tuple[float, ...], ...]
-            | Annotated[str, fields.matching(_SHARE, "values, or a share: `±1 %`")],
+            | Annotated[str, matching(_SHARE, "values, or a share: `±1 %`")],
         ],
-        Meta(description="values by parameter, such as `geom.solref[0]`, `option.cone`, `threads`"),
+        describe("values by parameter, such as `geom.solref[0]`, `option.cone`, `threads`"),
     ]
-    title: Annotated[fields.Text | None, Meta(description="shown over its figures")] = None
-    scenario: Annotated[
-        fields.Slug | None, Meta(description="the first one where it is left out")
-    ] = None
+    title: Annotated[fields.Text | None, describe("shown over its figures")] = None
+    scenario: Annotated[Slug | None, describe("the first one where it is left out")] = None
     show: Annotated[
-        tuple[SweepFigure, ...], Meta(description="figures; those that differ where none is named")
+        tuple[SweepFigure, ...], describe("figures; those that differ where none is named")
     ] = ()
 
 
@@ -241,14 +222,13 @@ class DeclaredSweep(SweepTable, frozen=True, kw_only=True):
     """A sweep with its variations parsed."""
 
     variations: tuple[Variation, ...]
-    """Those that `vary` describes."""
 
 
 class KeepTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A finding of the scene diet that is to stay as it is."""
 
-    finding: Annotated[fields.Text, Meta(description="as `coursebuild diet` names it")]
-    reason: Annotated[fields.Text, Meta(description="why it stays")]
+    finding: Annotated[fields.Text, describe("as `coursebuild diet` names it")]
+    reason: Annotated[fields.Text, describe("why it stays")]
 
 
 class Keep(KeepTable, frozen=True, kw_only=True):
@@ -263,7 +243,6 @@ class Declarations(Struct, frozen=True):
     model: str
     """The name of the model: its path below `models/`, without suffix, POSIX."""
     source: Source
-    """The file, or the model's source if there is none."""
     scenarios: tuple[DeclaredScenario, ...] = ()
     keep: tuple[Keep, ...] = ()
     bench: BenchTable = BenchTable()

@@ -1,8 +1,4 @@
-"""The vocabulary of every course: callouts, captions, closed forms to measure against.
-
-Entry points: `CALLOUTS`, `Words`, `ENGLISH` and `CLOSED_FORMS`. A course can add kinds of
-callouts, or relabel these, under `[callouts]` in course.toml.
-"""
+"""The vocabulary of every course: callouts, captions, closed forms to measure against."""
 
 from __future__ import annotations
 

@@ -1,23 +1,8 @@
-"""Walking a document: every block and every inline in order.
+"""Walking a document: every block and every inline in order; its summary for other pages.
 
-Entry points: `document_blocks`, `document_inlines`; `find_blocks`, `find_inlines` for those of one
-type; `find_formulas`; `document_scripts`, `output_numbers`, `sibling_groups`; `walk_blocks`,
-`walk_inlines` and `block_formulas`; `is_blank`, `is_comment`; `labelled_blocks`;
-`display_formulas`, those on lines of their own. A formula has the id that its author gives it, or
-one made from its TeX, which stays the same when the text around it changes. A formula in a heading,
-a quiz or a lab has none, since those are shown on other pages too.
-
-`without_prose(document)` is what the rest of a course must know of a document, as a document of the
-same type. Walking it meets, in the same order, everything that other pages or checks look at, and
-everything for which the document's own page looks something up: headings with their anchors,
-scripts, recorded outputs, bound numbers, blocks of features, MJCF, callouts, links, terms,
-pictures, raw HTML.
-
-1. Blocks come out of their containers, since no other page asks what contains what.
-2. Of inlines only links, without their text, citations, pictures, bound numbers, terms and raw HTML
-   stay.
-3. Formulas are left out, except those in recorded tables: they are checked in the whole document.
-4. If only prose was left out, a thematic break stands for it, so that the summary is not blank.
+A formula has the id that its author gives it, or one made from its TeX, which stays the same when
+the text around it changes. A formula in a heading, a quiz or a lab has none, since those are shown
+on other pages too.
 """
 
 from __future__ import annotations
@@ -52,16 +37,14 @@ from coursebuild.core.model.blocks import (
 )
 from coursebuild.core.model.inlines import (
     Citation,
-    Emphasis,
     Image,
     Inline,
     Label,
     Link,
     Math,
     NumberBinding,
+    Parent,
     RawInline,
-    Strikethrough,
-    Strong,
     Term,
 )
 from coursebuild.core.text.source import Span, key_of
@@ -72,8 +55,6 @@ AnyInline = TypeVar("AnyInline", bound=Inline)
 
 _BLOCK_CONTAINERS = (BlockQuote, Callout, ListBlock, FeatureBlock, Recording)
 """Blocks that may contain blocks."""
-_INLINE_CONTAINERS = frozenset((Emphasis, Strong, Strikethrough, Link, Term))
-"""Inlines that may contain inlines."""
 _COMMENTS = re.compile(r"(?:\s*<!--(?:(?!-->)[\s\S])*-->)*\s*")
 
 
@@ -118,10 +99,7 @@ def walk_blocks(blocks: tuple[Block, ...]) -> Iterator[Block]:
 
 
 def main_and_further(blocks: tuple[Block, ...]) -> Iterator[tuple[bool, tuple[Block, ...]]]:
-    """Cut a text into parts, each with whether it is a section that goes further.
-
-    Such a section ends before the next heading that is not below its own.
-    """
+    """Cut a text into parts, each with whether it is a section that goes further."""
     start, level = 0, 0
     for i, block in enumerate(blocks):
         if not isinstance(block, Heading):
@@ -208,9 +186,9 @@ def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
     """Every inline in order, a container before its content."""
     for inline in inlines:
         yield inline
-        if type(inline) in _INLINE_CONTAINERS:
-            yield from walk_inlines(inline.children)  # type: ignore[union-attr]
-        elif type(inline) is Math and inline.value is not None:
+        if isinstance(inline, Parent | Link):
+            yield from walk_inlines(inline.children)
+        elif isinstance(inline, Math) and inline.value is not None:
             yield inline.value
 
 
@@ -252,7 +230,12 @@ _SUMMARY_INLINES = frozenset((Citation, Link, Image, NumberBinding, RawInline, T
 
 
 def without_prose(document: Document) -> Document:
-    """The summary of a document: all but what only its own page shows."""
+    """The summary of a document, of the same type: all but what only its own page shows.
+
+    Blocks come out of their containers, since no other page asks what contains what. Formulas
+    are left out, except those in recorded tables: they are checked in the whole document. If
+    only prose was left out, a thematic break stands for it, so that the summary is not blank.
+    """
     recorded_ids: set[int] = set()
     blocks: list[Block] = []
     for block in document_blocks(document):
@@ -266,7 +249,6 @@ def without_prose(document: Document) -> Document:
 
 
 def _summarize_block(block: Block) -> Iterator[Block]:
-    """The summary of a block without its child blocks, which come separately."""
     match block:
         case Paragraph() if block.figure:
             yield replace(block, children=_summary_inlines(block))
@@ -299,7 +281,6 @@ def _paragraph_of(span: Span, inlines: tuple[Inline, ...]) -> Iterator[Paragraph
 
 
 def _summary_inlines(block: Block) -> tuple[Inline, ...]:
-    """The inlines of a block that a summary keeps, without nesting."""
     return tuple(
         replace(inline, children=()) if isinstance(inline, Link | Term) else inline
         for inline in walk_inlines(block_inlines(block))

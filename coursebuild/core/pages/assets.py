@@ -1,15 +1,8 @@
 """The tool's own files: templates, interface texts, and the bundled files for browsers.
 
-Entry points: `Assets`, a value made by who reads the disk; `Names`; `hashed_name`.
-
-1. `templates` holds every file of `templates/` as text, `dist` every file of the bundle as bytes,
-   by path relative to their folder.
-2. A file that a page refers to is published under a name with a hash of its content, so that a
-   browser may keep it for ever.
-3. Each asset of a compressible kind gets `NAME.br` and `NAME.gz` (`compressed_files`). A server
-   configured for it (nginx's `brotli_static` and `gzip_static`, Caddy's `precompressed`) sends the
-   one that the browser accepts. Pages change with every build, and small files gain little, so
-   compressing these is left to the server. The same bytes give the same copies, which hold no time.
+A file that a page refers to is published under a name with a hash of its content, so that a browser
+may keep it for ever. Each one of a compressible kind gets `NAME.br` and `NAME.gz`, which a server
+configured for it sends; pages change with every build, and are left to the server to compress.
 """
 
 from __future__ import annotations
@@ -107,11 +100,12 @@ _SMALLEST = 8 << 10
 _LARGE = 2 << 20
 """Bytes; for larger files, the best quality would take a quarter of a minute."""
 Keep = Callable[[str, Callable[[], bytes]], bytes]
-"""Returns what was made under a key before, or makes it."""
 
 
 def compressed_files(files: Iterable[SiteFile], keep: Keep) -> tuple[CachedFile, ...]:
     """The copies of all assets among the files that are worth compressing."""
+    import brotli  # needed only by a build
+
     copies: list[CachedFile] = []
     for file in files:
         if not file.path.startswith("assets/") or not file.path.endswith(_SUFFIXES):
@@ -122,7 +116,7 @@ def compressed_files(files: Iterable[SiteFile], keep: Keep) -> tuple[CachedFile,
         # Quality 11 would save two percent more of small files in twice the time.
         quality = 9 if len(data) >= _LARGE else 10
         compressors = {
-            "br": functools.partial(_brotli, data, quality),
+            "br": functools.partial(brotli.compress, data, quality=quality),
             "gz": functools.partial(gzip.compress, data, 9, mtime=0),
         }
         for suffix, compress in compressors.items():
@@ -130,10 +124,3 @@ def compressed_files(files: Iterable[SiteFile], keep: Keep) -> tuple[CachedFile,
             make = functools.partial(keep, key, compress)
             copies.append(CachedFile(f"{file.path}.{suffix}", key, make))
     return tuple(copies)
-
-
-def _brotli(data: bytes, quality: int) -> bytes:
-    import brotli  # needed only by a build with a new asset
-
-    packed: bytes = brotli.compress(data, quality=quality)
-    return packed

@@ -1,12 +1,4 @@
-"""What features are given: a page to draw on, and a course to make files of.
-
-Entry points: `PageContext`, the `HtmlWriter` of one document on one page (`page_writer.PageWriter`
-completes it: it draws what is more than Markdown); `SiteContext` and `ExportContext`, what features
-make files from.
-
-Recorded outputs that directly follow their script are drawn as one object with it:
-`script_outputs`. Nothing is drawn in their own place.
-"""
+"""What features are given: a page to draw on, and a course to make files of."""
 
 from __future__ import annotations
 
@@ -19,25 +11,7 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import asdict
 
-from coursebuild.core.model import (
-    Block,
-    Citation,
-    CodeSpan,
-    Course,
-    Document,
-    HtmlBlock,
-    Label,
-    Lesson,
-    NumberedItem,
-    Recording,
-    Script,
-    Target,
-    UrlTarget,
-    child_blocks,
-    document_blocks,
-    is_comment,
-    sibling_groups,
-)
+from coursebuild.core import model
 from coursebuild.core.model.results import SiteFile
 from coursebuild.core.pages import formulas, urls
 from coursebuild.core.pages.assets import Assets, Names
@@ -58,34 +32,33 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     renderer: Renderer
     inputs: DocumentInputs
     place: urls.Place
-    document: Document
+    document: model.Document
 
     @cached_property
-    def script_outputs(self) -> Mapping[int, tuple[Recording, ...]]:
+    def script_outputs(self) -> Mapping[int, tuple[model.Recording, ...]]:
         """The recordings drawn together with a script, by the script's offset."""
-        outputs: dict[int, tuple[Recording, ...]] = {}
-        for siblings in sibling_groups(self.document):
+        outputs: dict[int, tuple[model.Recording, ...]] = {}
+        for siblings in model.sibling_groups(self.document):
             for number, block in enumerate(siblings):
-                if not isinstance(block, Script):
+                if not isinstance(block, model.Script):
                     continue
-                following: list[Recording] = []
+                following: list[model.Recording] = []
                 for sibling in siblings[number + 1 :]:
-                    if isinstance(sibling, HtmlBlock) and is_comment(sibling):
+                    if isinstance(sibling, model.HtmlBlock) and model.is_comment(sibling):
                         continue  # readers do not see it
-                    if not isinstance(sibling, Recording) or sibling.script != block.path:
+                    if not isinstance(sibling, model.Recording) or sibling.script != block.path:
                         break
                     following.append(sibling)
                 outputs[block.span.start] = tuple(following)
         return outputs
 
     @cached_property
-    def numbered_items(self) -> Mapping[int, NumberedItem]:
+    def numbered_items(self) -> Mapping[int, model.NumberedItem]:
         """What has a number, and other formulas on lines of their own, by offset."""
         return number_items(self.document, self.renderer.mathml)
 
     @cached_property
     def _names(self) -> Mapping[str, str]:
-        """The names of numbered items by their ids."""
         prefix = self.inputs.number_prefix
         items = self.numbered_items.values()
         return {item.id: item_name(item, prefix, self.words) for item in items}
@@ -100,7 +73,7 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     def direction(self) -> Literal["ltr", "rtl"]:
         return direction(self.words.language)
 
-    def href(self, target: Target) -> str:
+    def href(self, target: model.Target) -> str:
         """The address of a link's target."""
         return self.inputs.hrefs[target]
 
@@ -119,17 +92,17 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
         item = self.numbered_items.get(start)
         return self.template("blocks/formula.html", mathml=mathml, equation=item)
 
-    def number(self, label: Label | None) -> str:
+    def number(self, label: model.Label | None) -> str:
         """The name that a label gives, such as "Figure 4.2.3"; empty without one."""
         return self._names.get(label.id, "") if label is not None else ""
 
-    def reference(self, target: Target) -> str:
+    def reference(self, target: model.Target) -> str:
         """The text of a link without one: the number of what it leads to."""
-        if isinstance(target, UrlTarget) and target.url.startswith("#"):
+        if isinstance(target, model.UrlTarget) and target.url.startswith("#"):
             return self._names.get(unquote(target.url[1:]), "")
         return self.inputs.names.get(target, "")
 
-    def citation(self, citation: Citation) -> Markup:
+    def citation(self, citation: model.Citation) -> Markup:
         """A citation, with links to the references below the text."""
         texts = self.inputs.citations.texts
         return texts.get(citation.span.start) or super().citation(citation)
@@ -141,28 +114,25 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
             return Markup()
         return self.template("blocks/references.html", **asdict(citations))
 
-    def code_href(self, code: CodeSpan) -> str:
+    def code_href(self, code: model.CodeSpan) -> str:
         """The address of what inline code names."""
         return self.inputs.code_links.get(code.span.start, "")
 
     def find_repetition(self, name: str) -> Span:
-        """The place of the second block that draws an element with this id.
+        """The place of the second block that draws an element with this id, or of the only one."""
 
-        It is that of the only one if the page itself has the id, too.
-        """
-
-        def has_id(block: Block) -> bool:
+        def has_id(block: model.Block) -> bool:
             return name in ids_and_addresses(str(self.blocks((block,))))[0]
 
-        blocks = [block for block in document_blocks(self.document) if has_id(block)]
+        blocks = [block for block in model.document_blocks(self.document) if has_id(block)]
         ids = {id(block) for block in blocks}
-        inner = (b for b in blocks if not any(id(child) in ids for child in child_blocks(b)))
+        inner = (b for b in blocks if not any(id(child) in ids for child in model.child_blocks(b)))
         places = [block.span.first_line() for block in inner]
         return next(iter((*places[1:], *places)), self.document.source.span(0, 0))
 
     # what blocks need
 
-    def blocks(self, content: tuple[Block, ...]) -> Markup:
+    def blocks(self, content: tuple[model.Block, ...]) -> Markup:
         """Blocks as HTML, without the last line end."""
         return Markup(str.rstrip(self.render_blocks(content), "\n"))
 
@@ -183,14 +153,12 @@ class NotedPage(Struct, frozen=True):
     """A page that a feature has made a note of."""
 
     path: str
-    """Its site path."""
     kind: str
     """See `PageHead`."""
     id: str
     """The id of its lesson, level, model or page."""
     title: str
     digest: str
-    """The digest of the note."""
 
 
 class SiteContext(Struct, frozen=True):
@@ -203,13 +171,9 @@ class SiteContext(Struct, frozen=True):
     pages: tuple[NotedPage, ...]
     """The pages with a note of this feature, in the order of the site."""
     note: Callable[[str], bytes]
-    """Returns the note of a page, by its site path."""
     get_or_make: Callable[[str, Callable[[], bytes]], bytes]
-    """Returns what was made under a key before, or makes it."""
     archives: Mapping[str, Archive]
-    """Archives of scripts by site path."""
     imports: Callable[[str], frozenset[str]]
-    """Returns the modules that a Python text imports."""
 
 
 class ExportContext(Struct, frozen=True):
@@ -220,13 +184,12 @@ class ExportContext(Struct, frozen=True):
     assets: Assets
     site: Callable[[], Mapping[str, SiteFile]]
     """The files of its site by path, collected on the first call."""
-    page: Callable[[Document], PageContext]
+    page: Callable[[model.Document], PageContext]
     """A document with its whole text on its page, ready to be drawn."""
     read: Callable[[str], bytes]
-    """A file of the course, by its path."""
-    lesson: Lesson | None = None
+    lesson: model.Lesson | None = None
     """The lesson that an `Exporter` of a lesson writes."""
 
     @property
-    def course(self) -> Course:
+    def course(self) -> model.Course:
         return self.library.course

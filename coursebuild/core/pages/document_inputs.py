@@ -1,9 +1,4 @@
-"""What the page of a document looks up in the course and in its results.
-
-Entry points: `document_inputs(library, place, document)`; `lesson_inputs`, with a lesson's place in
-the course, its prerequisites and neighbours, and for a planned lesson `stub_inputs`; `owner_link`,
-`owner_links` and `added_page`, links to lessons and pages.
-"""
+"""What the page of a document looks up in the course and in its results."""
 
 from __future__ import annotations
 
@@ -34,10 +29,7 @@ from coursebuild.core.text.characters import visible
 def document_inputs(
     library: Library, place: urls.Place, document: model.Document, number_prefix: str = ""
 ) -> DocumentInputs:
-    """Everything that the document's page shows besides the document itself.
-
-    The summary of the document is enough. Numbers of a lesson have a prefix.
-    """
+    """Everything that a document's page shows besides its text; a summary of it is enough."""
     path = document.source.path
     blocks = tuple(model.document_blocks(document))
     feature_blocks = [block for block in blocks if isinstance(block, model.FeatureBlock)]
@@ -46,7 +38,16 @@ def document_inputs(
     link_targets = (link.target for link in model.find_inlines(document, model.Link))
     targets = dict.fromkeys((*link_targets, *map(model.ModelTarget, models)))
     bindings = model.find_inlines(document, model.NumberBinding)
-    named_scripts: dict[str, set[int]] = {b.script: set() for b in bindings if b.script}
+    # The paths of the scripts in the document or named there, with the lines it quotes of each
+    lines_by_script: dict[str, set[int]] = {b.script: set() for b in bindings if b.script}
+    for block in blocks:
+        if isinstance(block, model.Script):
+            lines_by_script.setdefault(block.path, set())
+        elif isinstance(block, model.Recording) and block.script is not None:
+            lines_by_script.setdefault(block.script, set())
+        elif isinstance(block, model.FeatureBlock):
+            for script, line in block.quoted_lines():
+                lines_by_script.setdefault(script, set()).add(line)
     names = {target: name_elsewhere(library, path, target) for target in targets}
     verdicts = ((block.span.start, library.verdict(block)) for block in recordings)
     trials = ((block.span.start, library.trial_value(block)) for block in feature_blocks)
@@ -59,9 +60,9 @@ def document_inputs(
         number_prefix=number_prefix,
         callouts={b.kind: library.callout(b.kind) for b in blocks if isinstance(b, model.Callout)},
         runs={
-            path: _shown_run(library.runs[path], lines)
-            for path, lines in (named_scripts | _quoted_lines(blocks)).items()
-            if path in library.runs
+            script: _shown_run(library.runs[script], lines)
+            for script, lines in lines_by_script.items()
+            if script in library.runs
         },
         verdicts={start: ShownVerdict(v.status, v.comparison) for start, v in verdicts if v},
         trials={start: value for start, value in trials if value is not None},
@@ -71,20 +72,6 @@ def document_inputs(
         keyframes={n: library.facts[n].keyframes for n in models if n in library.facts},
         address=urls.absolute(library.course.base_url, place.path),
     )
-
-
-def _quoted_lines(blocks: tuple[model.Block, ...]) -> dict[str, set[int]]:
-    """The paths of the scripts in a document or named there, with the lines it quotes of each."""
-    lines_by_script: dict[str, set[int]] = {}
-    for block in blocks:
-        if isinstance(block, model.Script):
-            lines_by_script.setdefault(block.path, set())
-        elif isinstance(block, model.Recording) and block.script is not None:
-            lines_by_script.setdefault(block.script, set())
-        elif isinstance(block, model.FeatureBlock):
-            for script, line in block.quoted_lines():
-                lines_by_script.setdefault(script, set()).add(line)
-    return lines_by_script
 
 
 def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:
@@ -113,8 +100,8 @@ def address(library: Library, place: urls.Place, path: str, target: model.Target
         case model.TermTarget():
             owner = library.terms.get(target.id)
             # In a preview the definition may just have been removed.
-            path = place.path if owner is None else urls.owner_path(owner)
-            return place.href(path, f"term:{target.id}")
+            owner_path = place.path if owner is None else urls.owner_path(owner)
+            return place.href(owner_path, f"term:{target.id}")
         case model.UrlTarget():
             return urls.file_address(place, path, target.url)
         case _:
@@ -292,11 +279,7 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
 
 
 def edit_address(library: Library, path: str) -> str | None:
-    """The address where a file of the course can be edited.
-
-    `{path}` in the repository's address stands for the file; without it, the address is that of a
-    repository on a host with the usual paths.
-    """
+    """The address where a file can be edited; `{path}` in the repository's stands for it."""
     repository = library.course.repository
     if not repository:
         return None

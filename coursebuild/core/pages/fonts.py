@@ -1,8 +1,5 @@
 """Fonts cut down to the characters that a site uses, and fallbacks with the same metrics.
 
-Entry points: `read_faces`; `font_jobs`, which fonts to cut to which characters; `subset_font`,
-which does one job, bytes to bytes; `face_rules`, the `@font-face` rules.
-
 1. A face is a font of the bundle with its family, style, range of weights and characters.
    `site/prepare_fonts.py` has done what does not depend on a course: it has left only the weights
    that the style sheet uses, and decompressed the font.
@@ -10,11 +7,8 @@ which does one job, bytes to bytes; `face_rules`, the `@font-face` rules.
    only these, whose fonts are cut when the tool is bundled, and few edits change a font. A face
    without used characters is left out. HarfBuzz chooses the glyphs (for mathematics with all
    variants and pieces of brackets), and fontTools compresses them.
-3. While a font loads, text is set in a local one, scaled so that lines break in the same places:
-   see `FALLBACKS`.
+3. While a font loads, text is set in a local one, scaled so that lines break in the same places.
 4. The course's own fonts come first: the tool's are used only for the characters that they lack.
-
-A job's `key` identifies its result, so that callers can keep results by it.
 """
 
 from __future__ import annotations
@@ -32,7 +26,6 @@ TEXT, CODE, MATH = "Source Serif 4 Variable", "Source Code Pro Variable", "STIX 
 COURSE = {"text": "Course Text", "interface": "Course Interface", "code": "Course Code"}
 """The families of a course's own fonts in the style sheet, by use."""
 _COURSE_FAMILIES = {TEXT: COURSE["text"], CODE: COURSE["code"]}
-"""The course's families that come before families of the bundle."""
 
 BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·¹½×éöü–—‘’“”…•−")
 """Characters of text that every site keeps."""
@@ -190,11 +183,7 @@ def subset_font(job: FontJob) -> bytes:
     subset = uharfbuzz.SubsetInput()
     subset.flags = uharfbuzz.SubsetFlags.NO_HINTING | uharfbuzz.SubsetFlags.NOTDEF_OUTLINE
     subset.unicode_set.update(map(ord, job.characters))
-    for tags in (
-        subset.layout_feature_tag_set,
-        subset.name_id_set,
-        subset.name_lang_id_set,
-    ):
+    for tags in (subset.layout_feature_tag_set, subset.name_id_set, subset.name_lang_id_set):
         tags.clear()
         tags.invert()
     part = subset.subset(uharfbuzz.Face(job.data)).blob.data
@@ -255,25 +244,20 @@ def face_rules(files: Iterable[tuple[FontJob, str]]) -> str:
             f'src:url("{url}") format("{form}")'
             + ("}" if whole else f";unicode-range:{unicode_range(job.characters)}}}")
         )
-    rules += [rule for fallback in FALLBACKS for rule in _fallback_rules(fallback, files)]
-    return "\n".join(rules) + "\n"
-
-
-def _fallback_rules(fallback: Fallback, files: Iterable[tuple[FontJob, str]]) -> tuple[str, ...]:
-    """The rule of a fallback, scaled to the face with the Latin letters, if that is used."""
-    families = fallback.family, _COURSE_FAMILIES[fallback.family]
-    for job, _ in files:
-        face = job.face
-        if face.family in families and (face.style, face.subset) == (fallback.style, "latin"):
-            measure = face.measure
-            assert measure is not None, "a font with the Latin letters was measured"
+    for fallback in FALLBACKS:
+        # It is scaled to the face with the Latin letters, if that is used.
+        families = fallback.family, _COURSE_FAMILIES[fallback.family]
+        faces = (job.face for job, _ in files if job.face.family in families)
+        kind = (fallback.style, "latin")
+        measures = (face.measure for face in faces if (face.style, face.subset) == kind)
+        if (measure := next(measures, None)) is not None:
             scale = measure[0] / fallback.width
             ascent, descent, gap = (x / scale for x in measure[1:])
             local = ",".join(f'local("{name}")' for name in fallback.locals)
-            return (
+            rules.append(
                 f'@font-face{{font-family:"{fallback.family} fallback";'
                 f"font-style:{fallback.style};src:{local};size-adjust:{scale:.2%};"
                 f"ascent-override:{ascent:.2%};descent-override:{descent:.2%};"
-                f"line-gap-override:{gap:.2%}}}",
+                f"line-gap-override:{gap:.2%}}}"
             )
-    return ()
+    return "\n".join(rules) + "\n"

@@ -1,7 +1,4 @@
-r"""Inline formulas: where a line may break, and where it must not.
-
-Entry points: `inline_formula(mathml, label)`, for a single formula, with its steps `split_formula`
-and `wrap_wide_pieces`; `glue_formulas(html)`, for a whole page.
+"""Inline formulas: where a line may break, and where it must not.
 
 A browser never breaks a line inside a `math` element, but may do so on either side. Therefore
 
@@ -29,7 +26,6 @@ FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
 """A formula of any kind; splitting a page by it gives texts and formulas in turn."""
 
 _CACHE_SIZE = 256
-"""How many formulas are remembered: texts repeat them."""
 
 _ROW = re.compile(r"<(/?)mrow\b[^>]*>")
 _WHOLE = re.compile(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)

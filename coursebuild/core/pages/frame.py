@@ -1,12 +1,8 @@
 """The frame of pages: head, site navigation, foot; and what search engines read.
 
-Entry points: `FrameInputs`, what frames show of a course; `PageFrame`, whose `render` puts the
-frame around the body of a page; `course_data` and `lesson_data`, structured data; `sitemap`,
-`versions`, `robots`. Whatever needs the site's full address is left out if the course does not give
-that.
-
-Pages are drawn in two steps because a page's head refers to the style sheet by a hash of its
-content, and the style sheet names the fonts, which depend on the characters of all pages.
+Whatever needs the site's full address is left out if the course does not give that. Pages are drawn
+in two steps because a page's head refers to the style sheet by a hash of its content, and the style
+sheet names the fonts, which depend on the characters of all pages.
 """
 
 from __future__ import annotations
@@ -47,21 +43,15 @@ PAGE_WORDS = (
     "search.open",
     "search.failed",
 )
-"""Interface texts that the page's script shows."""
 
 FRAME_IDS = frozenset(("_words",))
-"""The ids in `base.html`."""
 
 LOGO_HEIGHT = 28
 """Pixels, as in the style sheet."""
 
 
 def policy(json_ld: str, *, form: bool = False) -> str:
-    """The Content-Security-Policy of a page: nothing from other hosts, no inline code or style.
-
-    Only a page with a `form` may send one, and only to this site. Structured data is not code, but
-    its hash is listed because checkers take it for code.
-    """
+    """The Content-Security-Policy of a page: nothing from other hosts, no inline code or style."""
     digest = base64.b64encode(hashlib.sha256(json_ld.encode()).digest()).decode()
     data = f" 'sha256-{digest}'" if json_ld else ""
     return "; ".join(
@@ -118,7 +108,6 @@ class FrameInputs(Struct, frozen=True):
     title: str
     """Of the course."""
     course_key: str
-    """See `Course.key`."""
     base_url: str
     licence: str
     source: str
@@ -126,16 +115,11 @@ class FrameInputs(Struct, frozen=True):
     menu: tuple[tuple[str, str], ...]
     """Site paths and titles of the pages in the menu of every page, besides the home page."""
     added_pages: tuple[tuple[str, str], ...]
-    """Those of the pages that features add."""
     engine: str
-    """Version of MuJoCo that ran the scripts."""
     python: str
     templates: Texts
-    """The course's own."""
     version: str
-    """See `Course.version`."""
     is_manual: bool
-    """See `Course.is_manual`."""
     names: Names
 
     @classmethod
@@ -168,11 +152,7 @@ class PageFrame(Struct, frozen=True):
     """Files of the tool alone."""
 
     def render(self, head: PageHead, parts: tuple[str, ...], body: str) -> str:
-        """The whole page around a body that has these parts; see `parts_of`.
-
-        The course is out of reach here: what a frame is to show of it becomes a field of its inputs
-        first.
-        """
+        """The whole page around a body that has these parts; see `parts_of`."""
         inputs, names, kind = self.inputs, self.inputs.names, page_kind(head.kind)
         renderer = renderer_for(
             self.assets, inputs.language, inputs.templates, is_manual=inputs.is_manual
@@ -180,6 +160,8 @@ class PageFrame(Struct, frozen=True):
         place = place_of(inputs.base_url, head.path)
         looks = ("figure-light", "figure-dark") if names.logo and names.logo_dark else ("", "")
         logos = zip((names.logo, names.logo_dark), looks, strict=True)
+        is_missing = head.path == urls.NOT_FOUND
+        canonical = "" if is_missing else urls.absolute(inputs.base_url, head.path)
         html = renderer.render(
             "base.html",
             frame=inputs,
@@ -188,11 +170,13 @@ class PageFrame(Struct, frozen=True):
             head_title=head_title(inputs.title, head.title, head.kind),
             description=head.description,
             social=social(inputs.title, inputs.base_url, head),
-            canonical=""
-            if head.path == urls.NOT_FOUND
-            else urls.absolute(inputs.base_url, head.path),
+            canonical=canonical,
             json_ld=head.json_ld,
-            copies=_copies(head.path),
+            copies=tuple(
+                (copy.type, place.href(urls.copy_path(head.path, copy.ending)))
+                for copy in page_copies()
+                if not copy.lessons and has_copies(head.path)
+            ),
             kind=head.kind,
             direction=direction(inputs.language),
             root=place.href(urls.HOME).removesuffix(urls.HOME),
@@ -213,13 +197,6 @@ class PageFrame(Struct, frozen=True):
             page_words=script_words(renderer.words.texts, parts),
         )
         return f"{visible(html)}\n"
-
-
-def _copies(page: str) -> tuple[tuple[str, str], ...]:
-    """The media types and addresses of a page's copies, without those of lessons only."""
-    copies = (copy for copy in page_copies() if not copy.lessons and has_copies(page))
-    place = urls.Place(page)
-    return tuple((copy.type, place.href(urls.copy_path(page, copy.ending))) for copy in copies)
 
 
 def _part_scripts(
@@ -273,32 +250,22 @@ def course_data(library: Library) -> Markup:
     parts: list[Json] = [
         _resource(library, lesson) for lesson in course.lessons if lesson.status != "planned"
     ]
-    return _script({**_context("Course"), **_course(course), "hasPart": parts})
+    return _script("Course", {**_course(course), "hasPart": parts})
 
 
 def lesson_data(library: Library, lesson: Lesson) -> Markup:
     """Structured data of a lesson."""
-    return _script(
-        {
-            **_context("LearningResource"),
-            **_resource(library, lesson),
-            "isPartOf": {"@type": "Course", **_course(library.course)},
-        }
-    )
-
-
-def _context(kind: str) -> dict[str, Json]:
-    return {"@context": "https://schema.org", "@type": kind}
+    whole: dict[str, Json] = {"@type": "Course", **_course(library.course)}
+    return _script("LearningResource", {**_resource(library, lesson), "isPartOf": whole})
 
 
 def _course(course: Course) -> dict[str, Json]:
-    address = urls.absolute(course.base_url, urls.HOME)
     return _filled(
         {
             "name": course.title,
             "description": course.summary,
             "inLanguage": course.language,
-            "url": address,
+            "url": urls.absolute(course.base_url, urls.HOME),
         }
     )
 
@@ -325,22 +292,20 @@ def _filled(data: dict[str, Json]) -> dict[str, Json]:
     return {key: value for key, value in data.items() if value not in ("", [])}
 
 
-def _script(data: dict[str, Json]) -> Markup:
+def _script(kind: str, data: dict[str, Json]) -> Markup:
     """JSON for a `script` element, with nothing in it that could end the element."""
+    data = {"@context": "https://schema.org", "@type": kind, **data}
     text = visible(json.dumps(data, ensure_ascii=False, separators=(",", ":")))
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
 
 def sitemap(course: Course, paths: Iterable[str]) -> bytes:
     """The sitemap of the given pages; the course must have a base address."""
-    rows = "".join(
-        f"<url><loc>{escape(urls.absolute(course.base_url, path), quote=False)}</loc></url>\n"
-        for path in paths
-    )
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        '<urlset xmlns="http://www.sitemaps.org/schemas/sitemap/0.9">\n' + rows + "</urlset>\n"
-    ).encode()
+    addresses = (escape(urls.absolute(course.base_url, path), quote=False) for path in paths)
+    rows = "".join(f"<url><loc>{address}</loc></url>\n" for address in addresses)
+    head = '<?xml version="1.0" encoding="UTF-8"?>\n'
+    space = "http://www.sitemaps.org/schemas/sitemap/0.9"
+    return f'{head}<urlset xmlns="{space}">\n{rows}</urlset>\n'.encode()
 
 
 def versions(course: Course) -> bytes:

@@ -1,9 +1,5 @@
 """Graphs of lessons that build on each other, as small drawings whose nodes are links.
 
-Entry points: `neighbourhood(library, place, lesson)`, the lessons around one; `level_graph`, the
-lessons of a level with their prerequisites; `drawings(graph, words)`, one for wide and one for
-narrow screens.
-
 A drawing is never the only source: the page also lists the lessons with their titles. Arrows that a
 longer path implies are left out, and so are nodes beyond a limit.
 """
@@ -39,14 +35,12 @@ class _Look(Struct, frozen=True):
     height: float
     gap: float
     step: float
-    """From one layer to the next."""
     titles: bool
 
 
 _WIDE = _Look(132, 56, 12, 92, True)
 _NARROW = _Look(50, 30, 5, 58, False)
 _SIZE = 12.0
-"""The font size."""
 _LINE = 15.0
 _CROSSING_WIDTH = 0.2
 """Room for an arrow that crosses a layer, in widths of nodes."""
@@ -134,20 +128,12 @@ def _drawing(graph: LessonGraph, layout: Layout, words: Strings, look: _Look) ->
     ]
     for node, placed_node in zip(graph.nodes, layout.nodes, strict=True):
         x, top = _x(placed_node.x, unit, look), _EDGE + placed_node.layer * look.step
-        parts.append(_node(node, _Box(x, top, wide, look.height), words, look))
+        parts.append(_node(node, x, top, wide, words, look))
     return Markup("".join((*parts, "</svg>")))
 
 
 def _x(place: float, unit: float, look: _Look) -> float:
     return place * unit - look.gap / 2 + _EDGE
-
-
-class _Box(Struct, frozen=True):
-    x: float
-    """The middle."""
-    top: float
-    width: float
-    height: float
 
 
 def _edges(layout: Layout, look: _Look, unit: float) -> Iterator[str]:
@@ -169,24 +155,32 @@ def _edges(layout: Layout, look: _Look, unit: float) -> Iterator[str]:
         yield f'<path class="heads" d="{"".join(heads)}"/>'
 
 
-def _node(node: GraphNode, box: _Box, words: Strings, look: _Look) -> str:
+def _node(node: GraphNode, x: float, top: float, width: float, words: Strings, look: _Look) -> str:
+    """A node, its middle at `x`, with its status as a full or half disc, or a ring."""
     kinds = f"node node-{node.status}" + (" node-outside" if node.outside else "")
-    left, middle = box.x - box.width / 2, box.top + box.height / 2
-    texts = _lines(node, box) if look.titles else []
+    left, middle = x - width / 2, top + look.height / 2
+    texts = _lines(node.title, width - 12) if look.titles else []
     first = middle + 4.3 - len(texts) * _LINE / 2
-    x, mark = box.x, (left + 10, box.top + 10)
+    id_x, mark_x, mark_y = x, left + 10, top + 10
     if not look.titles:  # the mark is on the line of the number
-        x += 5.5
-        mark = (x - text_width(node.id, _SIZE) / 2 - 7, middle)
+        id_x += 5.5
+        mark_x, mark_y = id_x - text_width(node.id, _SIZE) / 2 - 7, middle
     inner = [
-        f'<rect x="{left:.1f}" y="{box.top:.1f}" width="{box.width:.1f}"'
-        f' height="{box.height:.1f}" rx="3"/>',
-        *_mark(node.status, *mark),
-        f'<text class="node-id" x="{x:.1f}" y="{first:.1f}">{markup_text(node.id)}</text>',
+        f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{look.height:.1f}"'
+        ' rx="3"/>',
+        f'<circle class="ring" cx="{mark_x:.1f}" cy="{mark_y:.1f}" r="3.5"/>',
     ]
+    if node.status == "complete":
+        inner.append(f'<circle class="done" cx="{mark_x:.1f}" cy="{mark_y:.1f}" r="3.5"/>')
+    elif node.status == "draft":
+        half = f"M{mark_x:.1f} {mark_y - 3.5:.1f}a3.5 3.5 0 0 0 0 7z"
+        inner.append(f'<path class="done" d="{half}"/>')
+    inner.append(
+        f'<text class="node-id" x="{id_x:.1f}" y="{first:.1f}">{markup_text(node.id)}</text>'
+    )
     for number, text in enumerate(texts, 1):
         y = first + number * _LINE
-        inner.append(f'<text x="{box.x:.1f}" y="{y:.1f}">{markup_text(text)}</text>')
+        inner.append(f'<text x="{x:.1f}" y="{y:.1f}">{markup_text(text)}</text>')
     content = " ".join(inner)
     if node.current:
         return f'<g class="{kinds} node-current">{content}</g>'
@@ -197,23 +191,12 @@ def _node(node: GraphNode, box: _Box, words: Strings, look: _Look) -> str:
     return f'<a class="{kinds}" href="{escape(node.href)}"{name}>{content}</a>'
 
 
-def _mark(status: str, x: float, y: float) -> Iterator[str]:
-    """The status of a lesson as a shape: a full or half disc, or a ring."""
-    yield f'<circle class="ring" cx="{x:.1f}" cy="{y:.1f}" r="3.5"/>'
-    if status == "complete":
-        yield f'<circle class="done" cx="{x:.1f}" cy="{y:.1f}" r="3.5"/>'
-    elif status == "draft":
-        yield f'<path class="done" d="M{x:.1f} {y - 3.5:.1f}a3.5 3.5 0 0 0 0 7z"/>'
-
-
-def _lines(node: GraphNode, box: _Box) -> list[str]:
-    """The title in at most two lines."""
-    room = box.width - 12
-    words = node.title.split()
+def _lines(title: str, room: float) -> list[str]:
+    words = title.split()
     first = ""
     while words and text_width(f"{first} {words[0]}".strip(), _SIZE) <= room:
         first = f"{first} {words.pop(0)}".strip()
     if not first:
-        return [shorten_to_width(node.title, room, _SIZE)]
+        return [shorten_to_width(title, room, _SIZE)]
     rest = " ".join(words)
     return [first, shorten_to_width(rest, room, _SIZE)] if rest else [first]

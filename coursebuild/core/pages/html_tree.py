@@ -1,8 +1,5 @@
 """HTML as a tree, parsed as a browser does, however malformed.
 
-Entry points: `parse_html`, and `to_html` and `to_xml`, which write a tree; `elements_with`, which
-finds elements by their attributes.
-
 The parser is Lexbor: it adds what HTML allows a writer to omit, and repairs what is misplaced.
 Comments are left out.
 """
@@ -20,7 +17,6 @@ from selectolax.lexbor import LexborHTMLParser, LexborNode
 from coursebuild.core.text.characters import clean_xml
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
-"""Elements without content and end tag."""
 _RAW = frozenset("script style xmp iframe noembed noframes plaintext".split())
 """Elements whose text is not escaped."""
 _MAX_DEPTH = 200
@@ -63,7 +59,6 @@ class HtmlElement(Struct):
 
 
 HtmlContent: TypeAlias = HtmlElement | str
-"""An element, or a text without markup."""
 
 
 def parse_html(html: str) -> list[HtmlContent]:
@@ -113,54 +108,44 @@ def _copy_children(parent: LexborNode, target: HtmlElement, levels: int) -> None
         node = node.next
 
 
-def to_html(content: Iterable[HtmlContent]) -> str:
-    """A tree as HTML."""
-    return "".join(_html(content, raw=False))
-
-
-def _html(content: Iterable[HtmlContent], *, raw: bool) -> Iterator[str]:
+def to_html(content: Iterable[HtmlContent], *, raw: bool = False) -> str:
+    """A tree as HTML; `raw`: without escapes, as in a script."""
+    parts: list[str] = []
     for child in content:
         if isinstance(child, str):
-            yield child if raw else escape(child, quote=False)
+            parts.append(child if raw else escape(child, quote=False))
             continue
-        yield f"<{child.name}"
-        for key, value in child.attributes.items():
-            yield f' {key}="{escape(value)}"'
-        yield ">"
+        attributes = (f' {key}="{escape(value)}"' for key, value in child.attributes.items())
+        parts.append(f"<{child.name}{''.join(attributes)}>")
         if child.name not in VOID:
             if child.name in ("pre", "textarea", "listing"):
-                yield "\n"  # parsers drop the first line end in these
-            yield from _html(child.children, raw=child.name in _RAW)
-            yield f"</{child.name}>"
+                parts.append("\n")  # parsers drop the first line end in these
+            parts += to_html(child.children, raw=child.name in _RAW), f"</{child.name}>"
+    return "".join(parts)
 
 
 def to_xml(content: Iterable[HtmlContent]) -> str:
     """A tree as XHTML; of elements with names that XML forbids only the content is kept."""
-    return "".join(_xml(content))
-
-
-def _xml(content: Iterable[HtmlContent]) -> Iterator[str]:
+    parts: list[str] = []
     for child in content:
         if isinstance(child, str):
-            yield _xml_text(child)
+            parts.append(_xml_text(child))
         elif not _XML_NAME.fullmatch(child.name):
-            yield from _xml(child.children)
+            parts.append(to_xml(child.children))
         else:
-            yield f"<{child.name}"
+            parts.append(f"<{child.name}")
             if child.name in _NAMESPACES:
-                yield f' xmlns="{_NAMESPACES[child.name]}"'
+                parts.append(f' xmlns="{_NAMESPACES[child.name]}"')
             for key, value in child.attributes.items():
                 space, _, local = key.rpartition(":")
                 has_name = space in ("", "xml", "xlink") and _XML_NAME.fullmatch(local)
                 if has_name and key != "xmlns":
                     namespace = f' xmlns:xlink="{_XLINK}"' if space == "xlink" else ""
-                    yield f'{namespace} {key}="{_xml_text(value).replace(chr(34), "&quot;")}"'
-            if child.name in VOID:
-                yield "/>"
-            else:
-                yield ">"
-                yield from _xml(child.children)
-                yield f"</{child.name}>"
+                    text = _xml_text(value).replace('"', "&quot;")
+                    parts.append(f'{namespace} {key}="{text}"')
+            is_void = child.name in VOID
+            parts.append("/>" if is_void else f">{to_xml(child.children)}</{child.name}>")
+    return "".join(parts)
 
 
 def _xml_text(text: str) -> str:

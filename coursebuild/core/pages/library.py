@@ -1,7 +1,4 @@
-"""The library: a course, its results, words and templates, arranged for pages to look up.
-
-Entry point: `Library`, made once for a site (`materials.make_library`) and only read afterwards.
-"""
+"""A course, its results, words and templates, arranged for pages to look up."""
 
 from __future__ import annotations
 
@@ -15,29 +12,7 @@ from urllib.parse import quote
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.model import (
-    CalloutKind,
-    Course,
-    Document,
-    FeatureBlock,
-    Lesson,
-    LessonTarget,
-    Level,
-    Link,
-    ModelTarget,
-    Owner,
-    Page,
-    Recording,
-    Script,
-    Target,
-    Term,
-    computed_once,
-    document_blocks,
-    document_scripts,
-    find_blocks,
-    find_inlines,
-    resolve,
-)
+from coursebuild.core import model
 from coursebuild.core.model.results import (
     ModelFacts,
     OutputFile,
@@ -60,7 +35,7 @@ BY_LAB, BY_SCRIPT, BY_LINK = WAYS = "model.by_lab", "model.by_script", "model.by
 class ModelUse(Struct, frozen=True):
     """A document that uses a model, and how."""
 
-    owner: Owner
+    owner: model.Owner
     ways: tuple[str, ...]
     """Some of `WAYS`."""
 
@@ -68,21 +43,19 @@ class ModelUse(Struct, frozen=True):
 class Library(Struct, frozen=True, dict=True):
     """A course and its results, arranged by name; each arrangement is made when it is needed."""
 
-    course: Course
+    course: model.Course
     results: Results
     assets: Assets
     renderer: Renderer
     reports: Reports = Reports()
-    """The reports on models and hard cases that fit the course."""
     trial_values: Mapping[tuple[str, int], Struct] = {}
     """What pages show of the trials of blocks, by the path and offset of the block."""
     trial_files: tuple[OutputFile, ...] = ()
-    """The files of the site that trials have made."""
 
     # --- the course
 
     @cached_property
-    def order(self) -> tuple[Lesson, ...]:
+    def order(self) -> tuple[model.Lesson, ...]:
         """All lessons in the order of the course."""
         return self.course.lessons
 
@@ -92,66 +65,68 @@ class Library(Struct, frozen=True, dict=True):
         return {lesson.id: position for position, lesson in enumerate(self.order)}
 
     @cached_property
-    def lessons(self) -> Mapping[str, Lesson]:
+    def lessons(self) -> Mapping[str, model.Lesson]:
         """By id, in the order of the course; likewise levels and pages."""
         return {lesson.id: lesson for lesson in self.order}
 
     @cached_property
-    def levels(self) -> Mapping[str, Level]:
+    def levels(self) -> Mapping[str, model.Level]:
         return {level.id: level for level in self.course.levels}
 
     @cached_property
-    def pages(self) -> Mapping[str, Page]:
+    def pages(self) -> Mapping[str, model.Page]:
         return {page.id: page for page in self.course.pages}
 
     @property
-    def menu(self) -> tuple[Page, ...]:
+    def menu(self) -> tuple[model.Page, ...]:
         """The pages in the menu of every page, besides the home page."""
         return tuple(page for page in self.course.pages if page.menu and not page.is_home)
 
     @property
     def gallery(self) -> str:
         """The site path of the page of all models; empty without models, or with one `index`."""
-        names = {model.name for model in self.course.models}
+        names = {mjcf.name for mjcf in self.course.models}
         return urls.MODELS if names and "index" not in names else ""
 
     @cached_property
-    def leads(self) -> Mapping[str, tuple[Lesson, ...]]:
+    def leads(self) -> Mapping[str, tuple[model.Lesson, ...]]:
         """The lessons that build on a lesson, by its id."""
         return _group((need, lesson) for lesson in self.order for need in lesson.prerequisites)
 
     @cached_property
-    def scripts(self) -> Mapping[str, tuple[Script, Owner]]:
+    def scripts(self) -> Mapping[str, tuple[model.Script, model.Owner]]:
         """By path, in the order of the course; of two with the same path, the first."""
-        scripts: dict[str, tuple[Script, Owner]] = {}
+        scripts: dict[str, tuple[model.Script, model.Owner]] = {}
         for owner, document in self.course.owned_documents:
-            for script in document_scripts(document):
+            for script in model.document_scripts(document):
                 scripts.setdefault(script.path, (script, owner))
         return scripts
 
     @cached_property
-    def terms(self) -> Mapping[str, Owner]:
+    def terms(self) -> Mapping[str, model.Owner]:
         """The lesson or page that defines a term, by its id."""
-        terms: dict[str, Owner] = {}
+        terms: dict[str, model.Owner] = {}
         for owner, document in self.course.owned_documents:
-            for term in find_inlines(document, Term):
+            for term in model.find_inlines(document, model.Term):
                 terms.setdefault(term.id, owner)
         return terms
 
     @cached_property
-    def referrers(self) -> Mapping[str, tuple[Owner, ...]]:
+    def referrers(self) -> Mapping[str, tuple[model.Owner, ...]]:
         """The lessons and pages that link to a lesson, by its id, in the order of the course."""
         return _group(
             (id, owner)
             for owner, document in self.course.owned_documents
-            for id in {t.id for t in links(self.course, document) if isinstance(t, LessonTarget)}
+            for id in {
+                t.id for t in links(self.course, document) if isinstance(t, model.LessonTarget)
+            }
             if self.lessons.get(id) is not owner
         )
 
     @cached_property
     def uses(self) -> Mapping[str, tuple[ModelUse, ...]]:
         """The documents that use a model, by its name, in the order of the course."""
-        names = {model.name for model in self.course.models}
+        names = {mjcf.name for mjcf in self.course.models}
         return _group(
             (name, ModelUse(owner, tuple(way for way in WAYS if way in ways)))
             for owner, document in (self.course.owned_documents if names else ())
@@ -163,13 +138,13 @@ class Library(Struct, frozen=True, dict=True):
     def quiz_index(self) -> Mapping[str, str]:
         """The questions of documents that have any, by path, for the scripts of other pages.
 
-        `ID:KEY,KEY ID:KEY`: each quiz with the keys of its questions; ids are percent-encoded. So a
-        script knows, without loading the lesson, how many questions it has, whether all were
-        answered right, and where to find one to review.
+        `ID:KEY,KEY ID:KEY`: each quiz with the keys of its questions; ids are percent-encoded.
         """
         index: dict[str, str] = {}
         for document in self.course.documents:
-            keys_of_blocks = (b.progress_keys() for b in find_blocks(document, FeatureBlock))
+            keys_of_blocks = (
+                b.progress_keys() for b in model.find_blocks(document, model.FeatureBlock)
+            )
             entries = (
                 f"{quote(progress[0], safe='')}:{','.join(progress[1])}"
                 for progress in keys_of_blocks
@@ -179,7 +154,7 @@ class Library(Struct, frozen=True, dict=True):
                 index[document.source.path] = text
         return index
 
-    def summaries(self, feature: str) -> Iterator[tuple[Owner, Any]]:
+    def summaries(self, feature: str) -> Iterator[tuple[model.Owner, Any]]:
         """A feature's summaries of documents (`Feature.summary`), in the order of the course."""
         for owner, document in self.course.owned_documents:
             summaries = document.summaries or {}
@@ -202,11 +177,11 @@ class Library(Struct, frozen=True, dict=True):
     def _verdicts(self) -> Mapping[tuple[str, int], Verdict]:
         return {_place(verdict.recording): verdict for verdict in self.results.verdicts}
 
-    def verdict(self, recording: Recording) -> Verdict | None:
+    def verdict(self, recording: model.Recording) -> Verdict | None:
         """The verdict on a recorded output; `None` if it was not compared."""
         return self._verdicts.get(_place(recording))
 
-    def trial_value(self, block: FeatureBlock) -> Struct | None:
+    def trial_value(self, block: model.FeatureBlock) -> Struct | None:
         """The value that a feature publishes of the trial of a block."""
         return self.trial_values.get(_place(block))
 
@@ -224,19 +199,20 @@ class Library(Struct, frozen=True, dict=True):
         """A formula as MathML; empty for one with an error."""
         return known_mathml(self.renderer.formulas)(tex, display)
 
-    def callout(self, name: str) -> CalloutKind:
+    def callout(self, name: str) -> model.CalloutKind:
         """A kind of callout, with the course's own label and promise if it has any."""
-        kind = next((kind for kind in self.course.callouts if kind.name == name), CalloutKind(name))
+        kind = next(
+            (kind for kind in self.course.callouts if kind.name == name), model.CalloutKind(name)
+        )
         default_label, default_promise = (
             self.words(key) if self.words.has(key) else ""
             for key in (f"callout.{name}", f"promise.{name}")
         )
         label = kind.label or default_label or name.capitalize()
-        return CalloutKind(name, label, kind.promise or default_promise)
+        return model.CalloutKind(name, label, kind.promise or default_promise)
 
 
-def _place(block: Recording | FeatureBlock) -> tuple[str, int]:
-    """The path and offset of a block, by which the results of running it are found."""
+def _place(block: model.Recording | model.FeatureBlock) -> tuple[str, int]:
     return block.span.path, block.span.start
 
 
@@ -248,10 +224,10 @@ def _group(pairs: Iterable[tuple[str, Value]]) -> Mapping[str, tuple[Value, ...]
     return groups
 
 
-def links(course: Course, document: Document) -> Iterator[Target]:
+def links(course: model.Course, document: model.Document) -> Iterator[model.Target]:
     """The targets of the links in a document."""
-    for link in find_inlines(document, Link):
-        yield resolve(link.target, course, document.source.path)
+    for link in model.find_inlines(document, model.Link):
+        yield model.resolve(link.target, course, document.source.path)
 
 
 _MODEL_NAMED = re.compile(
@@ -260,12 +236,8 @@ _MODEL_NAMED = re.compile(
 )
 
 
-def models_named(script: Script) -> frozenset[str]:
-    """The names in a script that may be models.
-
-    They are arguments of `model_path`, names of files, and single words in quotes, which a function
-    of the script may pass on to `model_path`.
-    """
+def models_named(script: model.Script) -> frozenset[str]:
+    """The names in a script that may be models: of files, and single words in quotes."""
     names: set[str] = set()
     for match in _MODEL_NAMED.finditer(script.code.text):
         name = (match["name"] or match["file"] or match["word"]).removesuffix(".xml")
@@ -273,18 +245,18 @@ def models_named(script: Script) -> frozenset[str]:
     return frozenset(names)
 
 
-def _named_models(document: Document) -> Mapping[str, tuple[str, ...]]:
+def _named_models(document: model.Document) -> Mapping[str, tuple[str, ...]]:
     """The names in a document that may be models, with the ways in which it uses them."""
 
     def uses() -> Iterator[tuple[str, str]]:
-        for block in document_blocks(document):
-            if isinstance(block, FeatureBlock):
+        for block in model.document_blocks(document):
+            if isinstance(block, model.FeatureBlock):
                 yield from ((name, BY_LAB) for name in block.models())
                 yield from ((name, BY_LINK) for name in block.mentioned_models())
-            elif isinstance(block, Script):
+            elif isinstance(block, model.Script):
                 yield from ((name, BY_SCRIPT) for name in models_named(block))
-        for link in find_inlines(document, Link):
-            if isinstance(link.target, ModelTarget):
+        for link in model.find_inlines(document, model.Link):
+            if isinstance(link.target, model.ModelTarget):
                 yield link.target.name, BY_LINK
 
-    return computed_once(document, "models", lambda: _group(uses()))
+    return model.computed_once(document, "models", lambda: _group(uses()))

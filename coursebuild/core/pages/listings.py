@@ -1,14 +1,9 @@
 """Code as pages show it: as HTML, and which parts of it a reader sees at first.
 
-Entry points: `highlight_lines(language, code)`; `fold(code)`; `find_imports(code)`, the modules
-that it imports.
-
 1. tree-sitter reads Python, the language of most code, eight times as fast as Pygments, which reads
    the other languages. It also reads code that does not parse, such as a fragment or a mistake that
-   a lesson makes on purpose. Pygments distinguishes more kinds of tokens than a page should show;
-   they are mapped to few classes, and a token of none gets no element.
-2. Characters that HTML forbids (control characters, non-characters) are replaced by symbols.
-3. A fold begins and ends between top-level statements. The head (docstring, imports, constants) is
+   a lesson makes on purpose. The many kinds of tokens are mapped to few classes.
+2. A fold begins and ends between top-level statements. The head (docstring, imports, constants) is
    folded if it is long: the page around the script has said what it is for. The rest is shown up to
    `SHOWN_LINES` lines and then folded, except for the `__main__` guard at the end, which says what
    the script does.
@@ -63,7 +58,8 @@ _ORDER = "sd_icnkfa"
 def python_runs(code: str) -> Iterator[tuple[str, str]]:
     """The code in runs, each with its class, perhaps an empty one."""
     data = code.encode()
-    nodes_by_class = QueryCursor(_query()).captures(_parser().parse(data).root_node)
+    parser, query = _python()
+    nodes_by_class = QueryCursor(query).captures(parser.parse(data).root_node)
     classes = bytearray(b"_") * len(data)
     edges = {0, len(data)}
     for css in _ORDER:
@@ -76,23 +72,13 @@ def python_runs(code: str) -> Iterator[tuple[str, str]]:
 
 
 @functools.cache
-def _language() -> Language:
-    return Language(tree_sitter_python.language())
-
-
-@functools.cache
-def _parser() -> Parser:
-    return Parser(_language())
-
-
-@functools.cache
-def _query() -> Query:
+def _python() -> tuple[Parser, Query]:
+    language = Language(tree_sitter_python.language())
     keywords = " ".join(f'"{word}"' for word in _KEYWORDS.split())
-    return Query(_language(), _QUERY.replace("KEYWORDS", keywords))
+    return Parser(language), Query(language, _QUERY.replace("KEYWORDS", keywords))
 
 
 Run: TypeAlias = tuple[str, str]
-"""A class, perhaps empty, and the text that has it."""
 
 _CLASSES: tuple[tuple[_TokenType, str], ...] = (
     (Comment, "c"),
@@ -121,10 +107,7 @@ _WITHOUT_OUTER_SPACE = re.compile(r"\S(?:.*\S)?")
 
 
 def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
-    """The lines of code as HTML; no element crosses the end of a line.
-
-    If no lexer knows the language, they are escaped text.
-    """
+    """The lines of code as HTML, no element across the end of one; escaped text without a lexer."""
     text = visible(code)
     # Lexers drop a byte order mark at the start.
     mark = "\ufeff" if text.startswith("\ufeff") else ""
@@ -169,7 +152,6 @@ def _lex(lexer: Lexer, code: str) -> list[Run]:
 
 @functools.cache
 def _class_of(token: _TokenType) -> str:
-    """The class of a kind of token; empty if it has none."""
     return next((css for kind, css in _CLASSES if token in kind), "")
 
 
@@ -204,11 +186,8 @@ class Part(Struct, frozen=True):
     last: int
     folded: bool
     docstring: bool = False
-    """Whether it holds the script's docstring."""
     imports: bool = False
-    """Whether it holds imports."""
     names: tuple[str, ...] = ()
-    """Names that it defines."""
 
 
 def fold(code: str) -> tuple[Part, ...]:
@@ -258,12 +237,16 @@ def python_nodes(code: str) -> tuple[ast.AST, ...]:
 
 
 def _fold_long(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:
-    """The parts of a long script."""
-    unfolded = (Part(1, len(lines), folded=False),)
-    starts = [_start(statement) for statement in body]
+    starts: list[int] = []
+    for statement in body:
+        decorators = statement.decorator_list if isinstance(statement, _DEFINITIONS) else ()
+        starts.append(min([statement.lineno, *(node.lineno for node in decorators)]))
     if not body or len(set(starts)) != len(starts):
-        return unfolded
-    cuts = [*(_with_comments(lines, start) for start in starts), len(lines) + 1]
+        return (Part(1, len(lines), folded=False),)
+    cuts = [*starts, len(lines) + 1]
+    for number in range(len(starts)):  # comments above a statement belong to it
+        while cuts[number] > 1 and lines[cuts[number] - 2].startswith("#"):
+            cuts[number] -= 1
     head = _head_length(body)
     if head == len(body) or cuts[head] - 1 < HEAD:
         return _fold_rest(body, [1, *cuts[1:]], lines)
@@ -274,11 +257,7 @@ def _fold_long(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:
 
 
 def _fold_rest(body: list[ast.stmt], cuts: list[int], lines: list[str]) -> tuple[Part, ...]:
-    """The parts after the head: a visible one, perhaps a folded one, perhaps the guard.
-
-    Statement `i` has the lines from `cuts[i]` to before `cuts[i + 1]`. Blank lines at the border of
-    a fold belong to the fold.
-    """
+    """The parts after the head; statement `i` has the lines from `cuts[i]` to `cuts[i + 1]`."""
     first, total = cuts[0], len(lines)
     shown_count = 1
     while shown_count < len(body) and cuts[shown_count + 1] - first <= SHOWN_LINES:
@@ -314,25 +293,8 @@ def _folded_part(first: int, last: int, body: list[ast.stmt]) -> Part:
     return Part(first, last, True, docstring, imports, tuple(names))
 
 
-def _start(statement: ast.stmt) -> int:
-    """The first line of a statement, its decorators included."""
-    if isinstance(statement, _DEFINITIONS):
-        return min([statement.lineno, *(d.lineno for d in statement.decorator_list)])
-    return statement.lineno
-
-
-def _with_comments(lines: list[str], start: int) -> int:
-    """The line where the comments above a statement begin."""
-    while start > 1 and lines[start - 2].startswith("#"):
-        start -= 1
-    return start
-
-
 def _head_length(body: list[ast.stmt]) -> int:
-    """How many statements the head has: docstring, imports, constants.
-
-    Assignments are constants if only assignments come before the first definition.
-    """
+    """How many statements the head has: docstring, imports, and constants before a definition."""
     count = int(_is_docstring(body[0]))
     while count < len(body) and isinstance(body[count], ast.Import | ast.ImportFrom):
         count += 1

@@ -1,8 +1,4 @@
-"""Writing Markdown: links, fences, tables, escapes.
-
-Entry points: `escape_marks`, `escape_line`, `guard_lines`; `escape_text`, for readers of Markdown
-that are not ours; `link`, `picture`, `code_span`, `fence`, `table`, `block_quote`, `hang`.
-"""
+"""Writing Markdown: links, fences, tables, escapes."""
 
 from __future__ import annotations
 
@@ -117,15 +113,9 @@ _BLOCK_START = re.compile(
 
 def guard_lines(text: str) -> str:
     """Escape lines of a paragraph that would begin another block."""
-    return "\n".join(map(_guard_line, text.split("\n")))
-
-
-def _guard_line(line: str) -> str:
-    match = _BLOCK_START.match(line)
-    if match is None:
-        return line
-    if match["number"]:
-        return f"{match['number']}\\{line[match.end('number') :]}"
-    if match["note"]:
-        return f"{match['note']}\\{line[match.end('note') :]}"
-    return f"\\{line}"
+    lines = text.split("\n")
+    for number, line in enumerate(lines):
+        if match := _BLOCK_START.match(line):
+            at = max(match.end("number"), match.end("note"), 0)
+            lines[number] = f"{line[:at]}\\{line[at:]}"
+    return "\n".join(lines)

@@ -1,7 +1,5 @@
 """Writing blocks and inlines as HTML.
 
-Entry points: `HtmlWriter`; `SpecialBlock`, the blocks beyond Markdown.
-
 What depends on the course (the address of a lesson, the look of a formula or a lab) is a method of
 the writer that `PageContext` overrides; as it is here, text is written that is on no page.
 """
@@ -28,20 +26,15 @@ SpecialBlock: TypeAlias = (
     | model.Recording
     | model.Script
 )
-"""The blocks beyond Markdown."""
 
 
 def escape(text: str) -> str:
-    """Text as HTML, also for attributes in double quotes.
-
-    Usually there is nothing to escape, and then nothing is copied.
-    """
+    """Text as HTML, also for attributes in double quotes."""
     text = str.replace(text, "&", "&amp;").replace("<", "&lt;")
     return text.replace(">", "&gt;").replace('"', "&quot;")
 
 
 _SIMPLE = re.compile('[^0-9&<>"]*+')
-"""Text without quantities, and with nothing to escape."""
 
 
 def raw_html(node: model.HtmlBlock | model.RawInline, url: Callable[[str], str]) -> str:

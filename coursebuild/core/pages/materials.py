@@ -1,8 +1,4 @@
-"""What the pages of a course are drawn with, made of what the tool and its features bring.
-
-Entry points: `make_library`, a course with its results, words and templates; `renderer_for`,
-`strings_for` and `words_for`, for a language alone.
-"""
+"""What the pages of a course are drawn with, made of what the tool and its features bring."""
 
 from __future__ import annotations
 
@@ -54,10 +50,7 @@ def renderer_for(
     *,
     is_manual: bool = False,
 ) -> Renderer:
-    """The renderer of pages in a language, with the templates of a course and of the tool.
-
-    A course of pages alone is spoken of in the words of `manual`.
-    """
+    """The renderer of pages in a language, with the templates of a course and of the tool."""
     templates = templates_of(assets.templates, assets.compiled_templates, course_templates)
     words = strings_for(assets.templates, language)
     return Renderer(words.prefer("manual.") if is_manual else words, templates, formulas)
@@ -72,10 +65,7 @@ def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> String
 
 
 def words_for(templates: tuple[tuple[str, str], ...], language: str) -> Words:
-    """The words by which texts of a language are read: its own, and the English ones.
-
-    Letters with marks may be typed as one character or as two.
-    """
+    """The words by which texts of a language are read: its own, and the English ones."""
     strings, words = strings_for(templates, language), {}
     for field in Words.__struct_fields__:
         names = strings(f"words.{field}").split("|")

@@ -1,8 +1,5 @@
 r"""Numbers of formulas, figures, tables, listings and labs.
 
-Entry points: `number_items`; `items_of`, for other pages; `item_name`, `name_elsewhere` and
-`name_outside`, the texts of references; `fill_in`, for texts that are kept without them.
-
 1. What has a label has a number, in the order of the text, and nothing else: a number is there to
    be referred to. Each kind is counted for itself.
 2. A figure of Lesson 4.2 is "Figure 4.2.3" wherever it is named, and on a page that is no lesson
@@ -22,20 +19,7 @@ from urllib.parse import unquote
 
 from markupsafe import Markup
 
-from coursebuild.core.model import (
-    LABEL_KINDS,
-    Document,
-    Lesson,
-    LessonTarget,
-    NumberedItem,
-    Owner,
-    PageTarget,
-    Target,
-    UrlTarget,
-    display_formulas,
-    labelled_blocks,
-    resolve,
-)
+from coursebuild.core import model
 from coursebuild.core.model.results import Mathml
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.strings import Strings
@@ -47,11 +31,11 @@ _TAG_CLASS = 'class="tml-tag"'
 _NUMBER = re.compile(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
 
 
-def number_items(document: Document, mathml: Mathml) -> dict[int, NumberedItem]:
+def number_items(document: model.Document, mathml: Mathml) -> dict[int, model.NumberedItem]:
     """What has a number in a document, and formulas that have an id only, by offset."""
-    items: dict[int, NumberedItem] = {}
+    items: dict[int, model.NumberedItem] = {}
     count = 0
-    for formula in display_formulas(document):
+    for formula in model.display_formulas(document):
         html = mathml(formula.tex, True)
         styled_count = html.count(_COUNTER_CLASS)
         tag = _NUMBER.search(html) if _TAG_CLASS in html else None
@@ -61,27 +45,24 @@ def number_items(document: Document, mathml: Mathml) -> dict[int, NumberedItem]:
             number = unescape(tag[1]) if tag is not None and not styled_count else str(count + 1)
         count += styled_count + has_margin_number
         if formula.id:
-            items[formula.start] = NumberedItem(formula.id, number, has_margin_number)
+            items[formula.start] = model.NumberedItem(formula.id, number, has_margin_number)
     counts = Counter[str]()
-    for block, label in labelled_blocks(document):
-        item = NumberedItem(label.id)
+    for block, label in model.labelled_blocks(document):
+        item = model.NumberedItem(label.id)
         counts[item.kind] += 1
-        items[block.span.start] = NumberedItem(label.id, str(counts[item.kind]))
+        items[block.span.start] = model.NumberedItem(label.id, str(counts[item.kind]))
     return items
 
 
-def items_of(document: Document, mathml: Mathml) -> tuple[NumberedItem, ...]:
+def items_of(document: model.Document, mathml: Mathml) -> tuple[model.NumberedItem, ...]:
     """The numbered items of a document, or of its summary."""
     if document.summaries is not None:
         return document.numbered_items
     return tuple(number_items(document, mathml).values())
 
 
-def item_name(item: NumberedItem, prefix: str, words: Strings) -> str:
-    """The name of an item, such as "(3)" or "Figure 4.2.3"; empty without a number.
-
-    `prefix` is what stands before the numbers of its lesson: `4.2.`.
-    """
+def item_name(item: model.NumberedItem, prefix: str, words: Strings) -> str:
+    """The name of an item, such as "(3)" or "Figure 4.2.3"; empty without a number."""
     if not item.number or item.kind == "eq":
         return item.number and f"({item.number})"
     return words(f"number.{item.kind}", number=prefix + item.number)
@@ -105,26 +86,23 @@ def fill_in(text: TextT, names: Iterator[str]) -> TextT:
     return head
 
 
-def name_outside(library: Library, owner: Owner, target: Target) -> str:
+def name_outside(library: Library, owner: model.Owner, target: model.Target) -> str:
     """The name of what a link of a lesson or page leads to, for a page that quotes it."""
-    target = resolve(target, library.course, owner.path)
-    if isinstance(target, UrlTarget) and target.url.startswith("#"):
-        kind = LessonTarget if isinstance(owner, Lesson) else PageTarget
+    target = model.resolve(target, library.course, owner.path)
+    if isinstance(target, model.UrlTarget) and target.url.startswith("#"):
+        kind = model.LessonTarget if isinstance(owner, model.Lesson) else model.PageTarget
         target = kind(owner.id, unquote(target.url[1:]))
     return name_elsewhere(library, "", target)
 
 
-def name_elsewhere(library: Library, path: str, target: Target) -> str:
-    """The name of a numbered item of another page, for the document at a path.
-
-    Empty for a target of another kind.
-    """
-    target = resolve(target, library.course, path)
-    if not isinstance(target, LessonTarget | PageTarget) or not target.anchor:
+def name_elsewhere(library: Library, path: str, target: model.Target) -> str:
+    """The name of a numbered item of another page, for the document at a path; else empty."""
+    target = model.resolve(target, library.course, path)
+    if not isinstance(target, model.LessonTarget | model.PageTarget):
         return ""
-    if target.anchor.partition(":")[0] not in LABEL_KINDS:
+    if target.anchor is None or target.anchor.partition(":")[0] not in model.LABEL_KINDS:
         return ""
-    lesson = isinstance(target, LessonTarget)
+    lesson = isinstance(target, model.LessonTarget)
     owner = library.lessons[target.id] if lesson else library.pages[target.id]
     if owner.document is None:
         return ""

@@ -1,11 +1,8 @@
 """The inputs of a page: everything that it shows except the text of its document, as a value.
 
-Entry point: `PageInputs`, with its `PageHead`.
-
 A page is drawn from its inputs, its document, and the tool's templates and words, and from nothing
-else, so it is drawn again only when one of these changes. Inputs are plain values (texts, numbers,
-tuples, mappings and structs of them). What a page needs from the course (where a link leads, what a
-script printed) has been looked up already.
+else, so it is drawn again only when one of these changes. What a page needs from the course (where
+a link leads, what a script printed) has been looked up already.
 """
 
 from __future__ import annotations
@@ -25,7 +22,6 @@ class ShownRun(Struct, frozen=True):
 
     outcome: Outcome
     missing: tuple[str, ...]
-    """Required modules that are not installed."""
     lines: tuple[tuple[int, str | None], ...] = ()
     """The printed lines that the page quotes, by number from 1; `None` for a missing line."""
     recorded: str = ""
@@ -56,7 +52,6 @@ class Citations(Struct, frozen=True):
     texts: Mapping[int, Markup] = field(default_factory=dict)
     """The text of each citation, by its offset."""
     entries: tuple[CitedEntry, ...] = ()
-    """The sources, in the order of the style."""
     page: str = ""
     """The address of the page of all sources of the course."""
 
@@ -68,7 +63,6 @@ class DocumentInputs(Struct, frozen=True):
     """
 
     engine: str = ""
-    """Version of MuJoCo."""
     python: str = ""
     hrefs: Mapping[Target, str] = field(default_factory=dict)
     """Addresses of links, relative to the page."""
@@ -78,14 +72,11 @@ class DocumentInputs(Struct, frozen=True):
     """What stands before the numbers of figures: `4.2.` in a lesson."""
     callouts: Mapping[str, CalloutKind] = field(default_factory=dict)
     runs: Mapping[str, ShownRun] = field(default_factory=dict)
-    """By path of the script."""
     verdicts: Mapping[int, ShownVerdict] = field(default_factory=dict)
     trials: Mapping[int, Struct] = field(default_factory=dict)
-    """The values that features publish of trials."""
     blocks: Mapping[int, Struct] = field(default_factory=dict)
     """The values that features show with their blocks (`FenceKind.values`)."""
     code_links: Mapping[int, str] = field(default_factory=dict)
-    """Addresses of what inline code names."""
     citations: Citations = Citations()
     keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the keyframes of models, by the model's name."""
@@ -116,7 +107,6 @@ class GraphNode(Struct, frozen=True):
     href: str
     status: str
     current: bool
-    """Whether it is the lesson of the page."""
     outside: bool
     """Whether it belongs to another level than the page."""
 
@@ -125,7 +115,6 @@ class LessonGraph(Struct, frozen=True):
     """A graph of lessons that build on each other, drawn when the page is drawn."""
 
     nodes: tuple[GraphNode, ...]
-    """In the order of the course."""
     edges: tuple[tuple[str, str], ...]
     """Ids of a prerequisite and of the lesson that builds on it."""
 
@@ -134,14 +123,12 @@ class PageHead(Struct, frozen=True):
     """What the frame of a page shows about it."""
 
     path: str
-    """Its site path."""
     kind: str
     """One of `registry.CORE_PAGES`, or the name of a `PageKind`; a class of the style sheet too."""
     title: str
     description: str
     json_ld: Markup = Markup()
     indexed: bool = True
-    """Whether search engines should list it."""
 
 
 class PageInputs(Struct, frozen=True):

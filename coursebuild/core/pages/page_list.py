@@ -1,8 +1,5 @@
 """The list of all pages of a site, in order, and the inputs of those that are no lesson.
 
-Entry points: `page_list(library)`; `home_inputs`, `level_inputs`, `model_inputs`, `page_inputs`,
-`not_found_inputs`.
-
 An entry works with any library of the same course: edits change documents, but the pages stay the
 same as long as the course map does.
 """
@@ -49,7 +46,6 @@ class PageEntry(Struct, frozen=True):
     """A page of a site."""
 
     path: str
-    """Its site path."""
     kind: str
     """One of `CORE_PAGES`, or the name of a `PageKind`."""
     id: str = ""
@@ -171,14 +167,10 @@ class ModelCard(Struct, frozen=True):
     href: str
     picture: PictureLink | None
     lessons: tuple[LessonLink, ...]
-    """The lessons that use it."""
 
 
 def home_inputs(library: Library, document: Document | None) -> PageInputs:
-    """The inputs of the home page: what can be read, and the whole plan.
-
-    The document of the page `home` opens it, if there is one; its summary is enough.
-    """
+    """The inputs of the home page: what can be read, and the whole plan, opened by its document."""
     course = library.course
     place = urls.Place(urls.HOME)
     written_lessons = [lesson for lesson in library.order if lesson.document is not None]

@@ -1,49 +1,36 @@
-"""Drawing the blocks with code and its results, figures and callouts.
-
-Entry points: one function for each block, from the page's context and the block to HTML. They make
-values, which templates in `blocks/` turn into HTML.
-"""
+"""Drawing pages: blocks beyond Markdown, texts of documents, and inputs through the templates."""
 
 from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from decimal import Decimal
-from typing import assert_never
+from typing import TypeAlias, assert_never
 
 from markupsafe import Markup, escape
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import (
-    Callout,
-    Comparison,
-    FeatureBlock,
-    Image,
-    Mjcf,
-    Mode,
-    NumberBinding,
-    Paragraph,
-    PlainCode,
-    Recording,
-    Script,
-    Table,
-    find_blocks,
-    line_anchor,
-    listing_anchor,
-    output_anchor,
-    output_numbers,
-)
+from coursebuild.core import model
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.graph import drawings
 from coursebuild.core.pages.listings import Part, fold, highlight_lines
 from coursebuild.core.pages.markup import SpecialBlock
-from coursebuild.core.pages.page_inputs import ShownRun
+from coursebuild.core.pages.page_inputs import (
+    AddedParts,
+    HighlightedFile,
+    LessonGraph,
+    PageHead,
+    PageInputs,
+    ShownRun,
+)
+from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
-from coursebuild.core.registry import kind_of_block
+from coursebuild.core.registry import kind_of_block, model_parts, page_kind
 from coursebuild.core.text.characters import visible
 
 
@@ -52,10 +39,8 @@ class CodePart(Struct, frozen=True):
 
     html: Markup
     first: int
-    """The number of its first line."""
     folded: bool
     label: str
-    """What is in a fold, in words."""
 
 
 class Receipt(Struct, frozen=True):
@@ -64,112 +49,6 @@ class Receipt(Struct, frozen=True):
     kind: str
     """`verified`, `volatile` or `unverified`; also a class of the style sheet."""
     text: str
-
-
-def script(page: PageContext, block: Script, recordings: tuple[Recording, ...]) -> Markup:
-    """A script and the outputs that belong to it, as one object."""
-    text = block.code.text.rstrip("\n")
-    lines = highlight_lines("python", text)
-    parts = (Part(1, len(lines), folded=True),) if block.figures else fold(text)
-    return page.template(
-        "blocks/script.html",
-        script=block,
-        number=page.number(block.label),
-        parts=tuple(
-            CodePart(
-                numbered_lines(lines[part.first - 1 : part.last], block.path, part.first),
-                part.first,
-                part.folded,
-                _fold_label(page.words, part),
-            )
-            for part in parts
-        ),
-        anchor=listing_anchor(block.path),
-        href=page.place.href(block.path),
-        command=shlex.join(("python", block.path, *block.args)),
-        outputs=tuple(_output(page, recording) for recording in recordings),
-        receipt=None if recordings else script_receipt(page, block),
-    )
-
-
-def recording(page: PageContext, block: Recording) -> Markup:
-    """A recorded output apart from its script."""
-    return page.template("blocks/recording.html", output=_output(page, block))
-
-
-def code(page: PageContext, language: str, text: str) -> Markup:
-    """Code that is only shown."""
-    return page.template("blocks/code.html", language=language, html=page.highlight(language, text))
-
-
-def plain_code(page: PageContext, block: PlainCode) -> Markup:
-    """Python code that is shown, not run."""
-    code_html = code(page, "python", block.code.text)
-    if block.source is None:
-        return code_html
-    return page.template("blocks/source_part.html", path=block.source.path, code=code_html)
-
-
-def figure(page: PageContext, block: Paragraph, image: Image, caption: Markup) -> Markup:
-    """An image with its caption; a script's figure links to the script and its data."""
-    files = [file for file in recorded_figures(page.document) if file.span == image.url_span]
-    recorded, data = (*files, None, None)[:2]
-    return page.template(
-        "blocks/figure.html",
-        image=image,
-        caption=caption,
-        label=block.label,
-        number=page.number(block.label),
-        href=page.url(image.url),
-        figure=recorded,
-        dark=recorded and recorded.has_dark and page.place.href(urls.dark_path(recorded.path)),
-        anchor=recorded and listing_anchor(recorded.script),
-        unrepeated=recorded
-        and recorded.script in page.inputs.runs
-        and page.inputs.runs[recorded.script].unrepeated,
-        data=data and page.place.href(urls.file_path(data.path)),
-    )
-
-
-def callout(page: PageContext, block: Callout) -> Markup:
-    """A callout, folded where the author says so."""
-    return page.template(
-        "blocks/callout.html",
-        callout=block,
-        kind=page.inputs.callouts[block.kind],
-        title=page.inlines(block.title),
-        body=page.blocks(block.blocks),
-    )
-
-
-def mjcf(page: PageContext, block: Mjcf) -> Markup:
-    """A model or fragment, with a note that it compiles, or the message it fails with."""
-    return page.template(
-        "blocks/mjcf.html",
-        mjcf=block,
-        number=page.number(block.label),
-        html=page.highlight("xml", block.code.text.rstrip("\n")),
-        engine=page.inputs.engine,
-    )
-
-
-def number(page: PageContext, node: NumberBinding) -> Markup:
-    """A number that a script printed, marked with the script's name."""
-    text = re.sub(r"(?<!\w)-(?=\d)", "\u2212", node.text)
-    runs = page.inputs.runs
-    doubts = {p: r for p, r in runs.items() if r.outcome in (Outcome.SKIPPED, Outcome.NORUN)}
-    path, doubt = node.script, ""
-    if doubts and node.source is None:
-        outputs = find_blocks(page.document, Recording)
-        above = [block.script for block in outputs if block.body_span.end <= node.span.start]
-        printer = path or (above[-1] if above else None)
-        doubt = _not_run(page.words, doubts[printer]).text if printer in doubts else ""
-    return page.template(
-        "blocks/binding.html", text=text, path=path, source=node.source, doubt=doubt
-    )
-
-
-# --- outputs
 
 
 class OutputView(Struct, frozen=True):
@@ -185,24 +64,130 @@ class OutputView(Struct, frozen=True):
     receipt: Receipt
 
 
-def _output(page: PageContext, block: Recording) -> OutputView:
-    numbers, table = output_numbers(page.document), block.body
-    caption = page.inlines(block.caption) or Markup(escape(page.words("code.caption")))
-    if isinstance(table, Table) and table.label is not None:
-        number = Markup('<span class="numbered" id="{}">{}</span> {}')
-        caption = number.format(table.label.id, page.number(table.label), caption)
-        table = replace(table, label=None)
-    return OutputView(
-        caption=caption,
-        path=block.script or "",
-        anchor=output_anchor(block.script, numbers[block.span.start]) if block.script else "",
-        text=None if isinstance(table, Table) else visible(table.text).rstrip("\n"),
-        table=page.blocks((table,)) if isinstance(table, Table) else None,
-        receipt=output_receipt(page, block),
-    )
+class PageWriter(PageContext, frozen=True):
+    """A page that can be written whole: its special blocks are drawn here, or by their feature."""
+
+    def figure(self, block: model.Paragraph, image: model.Image, caption: Markup) -> Markup:
+        """An image with its caption; a script's figure links to the script and its data."""
+        files = [file for file in recorded_figures(self.document) if file.span == image.url_span]
+        recorded, data = (*files, None, None)[:2]
+        runs = self.inputs.runs
+        html = self.template(
+            "blocks/figure.html",
+            image=image,
+            caption=caption,
+            label=block.label,
+            number=self.number(block.label),
+            href=self.url(image.url),
+            figure=recorded,
+            dark=recorded and recorded.has_dark and self.place.href(urls.dark_path(recorded.path)),
+            anchor=recorded and model.listing_anchor(recorded.script),
+            unrepeated=recorded and recorded.script in runs and runs[recorded.script].unrepeated,
+            data=data and self.place.href(urls.file_path(data.path)),
+        )
+        return html + Markup("\n")
+
+    def code(self, language: str, text: str) -> Markup:
+        """A code block that is only shown, not run."""
+        html = self.highlight(language, text.rstrip("\n"))
+        return self.template("blocks/code.html", language=language, html=html) + Markup("\n")
+
+    def binding(self, binding: model.NumberBinding) -> Markup:
+        """A number that a script printed, marked with the script's name."""
+        text = re.sub(r"(?<!\w)-(?=\d)", "\u2212", binding.text)
+        runs = self.inputs.runs
+        doubts = {p: r for p, r in runs.items() if r.outcome in (Outcome.SKIPPED, Outcome.NORUN)}
+        path, source, doubt = binding.script, binding.source, ""
+        if doubts and source is None:
+            outputs = model.find_blocks(self.document, model.Recording)
+            above = [block.script for block in outputs if block.body_span.end <= binding.span.start]
+            printer = path or (above[-1] if above else None)
+            doubt = _not_run(self.words, doubts[printer]).text if printer in doubts else ""
+        return self.template(
+            "blocks/binding.html", text=text, path=path, source=source, doubt=doubt
+        )
+
+    def block(self, block: SpecialBlock) -> Markup:
+        """A special block, with its line end."""
+        match block:
+            case model.Callout():
+                html = self.template(
+                    "blocks/callout.html",
+                    callout=block,
+                    kind=self.inputs.callouts[block.kind],
+                    title=self.inlines(block.title),
+                    body=self.blocks(block.blocks),
+                )
+            case model.Script():
+                html = self._script(block, self.script_outputs.get(block.span.start, ()))
+            case model.Recording():
+                if any(block in group for group in self.script_outputs.values()):
+                    return Markup()  # drawn with its script
+                html = self.template("blocks/recording.html", output=self._output(block))
+            case model.Mjcf():
+                html = self.template(
+                    "blocks/mjcf.html",
+                    mjcf=block,
+                    number=self.number(block.label),
+                    html=self.highlight("xml", block.code.text.rstrip("\n")),
+                    engine=self.inputs.engine,
+                )
+            case model.PlainCode():
+                code = self.highlight("python", block.code.text)
+                html = self.template("blocks/code.html", language="python", html=code)
+                if block.source is not None:
+                    path = block.source.path
+                    html = self.template("blocks/source_part.html", path=path, code=html)
+            case model.FeatureBlock():
+                html = kind_of_block(block).draw(self, block)
+            case _:
+                assert_never(block)
+        return html + Markup("\n") if html else html
+
+    def _script(self, block: model.Script, recordings: tuple[model.Recording, ...]) -> Markup:
+        """A script and the outputs that belong to it, as one object."""
+        text, words = block.code.text.rstrip("\n"), self.words
+        lines = highlight_lines("python", text)
+        parts: list[CodePart] = []
+        for part in (Part(1, len(lines), folded=True),) if block.figures else fold(text):
+            key = "code.lines" if part.first < part.last else "code.line"
+            holds = [words("code.docstring")] if part.docstring else []
+            holds += [words("code.imports")] if part.imports else []
+            label = words(key, first=part.first, last=part.last)
+            label += ": " * bool(holds or part.names) + ", ".join((*holds, *part.names))
+            html = numbered_lines(lines[part.first - 1 : part.last], block.path, part.first)
+            parts.append(CodePart(html, part.first, part.folded, label))
+        return self.template(
+            "blocks/script.html",
+            script=block,
+            number=self.number(block.label),
+            parts=tuple(parts),
+            anchor=model.listing_anchor(block.path),
+            href=self.place.href(block.path),
+            command=shlex.join(("python", block.path, *block.args)),
+            outputs=tuple(map(self._output, recordings)),
+            receipt=None if recordings else script_receipt(self, block),
+        )
+
+    def _output(self, block: model.Recording) -> OutputView:
+        script, table = block.script, block.body
+        numbers = model.output_numbers(self.document)
+        caption = self.inlines(block.caption) or Markup(escape(self.words("code.caption")))
+        if isinstance(table, model.Table) and table.label is not None:
+            name = Markup('<span class="numbered" id="{}">{}</span> {}')
+            caption = name.format(table.label.id, self.number(table.label), caption)
+            table = replace(table, label=None)
+        return OutputView(
+            caption=caption,
+            path=script or "",
+            anchor=model.output_anchor(script, numbers[block.span.start]) if script else "",
+            text=None if isinstance(table, model.Table) else visible(table.text).rstrip("\n"),
+            table=self.blocks((table,)) if isinstance(table, model.Table) else None,
+            receipt=output_receipt(self, block),
+        )
 
 
-def output_receipt(page: PageContext, block: Recording) -> Receipt:
+def output_receipt(page: PageContext, block: model.Recording) -> Receipt:
     """The receipt of a recorded output."""
     words, inputs = page.words, page.inputs
     verdict, run = inputs.verdicts.get(block.span.start), inputs.runs.get(block.script or "")
@@ -225,14 +210,14 @@ def output_receipt(page: PageContext, block: Recording) -> Receipt:
             assert_never(verdict.status)
 
 
-def _describe_comparison(words: Strings, comparison: Comparison) -> str:
+def _describe_comparison(words: Strings, comparison: model.Comparison) -> str:
     match comparison.mode:
-        case Mode.EXACT | Mode.VOLATILE:
+        case model.Mode.EXACT | model.Mode.VOLATILE:
             text = words("receipt.exact")
-        case Mode.DIGITS:
+        case model.Mode.DIGITS:
             text = words("receipt.digits")
-        case Mode.TOLERANCE:
-            rtol, atol = short(comparison.rtol), short(comparison.atol)
+        case model.Mode.TOLERANCE:
+            rtol, atol = _short(comparison.rtol), _short(comparison.atol)
             if comparison.rtol and comparison.atol:
                 text = words("receipt.rtol_atol", rtol=rtol, atol=atol)
             elif comparison.rtol:
@@ -248,13 +233,13 @@ def _describe_comparison(words: Strings, comparison: Comparison) -> str:
     return text
 
 
-def short(value: Decimal) -> str:
+def _short(value: Decimal) -> str:
     """A tolerance as a person writes it: `1e-6`, `0.05`."""
     value = value.normalize()
     return f"{value:f}" if -4 < value.adjusted() < 6 else f"{value:e}"
 
 
-def script_receipt(page: PageContext, block: Script) -> Receipt:
+def script_receipt(page: PageContext, block: model.Script) -> Receipt:
     """The receipt of a script without a recorded output."""
     words, inputs = page.words, page.inputs
     run = inputs.runs.get(block.path)
@@ -274,61 +259,134 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
     return Receipt("unverified", words("receipt.unchecked"))
 
 
-# --- code
-
-
 def numbered_lines(lines: Iterable[Markup], path: str, first: int = 1) -> Markup:
     """Number lines of a file, from its line `first` on, so that each can be linked to.
 
-    No highlighted token crosses the end of a line, so each line can be an element. Its number is in
-    its anchor only, not in the text, so that it is neither copied nor read out.
+    The number is in the anchor only, not in the text, so that it is neither copied nor read out.
     """
-    start, _, _ = line_anchor(path, first).rpartition(str(first))
+    start, _, _ = model.line_anchor(path, first).rpartition(str(first))
     before = f'<span id="{escape(start)}'
     return Markup("\n".join(f'{before}{n}">{line}</span>' for n, line in enumerate(lines, first)))
 
 
-def _fold_label(words: Strings, part: Part) -> str:
-    lines = words(
-        "code.lines" if part.first < part.last else "code.line", first=part.first, last=part.last
+# --- whole pages
+
+
+class ContentsEntry(Struct, frozen=True):
+    """An entry of the table of contents."""
+
+    anchor: str
+    title: Markup
+    further: bool = False
+    children: tuple[ContentsEntry, ...] = ()
+
+
+def article(page: PageContext, document: model.Document) -> Markup:
+    """The text of a document; a docked block is placed beside the paragraphs around it."""
+    parts: list[Markup] = []
+    for further, blocks in model.main_and_further(document.blocks):
+        heading = page.blocks(blocks[:1]) if further else None
+        texts: list[Markup] = []
+        for before, docked, after in _groups(blocks[1:] if further else blocks):
+            html = page.blocks(before)
+            if docked is not None:
+                values = {"before": html, "docked": page.block(docked), "after": page.blocks(after)}
+                html = page.template("partials/dock.html", **values)
+            texts.append(html)
+        text = Markup("\n").join(texts)
+        parts.append(
+            page.template("partials/further.html", heading=heading, text=text) if further else text
+        )
+    return Markup("\n").join(filter(None, (*parts, page.footnotes(), page.references())))
+
+
+_WIDE = (model.Script, model.Recording, model.Mjcf, model.Table, model.HtmlBlock)
+
+
+def _is_wide(block: model.Block) -> bool:
+    if isinstance(block, model.FeatureBlock):
+        return kind_of_block(block).wide
+    return isinstance(block, _WIDE)
+
+
+def _docked(block: model.Block) -> model.FeatureBlock | None:
+    return (
+        block
+        if isinstance(block, model.FeatureBlock) and kind_of_block(block).docked(block)
+        else None
     )
-    holds = [words("code.docstring")] if part.docstring else []
-    holds += [words("code.imports")] if part.imports else []
-    holds += part.names
-    return f"{lines}: {', '.join(holds)}" if holds else lines
 
 
-class PageWriter(PageContext, frozen=True):
-    """A page that can be written whole: its special blocks are drawn here, or by their feature."""
+_Blocks: TypeAlias = tuple[model.Block, ...]
 
-    def figure(self, block: Paragraph, image: Image, caption: Markup) -> Markup:
-        """An image with its caption, its script and its data."""
-        return figure(self, block, image, caption) + Markup("\n")
 
-    def code(self, language: str, text: str) -> Markup:
-        """A code block that is only shown, not run."""
-        return code(self, language, text.rstrip("\n")) + Markup("\n")
+def _groups(blocks: _Blocks) -> Iterator[tuple[_Blocks, model.FeatureBlock | None, _Blocks]]:
+    """Blocks, a docked one if any, and those after it; headings and wide blocks end a group."""
+    rest = blocks
+    while (at := next((i for i, b in enumerate(rest) if _docked(b)), None)) is not None:
+        docked = _docked(rest[at])
+        start, end = at, at + 1
+        while start and not _is_wide(rest[start - 1]):
+            start -= 1
+            if isinstance(rest[start], model.Heading):
+                break
+        while end < len(rest) and not (_is_wide(rest[end]) or isinstance(rest[end], model.Heading)):
+            end += 1
+        if start:
+            yield rest[:start], None, ()
+        yield rest[start:at], docked, rest[at + 1 : end]
+        rest = rest[end:]
+    if rest:
+        yield rest, None, ()
 
-    def binding(self, binding: NumberBinding) -> Markup:
-        """A number that was compared with the output of a script."""
-        return number(self, binding)
 
-    def block(self, block: SpecialBlock) -> Markup:
-        """A special block, with its line end."""
-        match block:
-            case Callout():
-                html = callout(self, block)
-            case Script():
-                html = script(self, block, self.script_outputs.get(block.span.start, ()))
-            case Recording():
-                follows_script = any(block in group for group in self.script_outputs.values())
-                html = Markup() if follows_script else recording(self, block)
-            case Mjcf():
-                html = mjcf(self, block)
-            case PlainCode():
-                html = plain_code(self, block)
-            case FeatureBlock():
-                html = kind_of_block(block).draw(self, block)
+def contents(page: PageContext, document: model.Document) -> tuple[ContentsEntry, ...]:
+    """The table of contents: headings of level 2, with those of level 3 below them."""
+    entries: list[ContentsEntry] = []
+    for block in document.blocks:
+        if not isinstance(block, model.Heading) or block.level > 3:
+            continue
+        title = page.inlines(model.without_links(block.children, page.reference))
+        entry = ContentsEntry(block.anchor, title, block.goes_further)
+        if block.level == 3 and entries:
+            entries[-1] = replace(entries[-1], children=(*entries[-1].children, entry))
+        else:
+            entries.append(entry)
+    return tuple(entries)
+
+
+def draw(
+    inputs: PageInputs, document: model.Document | None, renderer: Renderer
+) -> tuple[PageHead, Markup, PageContext | None]:
+    """Draw a page: return its head, its body and the context of its document."""
+    page: PageContext | None = None
+    values = dict(inputs.values)
+    for name, value in inputs.values.items():
+        match value:
+            case HighlightedFile():
+                lines = highlight_lines(value.language, value.text)
+                values[name] = numbered_lines(lines, value.path)
+            case LessonGraph():
+                values[name] = drawings(value, renderer.words)
+            case AddedParts():
+                parts = model_parts()
+                html = (parts[key].draw(renderer, part) for key, part in value.values.items())
+                values[name] = Markup("").join(html)
             case _:
-                assert_never(block)
-        return html + Markup("\n") if html else html
+                pass
+    head = inputs.head
+    if document is not None and inputs.document_inputs is not None:
+        page = PageWriter(renderer, inputs.document_inputs, urls.Place(head.path), document)
+        values["contents"] = contents(page, document)
+        values["article"] = article(page, document)
+        values["title_anchor"] = document.title_anchor
+        if head.kind == "page":
+            first = next((b for b in document.blocks if isinstance(b, model.Paragraph)), None)
+            inlines = () if first is None else model.without_links(first.children, page.reference)
+            text = " ".join(model.plain_text(inlines).split())
+            text = text if len(text) <= 200 else text[:200].rsplit(" ", 1)[0] + " …"
+            head = replace(head, description=text)
+    kind = page_kind(head.kind)
+    if kind is not None and kind.draw is not None:
+        values |= {"title": head.title, "content": kind.draw(renderer, values)}
+    return head, renderer.render(inputs.template, **values), page

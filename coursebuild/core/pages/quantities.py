@@ -1,8 +1,5 @@
 """Numbers and their units in running text.
 
-Entry points: `text_html(text, direction)`; its steps `join_units` and `split_quantities`;
-`unit_length`; `isolate_ltr(html)`; `number(value)`.
-
 1. A no-break space replaces each space between a number and its unit, and inside a unit (`kg m²`).
 2. In text from the right, a sign or a unit would end up on the wrong side of its number, since
    neither has a direction of its own. Such quantities are isolated as text from the left.
@@ -72,10 +69,7 @@ def unit_length(text: str) -> int:
 
 
 def split_quantities(text: str) -> Iterator[tuple[str, bool]]:
-    """Split a text into pieces, each with whether it is a quantity to isolate.
-
-    A number after a word in Latin letters is in order already.
-    """
+    """Split a text into pieces, each with whether it is a quantity to isolate."""
     position = 0
     for match in re.finditer(_QUANTITY, text):
         if _LATIN_BEFORE.search(text, position, match.start()):

@@ -1,18 +1,12 @@
 """Checking that every internal link, anchor, image and script of the built pages leads somewhere.
 
-Entry points: `check_links(files, base_url)`, which returns broken links sorted by page;
-`ids_and_addresses`, `references` and `has_anchor`, which check without reading all pages.
-
-1. Each page is parsed once, for its ids and the addresses in it.
-2. Each address is resolved from its page, as a browser would; other hosts are left alone.
-3. It must be a file of the site, and its fragment an id of that page; otherwise the nearest one is
-   suggested.
+Each address is resolved from its page, as a browser would; other hosts are left alone. It must be a
+file of the site, and its fragment an id of that page; otherwise the nearest one is suggested.
 """
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable
 from typing import TypeAlias
 from urllib.parse import unquote, urljoin, urlsplit
 
@@ -41,14 +35,8 @@ _ADDRESSES = {
     "use": ("href",),
     "video": ("src", "poster"),
 }
-"""Attributes that hold addresses, by element."""
 
-_LINK_ATTRIBUTES = (
-    "id",
-    "name",
-    *sorted({name for names in _ADDRESSES.values() for name in names}),
-)
-"""Attributes that may hold an id or an address."""
+_LINK_ATTRIBUTES = ("id", "name", *sorted({name for n in _ADDRESSES.values() for name in n}))
 
 _ORIGIN = "https://site.invalid"
 """Stands for the host that serves the site."""
@@ -63,30 +51,38 @@ class BrokenLink(Struct, frozen=True):
     """An address of a page that leads nowhere."""
 
     page: str
-    """Site path of the page."""
     url: str
-    """The address as written there."""
     reason: str
     """What is wrong, lower case, no full stop."""
     suggestion: str | None
-    """The nearest existing file or id."""
 
 
 def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[BrokenLink, ...]:
     """The broken links in a site that is served at `base_url`."""
     contents = {file.path: file.data for file in files}
     pages = {
-        path: ids_and_addresses(data.decode())[:2]
+        path: ids_and_addresses(data.decode())
         for path, data in contents.items()
         if path.endswith(".html")
     }
-    ids = {path: page_ids for path, (page_ids, _) in pages.items()}
-    broken = (
-        problem
-        for path, (_, addresses) in pages.items()
-        for url in addresses
-        if (problem := _find_problem(path, url, contents.keys(), ids, base_url)) is not None
-    )
+    broken: list[BrokenLink] = []
+    for path, (_, addresses, _) in pages.items():
+        for url in addresses:
+            resolved = _target(path, url, base_url)
+            if resolved is None:
+                continue
+            target, anchor = resolved
+            reason, suggestion = anchor, None
+            if target and target not in contents:
+                reason = f"no file `{target}` in the site"
+                suggestion = nearest(target, contents, cutoff=0.7)
+            elif target:
+                ids = pages[target][0] if target in pages else None
+                if ids is None or anchor in ("", "top") or has_anchor(ids, anchor):
+                    continue
+                reason = f"`{target}` has no anchor `#{anchor}`"
+                suggestion = nearest(anchor, ids)
+            broken.append(BrokenLink(path, url, reason, suggestion))
     return tuple(sorted(broken, key=lambda link: (link.page, link.url)))
 
 
@@ -141,19 +137,13 @@ def merge_line_ids(ids: Iterable[str]) -> frozenset[str]:
     return frozenset(other_ids | {f"{stem}.L{last}" for stem, last in longest.items()})
 
 
-@functools.lru_cache(maxsize=8)
-def _base(base_url: str) -> tuple[str, str]:
-    """The folder that a site is served from, and the host; empty if not known."""
-    parts = urlsplit(base_url)
-    host = f"{parts.scheme}://{parts.netloc}" if parts.netloc else ""
-    return f"{parts.path.rstrip('/')}/", host
-
-
 def _target(path: str, url: str, base_url: str) -> Reference | None:
     """The target of an address; `None` for another site."""
     if url.startswith("#") and url.isprintable():  # as most
         return path, unquote(url.strip()[1:])
-    folder, site_host = _base(base_url)
+    base = urlsplit(base_url)
+    folder = f"{base.path.rstrip('/')}/"
+    site_host = f"{base.scheme}://{base.netloc}" if base.netloc else ""
     try:
         parts = urlsplit(urljoin(_ORIGIN + folder + urls.encode(path), url.strip()))
     except ValueError:
@@ -167,26 +157,3 @@ def _target(path: str, url: str, base_url: str) -> Reference | None:
     if not target or target.endswith("/"):
         target += urls.HOME
     return target, unquote(parts.fragment)
-
-
-def _find_problem(
-    path: str,
-    url: str,
-    files: Collection[str],
-    ids: Mapping[str, Collection[str]],
-    base_url: str,
-) -> BrokenLink | None:
-    def broken(reason: str, suggestion: str | None = None) -> BrokenLink:
-        return BrokenLink(path, url, reason, suggestion)
-
-    resolved = _target(path, url, base_url)
-    if resolved is None:
-        return None
-    target, anchor = resolved
-    if not target:
-        return broken(anchor)
-    if target not in files:
-        return broken(f"no file `{target}` in the site", nearest(target, files, cutoff=0.7))
-    if anchor in ("", "top") or target not in ids or has_anchor(ids[target], anchor):
-        return None
-    return broken(f"`{target}` has no anchor `#{anchor}`", nearest(anchor, ids[target]))

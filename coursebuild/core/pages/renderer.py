@@ -1,14 +1,8 @@
 """The renderer of pages: words, templates in Jinja's language, formulas.
 
-Entry points: `Renderer`; `known_mathml`; `templates_of`; `compile_templates`, for bundling the
-tool; `TemplateFailure`.
-
-1. Values that are not `Markup` are escaped.
-2. An undefined name or attribute is an error.
-3. Templates that the tool was bundled with are loaded as the Python they were compiled to then.
-   Others, in a source tree, are compiled on use.
-4. A course may replace templates by its own. Errors in these are its author's, and are reported
-   with their place.
+Templates that the tool was bundled with are loaded as the Python they were compiled to then; those
+of a source tree are compiled on use. A course may replace templates by its own. Errors in these are
+its author's, and are reported with their place.
 """
 
 from __future__ import annotations
@@ -46,10 +40,7 @@ Texts: TypeAlias = tuple[tuple[str, str], ...]
 def templates_of(
     texts: Texts, folder: Path | None = None, course_templates: Texts = ()
 ) -> Environment:
-    """The templates among the tool's files; `folder` holds compiled ones.
-
-    `course_templates` are those of the course, which come first.
-    """
+    """The templates among the tool's files, or compiled in `folder`, after those of the course."""
     compiled_folder = None if folder is None else folder / compiled_name(texts)
     loaders: list[BaseLoader] = [DictLoader(_pages(texts))]
     if compiled_folder is not None and compiled_folder.is_dir():
@@ -135,10 +126,7 @@ class Renderer(Struct, frozen=True):
     formulas: Mapping[Formula, str | MathError] = field(default_factory=dict)
 
     def render(self, template: str, **values: object) -> Markup:
-        """A filled-in template, without its last line end.
-
-        Templates can use `t`, the interface texts, and `authored`, see `text`.
-        """
+        """A filled-in template; it can use `t`, the interface texts, and `authored`, see `text`."""
         variables = {"t": self.words, "authored": self.text, **values}
         try:
             return Markup(self.templates.get_template(template).render(variables).rstrip("\n"))

@@ -1,8 +1,5 @@
 """The interface texts: one file for each language.
 
-Entry points: `parse_strings(text, fallback, language)`, which returns `Strings`; templates call
-`t("lesson.minutes", n=25)`. `category(language, n)`, the plural form that goes with a number.
-
 1. A file is TOML: tables of texts, addressed by dotted path. `{name}` in a text is replaced by a
    value.
 2. A text that depends on a number is a table with the plural forms of its language, `other` among
@@ -11,11 +8,9 @@ Entry points: `parse_strings(text, fallback, language)`, which returns `Strings`
 3. A key missing in a language is taken from English; one missing in English is a programming error
    (`KeyError`). All forms of a text are of one language.
 
-The direction in which a language is written (`direction(language)`): if its tag names a script
-(`az-Arab`, `ur-Latn`), that decides; otherwise language and region do if the region writes the
-language in another script than others (`pa-PK`), and else the language alone. Sources: the
-right-to-left scripts of the Unicode Standard (chapters 9, 10, 14 and 19), and the likely scripts of
-languages in CLDR.
+The direction in which a language is written is that of the script that its tag names (`az-Arab`),
+if any; else of the region, where that writes it in another script than others (`pa-PK`). Sources:
+the Unicode Standard (chapters 9, 10, 14 and 19), and the likely scripts of languages in CLDR.
 """
 
 from __future__ import annotations
@@ -38,23 +33,18 @@ class Strings(Struct, frozen=True):
     """The interface texts in one language."""
 
     texts: Mapping[str, str]
-    """By dotted key, sorted."""
     language: str = DEFAULT_LANGUAGE
-    """The language of the course."""
 
     def __call__(self, key: str, **values: str | int | float) -> str:
         """The text of a key, with values inserted."""
         text = self.texts.get(key)
         if text is None and "n" in values:
-            text = self._form(key, values["n"])
+            n = values["n"]
+            form = "other" if isinstance(n, str) else category(self.language, n)
+            text = self.texts.get(f"{key}.{form}", self.texts.get(f"{key}.other"))
         if text is None:
             raise KeyError(f"no interface text {key!r}")
         return text.format_map(values) if values else text
-
-    def _form(self, key: str, n: str | int | float) -> str | None:
-        """The form of a text that goes with a number."""
-        name = "other" if isinstance(n, str) else category(self.language, n)
-        return self.texts.get(f"{key}.{name}", self.texts.get(f"{key}.other"))
 
     def prefer(self, prefix: str) -> Strings:
         """The texts in which one of the key `prefix` + KEY replaces that of KEY."""
@@ -96,10 +86,7 @@ def _flatten(table: dict[str, object], prefix: str) -> Iterator[tuple[str, str]]
 
 
 def category(language: str, n: float) -> Category:
-    """The form of a text that goes with a number; one with decimals takes `other`.
-
-    A language without interface texts follows English, whose texts it shows.
-    """
+    """The plural form that goes with a number; a language without texts follows English."""
     if n != int(n):
         return "other"
     n = abs(int(n))
@@ -123,7 +110,6 @@ _FROM_THE_RIGHT = frozenset(
     " narb nbat nkoo orkh ougr palm phli phlp phnx prti rohg samr sarb sogd sogo syrc syre syrj"
     " syrn thaa todr yezi".split()
 )
-"""Scripts, as tags name them."""
 
 _LANGUAGES = frozenset(
     # of Arabic script

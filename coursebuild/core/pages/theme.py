@@ -1,9 +1,4 @@
-"""A course's own look in the files that all pages share, and drawings for dark pages.
-
-Entry points: `course_face`, a font of the course's own, and `measure_font`; `theme_faces`, all its
-fonts; `theme_style`, the end of the style sheet; `picture_size`; `dark_drawing`, made from a light
-one; `dark_colours`, the dark colours that a style sheet pairs with light ones.
-"""
+"""What a course changes of the looks of its pages: fonts, accent, drawings on dark pages."""
 
 from __future__ import annotations
 
@@ -12,19 +7,15 @@ import functools
 import io
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, RECOMMENDED_CONTRAST, legible
 from coursebuild.core.drawing.safe_svg import read_svg
 from coursebuild.core.model.course import Theme, ThemeFile
 from coursebuild.core.pages.fonts import COURSE, Face, unicode_range
 
-if TYPE_CHECKING:
-    from fontTools.ttLib import TTFont
-
 PER_MILLE = "183 103 75 65 62 57 57 53 50 50 33 33 23 22 20 20 17 16 15 14 13 8 6 1 1 1 1"
 FREQUENCY = dict(zip(" etaoinsrhldcumfwgpybvkxjqz", map(int, PER_MILLE.split()), strict=True))
-"""The frequency of characters in English text, per thousand."""
 
 
 @functools.lru_cache(maxsize=16)
@@ -51,7 +42,7 @@ def course_face(use: str, name: str, data: bytes) -> tuple[Face, bytes] | str:
     return face, whole.getvalue()
 
 
-def measure_font(font: TTFont) -> tuple[float, float, float, float] | None:
+def measure_font(font: Any) -> tuple[float, float, float, float] | None:
     """Mean advance width, weighted by `FREQUENCY`, ascent, descent and line gap of a font, in em.
 
     `None` for a font without the letters of `FREQUENCY`.
@@ -66,9 +57,7 @@ def measure_font(font: TTFont) -> tuple[float, float, float, float] | None:
 
 
 _ACCENT = "#17487a", "#9fc6ef"
-"""The accent of the style sheet, on light and dark pages."""
 _BOLD = 600
-"""The weight of headings."""
 _SIDE = re.compile(r"\s*+(\d+(?:\.\d*)?|\.\d+)")
 
 
@@ -133,10 +122,7 @@ def dark_colours(css: str) -> dict[str, str]:
 
 
 def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
-    """An SVG in the colours of a dark page.
-
-    A colour without a pair keeps its hue, but its lightness is inverted.
-    """
+    """An SVG in dark colours; one without a pair keeps its hue, with its lightness inverted."""
 
     def dark(match: re.Match[str]) -> str:
         value = match["value"]
@@ -149,7 +135,10 @@ def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
         inverted = bytes(min(max(channel + shift, 0), 255) for channel in (red, green, blue))
         return f"{match['name']}{match['is']}{paired_colours.get(light) or f'#{inverted.hex()}'}"
 
-    return _COLOUR.sub(dark, _ROOT.sub(_with_fill, svg, count=1))
+    root = _ROOT.search(svg)
+    if root is not None and " fill=" not in root[0]:  # the default colour of shapes
+        svg = svg.replace("<svg", '<svg fill="#000000"', 1)
+    return _COLOUR.sub(dark, svg)
 
 
 def _channels(colour: str) -> tuple[int, int, int] | None:
@@ -171,8 +160,3 @@ def _channels(colour: str) -> tuple[int, int, int] | None:
     except ValueError:
         return None
     return round(255 * a), round(255 * b), round(255 * c)
-
-
-def _with_fill(root: re.Match[str]) -> str:
-    """The root element, with the default colour of shapes made explicit."""
-    return root[0] if " fill=" in root[0] else f'<svg fill="#000000"{root[0][4:]}'

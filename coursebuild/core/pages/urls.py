@@ -1,13 +1,9 @@
 """The paths of pages and files in the site, and addresses from one page to another.
 
-Entry points: `lesson_path` and its siblings (site paths: POSIX, relative to the site's root), and
-`Place`, from which a page refers to others.
-
-1. A site path is plain text, the name of the file on disk; it is percent-encoded only as part of an
-   address.
-2. Every address is relative, so that the site works in any folder, from a disk and under any base.
-   The page for missing addresses is served at every depth, so its addresses begin with the path of
-   the course's base address instead.
+A site path is plain text, POSIX, relative to the site's root; it is percent-encoded only as part of
+an address. Every address is relative, so that the site works in any folder, from a disk and under
+any base; the page for missing addresses is served at every depth, so its addresses begin with the
+path of the course's base address instead.
 """
 
 from __future__ import annotations
@@ -35,7 +31,6 @@ replaced by that of all."""
 WORKER = "service-worker.js"
 """In the root, since a worker serves its own folder."""
 FILES = "files.json"
-"""The list of files that the worker may keep."""
 
 
 def lesson_path(lesson: Lesson) -> str:
@@ -79,10 +74,7 @@ def owner_path(owner: Owner) -> str:
 
 
 def file_path(path: str) -> str:
-    """`files/lessons/sketch.svg`: a file of the course that pages show or link to.
-
-    A file that a model includes is beside the model, as in the course.
-    """
+    """`files/lessons/sketch.svg`: a file of the course; what a model includes stays beside it."""
     return path if path.startswith("models/") else "files/" + path.removeprefix("content/")
 
 
@@ -105,7 +97,6 @@ def base_path(base_url: str) -> str:
 
 
 _UNRESERVED = re.compile("[A-Za-z0-9/~._+@,-]*+")
-"""Paths that need no encoding in an address."""
 
 
 def encode(path: str) -> str:
@@ -122,7 +113,6 @@ class Place(Struct, frozen=True):
     """A page that addresses are relative to."""
 
     path: str
-    """Its site path."""
     root: str | None = None
     """The prefix of every address; `None` to make addresses relative to `path`."""
 

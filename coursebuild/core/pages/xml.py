@@ -1,8 +1,4 @@
-"""XML: elements, files from templates, valid names.
-
-Entry points: `element`; `render_xml`, a file from a template, in which `markup` inserts elements;
-`identifier`, a name made from any text.
-"""
+"""XML: elements, files from templates, valid names."""
 
 from __future__ import annotations
 
@@ -63,10 +59,7 @@ def markup(content: Iterable[Element | str]) -> Markup:
 
 
 def identifier(prefix: str, text: str, *, most: int = 0) -> str:
-    """An ASCII NCName made from a text; different texts give different names.
-
-    With a limit of `most` characters, a longer name ends with digits of its hash.
-    """
+    """An ASCII NCName for each text; beyond `most` characters it ends with digits of its hash."""
     name = prefix + re.sub("[^A-Za-z0-9.-]", lambda match: f"_{ord(match[0]):x}_", text)
     if most and len(name) > most:
         digest = hashlib.sha256(name.encode()).hexdigest()[:12]

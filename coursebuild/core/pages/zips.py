@@ -1,11 +1,8 @@
 """Archives of scripts that run elsewhere, with models, `mjcourse` and exact requirements.
 
-Entry points: `make_archives`; `foreign_modules`, the modules of packages whose versions the caller
-should provide. What scripts import of `mjcourse` and of the course's own packages is put beside
-them, where Python looks first.
-
-The bytes depend on the content only: entries are sorted by path, with one fixed date and one fixed
-compression.
+What scripts import of `mjcourse` and of the course's own packages is put beside them, where Python
+looks first. The bytes depend on the content only: entries are sorted by path, with one fixed date
+and one fixed compression.
 """
 
 from __future__ import annotations
@@ -53,14 +50,12 @@ class Surroundings(Struct, frozen=True):
     style: tuple[OutputFile, ...] = ()
     """The course's `matplotlibrc`, if it has one: the style of all figures."""
     imports: Callable[[str], frozenset[str]] = find_imports
-    """Returns what a Python text imports; the caller may know it already."""
 
 
 class Archive(Struct, frozen=True):
     """An archive before it is packed."""
 
     path: str
-    """Site path."""
     parts: Mapping[str, bytes | Excerpt]
     """Its content by path: code or bytes."""
 
@@ -122,10 +117,7 @@ def foreign_modules(library: Library, surroundings: Surroundings) -> tuple[str, 
 def _follow_imports(
     scripts: Iterable[Script], surroundings: Surroundings, script_modules: Collection[str]
 ) -> tuple[list[OutputFile], set[str]]:
-    """Follow imports; return the files of the course's modules, and the names of foreign modules.
-
-    `script_modules` are the modules that scripts themselves are.
-    """
+    """The files of the course's modules that scripts import, and the names of foreign modules."""
     files: list[OutputFile] = []
     foreign: set[str] = set()
     modules: set[str] = set()
@@ -156,7 +148,14 @@ def _files(
     files: dict[str, bytes | Excerpt] = {script.path: script.code for script in scripts}
     library_files, foreign = _follow_imports(scripts, surroundings, script_modules)
     files |= {f"examples/{file.path}": file.data for file in library_files}
-    files |= _models(library, surroundings, scripts)
+    sources = {model.source.path: model.source.text.encode() for model in library.course.models}
+    model_files = {file.path: file.data for file in surroundings.model_files} | sources
+    names = {name for script in scripts for name in models_named(script)}
+    for model in library.course.models:
+        if model.name in names:
+            facts = library.facts.get(model.name)
+            paths = (model.source.path, *(facts.includes if facts is not None else ()))
+            files |= {path: model_files[path] for path in paths if path in model_files}
     if "matplotlib" in foreign:
         files |= {file.path: file.data for file in surroundings.style}
     lines_by_module = {
@@ -169,26 +168,6 @@ def _files(
     readme = library.words("zip.readme", title=library.course.title, script=first)
     files["README.md"] = f"{readme.strip()}\n".encode()
     return {f"{folder}/{path}": data for path, data in files.items()}
-
-
-def _models(
-    library: Library, surroundings: Surroundings, scripts: tuple[Script, ...]
-) -> Mapping[str, bytes]:
-    """The models that scripts name, and the files that these include."""
-    if not library.course.models:
-        return {}
-    sources = {model.source.path: model.source.text.encode() for model in library.course.models}
-    model_files = {file.path: file.data for file in surroundings.model_files}
-    names = {name for script in scripts for name in models_named(script)}
-    model_data: dict[str, bytes] = {}
-    for model in library.course.models:
-        if model.name in names:
-            model_data[model.source.path] = sources[model.source.path]
-            facts = library.facts.get(model.name)
-            for path in facts.includes if facts is not None else ():
-                if (data := sources.get(path, model_files.get(path))) is not None:
-                    model_data[path] = data
-    return model_data
 
 
 def pack_files(files: Mapping[str, bytes]) -> bytes:

@@ -1,12 +1,8 @@
 """A child process that answers JSON lines, for work that may crash or hang.
 
-Entry point: `JsonChild`, a context manager.
-
-1. The child runs a file of this package in a temporary folder and a clean environment. It says
-   `ready`, then answers each line with one line.
-2. It ends with the thread that uses this, also if that is killed.
-3. It is started with the first request, and again after it died. A request gives `None` when the
-   child did not answer; `death()` says why.
+It runs a file of this package in a temporary folder and a clean environment, says `ready`, then
+answers each line with one. It is started with the first request, again after it died, and ends
+with the thread that uses it, even if that is killed.
 """
 
 from __future__ import annotations
@@ -43,7 +39,7 @@ class JsonChild:
     ) -> None:
         """A child ends itself, by SIGPROF, after `seconds` of processor time for a request.
 
-        If it does not compute, it is killed after ten times as long. It cannot take more than
+        Where it does not compute, it is killed after ten times as long. It cannot take more than
         `memory` MiB, where the system can enforce that.
         """
         self.memory = memory
@@ -66,9 +62,9 @@ class JsonChild:
         self._folder = ""
 
     def ask(self, request: Any, seconds: float | None = None) -> Any:
-        """The child's answer; `None` if it died, or said nothing for too long.
+        """The child's answer; `None` if it died, or said nothing for too long: see `death`.
 
-        `seconds`: another limit for this request.
+        `seconds` is another limit for this request.
 
         Raises:
             EffectError: MuJoCo cannot be loaded, or `interrupt` was called.
@@ -133,9 +129,8 @@ class JsonChild:
                 self.stop()
                 errors.seek(0)
                 lines = errors.read().decode("utf-8", "replace").strip().splitlines()
-                raise EffectError(
-                    f"MuJoCo cannot be loaded: {lines[-1] if lines else 'the import crashed'}"
-                )
+                cause = lines[-1] if lines else "the import crashed"
+                raise EffectError(f"MuJoCo cannot be loaded: {cause}")
         with contextlib.suppress(AttributeError, OSError):  # only Linux can
             resource.prlimit(process.pid, resource.RLIMIT_DATA, (self.memory << 20,) * 2)
             resource.prlimit(process.pid, resource.RLIMIT_CORE, (0, 0))

@@ -1,12 +1,11 @@
 """The child process that compiles MJCF for `mjcf`: a crash or a hang takes nothing else along.
 
-Entry point: run as a file by `mjcf`, in a temporary folder, where MuJoCo may leave its log.
-
-The protocol: JSON lines. First this process says that it is ready. A request has a path (where the
-model stands, or would: includes and assets are relative to it), texts by their paths, which hide
-files that are there, and seconds; one that takes more processor time ends this process by SIGPROF.
-The reply is a message, which is empty where it compiles, the facts of `results.ModelFacts`, and the
-seconds that it took. A request for no model is answered by what MuJoCo says of names in MJCF.
+It is run as a file in a temporary folder, where MuJoCo may leave its log. The protocol is JSON
+lines, after `ready`. A request is the path where the model stands, or would (includes and assets
+are relative to it), texts by their paths, which hide files that are there, and seconds of processor
+time, after which SIGPROF ends this process. The reply is a message, empty where it compiles, the
+facts of `results.ModelFacts`, and the seconds taken. A request for no model is answered by what
+MuJoCo says of names in MJCF.
 """
 
 from __future__ import annotations
@@ -55,16 +54,13 @@ def _compile(mujoco: Any, path: str, texts: dict[str, str]) -> tuple[str, dict[s
         model = mujoco.MjModel.from_xml_path(path, assets=assets)
     except (ValueError, RuntimeError, mujoco.FatalError, MemoryError) as error:
         return str(error) or type(error).__name__, None
-    return "", _facts(model)
 
-
-def _facts(model: Any) -> dict[str, Any]:
     def names(addresses: Any) -> list[str]:
         blob: bytes = model.names
         return [blob[a : blob.index(b"\0", a)].decode("utf-8", "replace") for a in addresses]
 
     joints = set(model.jnt_type.tolist())
-    return {
+    return "", {
         "bodies": model.nbody - 1,
         "geoms": model.ngeom,
         "joints": model.njnt,

@@ -1,7 +1,5 @@
 """What the result of a script depends on, and how to say that it changed.
 
-Entry points: `group_key`, `dependencies_of`, `input_changes`, `state_changes`, `reason_forgotten`.
-
 1. What is known before a script runs (`Inputs`) determines a group of results.
 2. What it looked at while it ran (a `Trace`) determines its needs; a need with its state at that
    time is a `Dependency`.
@@ -53,6 +51,16 @@ class Kind(enum.Enum):
     __hash__ = object.__hash__  # that of enumerations is much slower, and needs are many
 
 
+FIELDS = {
+    "files": Kind.FILE,
+    "folders": Kind.LISTING,
+    "outside": Kind.OUTSIDE,
+    "modules": Kind.MODULE,
+    "sought": Kind.SOUGHT,
+}
+"""The fields of a trace that hold what dependencies are made of."""
+
+
 class Need(Struct, frozen=True):
     """Something whose state matters to a result."""
 
@@ -91,16 +99,14 @@ def inputs_of(job: ScriptJob, text: bytes, conditions: tuple[tuple[str, str], ..
     """The inputs of a job whose file holds this text."""
     digest = hashlib.sha256(text).hexdigest()
     job_conditions = [(f"environment variable {name}", value) for name, value in job.environment]
-    if job.packages:
-        job_conditions.append(("packages of the course", " ".join(job.packages)))
-    if job.writes:
-        job_conditions.append(("folders that it may write into", " ".join(job.writes)))
-    if job.figures:
-        job_conditions.append(("figures that it draws", " ".join(job.figures)))
-    if job.memory != Limits().scripts:
-        job_conditions.append(("MiB that it may take", str(job.memory)))
-    if job.perturbation:
-        job_conditions.append((_PERTURBATION, str(job.perturbation)))
+    options = {
+        "packages of the course": " ".join(job.packages),
+        "folders that it may write into": " ".join(job.writes),
+        "figures that it draws": " ".join(job.figures),
+        "MiB that it may take": "" if job.memory == Limits().scripts else str(job.memory),
+        _PERTURBATION: str(job.perturbation or ""),
+    }
+    job_conditions += [(name, value) for name, value in options.items() if value]
     conditions = tuple(sorted((*conditions, *job_conditions)))
     return Inputs(job.path, digest, job.args, float(job.timeout), job.requires, conditions)
 
@@ -135,17 +141,13 @@ def dependencies_of(
     trace = run.trace
     if trace is None:
         return ()
-    needs = {Need(Kind.FILE, path) for path in trace.files}
-    needs |= {Need(Kind.LISTING, path) for path in trace.folders}
-    needs |= {Need(Kind.SOUGHT, name) for name in trace.sought}
-    needs |= {Need(Kind.MODULE, name) for name in trace.modules}
+    needs = {Need(kind, name) for field, kind in FIELDS.items() for name in getattr(trace, field)}
     needs |= {Need(Kind.MODULE, name.partition(".")[0]) for name in requires}
     folders = dict(places)
+    # `mjcourse` may lie elsewhere on another machine, and is still the same.
     library_prefix = f"{folders['library'].rstrip('/')}/mjcourse/"
-    for path in trace.outside:
-        # `mjcourse` may lie elsewhere on another machine, and is still the same.
-        inside = path.startswith(library_prefix)
-        needs.add(Need(Kind.MODULE, "mjcourse") if inside else Need(Kind.OUTSIDE, path))
+    ours = {n for n in needs if n.kind is Kind.OUTSIDE and n.name.startswith(library_prefix)}
+    needs = needs - ours | ({Need(Kind.MODULE, "mjcourse")} if ours else set())
     for name, folder in folders.items():
         if len(folder) > 1 and folder in run.stdout:
             needs.add(Need(Kind.PLACE, name))
@@ -167,9 +169,8 @@ def sought_files(name: str) -> tuple[str, ...]:
     """The files that were looked for, given the name of a need of kind `SOUGHT`."""
     folder, modules = parse_sought(name)
     prefix = f"{folder}/" if folder else ""  # the project's own folder has no name
-    return tuple(
-        f"{prefix}{module}{suffix}" for module in modules for suffix in (".py", "/__init__.py")
-    )
+    endings = (".py", "/__init__.py")
+    return tuple(f"{prefix}{module}{ending}" for module in modules for ending in endings)
 
 
 def reason_forgotten(run: ScriptRun) -> str:
@@ -208,13 +209,13 @@ def input_changes(old: Inputs, new: Inputs) -> list[str]:
     before, now = dict(old.conditions), dict(new.conditions)
     names = sorted({*before, *now})
     for clause, old_value, new_value in (
-        ("its arguments changed", _list(old.args), _list(new.args)),
+        ("its arguments changed", " ".join(old.args), " ".join(new.args)),
         ("its option `timeout` changed", f"{old.timeout:g}", f"{new.timeout:g}"),
-        ("its option `requires` changed", _list(old.requires), _list(new.requires)),
+        ("its option `requires` changed", " ".join(old.requires), " ".join(new.requires)),
         *((name, before.get(name, "unset"), now.get(name, "unset")) for name in names),
     ):
         if old_value != new_value:
-            clauses.append(f"{clause}: {old_value} → {new_value}")
+            clauses.append(f"{clause}: {old_value or 'none'} → {new_value or 'none'}")
     if old.version != new.version:
         clauses.append("this version of coursebuild runs scripts in another way")
     return clauses
@@ -266,10 +267,6 @@ def _became(old: str, now: str) -> str:
     if now.startswith("unreadable"):
         return f"is {now}"
     return "may have changed" if now == SPECIAL else "changed"
-
-
-def _list(items: tuple[str, ...]) -> str:
-    return " ".join(items) or "none"
 
 
 def is_there(dependency: Dependency) -> bool:

@@ -1,17 +1,13 @@
 """Compile MJCF with MuJoCo itself, in a child process.
 
-Entry points: `compile_or_recall`, for results kept under a `model_key`; `compile_all`;
-`model_files`, what a model is made of; `readable_error`, for people; `read_schema`, of MJCF;
-`read_tags`, of a text.
-
 1. One child compiles everything; it starts again if a model crashes it or takes too long. One
    model may take half of the processor time that all may take together.
 2. A text is compiled as if it stood in `models/`, so that its includes and assets are found there.
 3. The messages are MuJoCo's own and whole, without the paths of this machine; a line is read from
    them if it is one of the compiled text, and not of a file that it includes.
 4. A result, also an error, is kept under a hash of the text, its place, and the state of every
-   other file that MuJoCo looks for. If one of these changed meanwhile, or time was up, nothing is
-   kept.
+   other file that MuJoCo looks for (`model_key`). If one of these changed meanwhile, or time was
+   up, nothing is kept.
 5. Where a message is about a name, the model is compiled with similar names in its place: those of
    the schema, keywords, names of the model. What gets further may have been meant.
 """
@@ -49,6 +45,10 @@ _ONE = 0.5
 """
 _LEAST = 0.01
 """Seconds; where less is left, nothing is compiled any more."""
+_CODE = tuple(
+    Path(m).read_bytes() for m in (__file__, compile_main.__file__, mujoco_files.__file__)
+)
+"""The code that compiles models and reads their facts."""
 OWN_FAULT = "MuJoCo's compiler "
 """How messages begin that are about the process that compiles."""
 _NO_MEMORY = re.compile(r"unknown exception|allocate memory|MemoryError|bad_alloc", re.IGNORECASE)
@@ -67,11 +67,8 @@ def compile_all(
 ) -> tuple[CompileResult, ...]:
     """Compile models, all in one child; a result for each.
 
-    Args:
-        root: the course folder.
-        texts: each with the path where it stands, or would (`TEXT_PATH`).
-        limits: those of the course.
-        python: another interpreter than the one that runs this, with a MuJoCo of its own.
+    Each text comes with the path in the course where it stands, or would (`TEXT_PATH`). `python` is
+    another interpreter than the one that runs this, with a MuJoCo of its own.
 
     Raises:
         EffectError: MuJoCo cannot be loaded.
@@ -89,10 +86,7 @@ def compile_or_recall(
     stage: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext,
     limits: Limits = LIMITS,
 ) -> tuple[CompileResult, ...]:
-    """A result for each text, see `compile_all`.
-
-    `stage` is entered only if anything has to be compiled.
-    """
+    """A result for each text, see `compile_all`; `stage` is entered if one has to be compiled."""
     keys = {model: model_key(root, *model) for model in texts}
     entries = {model: store.get_value(_KIND, key, CompileResult) for model, key in keys.items()}
     results = {model: result for model, result in entries.items() if result is not None}
@@ -113,19 +107,10 @@ def model_key(root: Path, path: str, text: str) -> str:
     """A hash of all that a compiled model depends on."""
     files = model_files(root, path, text)
     states = tuple((file, file_state(str(root / file))) for file in files)
-    return fingerprint((engine_version(), _code(), path, text, states))
-
-
-@functools.cache
-def _code() -> tuple[bytes, ...]:
-    """The code that compiles models and reads their facts."""
-    files = (__file__, compile_main.__file__, mujoco_files.__file__)
-    return tuple(Path(file).read_bytes() for file in files)
+    return fingerprint((engine_version(), _CODE, path, text, states))
 
 
 class _Compiler(JsonChild):
-    """The child that compiles."""
-
     def __init__(self, root: Path, limits: Limits, python: str | None) -> None:
         super().__init__(compile_main.__file__, limits.models, python, memory=limits.memory)
         self.root = root
@@ -140,9 +125,8 @@ class _Compiler(JsonChild):
     def _try(self, path: str, texts: Mapping[str, str]) -> CompileResult:
         """Compile the model at a path, with these texts in place of files."""
         text = texts[path]
-        for file in sorted(
-            {f for name in texts for f in model_files(self.root, name, texts[name])}
-        ):
+        files = {f for name in texts for f in model_files(self.root, name, texts[name])}
+        for file in sorted(files):
             if file_state(str(self.root / file)) == SPECIAL:  # to read it may take for ever
                 return CompileResult(f"'{file}' is a device or a pipe")
         limit = min(_ONE * self.seconds, self.left)
@@ -168,18 +152,21 @@ class _Compiler(JsonChild):
         message = error.strip().replace(f"{self.root}/", "")  # as it would be on any machine
         message = message.replace(f"models/{_TEXT_NAME}", _TEXT_NAME)
         message = message.replace(f"'{_TEXT_NAME}'", "this text").replace(_TEXT_NAME, "this text")
-        if _PARSER.search(message):
-            return CompileResult(message, _line_of_xml_error(text) or error_line(message, text))
-        if _NO_MEMORY.search(message):
+        line = error_line(message, text)
+        if _PARSER.search(message):  # MuJoCo names where the element begins that goes on there
+            try:
+                expat.ParserCreate().Parse(text.encode("utf-8", "surrogatepass"), True)
+            except expat.ExpatError as error:
+                line = min(error.lineno, len(text.splitlines())) or line
+        elif _NO_MEMORY.search(message):
             return CompileResult(f"{OWN_FAULT}takes more than {self.memory} MiB of memory for it")
-        return CompileResult(message, error_line(message, text))
+        return CompileResult(message, line)
 
     def _no_time_left(self) -> CompileResult:
         message = f"was not compiled: others took the {self.seconds:g} s that all may take"
         return CompileResult(message, timeout=True)
 
     def _find_misspelling(self, path: str, text: str, result: CompileResult) -> Misspelling | None:
-        """The name that a message is about, if others are likely."""
         texts = {path: text}
         if result.line is None or _PARSER.search(result.error):
             for file in existing_files(self.root, path, text):
@@ -209,7 +196,6 @@ class _Compiler(JsonChild):
 
     @functools.cached_property
     def _vocabulary(self) -> tuple[dict[str, dict[str, list[str]]], frozenset[str]]:
-        """The schema of MJCF, and keywords as MJCF may write them."""
         answer = self.ask((None, {}, 0.0))
         if answer is None:
             self.death()
@@ -222,15 +208,8 @@ class _Compiler(JsonChild):
 def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
     """Every file that MuJoCo looks for when it compiles a text, besides that of the text itself.
 
-    Those that are not there are among them: it would compile something else if they were.
-
-    Args:
-        root: the course folder.
-        path: where the text stands, or would, relative to it.
-        text: the model.
-
-    Returns:
-        Paths relative to the root, or absolute where they lie outside, sorted.
+    Those that are not there are among them: it would compile something else if they were. The paths
+    are relative to the course's folder, or absolute where they lie outside, and sorted.
     """
     names: set[str] = set()
     ModelFiles(names.add).scan_text(text, folder=os.path.dirname(root / path))  # noqa: PTH120
@@ -239,15 +218,6 @@ def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
     # MuJoCo joins an absolute path to another one; nothing is there, on any machine.
     nowhere = f"{root}/".lstrip("/")
     return tuple(sorted(file for file in files if file != path and nowhere not in file[1:]))
-
-
-def _line_of_xml_error(text: str) -> int | None:
-    """Where a text stops to be XML: MuJoCo names where the element begins that goes on there."""
-    try:
-        expat.ParserCreate().Parse(text.encode("utf-8", "surrogatepass"), True)
-    except expat.ExpatError as error:
-        return min(error.lineno, len(text.splitlines()))
-    return None
 
 
 def existing_files(root: Path, path: str, text: str) -> tuple[str, ...]:
@@ -262,9 +232,8 @@ _ELEMENT_AND_LINE = re.compile(r"Element name '([^']*)', id -?\d+, line \d+$")
 def error_line(message: str, text: str) -> int | None:
     """The line of `text`, from 1, that a message of MuJoCo's speaks of; `None` if of none.
 
-    MuJoCo gives line 0 for what comes from an included file. It gives no hint for what comes from
-    an attached model: there the line counts only if the name of the element stands on it or below
-    it.
+    MuJoCo gives line 0 for what comes from an included file, and no hint for what comes from an
+    attached model: there the line counts only if the name of the element stands on it or below it.
     """
     numbers = [int(a or b) for a, b in _LINE.findall(message)]
     lines = text.splitlines()
@@ -433,16 +402,15 @@ _PARSER = re.compile(
 
 def readable_error(error: str) -> str:
     """A message of MuJoCo's as one line in our style: no prefixes, no line numbers."""
-    text = _PARSER.sub(_describe_parser_error, error)
+
+    def describe(match: re.Match[str]) -> str:
+        kind = match[1].removeprefix("PARSING_").replace("_", " ").lower()
+        return f"not well-formed XML ({kind}{f' <{match[2]}>' if match[2] else ''})"
+
+    text = _PARSER.sub(describe, error)
     while (shorter := _NOISE.sub("", text)) != text:
         text = shorter
     text = _PLACE.sub(lambda m: f" (element `{m.group(1)}`)" if m.group(1) else "", text)
     text = _ELEMENT.sub(lambda m: f" in <{m.group(1)}> ", text)
     text = " ".join(text.split()).rstrip(". ")
     return _CAPITAL.sub(lambda m: m.group().lower(), text)
-
-
-def _describe_parser_error(match: re.Match[str]) -> str:
-    kind = match.group(1).removeprefix("PARSING_").replace("_", " ").lower()
-    element = f" <{match.group(2)}>" if match.group(2) else ""
-    return f"not well-formed XML ({kind}{element})"

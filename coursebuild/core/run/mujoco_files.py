@@ -1,6 +1,6 @@
 """Which files MuJoCo opens for a model, worked out from the text of the model.
 
-Entry point: `ModelFiles`. Checked against the system calls of MuJoCo 3.14.0.
+This was checked against the system calls of MuJoCo 3.14.0.
 
 1. Includes are read; a relative one is looked for in the folder of the model that was opened first,
    then in the folder of the file that includes it, as that was named, again relative to the first.
@@ -161,7 +161,6 @@ def _tags(data: bytes) -> tuple[tuple[str, dict[str, str]], ...]:
 
 
 def _asset_candidates(folder: str, inner: str, file: str, *, strip: bool) -> list[str]:
-    """Where an asset is looked for whose kind has a folder of its own; nowhere without a name."""
     if not file:
         return []
     if strip:

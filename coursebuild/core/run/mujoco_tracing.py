@@ -1,9 +1,8 @@
 """Wrap MuJoCo's functions that open files, so that a `Tracer` notes the files.
 
-Entry point: `wrap`, once MuJoCo has been imported; nothing is noted until `tracer` is set.
-
-Functions that this version of MuJoCo lacks are skipped. A wrapper has the name and the
-documentation of what it wraps, and removes itself from the traceback of what that raises.
+Nothing is noted until `tracer` is set. Functions that this version of MuJoCo lacks are skipped. A
+wrapper has the name and the documentation of what it wraps, and removes itself from the traceback
+of what that raises.
 """
 
 from __future__ import annotations
@@ -44,7 +43,8 @@ def wrap(mujoco: ModuleType) -> None:
         """Notes the files of a model whose path or text is the first argument."""
 
         def note_files(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-            files = ModelFiles(_note_read, _given_names(args, keywords), assets=assets)
+            given_names = _given_names(args, keywords)
+            files = ModelFiles(active_tracer().note_read, given_names, assets=assets)
             scan(files, _get_argument(args, keywords, 0, "filename", "xml"))
 
         return note_files
@@ -52,7 +52,7 @@ def wrap(mujoco: ModuleType) -> None:
     def note_binary(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         name = _decode(_get_argument(args, keywords, 0, "filename"))
         if name not in _given_names(args, keywords):
-            _note_read(name)
+            active_tracer().note_read(name)
 
     class_readers: tuple[tuple[Any, str, CallHook], ...] = (
         (model, "from_xml_path", reader(ModelFiles.scan_path)),
@@ -66,14 +66,13 @@ def wrap(mujoco: ModuleType) -> None:
             setattr(owner, name, staticmethod(wrap_function(getattr(owner, name), before)))
 
     def spec_reader(position: int) -> CallHook:
-        """Notes the files of the specification that is the argument at `position`."""
-        return lambda args, keywords: ModelFiles(_note_read).scan_spec(
+        return lambda args, keywords: ModelFiles(active_tracer().note_read).scan_spec(
             _get_argument(args, keywords, position, "child")
         )
 
     def note_library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        if tracer is not None:
-            tracer.note_library(_decode(_get_argument(args, keywords, 0, "path", "directory")))
+        path = _decode(_get_argument(args, keywords, 0, "path", "directory"))
+        active_tracer().note_library(path)
 
     for name, position in (("compile", 0), ("recompile", 0), ("attach", 1)):
         wrap_method(spec, name, spec_reader(position))
@@ -85,12 +84,10 @@ def wrap(mujoco: ModuleType) -> None:
 
 
 def _writer(position: int) -> CallHook:
-    """Notes a file that is written, whose name is the argument at `position`."""
-
     def note_write(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
         path = _get_argument(args, keywords, position, "filename")
-        if path is not None and tracer is not None:
-            tracer.note_write(path)
+        if path is not None:
+            active_tracer().note_write(path)
 
     return note_write
 
@@ -175,15 +172,10 @@ def replace_rollout(mujoco: Any, new: Callable[[Callable[..., Any]], Callable[..
     wrap_method(mujoco.MjData, "__init__", replace_once)
 
 
-def note(record: str) -> None:
-    """Add a record to the notes, as `Tracer.note` does."""
-    if tracer is not None:
-        tracer.note(record)
-
-
-def _note_read(path: str) -> None:
-    if tracer is not None:
-        tracer.note_read(path)
+def active_tracer() -> Tracer:
+    """The tracer, which hooks have, as nothing is hooked before it is set."""
+    assert tracer is not None
+    return tracer
 
 
 def _get_argument(
@@ -195,7 +187,6 @@ def _get_argument(
 
 
 def _given_names(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the files that the caller hands over as bytes."""
     tables = [value for value in (*args[1:], *keywords.values()) if hasattr(value, "keys")]
     return tuple(str(name) for table in tables for name in table.keys())  # noqa: SIM118
 

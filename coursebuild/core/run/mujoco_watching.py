@@ -1,8 +1,5 @@
 """Watch, in the process of a script, whether its simulations go well.
 
-Entry points: `watch`, once MuJoCo has been imported; `finish`, when the script has ended. Nothing
-is noted until `mujoco_tracing.tracer` is set.
-
 1. MuJoCo warns before it resets a lost state, or goes on with one. The warning is noted from any
    thread, whatever the script resets afterwards, and without making a step slower. MuJoCo turns the
    clock back in no other case.
@@ -48,11 +45,8 @@ _MOST_HELD = 1 << 26
 def watch(mujoco: ModuleType) -> None:
     """Watch the simulations of an imported MuJoCo, if its version has what this needs."""
     global _watch
-    if "numpy" not in sys.modules or not all(
-        hasattr(mujoco, name) for name in _REQUIRED_ATTRIBUTES
-    ):
-        return
-    _watch = _Watch(mujoco)
+    if "numpy" in sys.modules and all(hasattr(mujoco, name) for name in _REQUIRED_ATTRIBUTES):
+        _watch = _Watch(mujoco)
 
 
 def finish() -> None:
@@ -66,8 +60,6 @@ _watch: _Watch | None = None
 
 
 class _Watch:
-    """Notes warnings, and checks data as it is made and reset."""
-
     def __init__(self, mujoco: ModuleType) -> None:
         self._mujoco = mujoco
         self._numpy = sys.modules["numpy"]
@@ -101,7 +93,7 @@ class _Watch:
     def _note_warning(self, message: str) -> None:
         if mujoco_tracing.tracer is None:
             return
-        try:
+        with contextlib.suppress(Exception):  # the script's own step must not fail for this
             for text, _, kind in _KINDS:
                 if text in message:
                     self._warned.add(kind)
@@ -110,8 +102,6 @@ class _Watch:
                     all_data = list(self._data_by_id.values())
                     names = {_name(data) for data in all_data if f"{data.time:.4f}" == time}
                     self._note(kind, "", time, names.pop() if len(names) == 1 else "")
-        except Exception:  # the script's own step must not fail for this
-            pass
 
     # --- checks
 
@@ -241,7 +231,6 @@ def _count_references(data_by_id: Mapping[int, object], key: int) -> int:
 
 
 def _name(data: Any) -> str:
-    """The name of a model; empty where it has none of its own."""
     if not hasattr(data, "model"):  # before MuJoCo 3.1
         return ""
     name = str(data.model.names.partition(b"\0")[0], "utf-8", "replace")

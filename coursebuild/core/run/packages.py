@@ -1,17 +1,12 @@
 """The packages that scripts import: which are installed, and environments with others.
 
-Entry points: `InstalledPackages`, which says which package in which version provides a module,
-importing nothing; `distributions`, `module_files`, for archives of scripts.
-`prepare_environment` makes an environment with another version of MuJoCo and, apart from that, the
-packages installed here; `check_other_version`, for what the user names; `latest_version`, the one
-that the installer finds.
+Nothing is imported. Reading what each distribution provides takes a quarter of a second, so the
+whole map is stored under the names in the folders with installed packages, which say their
+versions. A module that no distribution names, and one of this tool's own, is identified by the
+content of its files. Of environments with another version of MuJoCo:
 
-Reading what each distribution provides takes a quarter of a second, so the whole map is stored
-under the names in the folders with installed packages, which say their versions. A module that no
-distribution names, and one of this tool's own, is identified by the content of its files.
-
-1. Environments lie in the user's own state folder, since what a course's folder holds is never run.
-   They are used again, for all courses. The ones used last are kept.
+1. They lie in the user's own state folder, since what a course's folder holds is never run, and are
+   used again, for all courses. The ones used last are kept.
 2. A new one is made under a temporary name, and renamed when MuJoCo can be imported in it, so that
    none is ever incomplete. What a killed process left is removed the next time.
 3. pip, as the user has configured it, installs MuJoCo with the packages that it consists of, and
@@ -130,8 +125,12 @@ def _spec(module: str, folders: Sequence[str]) -> ModuleSpec | None:
 
 
 def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str]:
-    """The distributions, with versions, of each top-level module in these folders."""
-    key = hashlib.sha256(repr((sys.version, *map(_names, folders))).encode()).hexdigest()
+    contents: list[list[str]] = []
+    for folder in folders:
+        contents.append([])
+        with contextlib.suppress(OSError):
+            contents[-1] = sorted(os.listdir(folder))  # noqa: PTH208
+    key = hashlib.sha256(repr((sys.version, *contents)).encode()).hexdigest()
     # It is no result of the course, so that `--no-cache` does not make it again.
     decode = functools.partial(msgspec.json.decode, type=dict[str, str])
     names = store.peek("installed", key, decode)
@@ -158,16 +157,7 @@ def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str
     return names
 
 
-def _names(folder: str) -> list[str]:
-    """The names in a folder, sorted; none if there is no such folder."""
-    try:
-        return sorted(os.listdir(folder))  # noqa: PTH208
-    except OSError:
-        return []
-
-
 # --- environments with other versions
-
 
 _FOLDER = "environments"
 _MAX_ENVIRONMENTS = 4
@@ -178,16 +168,12 @@ _VERSION = re.compile(
 _ENGINE = "mujoco"
 _NO_VERSION = rf"there is no version of {_ENGINE}|{_ENGINE}\S* was not found"
 """What uv says."""
-_LINES = 4
+_MOST_QUOTED = 4
 """The most lines of an installer's that an error quotes."""
 
 
 def check_other_version(text: str) -> str:
-    """The version of MuJoCo that a text names, which must not be the one installed here.
-
-    Raises:
-        UsageError: it is no version, or the one installed here.
-    """
+    """The version of MuJoCo that a text names; a `UsageError` where it is none, or that of here."""
     if not _VERSION.fullmatch(text):
         raise UsageError(f"--against: {text!r} is not a version of MuJoCo, such as 3.13.0")
     if _without_zeros(text) == _without_zeros(engine_version()):
@@ -196,11 +182,7 @@ def check_other_version(text: str) -> str:
 
 
 def latest_version() -> str:
-    """The newest version of MuJoCo that pip or uv, as configured, would install here.
-
-    Raises:
-        EffectError: it finds none.
-    """
+    """The newest MuJoCo that pip or uv would install here; an `EffectError` where there is none."""
     command = _install_command(sys.executable)
     anew = ["--ignore-installed"] if _has_pip() else ["--reinstall", "--upgrade"]
     status, output = _run([*command, "--dry-run", *anew, _ENGINE])
@@ -216,11 +198,7 @@ def _without_zeros(version: str) -> str:
 
 
 def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> Interpreter:
-    """The environment with this version of MuJoCo; made if it is not there.
-
-    Raises:
-        EffectError: it cannot be made.
-    """
+    """The environment with this version of MuJoCo; an `EffectError` where it cannot be made."""
     prefix = environment_prefix(root, engine)
     folder = prefix.parent
     try:
@@ -239,31 +217,20 @@ def prepare_environment(root: Path, engine: str, say: Callable[[str], None]) -> 
                 shutil.rmtree(path, ignore_errors=True)
     except OSError as error:
         raise EffectError(f"{prefix.name} cannot be created: {reason(error)}") from None
-    return Interpreter(
-        prefix.name,
-        f"{prefix}/bin/python",
-        str(prefix),
-        sys.base_prefix,
-        python_version(),
-        engine,
-        (str(_packages(prefix)), *site_folders()),
-    )
+    python, packages = f"{prefix}/bin/python", (str(_packages(prefix)), *site_folders())
+    version, base = python_version(), sys.base_prefix
+    return Interpreter(prefix.name, python, str(prefix), base, version, engine, packages)
 
 
 def environment_prefix(root: Path, engine: str) -> Path:
-    """Where the environment with a version of MuJoCo is, or would be.
-
-    Raises:
-        EffectError: there is no place for it.
-    """
+    """Where the environment with a MuJoCo is, or would be; an `EffectError` without a place."""
     parts = [sys.version, sys.base_prefix, site_folders()]
     name = f"mujoco-{engine}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}"
     state = state_folder(str(root))
     if state is None:
-        raise EffectError(
-            f"there is no place for an environment with MuJoCo {engine}",
-            help="set HOME or XDG_STATE_HOME to a folder outside the course",
-        )
+        help = "set HOME or XDG_STATE_HOME to a folder outside the course"
+        message = f"there is no place for an environment with MuJoCo {engine}"
+        raise EffectError(message, help=help)
     return Path(state, _FOLDER, name)
 
 
@@ -277,17 +244,14 @@ def _has_pip() -> bool:
 
 
 def _install_command(python: str) -> list[str]:
-    """The command that installs packages for a Python, without what they need."""
     plain = ["--no-deps", "--only-binary", ":all:"]
     if _has_pip():
         pip = [sys.executable, "-m", "pip", "--python", python, "install"]
         return [*pip, "--no-input", "--progress-bar", "off", *plain]
     if uv := shutil.which("uv"):
         return [uv, "pip", "install", "--python", python, "--no-progress", *plain]
-    raise EffectError(
-        "this Python has no pip, and there is no uv, so nothing can be installed",
-        help="run `python -m ensurepip`",
-    )
+    message = "this Python has no pip, and there is no uv, so nothing can be installed"
+    raise EffectError(message, help="run `python -m ensurepip`")
 
 
 def _create_environment(prefix: Path, engine: str) -> None:
@@ -316,19 +280,15 @@ def _create_environment(prefix: Path, engine: str) -> None:
         (_packages(new) / "packages_of_here.pth").write_text("".join(lines))
         status, output = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
         if status:
-            message = (
-                f"MuJoCo {engine} cannot be imported together with the other installed packages"
-            )
-            output_lines = [line.strip() for line in output.splitlines() if line.strip()]
-            last_line = output_lines[-1] if output_lines else "no reason"
-            raise EffectError(f"{message}: {last_line}")
+            message = "cannot be imported together with the other installed packages"
+            last_line = ["no reason", *_lines(output)][-1]
+            raise EffectError(f"MuJoCo {engine} {message}: {last_line}")
         new.rename(prefix)
     finally:
         shutil.rmtree(new, ignore_errors=True)
 
 
 def _install_error(engine: str, output: str) -> EffectError:
-    """Why this version of MuJoCo was not installed, mostly in the installer's words."""
     tool, offline = ("pip", "PIP_NO_INDEX") if _has_pip() else ("uv", "UV_OFFLINE")
     if re.search(rf"No matching distribution found for {_ENGINE}|{_NO_VERSION}", output):
         host = f"Python {'.'.join(platform.python_version_tuple()[:2])} on {platform.machine()}"
@@ -337,12 +297,15 @@ def _install_error(engine: str, output: str) -> EffectError:
             f"{tool.upper()}_FIND_LINKS and {offline}"
         )
         return EffectError(f"{tool} finds no MuJoCo {engine} for {host}", help=help)
-    lines = [line.strip() for line in output.splitlines() if line.strip()]
+    lines = _lines(output)
     errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
     reasons = errors if errors != ["Exception:"] else lines[-1:]  # pip's own traceback
-    return EffectError(
-        f"{tool} cannot install MuJoCo {engine}: {'; '.join((reasons or lines)[-_LINES:])}"
-    )
+    quoted_lines = (reasons or lines)[-_MOST_QUOTED:]
+    return EffectError(f"{tool} cannot install MuJoCo {engine}: {'; '.join(quoted_lines)}")
+
+
+def _lines(output: str) -> list[str]:
+    return [line.strip() for line in output.splitlines() if line.strip()]
 
 
 def _run(command: Sequence[str]) -> tuple[int, str]:

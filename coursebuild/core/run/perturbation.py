@@ -1,7 +1,6 @@
 """Run a script with slightly moved initial states or half steps: which printed digits hold?
 
-Entry points: `perturb` or `divide_steps`, in the process of such a run; `note_final_state`, for an
-`MjData` that the script no longer uses. Of moved states:
+`perturb` or `DividedSteps` changes the process of such a run. Of moved states:
 
 1. What the script has put into `qpos`, `qvel` and `act` since MuJoCo last computed anything from
    them is an initial state: all of it for new data and after the clock went back. Before MuJoCo
@@ -53,7 +52,6 @@ _MOST_NUMBERS = 8192
 """The most numbers of all final states that are noted."""
 _DIVERGENCE_SIZE = 1e10
 """Larger numbers are those of a simulation that is lost."""
-_FIELDS = ("qpos", "qvel", "act")
 
 
 def perturb(mujoco: ModuleType, numpy: ModuleType, run: int) -> None:
@@ -72,8 +70,6 @@ _perturbation: _Perturbation | None = None
 
 
 class _Perturbation:
-    """Moves initial states before MuJoCo computes from them."""
-
     def __init__(self, mujoco: Any, numpy: Any, run: int) -> None:
         self._mujoco = mujoco
         self._numpy = numpy
@@ -116,13 +112,12 @@ class _Perturbation:
     def _move(self, model: Any, data: Any, extent: _Extent) -> None:
         begins = not extent.states or data.time < extent.time
         plan = self._get_plan(model)
-        arrays = [getattr(data, name) for name in _FIELDS]
-        old_states = extent.states if extent.states else (None,) * len(_FIELDS)
+        qpos, qvel, act = data.qpos, data.qvel, data.act
+        old_states = extent.states if extent.states else (None, None, None)
         masks = [
             self._find_new(i, array, old, begins)
-            for i, (array, old) in enumerate(zip(arrays, old_states, strict=True))
+            for i, (array, old) in enumerate(zip((qpos, qvel, act), old_states, strict=True))
         ]
-        qpos, qvel, act = arrays
         zeros = qpos == 0
         has_moved = plan.move(qpos, qvel, act, masks, begins)
         if begins:
@@ -130,7 +125,7 @@ class _Perturbation:
         extent.cover(data)
         extent.from_zero = extent.from_zero or bool((qpos[zeros] != 0).any())
         if has_moved:
-            mujoco_tracing.note("p")
+            mujoco_tracing.active_tracer().note("p")
         self._remember(extent, data)
 
     def _find_new(self, field: int, array: Any, before: bytes | None, begins: bool) -> Any:
@@ -172,7 +167,7 @@ class _Perturbation:
                     fields = (qpos, qvel, act)
                     masks = [self._find_new(k, array, None, True) for k, array in enumerate(fields)]
                     if self._get_plan(model).move(*fields, masks, True):
-                        mujoco_tracing.note("p")
+                        mujoco_tracing.active_tracer().note("p")
                 args = (*args[:5], states, *args[6:])
             return real(*args, **keywords)
 
@@ -190,7 +185,7 @@ class _Perturbation:
         if self._numbers <= _MOST_NUMBERS:
             parts = [str(extent.number), str(len(data.qpos))]
             parts += [x.hex() for x in (*extent.sizes(), *numbers)]
-            mujoco_tracing.note(f"s{' '.join(parts)}")
+            mujoco_tracing.active_tracer().note(f"s{' '.join(parts)}")
 
 
 class _Extent:
@@ -205,7 +200,6 @@ class _Extent:
         self.begin(0.0)
 
     def begin(self, time: float) -> None:
-        """A simulation begins at this time."""
         self.start_time = self.until = time
         self.largest = [0.0, 0.0]
         """The largest |qpos| and |qvel| since then."""
@@ -213,7 +207,6 @@ class _Extent:
         """Whether coordinates that were zero have been moved."""
 
     def cover(self, data: Any) -> None:
-        """Include the state that the simulation has come to."""
         if data.time < self.until:  # MuJoCo has reset what diverged
             self.begin(data.time)
         self.until = data.time
@@ -316,13 +309,12 @@ def _model_and_data(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple
 
 # --- shorter steps
 
-
 _INTEGRATORS = ("mj_Euler", "mj_implicit", "mj_RungeKutta")
 """Integrators; a script has computed the accelerations itself before it calls one."""
 
 
-def divide_steps(mujoco: ModuleType, numpy: ModuleType, parts: int) -> None:
-    """Make each step of this process from now on as so many, with that part of the timestep.
+class DividedSteps:
+    """Makes each step of this process from now on as so many, with that part of the timestep.
 
     1. All parts have the commands and forces that the script has set for the whole. Then the
        clock is set to what it would have been, so that a script that counts steps, or looks at the
@@ -332,11 +324,6 @@ def divide_steps(mujoco: ModuleType, numpy: ModuleType, parts: int) -> None:
 
     What a script integrates itself, without a function of MuJoCo's that makes a step, stays whole.
     """
-    _DividedSteps(mujoco, numpy, parts)
-
-
-class _DividedSteps:
-    """Replaces MuJoCo's functions when it is made."""
 
     def __init__(self, mujoco: Any, numpy: Any, parts: int) -> None:
         self._mujoco = mujoco
@@ -352,7 +339,6 @@ class _DividedSteps:
         mujoco_tracing.replace_rollout(self._mujoco, self._rollout)
 
     def _replace(self, name: str, divided: Callable[..., None]) -> None:
-        """Replace a function that makes a step by one that makes shorter ones."""
         real = getattr(self._mujoco, name)
 
         def function(m: Any, d: Any, *args: Any, **keywords: Any) -> None:
@@ -402,7 +388,7 @@ class _DividedSteps:
             time += timestep
         if abs(data.time - time) < timestep / (2 * self._parts):
             data.time = time
-        mujoco_tracing.note("p")
+        mujoco_tracing.active_tracer().note("p")
 
     def _rollout(self, real: Callable[..., None]) -> Callable[..., None]:
         numpy, parts = self._numpy, self._parts
@@ -414,23 +400,12 @@ class _DividedSteps:
             """As MuJoCo's, in shorter steps."""
             begin, warm, control, *outputs = rest[:5]
             all_outputs = [repeat_rows(output) for output in outputs]
-            controls = repeat_rows(control)
+            arrays = (begin, warm, repeat_rows(control), *all_outputs)
             with self._part_of(list({id(model): model for model in models}.values())):
-                real(
-                    of,
-                    models,
-                    data,
-                    parts * nstep,
-                    spec,
-                    begin,
-                    warm,
-                    controls,
-                    *all_outputs,
-                    *rest[5:],
-                )
+                real(of, models, data, parts * nstep, spec, *arrays, *rest[5:])
             for output, states in zip(outputs, all_outputs, strict=True):
                 if output is not None and states is not None:
                     output[:] = states[:, parts - 1 :: parts]
-            mujoco_tracing.note("p")
+            mujoco_tracing.active_tracer().note("p")
 
         return rollout

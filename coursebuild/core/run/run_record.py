@@ -1,10 +1,7 @@
 """What a script did: the trace that its notes give, and its result as it is stored.
 
-Entry points: `read_records`, from a `Tracer`'s records to a `Trace`; `RunRecord` with what it
-depends on, `to_bytes`, `from_bytes`.
-
-In a script's error output, paths of this machine are replaced by marks; when the record is read,
-the marks become the paths of the machine that reads it.
+In a script's error output, marks replace paths of this machine; the machine that reads a record
+puts its own there.
 """
 
 from __future__ import annotations
@@ -30,13 +27,12 @@ from coursebuild.core.model.results import (
     Sign,
     Trace,
 )
-from coursebuild.core.run.dependencies import Dependency, Inputs, Kind
+from coursebuild.core.run.dependencies import FIELDS, Dependency, Inputs, Kind
 
 Moment: TypeAlias = Annotated[int, Meta(ge=0, lt=1 << 37)]
 """Seconds since 1970, in a year that has a name."""
 STORABLE_OUTCOMES = (Outcome.OK, Outcome.FAILED, Outcome.OUTPUT_LIMIT, Outcome.ENCODING)
 _MARK = "\0"
-_EMPTY_TRACE = Trace((), (), (), (), "")
 
 
 class RunRecord(
@@ -60,14 +56,8 @@ class RunRecord(
         names: dict[Kind, list[str]] = {kind: [] for kind in Kind}
         for dependency in self.dependencies:
             names[dependency.kind].append(dependency.name)
-        trace = replace(
-            self.stored_run.trace or _EMPTY_TRACE,
-            files=tuple(names[Kind.FILE]),
-            folders=tuple(names[Kind.LISTING]),
-            outside=tuple(names[Kind.OUTSIDE]),
-            modules=tuple(names[Kind.MODULE]),
-            sought=tuple(names[Kind.SOUGHT]),
-        )
+        fields = {field: tuple(names[kind]) for field, kind in FIELDS.items()}
+        trace = replace(self.stored_run.trace or Trace((), (), (), (), ""), **fields)
         stderr = self.stored_run.stderr
         for name, folder in places if _MARK in stderr else ():
             stderr = stderr.replace(f"{_MARK}{name}{_MARK}", folder.rstrip("/"))
@@ -82,7 +72,7 @@ def record_of(
     run: ScriptRun,
 ) -> RunRecord:
     """The record of a run."""
-    bare = run.trace and replace(run.trace, files=(), folders=(), outside=(), modules=(), sought=())
+    bare = run.trace and replace(run.trace, **dict.fromkeys(FIELDS, ()))
     return RunRecord(inputs, dependencies, timestamp, reason_forgotten, replace(run, trace=bare))
 
 
@@ -103,11 +93,7 @@ def to_bytes(record: RunRecord, places: Iterable[tuple[str, str]]) -> bytes:
 
 
 def from_bytes(data: bytes) -> RunRecord:
-    """Read a record from JSON.
-
-    Raises:
-        ValueError: there is none in it.
-    """
+    """Read a record from JSON; a `ValueError` says that there is none in it."""
     try:
         return msgspec.json.decode(data, type=RunRecord)
     except msgspec.DecodeError:  # perhaps for an escape that is half a letter
@@ -118,12 +104,9 @@ def from_bytes(data: bytes) -> RunRecord:
 
 
 def read_records(records: bytes, root: str, script: str) -> Trace:
-    """The trace that records hold, each of which ends with a null byte.
+    """The trace that the records of one script hold, each ended by a null byte: see `tracing`.
 
-    Args:
-        records: those of one script; see `tracing` for what they hold.
-        root: the project's folder, resolved.
-        script: the script's path relative to it.
+    `root` is the project's folder, resolved; `script` is relative to it.
     """
     top = root.rstrip("/")
     values_by_kind: dict[str, list[str]] = defaultdict(list)
@@ -139,20 +122,19 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
             elif kind == "d":
                 sign, detail, time, model, path, line = value.split("\t")
                 depth, *geoms = detail.split("\x1f")
-                divergences.append(
-                    Divergence(Sign(sign), time, model, path, int(line), depth, tuple(geoms))
-                )
+                place = (time, model, path, int(line))
+                divergences.append(Divergence(Sign(sign), *place, depth, tuple(geoms)))
     files = {_resolve(path, top) for path in values_by_kind["r"]}
     inside = {path.removeprefix(f"{top}/") for path in files if path.startswith(f"{top}/")}
     sought_names: dict[str, set[str]] = defaultdict(set)  # by the folder where they are not
     for record in values_by_kind["v"]:
         folder, _, names = record.partition("\t")
         sought_names[_make_relative(folder, top)].update(names.split(","))
+    folders = {_make_relative(folder, top) or "." for folder in values_by_kind["l"]}
+    sought = (f"{at}/{{{','.join(sorted(n))}}}" for at, n in sorted(sought_names.items()))
     return Trace(
         files=tuple(sorted(inside - {os.path.normpath(script)})),
-        folders=tuple(
-            sorted({_make_relative(folder, top) or "." for folder in values_by_kind["l"]})
-        ),
+        folders=tuple(sorted(folders)),
         outside=tuple(sorted(path for path in files if not path.startswith(f"{top}/"))),
         modules=tuple(sorted(set(values_by_kind["m"]))),
         opaque=next(iter(values_by_kind["o"]), ""),
@@ -160,14 +142,11 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
         effects=tuple(effects),
         is_perturbed=bool(values_by_kind["p"]),
         states=tuple(values_by_kind["s"]),
-        sought=tuple(
-            f"{folder}/{{{','.join(sorted(n))}}}" for folder, n in sorted(sought_names.items())
-        ),
+        sought=tuple(sought),
     )
 
 
 def _make_relative(folder: str, top: str) -> str:
-    """A folder relative to the project's; empty for the project's own."""
     return folder.removeprefix(top).lstrip("/")
 
 

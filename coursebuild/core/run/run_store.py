@@ -1,14 +1,11 @@
 """The results of scripts: one runs again only if something that it depends on has changed.
 
-Entry point: `RunStore`.
-
-1. `get_runs`: what is known before a script runs determines a group of results; the one whose
-   dependencies are all unchanged is its result. Groups that this machine lacks are looked for in
-   the shared cache.
-2. `put_run`: after a run, the state of everything in its trace is read and stored with the result.
-   If something changed while it ran, the script may have seen another state, and nothing is stored.
-3. `claim`: of several processes that need the same result one runs the script, and the others get
-   its result. So `serve` and other commands can run scripts at the same time.
+1. What is known before a script runs determines a group of results; the one whose dependencies are
+   all unchanged is its result. Groups that this machine lacks are sought in the shared cache.
+2. After a run, the state of everything in its trace is read and stored with the result. If
+   something changed while it ran, the script may have seen another state, and nothing is stored.
+3. Of several processes that need the same result one runs the script, and the others get its
+   result (`claim`). So `serve` and other commands can run scripts at the same time.
 4. How a script's last run ended is noted under its path, whether it is remembered or not: for
    `explain`, and for the order in which scripts run.
 """
@@ -20,45 +17,22 @@ import math
 import os
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import assert_never
 
 from msgspec.structs import replace
 
-from coursebuild.core.engine.digests import (
-    Clock,
-    changed_since,
-    file_state,
-    folder_state,
-    modules_in,
-)
+from coursebuild.core.engine import digests
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.locks import claim, unclaim
 from coursebuild.core.files.trust import FOLDER
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
-from coursebuild.core.run.dependencies import (
-    Dependency,
-    Inputs,
-    Kind,
-    Need,
-    dependencies_of,
-    group_key,
-    input_changes,
-    inputs_of,
-    is_perturbed,
-    parse_sought,
-    reason_forgotten,
-    result_key,
-    state_changes,
-)
+from coursebuild.core.run import dependencies as needs
+from coursebuild.core.run import run_record
+from coursebuild.core.run.dependencies import Dependency, Inputs, Kind, Need
 from coursebuild.core.run.packages import InstalledPackages
-from coursebuild.core.run.run_record import (
-    STORABLE_OUTCOMES,
-    RunRecord,
-    from_bytes,
-    record_of,
-    to_bytes,
-)
+from coursebuild.core.run.run_record import STORABLE_OUTCOMES, RunRecord
 from coursebuild.core.run.script_environment import Interpreter, conditions, places
 
 _RESULTS, _LAST = "scripts", "lastruns"
@@ -77,9 +51,8 @@ class States:
         self._inside = f"{str(root).rstrip('/')}/"
         self.places = places(root, os.environ, interpreter)
         self.conditions = conditions(os.environ, interpreter)
-        self._installed = InstalledPackages(
-            store, None if interpreter is None else interpreter.packages
-        )
+        folders = None if interpreter is None else interpreter.packages
+        self._installed = InstalledPackages(store, folders)
         self._states: dict[Need, str] = {}
 
     def __call__(self, need: Need) -> str:
@@ -92,14 +65,14 @@ class States:
         """The state of a need at this moment."""
         match need.kind:
             case Kind.FILE:
-                return file_state(self._inside + need.name)
+                return digests.file_state(self._inside + need.name)
             case Kind.LISTING:
-                return folder_state(self._inside + need.name)
+                return digests.folder_state(self._inside + need.name)
             case Kind.SOUGHT:
-                folder, modules = parse_sought(need.name)
-                return modules_in(self._inside + folder, modules)
+                folder, modules = needs.parse_sought(need.name)
+                return digests.modules_in(self._inside + folder, modules)
             case Kind.OUTSIDE:
-                return file_state(need.name)
+                return digests.file_state(need.name)
             case Kind.MODULE:
                 return self._installed.version(need.name)
             case Kind.PLACE:
@@ -111,11 +84,7 @@ class States:
 class RunStore:
     """The results of the scripts of a course in its store.
 
-    Args:
-        root: the course folder.
-        store: where they are kept.
-        fresh: whether all is to be run again.
-        interpreter: another one that runs them. Last runs are noted only for the course's own.
+    With `fresh`, all is to be run again. Last runs are noted only for the course's own interpreter.
     """
 
     def __init__(
@@ -135,28 +104,21 @@ class RunStore:
         """The remembered and the new run of scripts that differ though nothing changed."""
         self.edited_paths: set[str] = set()
         """The scripts that ran with another text than before."""
-        self._clock = Clock(store)
+        self._clock = digests.Clock(store)
         self._started: dict[str, int] = {}
 
     def inputs(self, job: ScriptJob, text: bytes) -> Inputs:
         """The inputs of a script, which are known before it runs."""
-        return inputs_of(job, text, self.states.conditions)
+        return needs.inputs_of(job, text, self.states.conditions)
 
     def get_runs(self, all_inputs: Sequence[Inputs]) -> dict[str, ScriptRun]:
         """The results that hold, by path; none where everything is to run."""
         if self.fresh:
             return {}
-        runs: dict[str, ScriptRun] = {}
-        missing: list[Inputs] = []
-        for inputs in all_inputs:
-            record = self.get_record(inputs)
-            if record is None:
-                missing.append(inputs)
-            else:
-                runs[inputs.path] = record.restore(self.states.places)
-        for record in self._fetch(missing):
-            runs[record.inputs.path] = record.restore(self.states.places)
-        return runs
+        local_records = [(inputs, self.get_record(inputs)) for inputs in all_inputs]
+        records = [record for _, record in local_records if record is not None]
+        records += self._fetch([inputs for inputs, record in local_records if record is None])
+        return {record.inputs.path: record.restore(self.states.places) for record in records}
 
     def get_record(self, inputs: Inputs) -> RunRecord | None:
         """The result kept on this machine that holds now."""
@@ -167,11 +129,8 @@ class RunStore:
         return record
 
     def claim(self, inputs: Inputs) -> ScriptRun | bool:
-        """Claim the run of a script; `False` while another process has it.
-
-        Where that has just ended, this is its result.
-        """
-        if not claim(self.store.folder, group_key(inputs)):
+        """Claim a run: its result if it has just ended, `False` while another process has it."""
+        if not claim(self.store.folder, needs.group_key(inputs)):
             return False
         record = None if self.fresh else self.get_record(inputs)
         if record is None:
@@ -181,18 +140,18 @@ class RunStore:
 
     def unclaim(self, inputs: Inputs) -> None:
         """Let other processes run a script."""
-        unclaim(self.store.folder, group_key(inputs))
+        unclaim(self.store.folder, needs.group_key(inputs))
 
     def records(self, inputs: Inputs) -> Iterator[RunRecord]:
         """All results kept on this machine for these inputs, newest first."""
-        for key in self.store.group(_RESULTS, group_key(inputs)):
-            record = self.store.peek(_RESULTS, key, from_bytes)
+        for key in self.store.group(_RESULTS, needs.group_key(inputs)):
+            record = self.store.peek(_RESULTS, key, run_record.from_bytes)
             if record is not None and _fits(record, inputs):
                 yield record
 
     def last_record(self, path: str) -> RunRecord | None:
         """The record of a script's last run, without what it printed."""
-        record = self.store.peek(_LAST, _last_key(path), from_bytes)
+        record = self.store.peek(_LAST, _last_key(path), run_record.from_bytes)
         return record if record is not None and record.inputs.path == path else None
 
     def reasons(self, inputs: Inputs) -> list[str]:
@@ -202,12 +161,10 @@ class RunStore:
         last = self.last_record(inputs.path)
         if last is None:
             aside = self.store.set_aside
-            return [
-                "there is no result of it on this machine",
-                *([f"{FOLDER} is not used: it {aside}"] if aside else []),
-            ]
-        clauses = input_changes(last.inputs, inputs)
-        clauses += state_changes(last.dependencies, self.states)
+            reasons = [f"{FOLDER} is not used: it {aside}"] if aside else []
+            return ["there is no result of it on this machine", *reasons]
+        clauses = needs.input_changes(last.inputs, inputs)
+        clauses += needs.state_changes(last.dependencies, self.states)
         if last.reason_forgotten:
             clauses.append(f"its last result is not remembered: {last.reason_forgotten}")
         return clauses or ["its result is no longer kept"]
@@ -224,15 +181,14 @@ class RunStore:
     ) -> None:
         """Note what a trial depends on besides its inputs: files of the course.
 
-        `lasting`: whether its result can be used again. `timestamp`: when it ran, in seconds since
-        1970.
+        `lasting`: whether its result can be used again. `timestamp`: in seconds since 1970.
         """
         states = ((path, self.states(Need(Kind.FILE, path))) for path in sorted(files))
         dependencies = tuple(Dependency(Kind.FILE, path, state) for path, state in states)
         reason = "" if lasting else "it may end differently next time"
         outcome = Outcome.OK if ok else Outcome.FAILED
         run = ScriptRun(inputs.path, outcome, 0, "", "", seconds)
-        self._note(record_of(inputs, dependencies, timestamp, reason, run))
+        self._note(run_record.record_of(inputs, dependencies, timestamp, reason, run))
 
     def note_start(self, path: str) -> None:
         """Note that a script is about to run."""
@@ -245,8 +201,8 @@ class RunStore:
     def put_run(self, inputs: Inputs, run: ScriptRun) -> None:
         """Remember the result of a run, or why it is not remembered."""
         states = self.states
-        dependencies = dependencies_of(run, inputs.requires, states.places, states.now)
-        reason = reason_forgotten(run) or self._reason_disturbed(inputs, dependencies)
+        dependencies = needs.dependencies_of(run, inputs.requires, states.places, states.now)
+        reason = needs.reason_forgotten(run) or self._reason_disturbed(inputs, dependencies)
         varies = ""
         for before in self.records(inputs) if self.fresh and not reason else ():
             if before.dependencies == dependencies:
@@ -256,11 +212,12 @@ class RunStore:
                     self.differing_runs.append((old, run))
                     if run.unrepeated:  # else the lesson says what varies
                         varies = "two runs of it differed"
-        record = record_of(inputs, dependencies, int(time.time()), reason or varies, run)
+        record = run_record.record_of(inputs, dependencies, int(time.time()), reason or varies, run)
         if not reason:  # one that varies takes the place of the one that is kept
             assert run.outcome in STORABLE_OUTCOMES
-            key = f"{group_key(inputs)}/{result_key(dependencies)}"
-            self.store.put(_RESULTS, key, to_bytes(record, self.states.places), shared=True)
+            key = f"{needs.group_key(inputs)}/{needs.result_key(dependencies)}"
+            data = run_record.to_bytes(record, states.places)
+            self.store.put(_RESULTS, key, data, shared=True)
         last = self.last_record(inputs.path)
         if last is not None and last.inputs.text != inputs.text:
             self.edited_paths.add(inputs.path)
@@ -283,30 +240,27 @@ class RunStore:
                     continue
                 case _:
                     assert_never(dependency.kind)
-            if changed_since(path, since):
+            if digests.changed_since(path, since):
                 return _REASON.format(path.removeprefix(f"{self.states.root}/"))
         return ""
 
     def _holds(self, record: RunRecord) -> bool:
-        return next(state_changes(record.dependencies, self.states), None) is None
+        return next(needs.state_changes(record.dependencies, self.states), None) is None
 
     def _fetch(self, all_inputs: Sequence[Inputs]) -> list[RunRecord]:
-        """Results from the shared cache that hold."""
         if self.store.shared is None or not all_inputs:
             return []
 
         def fetch(inputs: Inputs) -> list[RunRecord]:
-            group = group_key(inputs)
+            group = needs.group_key(inputs)
             local_keys = set(self.store.group(_RESULTS, group))
             all_keys = self.store.shared_group(_RESULTS, group)
             new_keys = [key for key in all_keys if key not in local_keys]
             records = (
-                self.store.get(_RESULTS, key, from_bytes, shared=True)
+                self.store.get(_RESULTS, key, run_record.from_bytes, shared=True)
                 for key in new_keys[:_MOST_SHARED]
             )
             return [record for record in records if record is not None and _fits(record, inputs)]
-
-        from concurrent.futures import ThreadPoolExecutor
 
         with ThreadPoolExecutor(_FETCHERS, "cache") as pool:
             groups = [filter(self._holds, group) for group in pool.map(fetch, all_inputs)]
@@ -316,18 +270,16 @@ class RunStore:
         return records
 
     def _note(self, record: RunRecord) -> None:
-        """Note a script's last run under its path."""
-        if self.is_elsewhere or is_perturbed(record.inputs):
+        if self.is_elsewhere or needs.is_perturbed(record.inputs):
             return
         key = _last_key(record.inputs.path)
         run = replace(record.stored_run, stdout="", stderr="", trace=None, figures=())
-        data = to_bytes(replace(record, stored_run=run), ())
+        data = run_record.to_bytes(replace(record, stored_run=run), ())
         if self.store.peek(_LAST, key, bytes) != data:
             self.store.put(_LAST, key, data)
 
 
 def _fits(record: RunRecord, inputs: Inputs) -> bool:
-    """Whether a record is a result of these inputs."""
     return (
         record.inputs == inputs
         and record.stored_run.path == inputs.path

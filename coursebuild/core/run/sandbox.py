@@ -1,7 +1,5 @@
 """A sandbox for scripts of strangers, made by Bubblewrap (`bwrap`).
 
-Entry points: `find_sandbox` and `examine_sandbox`, which try to start one; `Sandbox`.
-
 A supervisor runs in namespaces of its own, and only one script (see `script_server`), so that a
 script that takes over its supervisor can falsify only its own result:
 
@@ -20,13 +18,12 @@ script that takes over its supervisor can falsify only its own result:
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
 import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from msgspec import Struct
@@ -82,11 +79,7 @@ class SandboxPart(Struct, frozen=True):
 
 
 def find_sandbox(root: Path) -> Sandbox:
-    """The sandbox of this machine, after a trial start for the course in a folder.
-
-    Raises:
-        EffectError: a part of it is not to be had.
-    """
+    """The sandbox of this machine, after a trial start; an `EffectError` says what it lacks."""
     sandbox, parts = examine_sandbox(root)
     for part in parts:
         if part.problem:
@@ -97,28 +90,26 @@ def find_sandbox(root: Path) -> Sandbox:
 
 def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[SandboxPart, ...]]:
     """The sandbox of this machine, and its parts; none, and those up to the first that lacks."""
-    parts = [SandboxPart("Bubblewrap"), SandboxPart("a filter of system calls")]
+    bubblewrap, system_call_filter = "Bubblewrap", "a filter of system calls"
     program, machine = shutil.which("bwrap"), platform.machine()
     if program is None:
         problem = "needs Bubblewrap, but there is no program `bwrap`"
         help = "install it, for example with `apt-get install bubblewrap`"
-        return None, (SandboxPart("Bubblewrap", problem, help),)
+        return None, (SandboxPart(bubblewrap, problem, help),)
     system_calls = compile_filter(machine)
     if system_calls is None:
         problem = f"needs a filter of system calls, and there is none for {machine} machines"
-        return None, (
-            parts[0],
-            SandboxPart(parts[1].name, problem, "use an x86_64 or aarch64 machine"),
-        )
+        part = SandboxPart(system_call_filter, problem, "use an x86_64 or aarch64 machine")
+        return None, (SandboxPart(bubblewrap), part)
     scope = _find_scope()
     sandbox = Sandbox(program, system_calls.hex(), scope)
     problem = _try_sandbox(sandbox, root)
+    parts = tuple(map(SandboxPart, (bubblewrap, system_call_filter)))
     if problem:
         return None, (*parts, SandboxPart("namespaces", problem, _ALLOW))
     means = "by a control group and by watching" if scope else "by watching"
-    parts += [SandboxPart("namespaces"), SandboxPart("a session keyring")]
-    parts += [SandboxPart(f"limits of memory and processes in all, {means}")]
-    return sandbox, tuple(parts)
+    names = ("namespaces", "a session keyring", f"limits of memory and processes in all, {means}")
+    return sandbox, (*parts, *map(SandboxPart, names))
 
 
 def _find_scope() -> tuple[str, ...]:
@@ -128,14 +119,8 @@ def _find_scope() -> tuple[str, ...]:
     if program is None or not systemd.is_dir() or not unified.exists():
         return ()
     manager = "--system" if os.geteuid() == 0 else "--user"
-    scope = (
-        program,
-        manager,
-        "--scope",
-        "--quiet",
-        "--collect",
-        f"--property=TasksMax={16 * PROCESSES}",
-    )
+    limit = f"--property=TasksMax={16 * PROCESSES}"
+    scope = (program, manager, "--scope", "--quiet", "--collect", limit)
     trial = [*scope, "--property=MemoryMax=1G", "--", "true"]
     with contextlib.suppress(OSError, subprocess.SubprocessError):
         subprocess.run(trial, capture_output=True, check=True, timeout=10.0)
@@ -165,11 +150,11 @@ def _try_sandbox(sandbox: Sandbox, root: Path) -> str:
     if not state:
         output = errors.strip().removeprefix("bwrap: ")
         return f"does not work here, Bubblewrap says: {output or 'nothing'}"
-    faults = (
-        fault for (fault, value), actual in zip(_FAULTS, state, strict=True) if actual != value
-    )
-    fault = next(faults, "" if is_watched else "its memory and processes cannot be seen in /proc")
-    return fault and f"does not work here: {fault}"
+    for (fault, value), actual in zip(_FAULTS, state, strict=True):
+        if actual != value:
+            return f"does not work here: {fault}"
+    unseen = "does not work here: its memory and processes cannot be seen in /proc"
+    return "" if is_watched else unseen
 
 
 class Sandbox(Struct, frozen=True):
@@ -259,25 +244,17 @@ def special_files(sources: Mapping[str, str], copies: Iterable[tuple[str, str]])
     What is read-only can be neither changed nor made, but anybody may talk into it. In folders of
     the system nobody but root can have made one, for all to use.
     """
-    find = functools.cache(lambda source: tuple(_find_special_files(source)))
-    places = {**sources, **{place: path for path, place in copies}}
-    return {
-        place + path.removeprefix(source): path
-        for place, source in places.items()
-        if source not in _SYSTEM
-        for path in find(source)
-    }
-
-
-def _find_special_files(folder: str) -> Iterator[str]:
-    folders = [folder]
-    while folders:
-        with contextlib.suppress(OSError), os.scandir(folders.pop()) as entries:
-            for entry in entries:
-                if entry.is_dir(follow_symlinks=False):
-                    folders.append(entry.path)
-                elif not entry.is_file(follow_symlinks=False) and not entry.is_symlink():
-                    yield entry.path
+    files: dict[str, str] = {}
+    for place, source in {**sources, **{place: path for path, place in copies}}.items():
+        folders = [] if source in _SYSTEM else [source]
+        while folders:
+            with contextlib.suppress(OSError), os.scandir(folders.pop()) as entries:
+                for entry in entries:
+                    if entry.is_dir(follow_symlinks=False):
+                        folders.append(entry.path)
+                    elif not entry.is_file(follow_symlinks=False) and not entry.is_symlink():
+                        files[place + entry.path.removeprefix(source)] = entry.path
+    return files
 
 
 def copied_folders(root: str, jobs: Iterable[ScriptJob], scratch: str) -> list[tuple[str, str]]:

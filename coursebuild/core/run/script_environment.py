@@ -1,10 +1,6 @@
 """Where scripts run: their environment, their interpreter, the versions and the machine.
 
-Entry points: `clean_environment`, `library_folder`, `wanted_packages`; `conditions` and `places`,
-on which results depend; `engine_version`, `package_version` and others; `Interpreter`, one other
-than the tool's, as `course_environment` finds it where the map names one, by reading its files;
-`machine()`, as reports name it, and `one_processor()`, while something is timed. Nothing is
-imported to find a version, and nothing of an environment is run.
+Nothing is imported to find a version, and nothing of an environment is run: its files are read.
 """
 
 from __future__ import annotations
@@ -114,10 +110,7 @@ def wanted_packages(scripts: Iterable[Path]) -> tuple[str, ...]:
 def conditions(
     outer: Mapping[str, str], interpreter: Interpreter | None = None
 ) -> tuple[tuple[str, str], ...]:
-    """The conditions under which results are the same, by name and sorted.
-
-    `outer` is the environment of the tool; `interpreter` is another one than runs the tool.
-    """
+    """What results depend on besides files, by name and sorted; `outer`: the tool's environment."""
     values = {f"environment variable {name}": outer[name] for name in DECISIVE if name in outer}
     version = platform.python_version() if interpreter is None else interpreter.version
     values["Python"] = f"{platform.python_implementation()} {version}"
@@ -135,10 +128,7 @@ def conditions(
 def places(
     root: Path, outer: Mapping[str, str], interpreter: Interpreter | None = None
 ) -> tuple[tuple[str, str], ...]:
-    """Folders of this machine, by name, whose paths a script may print; longest first.
-
-    `interpreter` is another one than runs the tool.
-    """
+    """Folders of this machine, by name, whose paths a script may print; longest first."""
     folders = {
         "course": str(root),
         "library": library_folder(),
@@ -159,32 +149,21 @@ def python_version() -> str:
 
 @functools.cache
 def engine_version() -> str:
-    """The version of the installed MuJoCo, such as `3.14.0`.
-
-    Raises:
-        EffectError: there is none.
-    """
-    version = version_in(sys.path, "mujoco")
-    if version is None:
-        raise EffectError(
-            "MuJoCo is not installed for this Python", help="run `pip install coursebuild` again"
-        )
+    """The version of the installed MuJoCo, such as `3.14.0`; an `EffectError` without one."""
+    version = package_version("mujoco")
+    if version == "none":
+        message = "MuJoCo is not installed for this Python"
+        raise EffectError(message, help="run `pip install coursebuild` again")
     return version
 
 
 def package_version(name: str, folders: Iterable[str] | None = None) -> str:
     """The version of a distribution, here or in these folders; `none` where it is not installed."""
-    return version_in(sys.path if folders is None else folders, name) or "none"
-
-
-def version_in(folders: Iterable[str], name: str) -> str | None:
-    """The version of a distribution that is installed in one of these folders."""
-    installed = distributions(name=name, path=list(folders))
-    return next((distribution.version for distribution in installed), None)
+    installed = distributions(name=name, path=list(sys.path if folders is None else folders))
+    return next((distribution.version for distribution in installed), "none")
 
 
 # --- the course's own environment
-
 
 _OLDEST = (3, 11)
 """The oldest Python that can run the modules of this package."""
@@ -205,10 +184,8 @@ def course_environment(root: Path, course: Course) -> Parsed[Interpreter | None]
     try:
         settings = dict(_SETTING.findall((prefix / "pyvenv.cfg").read_text("utf-8", "replace")))
     except OSError as error:
-        message = (
-            f"`{named_path.path}` is not of a virtual environment: no pyvenv.cfg, {reason(error)}"
-        )
-        return _reject(named_path, message)
+        problem = f"is not of a virtual environment: no pyvenv.cfg, {reason(error)}"
+        return _reject(named_path, f"`{named_path.path}` {problem}")
     version_text = settings.get("version") or settings.get("version_info", "")
     # Such as 3.12.1, or virtualenv's 3.12.1.final.0.
     match = re.match(r"(\d+)\.(\d+)\.\d+", version_text)
@@ -217,8 +194,8 @@ def course_environment(root: Path, course: Course) -> Parsed[Interpreter | None]
         message = f"`{named_path.path}` is of Python {version_text}, and scripts need 3.11 or newer"
         return _reject(named_path, message)
     packages = str(prefix / "lib" / f"python{major}.{minor}" / "site-packages")
-    engine = version_in((packages,), "mujoco")
-    if engine is None:
+    engine = package_version("mujoco", (packages,))
+    if engine == "none":
         required = course.engine or engine_version()
         help = f"run `{named_path.path} -m pip install mujoco=={required}`"
         return _reject(named_path, f"MuJoCo is not installed for `{named_path.path}`", help)
@@ -233,7 +210,6 @@ def _reject(named_path: NamedPath, message: str, help: str = "") -> Parsed[Inter
 
 # --- the machine
 
-
 _INFO = Path("/proc/cpuinfo")
 _GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
 _NAMES = ("model name", "Model", "Hardware", "cpu model", "uarch")
@@ -242,13 +218,7 @@ _CAN_PIN = hasattr(os, "sched_setaffinity")
 
 
 def machine(*, pinned: bool = False, interpreter: Interpreter | None = None) -> Machine:
-    """Versions, system and processor; `pinned`: times are taken on one processor alone.
-
-    `interpreter` is another one than runs the tool.
-
-    Raises:
-        EffectError: MuJoCo is not installed.
-    """
+    """Versions, system and processor; `pinned`: times are taken on one processor alone."""
     return Machine(
         engine=engine_version() if interpreter is None else interpreter.engine,
         python=python_version() if interpreter is None else interpreter.version,
@@ -279,11 +249,10 @@ def cpu_name() -> str:
     """What the processor calls itself; empty where it does not say."""
     if platform.system() == "Darwin":
         command = ["sysctl", "-n", "machdep.cpu.brand_string"]
-        try:
+        with contextlib.suppress(OSError, subprocess.SubprocessError):
             process = subprocess.run(command, capture_output=True, timeout=10, check=False)
-        except (OSError, subprocess.SubprocessError):
-            return ""
-        return _tidy(process.stdout.decode("utf-8", "replace"))
+            return _tidy(process.stdout.decode("utf-8", "replace"))
+        return ""
     return find_cpu_name(_read(_INFO)) or _tidy(platform.processor())
 
 

@@ -1,10 +1,8 @@
 """Turn a process into a script that finds what a bare `python examples/x.py` finds, and is traced.
 
-Entry points: `PreloadedPackages`, the packages that are imported once for all scripts;
-`ScriptProcess`, which sets up this process; `script_main` then executes the script.
-
-Only two things differ from a bare Python: there is one more frame below the script's own, and
-`sys.modules` holds modules of the standard library that the script has not imported.
+Only two things differ from a bare Python: there is one more frame below the script's own, that of
+`script_main`, and `sys.modules` holds modules of the standard library that the script has not
+imported.
 """
 
 from __future__ import annotations
@@ -113,7 +111,6 @@ class PreloadedPackages:
         return self._group(name).get(name)
 
     def _group(self, name: str) -> dict[str, ModuleType]:
-        """All modules that were loaded together with one."""
         return next((group for group in self._groups.values() if name in group), {})
 
     def offer(self, tracer: Tracer) -> None:
@@ -210,13 +207,13 @@ class ScriptProcess:
         }
         tracer = self._tracer()
         mujoco_tracing.tracer = tracer
-        if job["perturbation"] and (mujoco := preloaded.module("mujoco")) is not None:
-            numpy = preloaded.module("numpy")
+        mujoco, numpy = preloaded.module("mujoco"), preloaded.module("numpy")
+        tracer.has_mujoco = mujoco is not None
+        if job["perturbation"] and mujoco is not None:
             if job["perturbation"] < 0:
-                perturbation.divide_steps(mujoco, numpy, 2 ** -job["perturbation"])
+                perturbation.DividedSteps(mujoco, numpy, 2 ** -job["perturbation"])
             else:
                 perturbation.perturb(mujoco, numpy, job["perturbation"])
-        tracer.has_mujoco = preloaded.module("mujoco") is not None
         for name in [name for name in sys.modules if name.partition(".")[0] == "coursebuild"]:
             del sys.modules[name]
         sys.modules["__main__"] = self.main
@@ -257,10 +254,7 @@ def figure_path(temporary: str, name: str) -> str:
 
 
 def redirect_figures(job: Job, temporary: str) -> None:
-    """From now on, write figures to the script's temporary folder instead.
-
-    So the project stays unchanged, and two runs at the same time do not share files.
-    """
+    """From now on, write figures to the script's temporary folder: two runs share no files."""
     root = job["root"].rstrip("/")
     paths = {f"{root}/{name}": figure_path(temporary, name) for name in job["figures"]}
     os.mkdir(os.path.dirname(next(iter(paths.values()))))  # noqa: PTH102, PTH120 (time counts)

@@ -1,16 +1,11 @@
 """Run the lessons' scripts, each in a process, a session and an environment of its own.
 
-Entry point: `ScriptServer`, which stays warm between runs.
-
-1. `parallel` supervisors are started. They are given one script after another, and run each in a
-   copy of themselves, or in an interpreter of its own (see `supervisor`); the results are the same.
+1. `parallel` supervisors are given one script after another, and run each in a copy of themselves,
+   or in an interpreter of its own (see `supervisor`); the results are the same.
 2. Each report becomes a `ScriptRun`: UTF-8 is decoded, CRLF becomes LF.
 3. In a `Sandbox`, a supervisor runs only one script, and its report is not trusted.
 4. However this ends, a KeyboardInterrupt included, the supervisors see their input close, kill what
    they run and exit.
-
-A script's environment is made here. Of the user's own it has only what it needs to find programs,
-libraries and graphics.
 """
 
 from __future__ import annotations
@@ -76,11 +71,8 @@ class ScriptServer:
     """Runs scripts; between runs, supervisors keep imported what scripts import.
 
     Supervisors are replaced when they have died, when packages were installed, and when the
-    environment changes.
-
-    Args:
-        fork: let scripts be copies of their supervisor, where possible.
-        sandbox: the sandbox around each script; then no supervisor is kept warm.
+    environment changes. Without `fork`, no script is a copy of its supervisor; with a sandbox
+    around each script, no supervisor is kept warm.
     """
 
     def __init__(self, *, fork: bool = True, sandbox: Sandbox | None = None) -> None:
@@ -88,7 +80,7 @@ class ScriptServer:
         self._sandbox = sandbox
         self._idle: list[Worker] = []
         """Supervisors that wait for the next run."""
-        self._package_states: tuple[object, ...] = ()
+        self._package_states: list[object] = []
         """The state of the folders with packages when these were started."""
 
     def __enter__(self) -> Self:
@@ -116,20 +108,12 @@ class ScriptServer:
         is_unwanted: Callable[[frozenset[str]], bool] | None = None,
         claim: Claim = lambda _: True,
     ) -> tuple[ScriptRun, ...]:
-        """Run scripts; only one run at a time.
+        """Run scripts, `parallel` at a time; return what each did, in the order of the jobs.
 
-        Args:
-            root: the course folder, which becomes the working directory.
-            jobs: what to run, in the order of their start.
-            parallel: how many at a time, at least 1.
-            on_start: called in this thread; what it raises ends the run.
-            on_finish: likewise.
-            interpreter: another interpreter that is to run them.
-            is_unwanted: called regularly with the paths of what runs; whether to stop.
-            claim: called before a script begins.
-
-        Returns:
-            What each did, in the order of the jobs.
+        `root`, the course folder, becomes the working directory; `interpreter` is another one that
+        runs them. `claim` is called before a script begins, `on_start` and `on_finish` in this
+        thread, where what they raise ends the run. `is_unwanted` is called regularly with the paths
+        of what runs, and says whether to stop. There is only one run at a time.
 
         Raises:
             EffectError: there is no place for temporary files, or the interpreter is none.
@@ -138,16 +122,8 @@ class ScriptServer:
         if not jobs:
             return ()
         with temporary_folder() as scratch:
-            work = _Work(
-                root.resolve(),
-                jobs,
-                on_start,
-                on_finish,
-                claim,
-                interpreter,
-                self._sandbox,
-                scratch,
-            )
+            work = _Work(root.resolve(), jobs, interpreter, self._sandbox, scratch)
+            work.on_start, work.on_finish, work.claim = on_start, on_finish, claim
             self._run(work, parallel, is_unwanted)
         return tuple(work.runs[i] for i in range(len(jobs)))
 
@@ -193,8 +169,11 @@ class ScriptServer:
                     log.unlink()
 
     def _get_worker(self, work: _Work) -> Worker:
-        """A supervisor that waits for a job: an idle or a new one."""
-        states = _package_states(work.interpreter)
+        packages = () if work.interpreter is None else work.interpreter.packages
+        states: list[object] = []
+        for folder in (*site_folders(), *packages):  # a new time: something was installed there
+            with contextlib.suppress(OSError):
+                states.append((folder, Path(folder).stat().st_mtime_ns))
         if states != self._package_states:
             self.close()
             self._package_states = states
@@ -209,24 +188,20 @@ class ScriptServer:
 
 
 class _Work:
-    """The jobs of one run and their results."""
+    on_start: OnStart
+    on_finish: OnFinish
+    claim: Claim
 
     def __init__(
         self,
         root: Path,
         jobs: Sequence[ScriptJob],
-        on_start: OnStart,
-        on_finish: OnFinish,
-        claim: Claim,
         interpreter: Interpreter | None,
         sandbox: Sandbox | None,
         scratch: str,
     ) -> None:
         self.root = root
         self.jobs = jobs
-        self.on_start = on_start
-        self.on_finish = on_finish
-        self.claim = claim
         clean = clean_environment(os.environ)
         self.environment = clean if interpreter is None else interpreter.environment(clean)
         self.environment |= dict(jobs[0].environment)
@@ -272,17 +247,13 @@ class _Work:
         return None
 
     def give(self, worker: Worker, index: int) -> None:
-        """Hand over a job."""
         if index not in self.announced_jobs:
             self.announced_jobs.add(index)
             self.on_start(self.jobs[index].path)
         worker.give(index, self._message(self.jobs[index]))
 
     def read_report(self, worker: Worker) -> bool:
-        """Read from a supervisor and finish its job if the report is complete.
-
-        Return `False` when the supervisor has ended.
-        """
+        """Read from a supervisor, and finish its job; `False` when the supervisor has ended."""
         if not worker.read():
             if worker.job is not None:
                 index, worker.job = worker.job, None
@@ -313,7 +284,6 @@ class _Work:
         return True
 
     def _finish_job(self, worker: Worker, index: int) -> None:
-        """Finish a job if its report is complete."""
         report = worker.take_report()
         if report is None:
             return
@@ -371,12 +341,3 @@ class _Work:
     def _finish(self, index: int, run: ScriptRun) -> None:
         self.runs[index] = run
         self.on_finish(run)
-
-
-def _package_states(interpreter: Interpreter | None) -> tuple[object, ...]:
-    """The folders with packages, each with the time of the last installation there."""
-    states: list[object] = []
-    for folder in (*site_folders(), *(() if interpreter is None else interpreter.packages)):
-        with contextlib.suppress(OSError):
-            states.append((folder, Path(folder).stat().st_mtime_ns))
-    return tuple(states)

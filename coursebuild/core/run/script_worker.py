@@ -1,7 +1,5 @@
 """The processes that run scripts, seen from the tool, and what their sandboxes take.
 
-Entry points: `Worker`, which gives `ChildReport`s; `SandboxWatch`.
-
 A limit of the system holds for one process only. So the tool adds up, many times a second, what
 lies in the memory of all processes of a sandbox and in its folders in memory. Other memory can be
 had by nobody in there: the filter of system calls refuses it (see `seccomp`). The processes are
@@ -54,11 +52,8 @@ class ChildReport(Struct, frozen=True):
 class Worker:
     """A supervisor process, which gets jobs and sends reports; it starts when this is made.
 
-    Args:
-        environment: the environment of the scripts.
-        python: the interpreter that runs them.
-        fork: whether they may run in copies of the supervisor.
-        enclose: makes a command that runs in a sandbox.
+    `environment` is that of the scripts, `python` runs them, `fork` says whether they may run in
+    copies of the supervisor, and `enclose` makes a command that runs in a sandbox.
 
     Raises:
         OSError: the process cannot be started.
@@ -149,11 +144,7 @@ class Worker:
         return bool(data)
 
     def take_report(self) -> ChildReport | None:
-        """Take the next report if all of it has been read.
-
-        Raises:
-            ValueError: it is no report.
-        """
+        """Take the next report if all of it has been read; a `ValueError` says that it is none."""
         size = supervisor.LENGTH.size
         if not self._has_started and self._buffer.startswith(supervisor.STARTED):
             del self._buffer[:size]
@@ -191,7 +182,6 @@ class Worker:
 
 
 # --- what a sandbox takes
-
 
 PROCESSES = 256
 """Processes and threads that a script may have, with all that it starts."""
@@ -256,10 +246,7 @@ class SandboxWatch:
         return True
 
     def excess(self, memory: int) -> str:
-        """The limit that the sandbox exceeds, as the end of a sentence; empty while it does not.
-
-        `memory` is in MiB.
-        """
+        """The limit that is exceeded (`memory` is in MiB), as the end of a sentence, or empty."""
         if not self.is_ready():
             return ""
         most = memory + SUPERVISOR_MEMORY << 10
@@ -304,7 +291,6 @@ class SandboxWatch:
         return size
 
     def _mounts_in_memory(self) -> Iterator[tuple[str, int]]:
-        """The mount points of file systems in memory, each with its device."""
         for line in self._read("1/mountinfo").splitlines():
             fields = line.split()
             kind, is_own = fields[fields.index(b"-") + 1], fields[3] == b"/"

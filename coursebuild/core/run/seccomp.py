@@ -1,13 +1,9 @@
 """The filter of system calls for scripts in a sandbox, as a program that `bwrap --seccomp` loads.
 
-Entry point: `compile_filter`.
-
 What is refused serves to look at other processes, to change the machine, or to take memory that no
 limit counts. All that Python, NumPy and MuJoCo call stays allowed, as do `fork`, threads, pipes,
-and sockets of the sandbox's own network.
-
-The program is classic BPF, see seccomp(2). It has no loops, and looks at numbers only: an address
-of a socket, for one, it cannot see.
+and sockets of the sandbox's own network. The program is classic BPF, see seccomp(2): it has no
+loops, and looks at numbers only, so it cannot see the address of a socket.
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
 """The process that runs scripts for `script_server` and cleans up after them.
 
-Entry point: `main`, called by the program `script_main`.
-
 It runs one script after another, each in a session of its own, so that
 
 1. every process that a script starts is found and killed when the script ends, daemons too: on
@@ -10,14 +8,13 @@ It runs one script after another, each in a session of its own, so that
 3. when this process dies, the system kills the script (Linux).
 
 Importing NumPy and MuJoCo takes longer than most scripts. So this process imports them once, and
-runs scripts in copies of itself. Where that is impossible, it starts this program anew for each
-script. It has one thread, so that it may fork.
+runs scripts in copies of itself, which it may as it has one thread. Where that is impossible, it
+starts this program anew for each script.
 
 The protocol: JSON objects, each after its length in 4 bytes; from the tool a `Job`, and back a
-`ChildReport` for each (see `script_worker`), after `STARTED` if there is something to wait for.
-
-In a sandbox this process is the first one, with number 1: signals from in there do not reach it,
-and nobody in there may look into it.
+`ChildReport` for each (see `script_worker`), after `STARTED` if there is something to wait for. In
+a sandbox this process is the first one, with number 1: signals from in there do not reach it, and
+nobody in there may look into it.
 """
 
 from __future__ import annotations
@@ -114,8 +111,6 @@ def main(arguments: Sequence[str], initial_modules: Collection[str]) -> ScriptPr
 
 
 class _Supervisor:
-    """Runs the jobs that arrive at one descriptor, and writes reports to another."""
-
     def __init__(self, jobs: int, reports: int, *, may_fork: bool) -> None:
         self.jobs = jobs
         self.reports = reports
@@ -195,7 +190,9 @@ class _Supervisor:
                 script.end()
             trace = _read_notes(script.shared, notes_folder(folder))
             stdout, stderr = script.stdout[:STDOUT_LIMIT], script.stderr[-STDERR_KEPT:]
-            figures = _read_figures(folder, job["figures"])
+            paths = (Path(figure_path(folder, name)) for name in job["figures"])
+            # One that is too large is cut off, so that it cannot be shown.
+            figures = (_read_regular(path, FIGURE_LIMIT + 1) for path in paths)
             parts = bytes(stdout), _OUR_FRAME.sub(b"", bytes(stderr)), trace, *figures
             status = script.exit_status()
             outcome = script.limit or ("killed" if status < 0 else "failed" if status else "ok")
@@ -213,7 +210,6 @@ class _Supervisor:
         try:
             prepare = functools.partial(self._prepare_script, job, stdout, stderr, os.getpid())
             if not self._can_fork(job):
-                # Start this program for one script
                 process = subprocess.Popen(
                     [sys.executable, PROGRAM, json.dumps(job)],
                     env=environment,
@@ -221,8 +217,7 @@ class _Supervisor:
                     preexec_fn=prepare,  # safe: there is no other thread
                 )
                 process.returncode = 0  # `RunningScript` reaps it
-                pid = process.pid
-                return RunningScript(pid, (out, err), None, job["timeout"], self.awake)
+                return RunningScript(process.pid, (out, err), None, job["timeout"], self.awake)
             shared = _shared_memory(environment["TMPDIR"])
             gc.freeze()  # else a script's garbage collector would touch, and so copy, our memory
             pid = os.fork()
@@ -252,7 +247,6 @@ class _Supervisor:
         return _sibling_names(job).isdisjoint(self.preloaded.names())
 
     def _prepare_script(self, job: Job, stdout: int, stderr: int, parent: int) -> None:
-        """Prepare a script's process: its session, pipes, signals and limits."""
         os.setsid()
         if self.libc is not None:
             self.libc.prctl(_PR_SET_DUMPABLE, 1, 0, 0, 0)
@@ -273,8 +267,13 @@ class _Supervisor:
         os.chdir(job["root"])
 
 
+def _special_names(folder: str, names: Sequence[str]) -> list[str]:
+    """The files that cannot be copied: sockets, pipes and devices."""
+    paths = {name: Path(folder, name) for name in names}
+    return [n for n, p in paths.items() if not (p.is_symlink() or p.is_dir() or p.is_file())]
+
+
 def _sibling_names(job: Job) -> frozenset[str]:
-    """The names of files, as modules, in the folders where a script looks first."""
     names: set[str] = set()
     for folder in (os.path.dirname(f"{job['root']}/{job['path']}"), *job["folders"]):  # noqa: PTH120
         with contextlib.suppress(OSError):
@@ -282,14 +281,7 @@ def _sibling_names(job: Job) -> frozenset[str]:
     return frozenset(names)
 
 
-def _special_names(folder: str, names: Sequence[str]) -> list[str]:
-    """The files that cannot be copied: sockets, pipes and devices."""
-    paths = {name: Path(folder, name) for name in names}
-    return [n for n, p in paths.items() if not (p.is_symlink() or p.is_dir() or p.is_file())]
-
-
 def _shared_memory(folder: str) -> mmap.mmap:
-    """Memory for a script's notes, which its process shares with this one."""
     if os.getpid() != _FIRST:
         return mmap.mmap(-1, _NOTES_BYTES)
     fd = os.open(folder, os.O_TMPFILE | os.O_RDWR)  # in a sandbox, all that is shared is a file's
@@ -301,18 +293,24 @@ def _shared_memory(folder: str) -> mmap.mmap:
 
 
 def _read_notes(shared: mmap.mmap | None, overflow: str) -> bytes:
-    """The notes of a script, from shared memory and from files in the folder `overflow`."""
     parts = []
     if shared is not None:
         end = shared.find(b"\0\0")
         parts.append(shared[: end if end >= 0 else len(shared)])
         shared.close()
     with contextlib.suppress(OSError):
-        for path in sorted(Path(overflow).iterdir()):
-            with contextlib.suppress(OSError):
-                if path.is_file():
-                    parts.append(path.read_bytes())
+        paths = sorted(Path(overflow).iterdir())
+        parts += [data for path in paths if (data := _read_regular(path)) is not None]
     return b"\0".join(parts)
+
+
+def _read_regular(path: Path, size: int = -1) -> bytes | None:
+    """The beginning of a file; `None` where there is none: to open a pipe may take for ever."""
+    with contextlib.suppress(OSError):
+        if path.is_file():
+            with path.open("rb") as file:
+                return file.read(size)
+    return None
 
 
 def missing_modules(names: Sequence[str], folders: Sequence[str], library: str) -> list[str]:
@@ -320,27 +318,26 @@ def missing_modules(names: Sequence[str], folders: Sequence[str], library: str) 
     if not names:
         return []
     importlib.invalidate_caches()
-    path = [*folders, *sys.path, *([library] if library else [])]
-    return [name for name in names if not _is_importable(name, path)]
+    all_folders, original_path = [*folders, *sys.path, *([library] if library else [])], sys.path
 
+    def is_importable(name: str) -> bool:
+        path: Sequence[str] | None = None
+        parts = name.split(".")
+        for count, part in enumerate(parts, 1):
+            spec = None
+            try:
+                sys.path = all_folders if path is None else original_path
+                for finder in sys.meta_path if part.isidentifier() else ():
+                    with contextlib.suppress(Exception):  # a package's own finder may do anything
+                        spec = spec or finder.find_spec(".".join(parts[:count]), path)
+            finally:
+                sys.path = original_path
+            if spec is None:
+                return False
+            path = spec.submodule_search_locations or ()
+        return True
 
-def _is_importable(name: str, path: Sequence[str]) -> bool:
-    is_top, original_path = True, sys.path
-    for stop in (at for at, c in enumerate(f"{name}.") if c == "."):
-        if not name[:stop].rpartition(".")[2].isidentifier():
-            return False
-        spec = None
-        try:
-            sys.path = list(path) if is_top else original_path
-            for finder in sys.meta_path:
-                with contextlib.suppress(Exception):  # a package's own finder may do anything
-                    spec = spec or finder.find_spec(name[:stop], None if is_top else path)
-        finally:
-            sys.path = original_path
-        if spec is None:
-            return False
-        path, is_top = spec.submodule_search_locations or (), False
-    return True
+    return [name for name in names if not is_importable(name)]
 
 
 def _make_temporary_folder(scratch: str) -> str:
@@ -357,23 +354,6 @@ def _make_temporary_folder(scratch: str) -> str:
                 Path(scratch).mkdir(mode=0o700, parents=True)
 
 
-def _read_figures(folder: str, names: Sequence[str]) -> list[bytes | None]:
-    """The figures in a script's temporary folder; `None` for one that it did not draw.
-
-    One that is too large is cut off, so that it cannot be shown.
-    """
-    figures: list[bytes | None] = []
-    for name in names:
-        path = Path(figure_path(folder, name))
-        data = None
-        with contextlib.suppress(OSError):
-            if path.is_file():  # to open a pipe may take for ever
-                with path.open("rb") as file:
-                    data = file.read(FIGURE_LIMIT + 1)
-        figures.append(data)
-    return figures
-
-
 def _report_unstartable(text: str) -> bytes:
     return _report("failed", 2, parts=(b"", text.encode(), b""))
 
@@ -385,7 +365,6 @@ def _report(
     missing: Sequence[str] = (),
     parts: Sequence[bytes | None] = (b"", b"", b""),
 ) -> bytes:
-    """A `ChildReport` as it is sent."""
     report = {
         "outcome": outcome,
         "status": status,

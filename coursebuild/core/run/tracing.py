@@ -1,10 +1,8 @@
 """Trace, in a script's own process, what the script looks at while it runs.
 
-Entry point: `Tracer`, whose `install` adds an audit hook; `mujoco_tracing` reports the files that
-MuJoCo opens, of which Python knows nothing.
-
 1. Events of Python's audit system say which files are opened, folders listed, modules imported and
-   programs started. Whatever lies in Python or an installed package is ignored at once.
+   programs started. Whatever lies in Python or an installed package is ignored at once. What MuJoCo
+   opens, of which Python knows nothing, `mujoco_tracing` reports.
 2. The rest becomes short records, each only once, in memory that is shared with the supervisor: so
    they survive however the script ends. A process that the script forks appends its records to a
    file.
@@ -136,14 +134,9 @@ class Tracer:
             "os.chdir": lambda args: self._opened.clear(),
             "ctypes.dlopen": self._on_load_library,
             "sqlite3.connect": self._on_open_database,
-            "socket.connect": self._on_network,
-            "socket.bind": self._on_network,
-            "socket.sendto": self._on_network,
-            "socket.sendmsg": self._on_network,
-            "socket.getaddrinfo": self._on_network,
-            "socket.gethostbyname": self._on_network,
-            "socket.gethostbyaddr": self._on_network,
         }
+        for name in "connect bind sendto sendmsg getaddrinfo gethostbyname gethostbyaddr".split():
+            handlers[f"socket.{name}"] = self._on_network
         for name in ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "pty.spawn"):
             handlers[name] = self._on_program
         for name, paths in _CHANGES.items():
@@ -209,10 +202,8 @@ class Tracer:
             return
         self._written_paths.add(full_path)
         if not f"{full_path}/".startswith(self._writable or ("\0",)):
-            inside = full_path.startswith(self.root)
-            self._note_effect(
-                "w", full_path.removeprefix(self.root), WRITES if inside else WRITES_OUTSIDE
-            )
+            reason = WRITES if full_path.startswith(self.root) else WRITES_OUTSIDE
+            self._note_effect("w", full_path.removeprefix(self.root), reason)
 
     def note_library(self, path: object) -> None:
         """Note that native code was loaded from a file, or from all files of a folder."""
@@ -300,8 +291,18 @@ class Tracer:
             self.note_opaque(LISTS_OUTSIDE)
 
     def _on_change(self, paths: Iterable[tuple[int, int]], args: tuple[object, ...]) -> None:
-        for path, folder in paths:
-            self.note_write(_join_descriptor(args[folder] if folder else -1, args[path]))
+        for path_at, folder_at in paths:
+            path, folder = args[path_at], args[folder_at] if folder_at else -1
+            if isinstance(path, bytes):
+                path = path.decode("utf-8", "surrogateescape")
+            if (
+                isinstance(folder, int)
+                and folder >= 0
+                and isinstance(path, str)
+                and path[:1] != "/"
+            ):
+                path = f"{_descriptor_path(folder)}/{path}"  # relative to an open folder
+            self.note_write(path)
 
     def _on_program(self, args: tuple[object, ...]) -> None:
         if not self.is_by_import():
@@ -326,10 +327,8 @@ class Tracer:
             self.note_library(name)
 
     def _on_open_database(self, args: tuple[object, ...]) -> None:
-        if (
-            args[0] not in (":memory:", b":memory:", "")
-            and self._relevant_path(args[0]) is not None
-        ):
+        is_file = args[0] not in (":memory:", b":memory:", "")
+        if is_file and self._relevant_path(args[0]) is not None:
             self.note_opaque(DATABASE)
 
     # --- paths
@@ -347,13 +346,8 @@ class Tracer:
         full_path = "/" + normpath(path).lstrip("/")
         if full_path.startswith(self._ignored) or full_path == self.temporary[:-1]:
             return None
-        if (
-            self._packages_around
-            and not full_path.startswith(self.root)
-            and full_path.startswith(self._installed)
-        ):
-            return None
-        return full_path
+        is_package = full_path.startswith(self._installed) and not full_path.startswith(self.root)
+        return None if self._packages_around and is_package else full_path
 
     def _project_folder(self, folder: object) -> str | None:
         if not isinstance(folder, str):
@@ -397,17 +391,7 @@ class Tracer:
             self._is_spilling = False
 
 
-def _join_descriptor(folder: object, path: object) -> object:
-    """A path that may be relative to a folder given as a descriptor."""
-    if isinstance(path, bytes):
-        path = path.decode("utf-8", "surrogateescape")
-    if not isinstance(folder, int) or folder < 0 or not isinstance(path, str) or path[:1] == "/":
-        return path
-    return f"{_descriptor_path(folder)}/{path}"
-
-
 def _descriptor_path(fd: int) -> str:
-    """The path of an open file, where the system tells it."""
     try:
         return posix.readlink(f"/proc/self/fd/{fd}")
     except OSError:

@@ -1,14 +1,10 @@
 """JavaScript in this process: V8 with limits on time and memory, and Temml in it.
 
-Entry points: `MathEngine.typeset`; `Isolate`, for other scripts; `start`, before copies of this
-process are made.
-
-1. mini-racer brings V8, which runs scripts in a thread of its own, and notifies an event loop when
-   one has ended. Each isolate has such a loop, in one more thread. Both threads end when the
-   isolate is closed, so that this process can be forked again.
-2. Formulas are typeset many at a time, as JSON (see `typeset.js`).
-3. When a batch exceeds a limit, its isolate is thrown away, and its formulas are typeset one by
-   one, to find the one to blame.
+mini-racer brings V8, which runs scripts in a thread of its own, and notifies an event loop when one
+has ended. Each isolate has such a loop, in one more thread. Both threads end when the isolate is
+closed, so that this process can be forked again. `MathEngine` typesets formulas many at a time, as
+JSON (see `typeset.js`). When a batch exceeds a limit, its isolate is thrown away, and its formulas
+are typeset one by one, to find the one to blame.
 """
 
 from __future__ import annotations
@@ -153,8 +149,7 @@ class Isolate:
         """Call a global function from string to string.
 
         Raises:
-            LimitError: it ran for more than `seconds`, or too long without progress, or took too
-                much memory.
+            LimitError: it ran for more than `seconds`, too long without progress, or out of memory.
             ScriptError: it threw.
         """
         result = self._evaluate(f"{function}({json.dumps(argument)})", seconds, progress)
@@ -226,7 +221,6 @@ class Isolate:
 
 
 async def _end_tasks() -> None:
-    """Cancel the other tasks of the running loop, and wait until they have ended."""
     tasks = asyncio.all_tasks() - {asyncio.current_task()}
     for task in tasks:
         task.cancel()
@@ -255,11 +249,7 @@ class MathEngine:
             self._isolate = None
 
     def typeset(self, formulas: Sequence[Formula]) -> list[str | MathError]:
-        """The MathML of each formula, or why there is none; no macro outlives its formula.
-
-        Raises:
-            EffectError: Temml or V8 is not installed.
-        """
+        """The MathML of each formula, or why there is none; no macro outlives its formula."""
         with self._lock:
             results: dict[Formula, str | MathError] = {
                 formula: self._mathml[formula] for formula in formulas if formula in self._mathml

@@ -1,7 +1,6 @@
 """A running script: its output, its limits, and the end of everything that it started.
 
-Entry point: `RunningScript`, used by `supervisor`, whose process has one thread and becomes the
-parent of the script's orphans.
+It is used by `supervisor`, whose process has one thread and becomes the parent of orphans.
 """
 
 from __future__ import annotations
@@ -48,12 +47,8 @@ def has_ended(parent: int) -> bool:
 class RunningScript:
     """One script, from its start until nothing of it is left.
 
-    Args:
-        pid: its process.
-        pipes: the reading ends of its output and of its error output.
-        shared: the memory for its notes, if that is shared with this process.
-        timeout: seconds that it may take.
-        awake: a descriptor that becomes readable when a child has ended.
+    `pipes` are the reading ends of its output and its error output; `shared` is the memory for its
+    notes, if it shares some; `awake` becomes readable when a child has ended.
     """
 
     def __init__(
@@ -125,7 +120,7 @@ class RunningScript:
                 return
 
     def _wait(self, seconds: float, fds: list[int]) -> set[int]:
-        """Wait for a pipe, the end of a child, or one of `fds`; return which of `fds` are ready."""
+        """Wait for a pipe, the end of a child, or one of `fds`; those of `fds` that are ready."""
         poll = select.poll()
         for fd in (*self.pipes, self.awake, *fds):
             poll.register(fd, select.POLLIN)
@@ -153,7 +148,6 @@ class RunningScript:
         return buffer is self.stderr or len(buffer) <= STDOUT_LIMIT
 
     def _reap_children(self) -> bool:
-        """Reap every child that has ended; return whether the script has."""
         with contextlib.suppress(ChildProcessError):
             while (child := os.waitpid(-1, os.WNOHANG))[0]:
                 if child[0] == self.pid:
@@ -161,8 +155,7 @@ class RunningScript:
         return self.status is not None
 
     def _kill_descendants(self, until: float) -> None:
-        """Kill every process that the script left: when one dies, its children become ours."""
-        while time.monotonic() < until:
+        while time.monotonic() < until:  # when one dies, its children become ours
             self._reap_children()
             children = list(_children())
             if not children and self.status is not None:
@@ -179,15 +172,8 @@ class RunningScript:
 def _children() -> Iterator[int]:
     """The children of this process that are alive or not yet reaped, where the system can tell."""
     me = os.getpid()
-    try:
-        children_fd = os.open(f"/proc/self/task/{me}/children", os.O_RDONLY)
-    except OSError:
-        pass
-    else:
-        try:
-            yield from map(int, os.read(children_fd, _CHUNK).split())
-        finally:
-            os.close(children_fd)
+    with contextlib.suppress(OSError):
+        yield from map(int, Path(f"/proc/self/task/{me}/children").read_bytes().split())
         return
     with contextlib.suppress(OSError):
         for entry in Path("/proc").iterdir():

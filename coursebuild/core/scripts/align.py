@@ -1,8 +1,5 @@
 """Which recorded line corresponds to which printed line.
 
-Entry points: `same_lines` (do they match?), `align` (where do they differ?); `pair`, which also
-aligns the words of a line and the rows of a table.
-
 1. A line of only `...` stands for any number of lines, or none. The recorded lines between two of
    them must be printed without a gap: the first block at the start, the last one at the end, each
    other one at its first place.
@@ -41,7 +38,6 @@ class StepKind(enum.Enum):
     MISSING = "missing"
     EXTRA = "extra"
     ELLIPSIS = "ellipsis"
-    """A recorded `...` line."""
     ELIDED = "elided"
     """A printed line that a `...` line stands for."""
 
@@ -89,10 +85,7 @@ def same_lines(recorded: Side, printed: Side, comparison: Comparison) -> bool:
 
 
 def count_alike(text: Side, printed: Side, matcher: LineMatcher) -> int:
-    """How many lines of a text have a printed one, in order, with half of their words or more.
-
-    Numbers count as alike, whatever their values.
-    """
+    """How many lines of a text have a printed one, in order, with half of their words or more."""
     return len(_line_pairs(text, range(len(text.lines)), printed, matcher))
 
 
@@ -165,7 +158,6 @@ MATCH = 8
 """The weight of a pair that matches; smaller ones are for items that are alike, 0 for no pair."""
 
 _CELLS = 250_000
-"""The most cells that a table of dynamic programming may have."""
 
 
 def pair(

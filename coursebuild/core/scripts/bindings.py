@@ -1,7 +1,5 @@
 """Numbers in prose that must be what a script printed: `` `+6.6 %`{out} ``.
 
-Entry points: `check_bindings` (a document), `dependent_bindings` (those that a change affects).
-
 1. A binding depends on the nearest recorded output above it, or on the script that `{out=…}` names:
    on its recorded outputs anywhere in the course, or else on what it printed in this run.
 2. The numbers of a binding must be numbers of one printed line, one after the other, each rounded
@@ -34,14 +32,7 @@ from typing import TypeAlias
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import (
-    Document,
-    Mode,
-    NumberBinding,
-    Table,
-    document_scripts,
-    find_inlines,
-)
+from coursebuild.core import model
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bound_numbers import (
     BoundText,
@@ -87,7 +78,7 @@ BindingEvidence: TypeAlias = dict[BindingKey, tuple[str, ...]]
 class DependentBinding(Struct, frozen=True):
     """A binding, and the change of a recorded value that it depends on."""
 
-    binding: NumberBinding
+    binding: model.NumberBinding
     change: Change
 
 
@@ -112,11 +103,11 @@ class PrintedOutputs:
         self.scripts = frozenset({*scripts, *self.runs, *self._by_script})
         """The paths of all scripts."""
 
-    def of_document(self, document: Document) -> Sequence[Verdict]:
+    def of_document(self, document: model.Document) -> Sequence[Verdict]:
         """The recorded outputs of a document, in order."""
         return self._by_document.get(document.source.path, ())
 
-    def of_binding(self, binding: NumberBinding) -> list[Verdict]:
+    def of_binding(self, binding: model.NumberBinding) -> list[Verdict]:
         """The recorded outputs that a binding depends on."""
         if binding.script is not None:
             return self._by_script.get(binding.script, [])
@@ -124,7 +115,7 @@ class PrintedOutputs:
         after = bisect_left(verdicts, binding.span.start + 1, key=_end_of_body)
         return verdicts[after - 1 : after] if after else []
 
-    def key(self, binding: NumberBinding) -> BindingKey:
+    def key(self, binding: model.NumberBinding) -> BindingKey:
         """The key of a binding."""
         verdicts = self.of_binding(binding)
         if binding.script is not None or not verdicts:
@@ -152,13 +143,13 @@ def _recording_key(verdict: Verdict) -> tuple[str, int]:
     return verdict.recording.span.path, verdict.recording.body_span.start
 
 
-def document_bindings(document: Document) -> tuple[NumberBinding, ...]:
+def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ...]:
     """The bound numbers of a document, in order: also in footnotes, tables and quizzes."""
-    return tuple(b for b in find_inlines(document, NumberBinding) if b.source is None)
+    return tuple(b for b in model.find_inlines(document, model.NumberBinding) if b.source is None)
 
 
 def check_bindings(
-    document: Document, outputs: PrintedOutputs, evidence: BindingEvidence | None = None
+    document: model.Document, outputs: PrintedOutputs, evidence: BindingEvidence | None = None
 ) -> tuple[Diagnostic, ...]:
     """What is wrong with the bindings of a document.
 
@@ -175,7 +166,7 @@ def check_bindings(
             start = _end_of_body(verdicts[0]) if verdicts else binding.span.start
             scripts = [  # between it and the output further up that it depends on
                 script
-                for script in document_scripts(document)
+                for script in model.document_scripts(document)
                 if start < script.span.start < binding.span.start
             ]
             if finding.rule == "binding-mismatch" and scripts and key not in evidence:
@@ -183,7 +174,7 @@ def check_bindings(
                 finding = replace(finding, help=help, edits=())
             elif binding.script is not None and binding.script not in outputs.scripts:
                 likely = nearest(binding.script, outputs.scripts)
-                places = (s.span for s in document_scripts(document) if s.path == likely)
+                places = (s.span for s in model.document_scripts(document) if s.path == likely)
                 notes = (Note(f"`{likely}` is here", place.first_line()) for place in places)
                 finding = replace(finding, notes=(*finding.notes, *notes))
             diagnostics.append(finding)
@@ -193,7 +184,7 @@ def check_bindings(
 
 
 def _check(
-    binding: NumberBinding, outputs: PrintedOutputs, before: Sequence[str]
+    binding: model.NumberBinding, outputs: PrintedOutputs, before: Sequence[str]
 ) -> Diagnostic | Sequence[PrintedLine]:
     """What is wrong with a binding, or the lines by which it holds; no lines where it is unchecked.
 
@@ -212,12 +203,14 @@ def _check(
     if not verdicts and not ran_well:
         is_run = run is None or run.outcome is not Outcome.NORUN
         return () if is_run else _orphan_diagnostic(binding, path, outputs)
-    steady = [v for v in verdicts if v.comparison.mode is not Mode.VOLATILE]
+    steady = [v for v in verdicts if v.comparison.mode is not model.Mode.VOLATILE]
     bound_text = BoundText.of(binding.text)
     lines = [line for verdict in steady for line in outputs.lines(verdict)]
     if _holds(bound_text, lines):
         return lines
-    partial = any(v.comparison.ellipsis or isinstance(v.recording.body, Table) for v in steady)
+    partial = any(
+        v.comparison.ellipsis or isinstance(v.recording.body, model.Table) for v in steady
+    )
     drifted = any(v.status == "drift" for v in steady)
     if (partial or drifted or not verdicts) and run is not None and ran_well:
         lines = lines_of_run(run.stdout, [f for v in steady for f in v.comparison.own_filters])
@@ -240,7 +233,7 @@ def _holds(bound_text: BoundText, lines: Sequence[PrintedLine]) -> bool:
 
 
 def _orphan_diagnostic(
-    binding: NumberBinding, path: str | None, outputs: PrintedOutputs
+    binding: model.NumberBinding, path: str | None, outputs: PrintedOutputs
 ) -> Diagnostic:
     """A binding that has no output: none above it, no such script, or one that is not run."""
     if path is None:
@@ -259,7 +252,7 @@ def _orphan_diagnostic(
 
 
 def dependent_bindings(
-    verdict: Verdict, documents: Iterable[Document], outputs: PrintedOutputs
+    verdict: Verdict, documents: Iterable[model.Document], outputs: PrintedOutputs
 ) -> tuple[DependentBinding, ...]:
     """The bindings of the course, in order, that depend on a changed value of a recording."""
     changes = [c for c in verdict.changes if c.kind is not DriftKind.EXTRA]
@@ -284,12 +277,9 @@ _QUOTIENT = Context(prec=34)
 
 
 def _mismatch(
-    binding: NumberBinding, path: str, lines: Sequence[PrintedLine], before: Sequence[str]
+    binding: model.NumberBinding, path: str, lines: Sequence[PrintedLine], before: Sequence[str]
 ) -> Diagnostic:
-    """The diagnostic of a binding that none of these lines bears out.
-
-    `before` are the lines by which it held when it was last checked, if that is known.
-    """
+    """The diagnostic of a binding that none of these lines bears out; `before` as in `_check`."""
     bound_text = BoundText.of(binding.text)
     stray, label = bound_text.stray, ""
     if not bound_text.numbers:
@@ -351,10 +341,7 @@ def _successor(
 
 
 def _line_keys(lines: Sequence[PrintedLine]) -> tuple[list[Hashable], list[Hashable]]:
-    """Two keys of each line: its heading and words; these and the number that it begins with.
-
-    The number counts only in lines with several.
-    """
+    """Two keys of each line: its heading and words; these and, of several, its first number."""
     heading = ""
     words: list[Hashable] = []
     rows: list[Hashable] = []
@@ -379,8 +366,7 @@ def _distance(
         if not (s.is_finite and p.is_finite):
             return Decimal("Infinity"), absolute
         shown_size, printed_size = s.value.copy_abs(), p.value.copy_abs()
-        relative += _QUOTIENT.divide(
-            difference(shown_size, printed_size), max(shown_size, printed_size)
-        )
+        if size := max(shown_size, printed_size):  # `00` is 0 and not shown as it
+            relative += _QUOTIENT.divide(difference(shown_size, printed_size), size)
         absolute += difference(s.value, p.value)
     return relative, absolute

@@ -1,8 +1,4 @@
-"""The printed lines with their numbers, and which of these a bound number may mean.
-
-Entry points: `printed_lines` (a recorded output), `lines_of_run` (the output of a run);
-`BoundText.of`, `shows`, `text_places`.
-"""
+"""The printed lines with their numbers, and which of these a bound number may mean."""
 
 from __future__ import annotations
 
@@ -20,7 +16,7 @@ from coursebuild.core.scripts.tables import RowCell, table_rows
 from coursebuild.core.text.source import Excerpt, Span
 
 Locate = Callable[[int, int], Span]
-_STRAY = re.compile(r"[-+*/.,:;=_]+")
+_STRAY = re.compile(r"[-+*/.,:;=_]+|-?[eE][-+]+\d*|[-+][eE]\d*")
 """What beside a number is neither a unit nor a word: `-9.81-` has a slip."""
 
 

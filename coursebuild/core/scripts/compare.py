@@ -1,20 +1,9 @@
 """Is a recorded output what the script prints: here, a second time, with another version of MuJoCo?
 
-Entry points: `verify` (all recordings of a course), `compare` (one recording); `repeat_findings`,
-for a remembered run and a later one; `instability_diagnostic`, for two runs whose output is to be
-recorded; `run_standings`, runs elsewhere compared with what is recorded; `judge_comparability` and
-`judge`, the verdict on one script.
-
-1. Where both are the same, character by character, the recording is verified.
-2. Else both sides are filtered and split into lines; if these match, it is verified too.
-3. Else the lines are aligned (`align`), and each step that differs becomes changes: numbers
-   and texts inside lines (`diff`), runs of missing or extra lines.
-4. Every change is traced back through the filters to its place in the lesson.
-
-A recorded table has its own way of matching: see `tables`.
-
-An output that its lesson calls volatile may differ, and so may one that matches the recorded output
-both times.
+Where both are the same, character by character, the recording is verified. Else both sides are
+filtered and split into lines; if these match, it is verified too. Else the lines are aligned, each
+step that differs becomes changes, and every change is traced back through the filters to its place
+in the lesson. An output that its lesson calls volatile may differ.
 
 MuJoCo is the cause only if nothing else can be: the script prints here what is recorded; so does a
 control run in a fresh environment that differs from the other one in nothing but MuJoCo; and two
@@ -30,16 +19,7 @@ from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.model import (
-    Comparison,
-    Course,
-    Mode,
-    Recording,
-    Script,
-    Table,
-    document_blocks,
-    find_blocks,
-)
+from coursebuild.core import model
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.core.scripts.diff import (
@@ -56,7 +36,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagn
 from coursebuild.core.text.source import Excerpt, Span
 
 
-def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
+def verify(course: model.Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
     """A verdict for every recording of the course that has a script, in order.
 
     Where two blocks have the same path, only the first is run; what is recorded below the second
@@ -67,11 +47,11 @@ def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
     verdicts: list[Verdict] = []
     for document in course.documents:
         is_repeated = False
-        for block in document_blocks(document):
-            if isinstance(block, Script):
+        for block in model.document_blocks(document):
+            if isinstance(block, model.Script):
                 is_repeated = block.path in paths
                 paths.add(block.path)
-            elif isinstance(block, Recording) and block.script is not None:
+            elif isinstance(block, model.Recording) and block.script is not None:
                 comparison, run = course.comparison_of(block), by_path.get(block.script)
                 if run is None or is_repeated or not block.readable:
                     verdicts.append(Verdict(block, comparison, "unchecked"))
@@ -80,12 +60,12 @@ def verify(course: Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
     return tuple(verdicts)
 
 
-def compare(recording: Recording, comparison: Comparison, stdout: str) -> Verdict:
+def compare(recording: model.Recording, comparison: model.Comparison, stdout: str) -> Verdict:
     """The verdict on one recording, given what its script printed."""
     body = recording.body
-    if comparison.mode is Mode.VOLATILE:
+    if comparison.mode is model.Mode.VOLATILE:
         return Verdict(recording, comparison, "volatile")
-    if isinstance(body, Table):
+    if isinstance(body, model.Table):
         return compare_table(recording, body, comparison, stdout)
     if stdout in (body.text, f"{body.text}\n"):  # as it nearly always is
         return Verdict(recording, comparison, "verified")
@@ -101,7 +81,7 @@ def compare(recording: Recording, comparison: Comparison, stdout: str) -> Verdic
 class _ChangeFinder(Struct, frozen=True):
     """Turns steps into changes with their places in the lesson."""
 
-    recording: Recording
+    recording: model.Recording
     body: Excerpt
     recorded: Side
     printed: Side
@@ -132,7 +112,6 @@ class _ChangeFinder(Struct, frozen=True):
                     pass
 
     def _line(self, step: Step) -> Iterator[Change]:
-        """The changes inside one line."""
         recorded, printed = self.recorded.lines[step.recorded], self.printed.lines[step.printed]
         for d in find_differences(recorded, printed, self.matcher):
             start, end = self.recorded.origin(step.recorded, d.start, d.end)
@@ -163,7 +142,7 @@ _MAX_NOTES, _WIDTH = 10, 80
 
 
 def repeat_findings(
-    course: Course,
+    course: model.Course,
     extractions: Iterable[Extraction],
     differing_runs: Sequence[tuple[ScriptRun, ScriptRun]],
 ) -> tuple[Diagnostic, ...]:
@@ -171,7 +150,18 @@ def repeat_findings(
     by_path = {extraction.path: extraction for extraction in extractions}
     diagnostics: list[Diagnostic] = []
     for before, now in differing_runs:
-        if now.path not in by_path or _may_differ(course, before, now):
+        recordings = [
+            recording
+            for document in course.documents
+            for recording in model.find_blocks(document, model.Recording)
+            if recording.script == now.path and recording.readable
+        ]
+        may_differ = {before.outcome, now.outcome} == {Outcome.OK} and all(
+            compare(r, course.comparison_of(r), run.stdout).status != "drift"
+            for r in recordings
+            for run in (before, now)
+        )
+        if now.path not in by_path or (recordings and may_differ):
             continue
         notes = []
         if (before.outcome, before.status) != (now.outcome, now.status):
@@ -188,33 +178,14 @@ def repeat_findings(
     return tuple(diagnostics)
 
 
-def _may_differ(course: Course, before: ScriptRun, now: ScriptRun) -> bool:
-    if before.outcome is not Outcome.OK or now.outcome is not Outcome.OK:
-        return False
-    recordings = [
-        recording
-        for document in course.documents
-        for recording in find_blocks(document, Recording)
-        if recording.script == now.path and recording.readable
-    ]
-    return bool(recordings) and all(
-        compare(r, course.comparison_of(r), run.stdout).status != "drift"
-        for r in recordings
-        for run in (before, now)
-    )
-
-
 def _describe_end(run: ScriptRun) -> str:
     return f"{run.outcome.value} ({run.status})" if run.status else run.outcome.value
 
 
 def instability_diagnostic(
-    recording: Recording, first: Side, second: Side, comparison: Comparison
+    recording: model.Recording, first: Side, second: Side, comparison: model.Comparison
 ) -> Diagnostic:
-    """Say which lines differ between two runs.
-
-    `first` is the recorded or new text that matches the first run.
-    """
+    """Say which lines differ between two runs, of which the first is recorded."""
     steps = align(first, second, LineMatcher(comparison))
     different_steps = [step for step in steps if step.kind in _DIFFERENT]
     notes = []
@@ -232,7 +203,7 @@ def instability_diagnostic(
             notes.append(Note(f"line {number}: {a} in one run, {b} in the next"))
     if (rest := len(different_steps) - _MAX_NOTES) > 0:
         notes.append(Note(f"and {rest} more {'line' if rest == 1 else 'lines'}"))
-    help = _TABLE_HELP if isinstance(recording.body, Table) else _HELP
+    help = _TABLE_HELP if isinstance(recording.body, model.Table) else _HELP
     if isinstance(recording.body, Excerpt) and (
         pattern := varying_times(first, second, comparison)
     ):
@@ -274,7 +245,6 @@ class RunStanding(Struct, frozen=True):
 
     run: ScriptRun
     is_compared: bool
-    """Whether there was anything to compare it with."""
     changes: tuple[Change, ...] = ()
     diff: str = ""
     """The difference between the outputs, where nothing is recorded."""
@@ -286,7 +256,7 @@ class RunStanding(Struct, frozen=True):
 
 
 def run_standings(
-    course: Course, current_runs: Mapping[str, ScriptRun], runs: Iterable[ScriptRun]
+    course: model.Course, current_runs: Mapping[str, ScriptRun], runs: Iterable[ScriptRun]
 ) -> dict[str, RunStanding]:
     """The standing of each run, by path; `current_runs` are those of this environment."""
     runs = tuple(runs)
@@ -330,11 +300,8 @@ def judge(
 ) -> Judgement:
     """Judge a script that prints what is recorded here, but not with the other MuJoCo.
 
-    Args:
-        standing: its run with the other version of MuJoCo.
-        control: with this version, in a fresh environment; `None` where there is none.
-        repeated: with the other version once more.
-        engine: this version.
+    `control` is its run with this version, `engine`, in a fresh environment, if there is one;
+    `standing` and `repeated` are those with the other version.
     """
     if (standing.run.outcome, standing.run.stdout) != (repeated.run.outcome, repeated.run.stdout):
         return "unclear", "two runs of it there differed"

@@ -1,16 +1,10 @@
 """How a recorded output differs from what its script prints now: inside a line, and line by line.
 
-Entry points: `find_differences` (inside one line), `number_kind`; `diff_rows`; `text_diff`,
-`shorten`, `quote`; `varying_times`.
-
 1. Lines that differ in their numbers only: each pair of numbers that does not match.
 2. Other lines are cut into numbers, words, signs and white space, and these are aligned: paired
    numbers are compared, the rest is text. White space that differs is reported only where nothing
    else does, because columns shift when a number gets wider.
 3. A recorded line with an ellipsis that does not fit differs as a whole.
-
-Lines that match under the comparison's mode count as recorded, even where their characters differ;
-lines that a `...` stands for are left out. A row marks the parts of its line that changed.
 
 Of two runs of a script, `varying_times` gives the pattern that says on the fence which times vary:
 
@@ -63,29 +57,26 @@ class Difference(Struct, frozen=True):
     """Recorded and printed, where both are a number."""
 
 
-def number_kind(recorded: Number, printed: Number) -> DriftKind:
-    """The class of a difference between two numbers.
+def number_change(
+    span: Span, recorded: str, printed: str, numbers: tuple[Number, Number]
+) -> Change:
+    """The change of a number that stands at `span` in the lesson.
 
     It is rounding where a number with a point or an exponent is off by at most one unit of its last
     recorded place; a count that is off by one is not. The same value in another notation is text.
     """
-    if not (recorded.is_finite and printed.is_finite):
-        return DriftKind.NUMERIC
-    gap = difference(recorded.value, printed.value)
-    if gap == 0:
-        return DriftKind.TEXT
-    is_rounding = recorded.is_inexact and gap <= unit(recorded.place)
-    return DriftKind.ROUNDING if is_rounding else DriftKind.NUMERIC
-
-
-def number_change(
-    span: Span, recorded: str, printed: str, numbers: tuple[Number, Number]
-) -> Change:
-    """The change of a number that stands at `span` in the lesson."""
-    error = relative_error(numbers[0].value, numbers[1].value)
+    old, new = numbers
+    kind = DriftKind.NUMERIC
+    if old.is_finite and new.is_finite:
+        gap = difference(old.value, new.value)
+        if gap == 0:
+            kind = DriftKind.TEXT
+        elif old.is_inexact and gap <= unit(old.place):
+            kind = DriftKind.ROUNDING
+    error = relative_error(old.value, new.value)
     size = None if error is None else float(error)
     return Change(
-        number_kind(*numbers),
+        kind,
         span,
         recorded,
         printed,
@@ -207,10 +198,7 @@ def text_diff(before: str, now: str) -> str:
 
 
 def diff_rows(verdict: Verdict, stdout: str) -> tuple[DiffRow, ...]:
-    """The rows of a recording that a run differs from.
-
-    Of a table only the cells that changed are shown, as one row each.
-    """
+    """The rows of a recording that a run differs from; of a table the changed cells only."""
     body = verdict.recording.body
     if isinstance(body, Table):
         cells: list[DiffRow] = []

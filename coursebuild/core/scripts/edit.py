@@ -1,25 +1,18 @@
 """Edits that put a new output, or an edited script, into the lesson.
 
-Entry points: `update_body` (one recorded output), `adopt_file` (an extracted file that was edited),
-`apply_edits`.
-
 1. A recording that matches the run stays as it is. A volatile one takes the text of the run if
    that differs in more than its numbers.
 2. The new lines of a fence are those of the run. Lines with `...`, and lines that match only after
    a filter, stay as the author wrote them. Line ends and what stands before each line (`> `,
    indentation) are those of the lesson.
-3. The new text is compared with the run: an output that the lesson's text cannot hold is refused
-   with the reason.
+3. A table is brought up to date number by number, in place; under `digits` a number keeps as many
+   decimals as the author showed. A row that fits no line is refused: which line it was meant to
+   show cannot be known.
+4. The new text is compared with the run: an output that the lesson's text cannot hold is refused.
 
-A table is brought up to date number by number. Where a row fits a line except for its numbers,
-these are replaced in place; a U+2212 minus stays.
-Under `digits` a number keeps as many decimals as the author showed. A row that fits no line is
-refused: which line it was meant to show cannot be known.
-
-`check_source_parts`: code that lessons show from the project's files is what these hold, or gets
-the edit that makes it so; `shown_files` are these files. A part is a function, a class or a method,
-with its decorators, or the whole file. Indentation and white space at the ends of lines do not
-count.
+Code that lessons show from the project's files is what these hold, or gets the edit that makes it
+so. A part is a function, a class or a method with its decorators, or the whole file; indentation
+and white space at the ends of lines do not count.
 """
 
 from __future__ import annotations
@@ -33,18 +26,8 @@ from itertools import groupby, zip_longest
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import (
-    Comparison,
-    Course,
-    Mode,
-    PlainCode,
-    Recording,
-    Script,
-    SourcePart,
-    Table,
-    find_blocks,
-)
-from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
+from coursebuild.core import model
+from coursebuild.core.scripts.align import StepKind, align, same_lines
 from coursebuild.core.scripts.failures import without_indentation
 from coursebuild.core.scripts.lines import (
     ELLIPSIS,
@@ -63,11 +46,7 @@ _FENCE = re.compile(r"`{3,}|~{3,}")
 
 
 def apply_edits(text: str, edits: Iterable[Edit]) -> str:
-    """The text with edits applied by offset.
-
-    Raises `ValueError` for edits that overlap, stand at the same place, or belong to another text:
-    each is a bug of the caller.
-    """
+    """The text with edits applied by offset; `ValueError` for edits that overlap."""
     places: list[tuple[int, int, str]] = []
     for edit in sorted(edits, key=lambda edit: (edit.span.start, edit.span.end)):
         start, end = edit.span.start, edit.span.end
@@ -80,18 +59,15 @@ def apply_edits(text: str, edits: Iterable[Edit]) -> str:
 
 
 def update_body(
-    recording: Recording, comparison: Comparison, stdout: str
+    recording: model.Recording, comparison: model.Comparison, stdout: str
 ) -> Edit | Diagnostic | None:
-    """What to write into a recording whose script printed this.
-
-    `None` where it matches already; a diagnostic where it cannot be brought up to date.
-    """
+    """What to write into a recording whose script printed this; `None` where it matches already."""
     if not stdout.strip():
         return refusal(recording.caption_span, "the script printed nothing to record", "")
-    if isinstance(recording.body, Table):
+    if isinstance(recording.body, model.Table):
         return _update_table(recording.body, comparison, stdout)
     body, filters = recording.body, comparison.filters
-    if comparison.mode is Mode.VOLATILE:
+    if comparison.mode is model.Mode.VOLATILE:
         before, now = Side.of(body.text).lines, Side.of(stdout).lines
         alike = LineMatcher(comparison).alike
         if len(before) == len(now) and all(map(alike, before, now)):
@@ -118,9 +94,11 @@ def update_body(
     )
 
 
-def refusal(span: Span, message: str, help_text: str, label: str = "") -> Diagnostic:
+def refusal(
+    span: Span, message: str, help: str = "bring the row up to date by hand", label: str = ""
+) -> Diagnostic:
     """An output that cannot be brought up to date."""
-    return diagnose("output-not-updatable", span, message, label=label, help=help_text)
+    return diagnose("output-not-updatable", span, message, label=label, help=help)
 
 
 # ------------------------------------------------------------------------------------ new lines
@@ -144,16 +122,23 @@ def _update_lines(
     ):
         steps = tuple(group)
         for step in steps:
+            text = recorded.lines[step.recorded] if step.recorded < len(recorded.lines) else ""
             match step.kind:
                 case StepKind.MISSING if any(s.kind is StepKind.ELIDED for s in steps):
                     return refuse(step.recorded, "this line was not printed where `...` is")
-                case StepKind.DIFFERS if matcher.elides(recorded.lines[step.recorded]):
-                    line = _put_numbers(step, recorded, printed, matcher)
-                    if line is None:
+                case StepKind.DIFFERS if matcher.elides(text):
+                    pairs = matcher.pairs(text, printed.lines[step.printed])
+                    if pairs is None or recorded.raw_lines(step.recorded) != (text,):
                         label = "this line no longer fits what the script prints"
                         return refuse(step.recorded, label)
-                    lines.append(line)
-                case StepKind.SAME if _is_intended(step, recorded, printed, matcher):
+                    changed = [pair for pair in pairs if not matcher.numbers_match(*pair)]
+                    places = ((old.start, old.end, new.text) for old, new in changed)
+                    lines.append(replace_ranges(text, places))
+                case StepKind.SAME if (
+                    matcher.elides(text)  # it matches by an ellipsis or a filter
+                    or recorded.raw_lines(step.recorded) != (text,)
+                    or printed.raw_lines(step.printed) != (printed.lines[step.printed],)
+                ):
                     lines += recorded.raw_lines(step.recorded)
                 case StepKind.ELLIPSIS:
                     lines += recorded.raw_lines(step.recorded)
@@ -164,30 +149,10 @@ def _update_lines(
     return lines
 
 
-def _is_intended(step: Step, recorded: Side, printed: Side, matcher: LineMatcher) -> bool:
-    """Whether a line that matches does so by an ellipsis or a filter."""
-    text = recorded.lines[step.recorded]
-    return (
-        matcher.elides(text)
-        or recorded.raw_lines(step.recorded) != (text,)
-        or printed.raw_lines(step.printed) != (printed.lines[step.printed],)
-    )
-
-
-def _put_numbers(step: Step, recorded: Side, printed: Side, matcher: LineMatcher) -> str | None:
-    """A line with `...` that fits except for its numbers, with the numbers of the run."""
-    text = recorded.lines[step.recorded]
-    pairs = matcher.pairs(text, printed.lines[step.printed])
-    if pairs is None or recorded.raw_lines(step.recorded) != (text,):
-        return None
-    changes = ((a.start, a.end, b.text) for a, b in pairs if not matcher.numbers_match(a, b))
-    return replace_ranges(text, changes)
-
-
 # ---------------------------------------------------------------------------------------- fences
 
 
-def _fence_edit(recording: Recording, lines: Sequence[str]) -> Edit | Diagnostic:
+def _fence_edit(recording: model.Recording, lines: Sequence[str]) -> Edit | Diagnostic:
     """Replace the lines between the fences; refused where a fence cannot hold them."""
     fence = _opening_fence(recording.body_span)
     for number, line in enumerate(lines, start=1):
@@ -208,11 +173,8 @@ def _fence_edit(recording: Recording, lines: Sequence[str]) -> Edit | Diagnostic
     return whole_lines(recording.body_span, recording.prefix, lines)
 
 
-def adopt_file(script: Script, data: bytes) -> Edit | Diagnostic:
-    """What to write into the block so that it extracts to `data`; a diagnostic where that fails.
-
-    The lesson's line ends and what stands before each line of the block are kept.
-    """
+def adopt_file(script: model.Script, data: bytes) -> Edit | Diagnostic:
+    """What to write into the block so that it extracts to `data`; a diagnostic where that fails."""
 
     def refuse(reason: str) -> Diagnostic:
         message = f"{script.path} cannot be brought into the lesson: {reason}"
@@ -232,10 +194,7 @@ def adopt_file(script: Script, data: bytes) -> Edit | Diagnostic:
 
 
 def block_text(data: bytes) -> str | None:
-    """A file as a block can hold it; `None` where it is not UTF-8.
-
-    Without a byte order mark, with LF line ends, and one at the end.
-    """
+    """A file as a block can hold it: no byte order mark, LF; `None` where it is not UTF-8."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -267,22 +226,22 @@ def whole_lines(body: Span, prefix: str, lines: Sequence[str]) -> Edit:
 
 
 MINUS = "\u2212"
-_BY_HAND = "bring the row up to date by hand"
 
 
-def _update_table(table: Table, comparison: Comparison, stdout: str) -> Edit | Diagnostic | None:
-    """What to write into a recorded table; see `edit.update_body`."""
+def _update_table(
+    table: model.Table, comparison: model.Comparison, stdout: str
+) -> Edit | Diagnostic | None:
     filters = comparison.filters
     printed = Side.of(stdout, filters)
-    if comparison.mode is Mode.VOLATILE:
-        comparison = Comparison()
+    if comparison.mode is model.Mode.VOLATILE:
+        comparison = model.Comparison()
     matches = TableMatcher(table_rows(table, filters), printed, comparison).match()
     rows: list[tuple[RowCell, ...]] = []
     edits: list[Edit] = []
     for match in matches:
         if match.line < 0:
             span = match.row[0].cell.span.to(match.row[-1].cell.span)
-            return _refuse(span, "no line of this run has the cells of this row in order")
+            return refusal(span, "no line of this run has the cells of this row in order")
         places: dict[int, list[tuple[int, int, str]]] = {id(cell): [] for cell in match.row}
         for cell, old, new in match.pairs:
             if same_number(old, new, comparison):
@@ -290,16 +249,20 @@ def _update_table(table: Table, comparison: Comparison, stdout: str) -> Edit | D
             span, text = cell.span(old), new.text
             if span.text.replace(MINUS, "-") != old.text:
                 reason = "a number written with an entity or an escape cannot be replaced"
-                return _refuse(span, reason)
-            if comparison.mode is Mode.DIGITS and old.is_inexact and new.place < old.place:
+                return refusal(span, reason)
+            if comparison.mode is model.Mode.DIGITS and old.is_inexact and new.place < old.place:
                 text = round_like(old, new.value) or text
             places[id(cell)].append((old.start, old.end, text))
-            edits.append(Edit(span, _with_signs_of(span.text, text)))
+            # The minus signs of the old number stay: before it, and in its exponent.
+            halves = (re.split("(?=[eE])", half) for half in (span.text, text))
+            parts = zip_longest(*halves, fillvalue="")
+            signed = (part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
+            edits.append(Edit(span, "".join(signed)))
         texts = ((cell, replace_ranges(cell.mapped.text, places[id(cell)])) for cell in match.row)
         rows.append(tuple(replace(cell, canonical=canonicalize(text)) for cell, text in texts))
     if TableMatcher(rows, printed, comparison).find_matching_lines() is None:
         span = table.span if not edits else edits[0].span
-        return _refuse(span, "the table cannot be made to match what the script prints")
+        return refusal(span, "the table cannot be made to match what the script prints")
     if not edits:
         return None
     whole = edits[0].span.to(edits[-1].span)
@@ -308,26 +271,15 @@ def _update_table(table: Table, comparison: Comparison, stdout: str) -> Edit | D
     return Edit(whole, replace_ranges(whole.text, ranges))
 
 
-def _with_signs_of(old: str, new: str) -> str:
-    """The new number with the minus signs of the old one: before it, and in its exponent."""
-    parts = zip_longest(*(re.split("(?=[eE])", text) for text in (old, new)), fillvalue="")
-    return "".join(part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
-
-
-def _refuse(span: Span, message: str) -> Diagnostic:
-    return diagnose("output-not-updatable", span, message, help=_BY_HAND)
-
-
 ReadText = Callable[[str], str | None]
-"""The text of a file of the project; `None` where there is none."""
 
 
-def shown_files(course: Course) -> frozenset[str]:
+def shown_files(course: model.Course) -> frozenset[str]:
     """The files of which lessons show parts."""
     return frozenset(source.path for _, source in _source_parts(course))
 
 
-def check_source_parts(course: Course, read: ReadText) -> Iterator[Diagnostic]:
+def check_source_parts(course: model.Course, read: ReadText) -> Iterator[Diagnostic]:
     """A diagnostic, with an edit, for each part that differs from its file."""
     for block, source in _source_parts(course):
         text = read(source.path)
@@ -357,9 +309,9 @@ def check_source_parts(course: Course, read: ReadText) -> Iterator[Diagnostic]:
             yield diagnose("source-part", span, message, label=label, help=help)
 
 
-def _source_parts(course: Course) -> Iterator[tuple[PlainCode, SourcePart]]:
+def _source_parts(course: model.Course) -> Iterator[tuple[model.PlainCode, model.SourcePart]]:
     for document in course.documents:
-        for code in find_blocks(document, PlainCode):
+        for code in model.find_blocks(document, model.PlainCode):
             if code.source is not None:
                 yield code, code.source
 

@@ -1,7 +1,5 @@
 """The scripts of a course: what is extracted to which path, and which lesson line each line is.
 
-Entry points: `extract` (a course's scripts and what is wrong with their paths), `jobs`.
-
 Two paths clash when they are equal, when they differ only in upper and lower case, or when one is a
 folder on the way to the other. The first in the order of the course stays.
 """
@@ -9,7 +7,7 @@ folder on the way to the other. The first in the order of the course stays.
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from msgspec import Struct
 
@@ -70,20 +68,34 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
             extraction = Extraction(
                 script, owner.id, packages, course.environment, course.limits.scripts
             )
-            key = _key(script.path)
-            clash = _find_clash(extraction, files, folders)
-            if clash is None:
+            # Equal for paths that some file system takes for the same file
+            key = unicodedata.normalize("NFC", script.path).casefold()
+            blocking_file = next((files[f] for f in _folders(key) if f in files), None)
+            first = files.get(key) or folders.get(key) or blocking_file
+            if first is None:
                 files[key] = extraction
                 for folder in _folders(key):
                     folders.setdefault(folder, extraction)
                 extractions.append(extraction)
+                continue
+            path, first_path = script.path, first.path
+            note = f"`{first_path}` is written here"
+            if first_path == path:
+                message, note = f"two blocks have the file `{path}`", "the first one is here"
+            elif key in files:
+                message = f"`{path}` and `{first_path}` are one file where case does not count"
+            elif key in folders:
+                message = f"`{path}` is a file here and a folder of `{first_path}`"
             else:
-                diagnostics.append(clash)
+                message = f"`{first_path}` is a file and cannot be a folder of `{path}`"
+            help, notes = "give one of them another path", [Note(note, first.script.path_span)]
+            diagnostics.append(
+                diagnose("script-repeated", script.path_span, message, help=help, notes=notes)
+            )
     return Parsed(tuple(extractions), tuple(diagnostics))
 
 
 _PATIENCE = 3.0
-"""How many times as long a script may take when its initial states are moved."""
 
 
 def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[ScriptJob, ...]:
@@ -106,34 +118,7 @@ def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[Scri
     )
 
 
-def _key(path: str) -> str:
-    """A key that is equal for paths that some file system takes for the same file."""
-    return unicodedata.normalize("NFC", path).casefold()
-
-
 def _folders(key: str) -> list[str]:
     """The folders that a path lies in."""
     parts = key.split("/")
     return ["/".join(parts[:end]) for end in range(1, len(parts))]
-
-
-def _find_clash(
-    new: Extraction, files: Mapping[str, Extraction], folders: Mapping[str, Extraction]
-) -> Diagnostic | None:
-    """A diagnostic if a path clashes with an earlier file or folder; both are given by key."""
-    key = _key(new.path)
-    blocking_file = next((files[folder] for folder in _folders(key) if folder in files), None)
-    first = files.get(key) or folders.get(key) or blocking_file
-    if first is None:
-        return None
-    note = f"`{first.path}` is written here"
-    if first.path == new.path:
-        message, note = f"two blocks have the file `{new.path}`", "the first one is here"
-    elif key in files:
-        message = f"`{new.path}` and `{first.path}` are one file where case does not count"
-    elif key in folders:
-        message = f"`{new.path}` is a file here and a folder of `{first.path}`"
-    else:
-        message = f"`{first.path}` is a file and cannot be a folder of `{new.path}`"
-    help, notes = "give one of them another path", [Note(note, first.script.path_span)]
-    return diagnose("script-repeated", new.script.path_span, message, help=help, notes=notes)

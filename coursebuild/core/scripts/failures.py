@@ -1,9 +1,5 @@
 """Diagnostics of a script that did not run to its end, lost a simulation, or reached too far.
 
-Entry points: `failure_diagnostic` (a run), `silence_diagnostic` (an output is recorded and nothing
-was printed), `divergence_diagnostics` (simulations), `is_lost`, `effect_diagnostics` (what it wrote
-elsewhere, or asked of the network).
-
 1. A traceback's frames are read out of the standard error. Each line of an extracted file is the
    line of a lesson; the diagnostic points at the innermost such line. A script that does not parse
    gets none: the check of its lesson has reported it.
@@ -65,7 +61,6 @@ _HELPS = (
         "no window opens while a course is checked: leave it out, or say `norun` on its fence",
     ),
 )
-"""A pattern for the exception's line, and the help."""
 
 _TAIL_LINES = 30
 _TAIL_CHARACTERS = 4000
@@ -98,10 +93,7 @@ def without_indentation(span: Span) -> Span:
 def failure_diagnostic(
     extraction: Extraction, run: ScriptRun, scripts: Scripts, find_module: FindModule = lambda _: ""
 ) -> Diagnostic | None:
-    """What is wrong with a run; `None` where it ended well or the script was not run.
-
-    `find_module` knows the files of modules in folders that scripts do not import from.
-    """
+    """What is wrong with a run, if anything; `find_module` knows modules in other folders."""
     wording = _failure_wording(extraction, run)
     if wording is None:
         return None
@@ -220,7 +212,6 @@ def _stderr_notes(outcome: Outcome, text: str, scripts: Scripts) -> list[Note]:
 # --- simulations
 
 _MAX_INCIDENTS = 4
-"""The most further incidents that notes name."""
 _DIVERGES = (
     "try a smaller timestep or another integrator; if that is intended, put `diverges` on its fence"
 )
@@ -241,7 +232,6 @@ _EFFECTS = {
         "keep the data in the course, where it does not change",
     ),
 }
-"""The rule, the end of the message, and the help."""
 
 
 def is_lost(extraction: Extraction, run: ScriptRun) -> bool:
@@ -325,14 +315,12 @@ def _incident_diagnostic(
 
 
 def _place(incident: Divergence | Effect, scripts: Scripts) -> Span | None:
-    """The lesson's line where an incident was noticed."""
     extraction = scripts.get(incident.path)
     span = None if extraction is None else extraction.line_span(incident.line)
     return None if span is None else without_indentation(span)
 
 
 def _describe_incident(incident: Divergence | Effect) -> str:
-    """An incident in words."""
     if isinstance(incident, Effect):
         return f"`{incident.target}`"
     of = f" of model `{incident.model}`" if incident.model else ""

@@ -1,17 +1,9 @@
 """Figures as they are recorded, and how they differ from what a script drew now.
 
-Entry points: `figure_findings`; `prepare_figure`, what is recorded of a figure;
-`describe_difference`.
-
-1. A figure is judged as text of somebody else's: `core.drawing.safe_svg` says what an SVG may hold;
-   of a PNG what draws is recorded, and nothing else.
-2. Dates, comments and ids, which change from run to run, are taken out of a drawing in SVG, so that
-   the same drawing gives the same bytes.
-3. Two drawings in SVG are the same where elements, attributes and texts are, and numbers differ by
-   less than a thousandth of the drawing's size. Two in PNG are the same where the root mean square
-   of what pixels differ by is below one of 255 steps.
-4. Data in CSV are the same where texts are, and numbers differ by less than a thousandth of the
-   largest in their column.
+A figure is judged as text of somebody else's: `core.drawing.safe_svg` says what an SVG may hold; of
+a PNG what draws is recorded, and nothing else. Dates, comments and ids, which change from run to
+run, are taken out of an SVG, so that the same drawing gives the same bytes. Numbers may differ by
+`TOLERANCE`, pixels by `PIXEL_TOLERANCE`; everything else must be the same.
 """
 
 from __future__ import annotations
@@ -39,9 +31,7 @@ PIXEL_TOLERANCE = 1.0
 """How much pixels may differ: root mean square over all channels, of 255 steps."""
 
 MAX_PIXELS = 25_000_000
-"""Pixels that a PNG may have."""
 MAX_TABLE = 4 << 20
-"""Bytes that data may have."""
 SVG_HELP = "an SVG may contain only what draws a still picture, and refer only to its own parts"
 
 _NUMBER = re.compile(r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?")
@@ -54,7 +44,6 @@ _PNG_PARTS = frozenset(b"IHDR PLTE IDAT IEND tRNS bKGD cHRM cICP gAMA iCCP pHYs 
 """The chunks of a PNG that say what is drawn."""
 
 ReadFile = Callable[[str], bytes | None]
-"""A file of the course by its path; `None` where there is none."""
 
 
 def figure_findings(

@@ -1,9 +1,4 @@
-"""Everything that running the scripts of a course shows to be wrong.
-
-Entry points: `script_findings` (scripts that failed, and all of the next), `output_findings`
-(recorded outputs that differ from what was printed, bound numbers that no output bears out);
-`collect_evidence` (the lines by which bound numbers hold); `drift_diagnostic`; `count_unproven`.
-"""
+"""Everything that running the scripts of a course shows to be wrong."""
 
 from __future__ import annotations
 
@@ -15,28 +10,14 @@ from msgspec.structs import replace
 from coursebuild.core.model import CodeBlock, Course, Document, Owner, Table, document_scripts
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
+from coursebuild.core.scripts import bindings, failures
 from coursebuild.core.scripts.align import count_alike
-from coursebuild.core.scripts.bindings import (
-    BindingEvidence,
-    DependentBinding,
-    PrintedOutputs,
-    check_bindings,
-    dependent_bindings,
-    document_bindings,
-)
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
 from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
-from coursebuild.core.scripts.failures import (
-    FindModule,
-    divergence_diagnostics,
-    effect_diagnostics,
-    failure_diagnostic,
-    silence_diagnostic,
-)
 from coursebuild.core.scripts.lines import LineMatcher, Side
-from coursebuild.core.scripts.numbers import Number, scan
+from coursebuild.core.scripts.numbers import Number, only_number, scan
 from coursebuild.core.scripts.tables import TableMatcher, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.source import Excerpt
@@ -50,11 +31,11 @@ def script_findings(
     extractions: Sequence[Extraction],
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
-    evidence: BindingEvidence | None = None,
+    evidence: bindings.BindingEvidence | None = None,
     all_extractions: Sequence[Extraction] | None = None,
     other_runs: Mapping[str, ScriptRun] | None = None,
     broken: Collection[str] = (),
-    find_module: FindModule = lambda _: "",
+    find_module: failures.FindModule = lambda _: "",
 ) -> tuple[Diagnostic, ...]:
     """The diagnostics of the scripts that were run, and of all that depends on them.
 
@@ -66,8 +47,7 @@ def script_findings(
         evidence: see `check_bindings`.
         all_extractions: all scripts of the course, if known.
         other_runs: earlier runs of the same scripts, by path, where there are any.
-        broken: files of models that do not compile; a script that reads one is not reported, since
-            its failure is nothing new.
+        broken: files of models that do not compile; no script that reads one is reported.
         find_module: see `failure_diagnostic`.
     """
     by_path = {run.path: run for run in runs}
@@ -76,11 +56,11 @@ def script_findings(
     for extraction in extractions:
         run = by_path.get(extraction.path)
         if run is not None and not (run.trace and {*run.trace.files}.intersection(broken)):
-            diagnostic = failure_diagnostic(extraction, run, scripts, find_module)
+            diagnostic = failures.failure_diagnostic(extraction, run, scripts, find_module)
             diagnostics += [] if diagnostic is None else [diagnostic]
-            diagnostics += divergence_diagnostics(extraction, run, scripts)
-            diagnostics += effect_diagnostics(extraction, run, scripts)
-    outputs = PrintedOutputs(verdicts, runs, scripts)
+            diagnostics += failures.divergence_diagnostics(extraction, run, scripts)
+            diagnostics += failures.effect_diagnostics(extraction, run, scripts)
+    outputs = bindings.PrintedOutputs(verdicts, runs, scripts)
     return (
         *diagnostics,
         *output_findings(course, course.owned_documents, outputs, evidence, other_runs),
@@ -90,28 +70,25 @@ def script_findings(
 def output_findings(
     course: Course,
     documents: Iterable[tuple[Owner, Document]],
-    outputs: PrintedOutputs,
-    evidence: BindingEvidence | None = None,
+    outputs: bindings.PrintedOutputs,
+    evidence: bindings.BindingEvidence | None = None,
     other_runs: Mapping[str, ScriptRun] | None = None,
 ) -> Iterator[Diagnostic]:
-    """What is wrong with the recorded outputs and bound numbers of some documents.
-
-    For the arguments see `script_findings`.
-    """
+    """What is wrong with the recorded outputs and bound numbers of some documents."""
     for owner, document in documents:
         for verdict in outputs.of_document(document):
             recording = verdict.recording
             run = outputs.runs.get(recording.script or "")
             if run is not None and run.outcome is Outcome.OK and not run.stdout.strip():
-                yield silence_diagnostic(recording, run.path)
+                yield failures.silence_diagnostic(recording, run.path)
             elif run is not None and run.outcome is Outcome.UNRECORDED:
                 yield drift_diagnostic(verdict, owner.id)
             elif unstable_output := find_instability(verdict, run, other_runs or {}):
                 yield unstable_output
             elif verdict.status == "drift":
-                dependents = dependent_bindings(verdict, course.documents, outputs)
+                dependents = bindings.dependent_bindings(verdict, course.documents, outputs)
                 yield drift_diagnostic(verdict, owner.id, dependents)
-        yield from check_bindings(document, outputs, evidence)
+        yield from bindings.check_bindings(document, outputs, evidence)
         yield from _find_unmarked(course, document, outputs.runs)
 
 
@@ -191,12 +168,12 @@ def find_instability(
 
 def collect_evidence(
     course: Course, runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]
-) -> BindingEvidence:
+) -> bindings.BindingEvidence:
     """The lines by which the bindings of a course hold."""
-    evidence: BindingEvidence = {}
-    outputs = PrintedOutputs(verdicts, runs)
+    evidence: bindings.BindingEvidence = {}
+    outputs = bindings.PrintedOutputs(verdicts, runs)
     for document in course.documents:
-        check_bindings(document, outputs, evidence)
+        bindings.check_bindings(document, outputs, evidence)
     return evidence
 
 
@@ -207,14 +184,14 @@ def count_unproven(
     unrun = {run.path for run in runs if not run.did_run}
     if not unrun:
         return {}
-    outputs = PrintedOutputs(verdicts, ())
+    outputs = bindings.PrintedOutputs(verdicts, ())
     recorded: list[str | None] = []
     bound: list[str | None] = []
     for document in course.documents:
         recorded += (verdict.recording.script for verdict in outputs.of_document(document))
         figures = recorded_figures(document)
         recorded += (figure.script for figure in figures if not figure.path.endswith(".csv"))
-        for binding in document_bindings(document):
+        for binding in bindings.document_bindings(document):
             of_binding = outputs.of_binding(binding)
             bound.append(binding.script or (of_binding[0].recording.script if of_binding else None))
     return {path: (recorded.count(path), bound.count(path)) for path in unrun}
@@ -224,13 +201,9 @@ def count_unproven(
 
 
 def drift_diagnostic(
-    verdict: Verdict, owner: str, dependents: Sequence[DependentBinding] = ()
+    verdict: Verdict, owner: str, dependents: Sequence[bindings.DependentBinding] = ()
 ) -> Diagnostic:
-    """A recorded output that differs from this run; `owner` is the id of the lesson or page.
-
-    It points at the first place that differs; notes name the next ones, and every bound number of
-    the prose that depends on a value that changed.
-    """
+    """A recorded output of a lesson or page, `owner`, that differs from this run."""
     recording, update = verdict.recording, f"`coursebuild update {owner}`"
     if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
         message = f"no output of `{recording.script}` is recorded yet"
@@ -291,15 +264,11 @@ def _label(change: Change) -> str:
 
 
 def _is_same_value(change: Change) -> bool:
-    recorded, printed = _single_number(change.recorded), _single_number(change.printed)
-    if recorded is None or printed is None:
-        return False
-    whole = recorded.text == change.recorded and printed.text == change.printed
-    return whole and recorded.value == printed.value
+    recorded, printed = only_number(change.recorded), only_number(change.printed)
+    return recorded is not None and printed is not None and recorded.value == printed.value
 
 
 def _single_number(text: str) -> Number | None:
-    """The number of a text that has one."""
     numbers = scan(text)
     return numbers[0] if len(numbers) == 1 else None
 
@@ -327,8 +296,7 @@ def _describe_difference(change: Change) -> str:
     return f"recorded {recorded}; {_label(change)}"
 
 
-def _describe_dependence(dependent: DependentBinding) -> str:
-    """What a change means for a bound number of the prose."""
+def _describe_dependence(dependent: bindings.DependentBinding) -> str:
     change = dependent.change
     lead = f"`{dependent.binding.text}` depends on "
     recorded, printed = _single_number(change.recorded), _single_number(change.printed)

@@ -1,18 +1,11 @@
 """Texts to compare, and whether a recorded line matches a printed line.
 
-Entry points: `apply_filters`, `Side.of`, `plain_text`; `LineMatcher`.
-
 1. A `MappedText` knows where each character came from: a copied one from its own place, one that a
    filter wrote from all that the filter replaced.
-2. `apply_filters` removes insignificant white space, then applies the course's filters one after
-   the other, each to the whole text (`^` and `$` match at lines).
-3. A `Side` is one side of a comparison: its lines without trailing white space, and without
-   trailing empty lines.
-4. `canonicalize` replaces each number of a line by a mark and folds the white space around it,
+2. `canonicalize` replaces each number of a line by a mark and folds the white space around it,
    because columns shift when a number gets wider. Two lines are alike when these skeletons are
-   equal.
-5. Lines that are alike match when each pair of numbers does, by the rules of the comparison's mode.
-6. With `ellipsis`, a recorded line is cut at its `...`; its parts must stand in the printed line,
+   equal, and match when each pair of numbers does, by the rules of the comparison's mode.
+3. With `ellipsis`, a recorded line is cut at its `...`; its parts must stand in the printed line,
    in order, the first at the start and the last at the end. A part has a fixed length in the
    skeleton, so taking each at its first place finds a match whenever there is one.
 """
@@ -65,11 +58,7 @@ class MappedText(Struct, frozen=True):
 
     @classmethod
     def of_output(cls, text: str) -> MappedText:
-        """An output without insignificant white space.
-
-        Line ends are LF, the last line has one too, no line ends in white space, no empty lines
-        stand at the end.
-        """
+        """An output with LF line ends, without white space at ends of lines and at its end."""
         return cls.copy(text).substitute(_END_OF_LINE, "\n").substitute(_EMPTY_LINES, "")
 
     def origin(self, start: int, end: int) -> tuple[int, int]:
@@ -129,7 +118,6 @@ class Side(Struct, frozen=True):
     """Before the filters, its line ends as they came."""
     mapped: MappedText
     lines: tuple[str, ...]
-    """Without trailing white space."""
     starts: tuple[int, ...]
     """Where the lines begin in the mapped text."""
 
@@ -174,7 +162,6 @@ MARK = "\x00"
 ELLIPSIS = "..."
 
 _SPACE = re.compile(rf"(?<={MARK})\s++|(?<!\s)\s++(?={MARK})")
-"""White space after a number, or before one."""
 _CLOSING = frozenset(")]},;|")
 
 SameNumber = Callable[[Number, Number], bool]
@@ -197,19 +184,18 @@ def canonicalize(text: str, offset: int = 0) -> CanonicalText:
     """The skeleton and the numbers of a text that stands at `offset` of its line."""
     numbers = scan(text)
     places = ((number.start, number.end, MARK) for number in numbers)
-    skeleton = _SPACE.sub(_fold_space, replace_ranges(text.replace(MARK, "\ufffd"), places))
+
+    def fold_space(match: re.Match[str]) -> str:
+        line, start, end = match.string, *match.span()
+        before, after = line[max(start - 1, 0) : start], line[end : end + 1]
+        if before == MARK:
+            return " " if after and after not in _CLOSING else ""
+        return " " if before.isalnum() else ""
+
+    skeleton = _SPACE.sub(fold_space, replace_ranges(text.replace(MARK, "\ufffd"), places))
     if offset:
         numbers = tuple(replace(n, start=n.start + offset, end=n.end + offset) for n in numbers)
     return CanonicalText(skeleton, numbers)
-
-
-def _fold_space(match: re.Match[str]) -> str:
-    """What stays of white space beside a number: one space, or none."""
-    text, start, end = match.string, *match.span()
-    before, after = text[max(start - 1, 0) : start], text[end : end + 1]
-    if before == MARK:
-        return " " if after and after not in _CLOSING else ""
-    return " " if before.isalnum() else ""
 
 
 def same_number(recorded: Number, printed: Number, comparison: Comparison) -> bool:

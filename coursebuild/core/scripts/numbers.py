@@ -1,8 +1,5 @@
 """Numbers in text: where they stand and their exact values.
 
-Entry points: `scan` (numbers of a line of output), `scan_prose` (also `3.9 × 10⁻¹¹`),
-`within_half_unit`, `within_tolerance`, `relative_error`, `agreeing_digits`, `round_like`.
-
 1. One regular expression walks the text. Its first alternatives match what only looks like a
    number: words with digits in them (`x1`, `v3.14.0`, `UTF-8`), versions, dates, times of day,
    hexadecimal literals, hashes. They stay text, as do powers (`m^2`). No alternative can start
@@ -17,11 +14,9 @@ Entry points: `scan` (numbers of a line of output), `scan_prose` (also `3.9 × 1
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from decimal import Context, Decimal
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 _SIGN = "[+\\-\u2212]"
 _MAGNITUDE = rf"(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE]{_SIGN}?[0-9]{{1,4}})?"
@@ -94,10 +89,7 @@ class Number(Struct, frozen=True):
 
 def scan(text: str) -> tuple[Number, ...]:
     """The numbers of a text, in order."""
-    return tuple(_scan(text))
-
-
-def _scan(text: str) -> Iterator[Number]:
+    numbers: list[Number] = []
     for match in _TOKEN.finditer(text):
         kind = match.lastgroup
         if kind in ("number", "imaginary", "special") and match.end() - match.start() <= _LONGEST:
@@ -106,13 +98,20 @@ def _scan(text: str) -> Iterator[Number]:
             exponent = value.as_tuple().exponent
             place = exponent if isinstance(exponent, int) else 0
             is_integer = value.is_finite() and not any(c in digits for c in ".eE")
-            yield Number(*match.span(), digits, value, place, is_integer)
+            numbers.append(Number(*match.span(), digits, value, place, is_integer))
+    return tuple(numbers)
+
+
+def only_number(text: str) -> Number | None:
+    """The number that makes up the whole text, if one does."""
+    numbers = scan(text.strip())
+    return numbers[0] if len(numbers) == 1 and numbers[0].text == text.strip() else None
 
 
 def scan_prose(text: str) -> tuple[Number, ...]:
     """The numbers of a text that a person wrote: `3.9 × 10⁻¹¹` and `3.9·10^-11` are one number."""
     numbers: list[Number] = []
-    for number in _scan(text):
+    for number in scan(text):
         if numbers and number.start < numbers[-1].end:
             continue
         power = _POWER.match(text, number.end)
@@ -121,17 +120,9 @@ def scan_prose(text: str) -> tuple[Number, ...]:
             continue
         exponent = power["caret"] or power["raised"].translate(_SUPERSCRIPTS)
         shift = int(exponent.replace("\u2212", "-"))
-        end = power.end()
-        numbers.append(
-            replace(
-                number,
-                end=end,
-                text=text[number.start : end],
-                value=number.value.scaleb(shift, _EXACT),
-                place=number.place + shift,
-                is_integer=False,
-            )
-        )
+        start, end = number.start, power.end()
+        value, place = number.value.scaleb(shift, _EXACT), number.place + shift
+        numbers.append(Number(start, end, text[start:end], value, place, is_integer=False))
     return tuple(numbers)
 
 

@@ -1,10 +1,7 @@
 """Which printed digits repeat when initial states are moved by 1e-12, and which are converged.
 
-Entry points: `sensitivity` (a script), `noise_warnings`.
-
 1. What the runs with moved states print is compared with the recorded output, by the comparison
-   that verifies it but exactly: so each number is found at its place in the lesson, in text and in
-   tables, past ellipses and filters.
+   that verifies it but exactly: so each number is found at its place in the lesson.
 2. The spread of a number is how far the values printed in its place are from the one that the
    script prints unmoved. It repeats to the first place of which the spread is no more than half a
    unit. A number that is printed alike by all runs repeats in all its digits.
@@ -39,12 +36,11 @@ from coursebuild.core.scripts.bound_numbers import printed_lines
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import quote
 from coursebuild.core.scripts.lines import same_number
-from coursebuild.core.scripts.numbers import Number, difference, round_like, scan, unit
+from coursebuild.core.scripts.numbers import Number, difference, only_number, round_like, unit
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 
 PERTURBATION = 1e-12
-"""How far initial states are moved, relative."""
 RUNS = 4
 """Runs with moved states of each script: two pairs in opposite directions, the second pair half as
 far away."""
@@ -61,7 +57,6 @@ class Standing(enum.Enum):
 
     MEASURED = "measured"
     NO_MUJOCO = "without-mujoco"
-    """It does not import MuJoCo."""
     NOT_MOVED = "not-moved"
     """No initial state in it could be moved."""
     UNRECORDED = "unrecorded"
@@ -69,7 +64,6 @@ class Standing(enum.Enum):
     DRIFTED = "drifted"
     """It prints something other than recorded, or does not run to its end."""
     FAILED = "failed"
-    """It did not run to its end with moved states."""
 
 
 class Doubt(Struct, frozen=True):
@@ -78,9 +72,7 @@ class Doubt(Struct, frozen=True):
     span: Span
     printed: str
     digits: int
-    """Significant digits printed."""
     repeat: int
-    """How many of them stay the same when initial states are moved."""
     converged: int | None
     """How many of them are those of ever smaller timesteps; `None` where not known."""
     least: str
@@ -89,11 +81,9 @@ class Doubt(Struct, frozen=True):
     halved: str
     """The text printed in its place with half the timestep; empty where not known."""
     quartered: str
-    """The same with a quarter of the timestep."""
     instead: str
     """The number with only the digits that repeat and converge; empty if none does, or a count."""
     compared: bool
-    """Whether verification would report the difference as drift."""
 
 
 class Flip(Struct, frozen=True):
@@ -113,7 +103,6 @@ class Sensitivity(Struct, frozen=True):
     """Id of the lesson or page that it is extracted from."""
     standing: Standing
     numbers: int = 0
-    """How many recorded numbers were examined."""
     amplification: float | None = None
     """The largest growth of the distance between states from beginning to end; `None` where no
     final state is known."""
@@ -191,7 +180,6 @@ def is_worth_moving(course: Course, recordings: Iterable[Recording], base: Scrip
 def _compared_recordings(
     course: Course, recordings: Iterable[Recording]
 ) -> list[tuple[Recording, Comparison]]:
-    """The recorded outputs that are compared, and how."""
     pairs = ((recording, course.comparison_of(recording)) for recording in recordings)
     return [(r, comparison) for r, comparison in pairs if comparison.mode is not Mode.VOLATILE]
 
@@ -264,8 +252,8 @@ def _judge_number(
     `finer` with half and with a quarter of the timestep.
     """
     recorded, printed = texts
-    recorded_number, number = _only_number(recorded), _only_number(printed)
-    numbers = [n for value in values if (n := _only_number(value)) is not None]
+    recorded_number, number = only_number(recorded), only_number(printed)
+    numbers = [n for value in values if (n := only_number(value)) is not None]
     other_value = next((value for value in values if value != printed), None)
     if number is None or recorded_number is None or len(numbers) < len(values):
         if other_value is not None:
@@ -302,7 +290,7 @@ def _judge_number(
 
 def _count_converged(number: Number, finer: Sequence[str]) -> int:
     """How many digits runs with half and with a quarter of the timestep bear out."""
-    numbers = [number, *(n for text in finer if (n := _only_number(text)) is not None)]
+    numbers = [number, *(n for text in finer if (n := only_number(text)) is not None)]
     if len(numbers) < 3 or not all(n.is_finite for n in numbers):
         return 0
     first, second = (difference(a.value, b.value) for a, b in pairwise(numbers))
@@ -310,12 +298,6 @@ def _count_converged(number: Number, finer: Sequence[str]) -> int:
     if second > _SHRINKING * first and second > unit(number.place):
         error = 10 * max(first, second)
     return _count_repeating(number, error) if error else _digits(number)
-
-
-def _only_number(text: str) -> Number | None:
-    """The number that makes up the whole text, if one does."""
-    numbers = scan(text.strip())
-    return numbers[0] if len(numbers) == 1 and numbers[0].text == text.strip() else None
 
 
 def _digits(number: Number) -> int:
@@ -338,10 +320,7 @@ def _count_repeating(number: Number, spread: Decimal) -> int:
 
 
 def _round_to(number: Number, digits: int) -> str:
-    """A printed number with so many significant digits; empty for no digits, and for a count.
-
-    In its own notation where possible; a large number with few digits gets an exponent.
-    """
+    """A printed number with so many significant digits; empty for no digits, and for a count."""
     if digits < 1 or number.is_integer or not number.is_finite:
         return ""
     decimals = digits - 1 - number.value.adjusted()
@@ -361,30 +340,26 @@ def _round_to(number: Number, digits: int) -> str:
 
 def amplification(moved_runs: Sequence[ScriptRun]) -> float | None:
     """The largest factor by which states are farther apart at the end than at the beginning."""
-    ends = [_end_states(run) for run in moved_runs]
+    # By run and `MjData`: final positions and velocities, each with the size to compare by
+    ends: list[dict[int, list[tuple[float, list[float]]]]] = []
+    for run in moved_runs:
+        ends.append({})
+        for state in () if run.trace is None else run.trace.states:
+            number, length, *words = state.split()
+            position, velocity, *end = map(float.fromhex, words)
+            at = int(length)
+            ends[-1][int(number)] = [(position, end[:at]), (velocity, end[at:])]
     factors: list[float] = []
     for pair, (first, second) in enumerate(zip(ends[::2], ends[1::2], strict=True)):
         initial_gap = 2 * PERTURBATION * 0.5**pair
-        for number in first.keys() & second.keys():
-            pairs = zip(first[number], second[number], strict=True)
+        for data in first.keys() & second.keys():
+            pairs = zip(first[data], second[data], strict=True)
             for (size, mine), (other_size, theirs) in pairs:
                 if mine and len(mine) == len(theirs):
                     gap = max(abs(a - b) for a, b in zip(mine, theirs, strict=True))
                     growth = gap / (max(size, other_size, *map(abs, mine)) or 1.0)
                     factors.append(growth / initial_gap if math.isfinite(growth) else math.inf)
     return max(factors, default=None)
-
-
-def _end_states(run: ScriptRun) -> dict[int, list[tuple[float, list[float]]]]:
-    """For each `MjData`: its final positions and velocities, each with the size to compare by."""
-    states = () if run.trace is None else run.trace.states
-    end_states: dict[int, list[tuple[float, list[float]]]] = {}
-    for state in states:
-        number, length, *words = state.split()
-        position, velocity, *end = map(float.fromhex, words)
-        at = int(length)
-        end_states[int(number)] = [(position, end[:at]), (velocity, end[at:])]
-    return end_states
 
 
 # --- warnings
@@ -399,7 +374,7 @@ def noise_warnings(sensitivity: Sensitivity) -> Iterator[Diagnostic]:
         text = "no digit repeats"
         if doubt.repeat:
             text = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
-            number = _only_number(doubt.printed)
+            number = only_number(doubt.printed)
             instead = "" if number is None else _round_to(number, doubt.repeat)
             text += f", print {instead}" if instead else ""
         warnings.append((doubt.span, f"{text}: printed from {doubt.least} to {doubt.most}"))

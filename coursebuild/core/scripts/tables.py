@@ -1,11 +1,9 @@
 """Recorded tables: does each row stand in a line of the output?
 
-Entry points: `compare_table`, `table_rows`, `TableMatcher`.
-
 1. A body row's cells, as plain text, must stand in order in one printed line, white space folded;
    each row in a line further down than the row before. The header row and all other lines are free.
-2. Cells match whole words and whole numbers only: `4` not in `14`, `implicit` not in
-   `implicitfast`. Numbers match by the comparison's mode.
+2. Cells match whole words and whole numbers only: `4` not in `14`. Numbers match by the
+   comparison's mode.
 3. Where a row has no such line, rows and lines are aligned; a row that fits a line except for its
    numbers has drifted, and each of its numbers is compared with the nearest printed one.
 """
@@ -195,10 +193,7 @@ def _stands_in(row: Sequence[RowCell], line: CanonicalText, numbers_match: SameN
 def _nearest_places(
     row: Sequence[RowCell], line: CanonicalText, numbers_match: SameNumber
 ) -> list[int]:
-    """Places of the cells in order such that their numbers are nearest to the line's.
-
-    The row is known to stand in the line except for its numbers.
-    """
+    """Places in order for cells that fit the line, such that their numbers are nearest to its."""
     # For each place of the last cell: the cost so far, the places, the offset where it ends.
     best: list[tuple[float, list[int], int]] = [(0.0, [], 0)]
     for cell in row:
@@ -233,41 +228,36 @@ def _cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
     Marks of Markdown are gone, minus signs are hyphens, runs of white space are one space. A
     stretch that Markdown changed (entities, escapes) stands for all of itself.
     """
-    stretches = [
-        MappedText.copy(text, span.start)
-        if span.text == text
-        else MappedText.substitute_for(span.start, span.end, text)
-        for text, span in _text_stretches(cell.children)
-    ]
-    mapped = apply_filters(MappedText.join(stretches), filters)
-    folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
-    return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)
-
-
-def _text_stretches(inlines: Iterable[model.Inline]) -> Iterator[tuple[str, Span]]:
-    for inline in model.walk_inlines(inlines):
+    stretches: list[MappedText] = []
+    for inline in model.walk_inlines(cell.children):
+        span = inline.span
         match inline:
             case model.Text():
-                yield inline.text, inline.span
+                text = inline.text
             case model.CodeSpan():
                 # Between the backticks, without padding
-                markdown, text = inline.span.text, inline.text
+                markdown, text = span.text, inline.text
                 edge = len(markdown) - len(markdown.lstrip("`"))
                 if len(markdown) - 2 * edge == len(text) + 2:
                     edge += 1
-                yield (
-                    text,
-                    Span(inline.span.source, inline.span.start + edge, inline.span.end - edge),
-                )
+                span = Span(span.source, span.start + edge, span.end - edge)
             case model.NumberBinding():
-                yield inline.text, inline.text_span
+                text, span = inline.text, inline.text_span
             case model.Math():
-                yield inline.tex.text, inline.tex.span()
+                text, span = inline.tex.text, inline.tex.span()
             case model.Image():
-                yield inline.alt, inline.span
+                text = inline.alt
             case model.SoftBreak() | model.HardBreak():
-                yield " ", inline.span
+                text = " "
             case model.RawInline():
-                yield (" " if inline.html.startswith("<br") else ""), inline.span
+                text = " " if inline.html.startswith("<br") else ""
             case _:
-                pass
+                continue
+        stretches.append(
+            MappedText.copy(text, span.start)
+            if span.text == text
+            else MappedText.substitute_for(span.start, span.end, text)
+        )
+    mapped = apply_filters(MappedText.join(stretches), filters)
+    folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
+    return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)

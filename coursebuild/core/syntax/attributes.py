@@ -1,10 +1,4 @@
-"""Attributes in braces after inline content and headings, and the anchors of a document.
-
-Entry points: `TERM`, `SYMBOL` and `LABEL`, which find braces, also on the next line, as does
-`split_label`; `read_pairs`, `read_term` and `read_meaning`, which read them; `read_attributes`
-(`## Title {#id .class}`), `Anchors` (unique ids), `slug`, `check_heading`. A value with spaces
-stands in quotes.
-"""
+"""Attributes in braces after inline content and headings, and the anchors of a document."""
 
 from __future__ import annotations
 
@@ -37,8 +31,6 @@ from coursebuild.core.text.diagnostics import (
 )
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
-
-Report = Callable[[Diagnostic], None]
 
 TERM = re.compile(r"(\{\s*(?:term|terms|therm|tern|trem|tem|ter)\b[^{}]{0,400}\}?)", re.I)
 SYMBOL = re.compile(
@@ -91,22 +83,21 @@ def read_pairs(
     return values
 
 
-def read_term(braces: Excerpt, report: Report) -> str | None:
+def read_term(braces: Excerpt, report: Callable[[Diagnostic], None]) -> str | None:
     """The name given to a term; empty if that is the term's own text, `None` after a mistake."""
     values = read_pairs(braces, ("term",), "term-attribute", _TERM_HELP)
-    if isinstance(values, Diagnostic):
-        report(values)
-        return None
-    name = values.get("term")
-    if name is not None and not name.text.strip():
+    if not isinstance(values, Diagnostic):
+        name = values.get("term")
+        if name is None or name.text.strip():
+            return value_text(name)
         message = "the name of the term is empty"
-        report(diagnose("term-attribute", braces.span(), message, help=_TERM_HELP))
-        return None
-    return value_text(name)
+        values = diagnose("term-attribute", braces.span(), message, help=_TERM_HELP)
+    report(values)
+    return None
 
 
 def read_meaning(
-    braces: Excerpt, report: Report
+    braces: Excerpt, report: Callable[[Diagnostic], None]
 ) -> tuple[Meaning | None, str | None, NumberBinding | None]:
     """The meaning of a symbol, the source of given numbers, and its value, if they are there."""
     keys = ("symbol", "unit", "value", "given", "out")
@@ -115,12 +106,10 @@ def read_meaning(
         report(values)
         return None, None, None
     source = value_text(values["given"]) if "given" in values else None
-    value = values.get("value")
-    number: NumberBinding | None = None
+    value, number = values.get("value"), None
     if value is not None and _NUMBER.fullmatch(value.text) and not {"out", "given"} <= {*values}:
-        is_bound = "out" in values
         script = value_text(values.get("out")) or None
-        origin = None if is_bound else source or ""
+        origin = None if "out" in values else source or ""
         number = NumberBinding(braces.span(), value.text, value.span(), script, origin)
     elif "value" in values or "out" in values:
         text = "" if value is None else value.text
@@ -204,23 +193,18 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
 
 
 def _reject(title: Excerpt, place: Excerpt, message: str, help: str = _HELP) -> Parsed[Attributes]:
-    """A heading without attributes, as those that it has are wrong at `place`."""
     diagnostic = diagnose("heading-attributes", place.span(), message, help=help)
     return Parsed(Attributes(title), (diagnostic,))
 
 
-def slug(text: str) -> str:
+def slug(text: str, default: str = "section") -> str:
     """The anchor of a text: letters and digits of any script in lower case, hyphens for spaces."""
-    return _join_words(text) or "section"
-
-
-def _join_words(text: str) -> str:
-    return _SPACE.sub("-", _NO_SLUG.sub("", text.strip().lower())).strip("-")
+    return _SPACE.sub("-", _NO_SLUG.sub("", text.strip().lower())).strip("-") or default
 
 
 def term_id(name: str) -> str:
     """The id of a term in links; empty for a name without letters and digits."""
-    return _join_words(normalize("NFC", name))
+    return slug(normalize("NFC", name), "")
 
 
 class Anchors(Struct):
@@ -230,7 +214,6 @@ class Anchors(Struct):
     explicit: dict[str, Span | None] = field(default_factory=dict)
     """Each explicit id, with the span of the heading or formula that uses it, once it was read."""
     generated: set[str] = field(default_factory=set)
-    """Ids made of the texts of headings."""
     counts: dict[str, int] = field(default_factory=dict)
     """The last number given to ids made of the same text."""
 
@@ -241,13 +224,12 @@ class Anchors(Struct):
     def take(self, name: str, span: Span) -> None:
         """Use an explicit id."""
         first = self.explicit.get(name)
-        if first is not None or name in self.generated:
-            notes = [Note("first used here", first)] if first is not None else []
-            self.report(
-                diagnose("anchor-repeated", span, f"the id `{name}` is already used", notes=notes)
-            )
-        else:
+        if first is None and name not in self.generated:
             self.explicit[name] = span
+            return
+        message = f"the id `{name}` is already used"
+        notes = [Note("first used here", first)] if first is not None else []
+        self.report(diagnose("anchor-repeated", span, message, notes=notes))
 
     def has(self, name: str) -> bool:
         """Whether a heading or a formula has an id, or asks for it."""
@@ -309,7 +291,6 @@ def check_heading(
 
 
 def _deepen(heading: Span, levels: int) -> tuple[Edit, ...]:
-    """The edit that gives a heading so many more levels, if it begins with `#`."""
     marks = re.match("#+", heading.text)
     if marks is None:
         return ()

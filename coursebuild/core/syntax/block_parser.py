@@ -1,13 +1,10 @@
 """The block parser: markdown-it's rules, and those for footnotes and formulas, also in lines.
 
-Entry points: `block_tokens`; `math_inline`, a rule for the inline parser. CommonMark with tables,
-task lists, footnotes and formulas. In addition to markdown-it:
-
-1. The first token of a block gets its place, and the rows from which its content was cut.
-2. Link definitions know where they stand.
-3. Blocks nested deeper than `MAX_NESTING` become paragraphs with a mark, so that nothing is lost
-   and nothing overflows. The same happens in containers that together hold far more lines than the
-   text has, since each of them reads its lines again.
+CommonMark with tables, task lists, footnotes and formulas. The first token of a block gets its
+place, and the rows from which its content was cut.
+Blocks nested deeper than `MAX_NESTING` become paragraphs with a mark, so that nothing is lost and
+nothing overflows. The same happens in containers that together hold far more lines than the text
+has, since each of them reads its lines again.
 
 A `$` opens a formula when something other than white space follows; the next `$` that no backslash
 escapes must close it, with something other than white space before it and no digit after it. So
@@ -145,10 +142,7 @@ References: TypeAlias = dict[str, dict[str, Any]]
 
 
 def block_tokens(base: Excerpt, references: References) -> list[PositionedToken]:
-    """The block tokens of a text with LF line ends and no NUL.
-
-    Its link definitions are added to `references`.
-    """
+    """The block tokens of a text with LF and no NUL, whose link definitions join `references`."""
     state = BlockState(base, _MARKDOWN, {"references": references})
     state.lines_left = _MAX_READINGS * state.lineMax + _SPARE_LINES
     _MARKDOWN.block.tokenize(state, 0, state.lineMax)
@@ -170,7 +164,6 @@ def _footnote_definition(state: StateBlock, start: int, end: int, silent: bool) 
 
 
 def _link_definition(state: StateBlock, start: int, end: int, silent: bool) -> bool:
-    """The rule for a link definition, which also stores its place."""
     assert isinstance(state, BlockState)
     references: References = state.env["references"]
     count = len(references)
@@ -211,7 +204,6 @@ _WITH_TEXT = frozenset("fence code_block html_block paragraph_open math_block".s
 
 
 def _with_places(rule: BlockRule) -> BlockRule:
-    """The rule, which also gives places to its tokens."""
 
     def run(state: StateBlock, start: int, end: int, silent: bool) -> bool:
         assert isinstance(state, BlockState)
@@ -249,24 +241,19 @@ def _with_places(rule: BlockRule) -> BlockRule:
     return run
 
 
-def _build_parser() -> MarkdownIt:
-    """The parser: markdown-it's rules and ours, each with the blocks that it may interrupt."""
-    md = MarkdownIt("zero", {"html": True, "tasklists": True, "maxNesting": 2 * MAX_NESTING})
-    md.block = _BlockParser()
-    rules = {rule.name: (rule.fn, rule.alt) for rule in md.block.ruler.__rules__}
-    interrupts = ["paragraph", "reference", "blockquote"]
-    rules["reference"] = (_link_definition, [])
-    ours: dict[str, tuple[BlockRule, list[str]]] = {
-        "too deep": (_deep_paragraph, []),
-        "math": (math_block, [*interrupts, "list"]),
-        "footnote": (_footnote_definition, interrupts),
-    }
-    md.block.ruler = Ruler()
-    for name, (rule, alt) in (ours | rules).items():
-        md.block.ruler.push(name, _with_places(rule), {"alt": alt})
-    # Links with dangerous schemes stay links, so that they can be reported.
-    md.validateLink = lambda url: True  # type: ignore[method-assign]
-    return md
-
-
-_MARKDOWN = _build_parser()
+_MARKDOWN = MarkdownIt("zero", {"html": True, "tasklists": True, "maxNesting": 2 * MAX_NESTING})
+# Links with dangerous schemes stay links, so that they can be reported.
+_MARKDOWN.validateLink = lambda url: True  # type: ignore[method-assign]
+_MARKDOWN.block = _BlockParser()
+_INTERRUPTS = ["paragraph", "reference", "blockquote"]
+_RULES: dict[str, tuple[BlockRule, list[str]]] = {
+    "too deep": (_deep_paragraph, []),
+    "math": (math_block, [*_INTERRUPTS, "list"]),
+    "footnote": (_footnote_definition, _INTERRUPTS),
+    **{rule.name: (rule.fn, rule.alt) for rule in _MARKDOWN.block.ruler.__rules__},
+    "reference": (_link_definition, []),
+}
+"""Our rules and those of markdown-it, each with the blocks that it may interrupt."""
+_MARKDOWN.block.ruler = Ruler()
+for _name, (_rule, _alt) in _RULES.items():
+    _MARKDOWN.block.ruler.push(_name, _with_places(_rule), {"alt": _alt})

@@ -1,12 +1,6 @@
 """Fences become blocks according to their kind: scripts, code that is only shown, models.
 
-Entry points: `read_block`; `parse_python`. Fences of features are read by the features.
-
-1. Keys of a script: `file`, `timeout`, `requires`, `args`, `figure`, `norun`, `diverges`, `deep`,
-   `writes`, `record`. Code that is only shown may have `fragment`, if it need not parse, or `show`,
-   if it is copied from a file.
-2. `mjcf` is a model or a fragment of one. Keys: `fragment="worldbody"` (where the fragment goes;
-   `worldbody/body` names nested elements), `error="…"` (the message it must fail with).
+Fences of features are read by the features.
 """
 
 from __future__ import annotations
@@ -14,10 +8,12 @@ from __future__ import annotations
 import re
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable
+
+from msgspec.structs import replace
 
 from coursebuild.core.model import Block, CodeBlock, Mjcf, PlainCode, Script, SourcePart
-from coursebuild.core.model.blocks import FigureName
+from coursebuild.core.model.blocks import FigureName, Labelled
 from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import (
     Fence,
@@ -28,7 +24,6 @@ from coursebuild.core.syntax.fence import (
     find_likely_start,
     split_words,
 )
-from coursebuild.core.syntax.labels import label_block
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.python_syntax import check_syntax, find_windows
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
@@ -48,7 +43,7 @@ _UNUSABLE_NAMES = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "
     "code test this".split()
 )
 _PATH = re.compile(r"\w[\w.-]*(?:/\w[\w.-]*)*")
-_RESERVED_FOLDERS = ("content", "models", "examples", "features", "public")
+_FOLDER = re.compile(rf"(?!(?:content|models|examples|features|public)(?:/|\Z)){_PATH.pattern}/*")
 _FIGURE = re.compile(r"[A-Za-z0-9][\w-]*(?:\.[\w-]+)*\.(?:svg|png|csv)", re.ASCII)
 _ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
 
@@ -102,20 +97,35 @@ def _build_script(
         if "is not below" in mistake and not fence.nested:
             help = Fix(help, f"examples/{path.rpartition('/')[2]}", path)
         diagnostics.append(diagnose("script-path", file.value_span, mistake, help=help))
-    text = fence.body.text.rstrip("\n")  # with exactly one line end at its end
-    code = Excerpt(fence.body.source, text + "\n", fence.body.pieces)
-    if len(text) < len(fence.body.text):
-        code = fence.body.slice(0, len(text) + 1)
-    timeout = _read_timeout(keys.get("timeout"), diagnostics)
-    requires = _read_modules(keys.get("requires"), diagnostics)
-    args = _read_arguments(keys.get("args"), diagnostics)
-    writes = _read_folders(keys.get("writes"), diagnostics)
+    code = fence.body.slice(0, len(fence.body.text.rstrip("\n")) + 1)  # with one line end
+    if not code.text.endswith("\n"):
+        code = Excerpt(code.source, code.text + "\n", code.pieces)
+    timeout, word = DEFAULT_TIMEOUT, keys.get("timeout")
+    if word is not None and word.value is not None:
+        timeout = float(word.value) if _NUMBER.fullmatch(word.value) else 0.0
+        message = f"`{word.value}` is not a number of seconds above 0"
+        if timeout > MAX_TIMEOUT:
+            message = f"`{word.value}` s is more than a day"
+        if not 0 < timeout <= MAX_TIMEOUT:
+            number = re.fullmatch(rf"({_NUMBER.pattern})\s?s(?:ec)?", word.value)
+            help = "" if number is None else write(number[1])
+            diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
+            timeout = DEFAULT_TIMEOUT
+    requires = [part.text for part in _read_list("requires", keys, diagnostics)]
+    writes = [part.text.rstrip("/") for part in _read_list("writes", keys, diagnostics)]
+    args: list[str] = []
+    try:
+        args = shlex.split(keys.value("args") or "")
+    except ValueError as error:
+        message = f"the arguments cannot be split: {str(error).lower()}"
+        place = keys.place("args") or fence.head
+        diagnostics.append(diagnose("fence-key-value", place, message))
     record = keys.get("record")
     if record is not None and record.value != "once":
         message = f"`{record.value}` is not a way to record"
         help = Fix("write `record=once`", "once")
         diagnostics.append(diagnose("fence-key-value", record.value_span, message, help=help))
-    figures = tuple(_read_figures(keys.get("figure"), diagnostics))
+    figures = _read_list("figure", keys, diagnostics)
     if keys.get("figure") is None and keys.get("norun") is None:
         diagnostics += find_windows(fence.body)
     if mistake:
@@ -127,85 +137,52 @@ def _build_script(
         code,
         fence.prefix,
         timeout,
-        requires,
-        args,
+        tuple(dict.fromkeys(requires)),
+        tuple(args),
         keys.get("norun") is not None,
         fence.body_span,
         keys.get("diverges") is not None,
         keys.get("deep") is not None,
-        writes,
+        tuple(writes),
         once=record is not None,
-        figures=figures,
+        figures=tuple(FigureName(name.text, name.span()) for name in figures),
     )
 
 
-def _read_timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
-    if word is None or word.value is None:
-        return DEFAULT_TIMEOUT
-    seconds = float(word.value) if _NUMBER.fullmatch(word.value) else 0.0
-    if 0 < seconds <= MAX_TIMEOUT:
-        return seconds
-    message = f"`{word.value}` is not a number of seconds above 0"
-    if seconds > MAX_TIMEOUT:
-        message = f"`{word.value}` s is more than a day"
-    seconds_text = re.fullmatch(rf"({_NUMBER.pattern})\s?s(?:ec)?", word.value)
-    help = "" if seconds_text is None else write(seconds_text[1])
-    diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
-    return DEFAULT_TIMEOUT
+def _read_list(key: str, keys: FenceKeys, diagnostics: list[Diagnostic]) -> list[Excerpt]:
+    """The right names in the value of a key of `_LISTS`."""
+    accepts, message, help = _LISTS[key]
+    word = keys.get(key)
+    parts = [] if word is None else word.parts()
+    for part in parts:
+        if word is not None and key == "requires" and not part.text:
+            place, missing = word.value_span, "a name of a module is missing"
+            diagnostics.append(diagnose("fence-key-value", place, missing, help=help))
+        elif not accepts(part.text):
+            text = message.format(part.text)
+            diagnostics.append(diagnose("fence-key-value", part.span(), text, help=help))
+    return [part for part in parts if accepts(part.text)]
 
 
-def _read_figures(word: Word | None, diagnostics: list[Diagnostic]) -> Iterator[FigureName]:
-    for name in () if word is None else word.parts():
-        if _FIGURE.fullmatch(name.text):
-            yield FigureName(name.text, name.span())
-        else:
-            message = f"`{name.text}` is not a name for a figure"
-            help = "it is a file name that ends in `.svg` or `.png`, as in `figure=flip.svg`, or "
-            help += "in `.csv` for the data of the figure with this name"
-            diagnostics.append(diagnose("fence-key-value", name.span(), message, help=help))
-
-
-def _read_modules(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
-    if word is None:
-        return ()
-    modules: dict[str, None] = {}
-    for part in word.parts():
-        name = part.text
-        if name and all(piece.isidentifier() for piece in name.split(".")):
-            modules[name] = None
-            continue
-        message = (
-            f"`{name}` is not the name of a module" if name else "a name of a module is missing"
-        )
-        span = part.span() if name else word.value_span
-        help = "write names with commas between them, for example `requires=torch,mjx`"
-        diagnostics.append(diagnose("fence-key-value", span, message, help=help))
-    return tuple(modules)
-
-
-def _read_arguments(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
-    if word is None or word.value is None:
-        return ()
-    try:
-        return tuple(shlex.split(word.value))
-    except ValueError as error:
-        message = f"the arguments cannot be split: {str(error).lower()}"
-        diagnostics.append(diagnose("fence-key-value", word.value_span, message))
-        return ()
-
-
-def _read_folders(word: Word | None, diagnostics: list[Diagnostic]) -> tuple[str, ...]:
-    folders = []
-    for part in () if word is None else word.parts():
-        folder = part.text.rstrip("/")
-        first = folder.partition("/")[0]
-        if _PATH.fullmatch(folder) and first not in _RESERVED_FOLDERS:
-            folders.append(folder)
-            continue
-        message = f"`{part.text}` is not a folder that a script may write into"
-        help = "name a folder of the project that holds nothing else, for example `writes=runs/`"
-        diagnostics.append(diagnose("fence-key-value", part.span(), message, help=help))
-    return tuple(folders)
+_LISTS: dict[str, tuple[Callable[[str], bool], str, str]] = {
+    "figure": (
+        lambda name: bool(_FIGURE.fullmatch(name)),
+        "`{}` is not a name for a figure",
+        "it is a file name that ends in `.svg` or `.png`, as in `figure=flip.svg`, or in `.csv` "
+        "for the data of the figure with this name",
+    ),
+    "requires": (
+        lambda name: all(piece.isidentifier() for piece in name.split(".")),
+        "`{}` is not the name of a module",
+        "write names with commas between them, for example `requires=torch,mjx`",
+    ),
+    "writes": (
+        lambda path: bool(_FOLDER.fullmatch(path)),
+        "`{}` is not a folder that a script may write into",
+        "name a folder of the project that holds nothing else, for example `writes=runs/`",
+    ),
+}
+"""Keys with a list of names: which are right, and the message and the help for others."""
 
 
 def path_mistake(path: str) -> str:
@@ -244,15 +221,27 @@ _HEAD_RULES = frozenset(
 
 
 def read_block(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
-    """The block of a fence, with its label."""
-    block = _read_kind(fence, state, texts)
-    if fence.label is None or not fence.is_closed:
+    """The block of a fence, with the label on its first line."""
+    block, braces = _read_kind(fence, state, texts), fence.label
+    if braces is None or not fence.is_closed:
         return block
-    return label_block(block, fence.label, fence, state)
+    feature_kind = fence_kind(fence.kind)
+    kind = "lst" if feature_kind is None else feature_kind.label
+    if fence.nested:
+        message = "a block in a text of a quiz or lab has no label"
+        state.reject_label(braces, message, "label blocks of the lesson's text")
+    elif fence.kind == "output":
+        help = "write `{#lst:name}` on the first line of its script"
+        state.reject_label(braces, "an output has no label", help)
+    elif not kind:
+        message = f"a block of kind `{fence.kind}` has no label"
+        state.reject_label(braces, message, "labels stand on scripts, code and labs")
+    elif isinstance(block, Labelled):
+        return replace(block, label=state.take_label(braces, kind))
+    return block
 
 
 def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
-    """The block of a fence; recorded outputs are read in `recording`."""
     if not fence.is_closed or fence.inner is not None:
         return _read_unclosed(fence, state)
     match fence.kind:

@@ -1,12 +1,7 @@
-r"""Containers: quotations, callouts and tables, each part with its place; and lists.
+r"""Quotations, callouts, tables and lists, each part with its place, and marks that they lost.
 
-A callout is a quotation whose first line is `[!kind] Optional title`; `[!kind]- Title` makes one
-that starts folded.
-
-Entry points: `read_head`, which reads that line; `read_table`. markdown-it finds the tables and
-their rows. A row is split here, at each `|` without a backslash before it; `\|` is a `|` in the
-cell. Marks that were lost, doubled or mistyped are found by `check_quotation`, `check_neighbours`
-of a block and those above it, `check_numbers` and `check_item` of a list.
+markdown-it finds the tables and their rows. A row is split here, at each `|` without a backslash
+before it; `\|` is a `|` in the cell.
 """
 
 from __future__ import annotations
@@ -57,10 +52,7 @@ class Head(Struct, frozen=True):
 
 
 def read_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None:
-    """The head of a callout, if a blockquote's first paragraph begins with one.
-
-    Its kind is one of `kinds`, without regard to case.
-    """
+    """The head of a callout, if a quotation's first paragraph begins with one of `kinds`."""
     match = _HEAD.match(paragraph.text)
     if match is None:
         return _read_broken_head(paragraph, kinds)
@@ -154,6 +146,14 @@ def read_table(
         elif token.type == "th_open":
             align.append(_ALIGN.get(token.attrs.get("style")))
     cells = [_read_cells(base, row, len(align), inlines, report) for row in rows]
+    for above, row in pairwise(rows[1:]):
+        line = base.text[row.start : row.end].strip()
+        if line == base.text[above.start : above.end].strip() and re.search(r"[^\W\d_]{2}", line):
+            place, message = base.span(row.start, row.end), "this row is repeated here"
+            source, number = place.source, place.line
+            whole_line = source.span(source.line_start(number), source.line_start(number + 1))
+            fix = Fix("delete one of the two", edits=(Edit(whole_line, ""),))
+            report(diagnose("text-repeated", place, message, help=fix))
     span = base.span(opening.start, opening.end)
     return Table(span, tuple(align), cells[0], tuple(cells[1:])), at + 1
 
@@ -201,7 +201,6 @@ def _read_cells(
 _EMPTY_QUOTED = re.compile(r"^[ >]*>[ \t]*$", re.MULTILINE)
 _QUOTE_MARKS = re.compile(r"[ >]*")
 _SLIP_OF_MARK = re.compile(r" {0,3}([<.?/,;:|])(?= |$)")
-"""What a line of a quotation may begin with if `>` was mistyped."""
 
 
 def check_quotation(span: Span) -> Iterator[Diagnostic]:
@@ -219,6 +218,10 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
         begins_inside = re.match(r">[ >]*(?:[a-z]|\$\$)", span.text)
         is_doubled = marks[0].count(">") == 2 and (any(fewer) or begins_inside is not None)
         is_in_text = is_in_text or is_doubled
+        if not is_in_text and marks[0].count(">") > 1 and _is_in_callout(source, line):
+            place, message = span.first_line(), "a second quotation begins in this callout"
+            help = "remove one `>`, or begin each line of it with `> > `"
+            yield diagnose("markup-unread", place, message, help=help)
     if is_in_text and ">>" in marks[0]:
         message = "a quotation begins in the middle of a paragraph"
         help = "remove one `>`, or leave a line with nothing but `>` above it"
@@ -238,6 +241,13 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
             place = source.span(start + slip.start(1), start + slip.end(1))
             help = Fix("begin the line with `> `", ">", safe=True)
             yield diagnose("markup-unread", place, message, help=help)
+
+
+def _is_in_callout(source: Source, line: int) -> bool:
+    """Whether the quotation that has a line begins as a callout does."""
+    while line > 1 and source.line_text(line - 1).startswith(">"):
+        line -= 1
+    return re.match(r"> ?\[!", source.line_text(line)) is not None
 
 
 def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterator[Diagnostic]:

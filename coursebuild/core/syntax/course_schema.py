@@ -1,12 +1,4 @@
-"""The tables and fields of course.toml.
-
-Entry points: `CourseFile`; `slug_of`, a slug made of a title; of the table `[theme]`, `theme`,
-its value, with files not read yet, and `check_contrast`; of the table `[launch]`, `launch` and
-`check_launch`.
-
-The decoder checks the file against `CourseFile`, and the JSON Schema for editors is made from it;
-ids that must be unique and prerequisites that must exist are checked in `coursemap`.
-"""
+"""The tables and fields of course.toml, its theme, and where notebooks run."""
 
 from __future__ import annotations
 
@@ -16,7 +8,6 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeAlias
 
 from msgspec import Meta, Struct
-from msgspec.structs import replace
 
 from coursebuild.core.drawing.contrast import (
     GROUNDS_DARK,
@@ -27,13 +18,12 @@ from coursebuild.core.drawing.contrast import (
 )
 from coursebuild.core.model import Filter, LessonTable, Limits, Pace, Silence
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
-from coursebuild.core.model.fields import NotNegative, Slug, Text, matching
+from coursebuild.core.model.fields import NotNegative, Slug, Text, describe, matching
 from coursebuild.core.syntax.nodes import ObjectNode, format_name
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 
 
 def _file_field(noun: str, endings: str, example: str) -> Meta:
-    """The field of a file in `theme/` with one of these endings."""
     return matching(
         rf"^theme(/[\w-][\w.-]*)+\.({endings})$", f"{noun} in `theme/`, as in `theme/{example}`"
     )
@@ -50,25 +40,25 @@ Colour: TypeAlias = Annotated[str, matching("^#[0-9A-Fa-f]{6}$", "a colour as in
 class FontTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A typeface of the course's own."""
 
-    use: Annotated[Literal["text", "interface", "code"], Meta(description="what is set in it")]
-    files: Annotated[tuple[Font, ...], Meta(min_length=1, description="its styles, upright first")]
-    licence: Annotated[Licence, Meta(description="by which it may be published")]
+    use: Annotated[Literal["text", "interface", "code"], describe("what is set in it")]
+    files: Annotated[tuple[Font, ...], describe("its styles, upright first", min_length=1)]
+    licence: Annotated[Licence, describe("by which it may be published")]
 
 
 class ThemeTable(Struct, frozen=True, forbid_unknown_fields=True):
     """The face of the site."""
 
-    logo: Annotated[Picture | None, Meta(description="beside the title of every page")] = None
-    logo_dark: Annotated[Picture | None, Meta(description="the same on dark pages")] = None
-    icon: Annotated[Picture | None, Meta(description="of the browser's tab, square")] = None
+    logo: Annotated[Picture | None, describe("beside the title of every page")] = None
+    logo_dark: Annotated[Picture | None, describe("the same on dark pages")] = None
+    icon: Annotated[Picture | None, describe("of the browser's tab, square")] = None
     touch_icon: Annotated[
-        Png | None, Meta(description="of an installed course, square; 512 pixels are enough")
+        Png | None, describe("of an installed course, square; 512 pixels are enough")
     ] = None
-    accent: Annotated[Colour | None, Meta(description="of links and buttons")] = None
+    accent: Annotated[Colour | None, describe("of links and buttons")] = None
     accent_dark: Annotated[
-        Colour | None, Meta(description="the same on dark pages; without it, a lighter `accent`")
+        Colour | None, describe("the same on dark pages; without it, a lighter `accent`")
     ] = None
-    css: Annotated[tuple[StyleSheet, ...], Meta(description="read after the tool's own")] = ()
+    css: Annotated[tuple[StyleSheet, ...], describe("read after the tool's own")] = ()
     font: tuple[FontTable, ...] = ()
 
 
@@ -118,19 +108,11 @@ def _theme_files(node: ObjectNode, name: str, paths: tuple[str, ...]) -> tuple[T
 
 
 _GITHUB = re.compile(r"https?://(?i:github\.com)/[\w-]+/[\w.-]+/?", re.ASCII)
-"""A repository on GitHub."""
 _NO_BRANCH = re.compile(
     r"[\x00-\x20\x7f~^:?*\[\\]|\.\.|//|@\{|(^|/)\.|^[-/]|[./]$|\.lock(/|$)|^@?$"
 )
 """What git-check-ref-format(1) forbids in the name of a branch."""
 _SERVICES = ("colab", "binder", "jupyterhub", "codespaces")
-
-
-def launch(fields: Launch | None, settings: CourseTable) -> Launch | None:
-    """Where notebooks can be run, with its repository."""
-    if fields is None:
-        return None
-    return replace(fields, repository=fields.repository or settings.repository)
 
 
 def check_launch(node: ObjectNode, fields: Launch, repository: str | None) -> Iterator[Diagnostic]:
@@ -199,47 +181,41 @@ def slug_of(text: str) -> str:
 class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
     """What the course is."""
 
-    title: Annotated[Text, Meta(description="plain text")]
+    title: Annotated[Text, describe("plain text")]
     id: Annotated[
-        Slug | None, Meta(description="what readers' progress is kept under; without it, the title")
+        Slug | None, describe("what readers' progress is kept under; without it, the title")
     ] = None
     summary: Annotated[
-        str, Meta(description="one or two sentences, for the home page and search engines")
+        str, describe("one or two sentences, for the home page and search engines")
     ] = ""
     language: Annotated[
-        Language,
-        Meta(description="the language of the lessons and the interface, as in `en` or `pt-BR`"),
+        Language, describe("the language of the lessons and the interface, as in `en` or `pt-BR`")
     ] = "en"
     base_url: Annotated[
-        Url | None, Meta(description="where the site will stand: for the sitemap and the 404 page")
+        Url | None, describe("where the site will stand: for the sitemap and the 404 page")
     ] = None
     repository: Annotated[
-        Url | None, Meta(description="where its sources are: pages get a link to edit their file")
+        Url | None, describe("where its sources are: pages get a link to edit their file")
     ] = None
-    licence: Annotated[
-        str, Meta(description="its name, as in `CC-BY-4.0`, shown in the footer")
-    ] = ""
+    licence: Annotated[str, describe("its name, as in `CC-BY-4.0`, shown in the footer")] = ""
     version: Annotated[
         Edition | None,
-        Meta(description="of the course, as in `2026` or `1.2.0`: shown in the head of each page"),
+        describe("of the course, as in `2026` or `1.2.0`: shown in the head of each page"),
     ] = None
     engine: Annotated[
         Version | None,
-        Meta(description="the version of MuJoCo that the course needs; another one is an error"),
+        describe("the version of MuJoCo that the course needs; another one is an error"),
     ] = None
     features: Annotated[
-        tuple[FeaturePath, ...],
-        Meta(description="features of the course's own, as files in `features/`"),
+        tuple[FeaturePath, ...], describe("features of the course's own, as files in `features/`")
     ] = ()
     folds: Annotated[
         Literal["open", "closed"],
-        Meta(description="whether folded parts are printed in full, in `export page` and `pdf`"),
+        describe("whether folded parts are printed in full, in `export page` and `pdf`"),
     ] = "open"
     packages: Annotated[
         tuple[FolderPath, ...],
-        Meta(
-            description="folders that scripts import from, before installed packages, as in `src`"
-        ),
+        describe("folders that scripts import from, before installed packages, as in `src`"),
     ] = ()
 
 
@@ -248,33 +224,29 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
 
     compare: Annotated[
         Literal["exact", "digits", "rtol"] | None,
-        Meta(description="the same text, the same digits, or within rtol and atol; else exact"),
+        describe("the same text, the same digits, or within rtol and atol; else exact"),
     ] = None
-    rtol: Annotated[
-        NotNegative | None, Meta(description="tolerance relative to the recorded number")
-    ] = None
-    atol: Annotated[NotNegative | None, Meta(description="absolute tolerance")] = None
-    ellipsis: Annotated[bool, Meta(description="`...` in a recorded output matches anything")] = (
-        False
+    rtol: Annotated[NotNegative | None, describe("tolerance relative to the recorded number")] = (
+        None
     )
+    atol: Annotated[NotNegative | None, describe("absolute tolerance")] = None
+    ellipsis: Annotated[bool, describe("`...` in a recorded output matches anything")] = False
     filter: tuple[Filter, ...] = ()
-    env: Annotated[dict[str, str], Meta(description="environment variables of scripts")] = {}
+    env: Annotated[dict[str, str], describe("environment variables of scripts")] = {}
     python: Annotated[
-        InterpreterPath | None,
-        Meta(description="what runs the scripts, relative to the course's folder"),
+        InterpreterPath | None, describe("what runs the scripts, relative to the course's folder")
     ] = None
     truth: Annotated[
         Annotated[float, Meta(ge=0, le=1)] | None,
-        Meta(description="the share of the numbers in lessons that must be proven, from 0 to 1"),
+        describe("the share of the numbers in lessons that must be proven, from 0 to 1"),
     ] = None
-    strict: Annotated[bool, Meta(description="warnings are errors, as with `--strict`")] = False
+    strict: Annotated[bool, describe("warnings are errors, as with `--strict`")] = False
     unproven: Annotated[
         tuple[Text, ...],
-        Meta(description="paths of scripts that `strict` lets pass where they are not run"),
+        describe("paths of scripts that `strict` lets pass where they are not run"),
     ] = ()
     names: Annotated[
-        tuple[Text, ...],
-        Meta(description="inline code that names nothing; `*` and `?` stand for anything"),
+        tuple[Text, ...], describe("inline code that names nothing; `*` and `?` stand for anything")
     ] = ()
 
 
@@ -283,19 +255,15 @@ class FormatTable(Struct, frozen=True, forbid_unknown_fields=True):
 
     width: Annotated[
         int,
-        Meta(
-            ge=0,
-            le=1000,
-            description="columns of a line of text; 0 leaves line breaks where they are",
-        ),
+        describe("columns of a line of text; 0 leaves line breaks where they are", ge=0, le=1000),
     ] = 0
 
 
 class CalloutTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A kind of callout."""
 
-    label: Annotated[Text, Meta(description="shown over the callout")]
-    promise: Annotated[str, Meta(description="what it promises the reader")] = ""
+    label: Annotated[Text, describe("shown over the callout")]
+    promise: Annotated[str, describe("what it promises the reader")] = ""
 
 
 class LevelTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -304,28 +272,28 @@ class LevelTable(Struct, frozen=True, forbid_unknown_fields=True):
     id: Annotated[
         Annotated[str, matching(r"^[A-Za-z0-9]+$", "letters and digits, as in `4` or `A`")]
         | Annotated[int, Meta(ge=0)],
-        Meta(description="letters and digits, as in `4` or `A`"),
+        describe("letters and digits, as in `4` or `A`"),
     ]
-    title: Annotated[Text, Meta(description="plain text")]
-    summary: Annotated[str, Meta(description="one sentence, for the course map")] = ""
+    title: Annotated[Text, describe("plain text")]
+    summary: Annotated[str, describe("one sentence, for the course map")] = ""
     lesson: tuple[LessonTable, ...] = ()
 
 
 class PageTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A page that is no lesson."""
 
-    id: Annotated[Slug, Meta(description="the page's name in links and in its address")]
-    title: Annotated[Text, Meta(description="plain text")]
-    file: Annotated[Text, Meta(description="its Markdown file, anywhere in the project")]
+    id: Annotated[Slug, describe("the page's name in links and in its address")]
+    title: Annotated[Text, describe("plain text")]
+    file: Annotated[Text, describe("its Markdown file, anywhere in the project")]
     section: Annotated[
         str,
-        Meta(
-            description="the heading under which it stands in a list of pages beside it; "
+        describe(
+            "the heading under which it stands in a list of pages beside it; "
             "without one it has no such list"
         ),
     ] = ""
-    menu: Annotated[bool, Meta(description="whether it is in the menu of every page")] = True
-    names: Annotated[bool, Meta(description="whether names in its code have to be known")] = True
+    menu: Annotated[bool, describe("whether it is in the menu of every page")] = True
+    names: Annotated[bool, describe("whether names in its code have to be known")] = True
 
 
 class SecurityTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -333,8 +301,8 @@ class SecurityTable(Struct, frozen=True, forbid_unknown_fields=True):
 
     html: Annotated[
         Literal["none", "safe", "trusted"],
-        Meta(
-            description="raw HTML in texts: none, none that runs or loads anything, or any at all; "
+        describe(
+            "raw HTML in texts: none, none that runs or loads anything, or any at all; "
             "then any SVG file, too"
         ),
     ] = "safe"
@@ -353,7 +321,7 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
     pace: Pace | None = None
     callouts: Annotated[
         dict[str, Text | CalloutTable],
-        Meta(description="more kinds of callouts by name, with a label or a table"),
+        describe("more kinds of callouts by name, with a label or a table"),
     ] = {}
     silence: tuple[Silence, ...] = ()
     level: tuple[LevelTable, ...] = ()

@@ -1,44 +1,23 @@
-"""The course map, content/course.toml.
+"""The course map, content/course.toml, becomes a `Course` without documents.
 
-Entry point: `parse_course_map(source)` → a `Course` whose lessons and pages have no documents yet.
-
-1. The TOML is read into nodes, and these into the declared tables.
-2. Rules that types cannot express are checked on every table whose own fields are right: ids,
-   prerequisites, files, settings.
-3. If nothing is wrong, the tables become the course.
-
-The id of a level consists of letters and digits (`4`, `A`). That of a lesson is its level's id, a
-dot, and more such parts joined by dots (`4.2`, `A.1`). Ids that differ in upper and lower case only
-count as the same, as not every file system tells them apart.
+Ids that differ in upper and lower case only count as the same, as not every file system tells them
+apart.
 """
 
 from __future__ import annotations
 
 import graphlib
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from decimal import Decimal
 from itertools import pairwise
 
-from msgspec.structs import asdict
+from msgspec.structs import asdict, replace
 
-from coursebuild.core.model import (
-    CalloutKind,
-    Comparison,
-    Course,
-    Filter,
-    Lesson,
-    LessonTable,
-    Level,
-    Mode,
-    NamedPath,
-    Page,
-    Silence,
-)
+from coursebuild.core import model
 from coursebuild.core.model.course import Launch
 from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.syntax.course_schema import (
-    CalloutTable,
     CourseFile,
     LevelTable,
     PageTable,
@@ -46,7 +25,6 @@ from coursebuild.core.syntax.course_schema import (
     VerifyTable,
     check_contrast,
     check_launch,
-    launch,
     theme,
 )
 from coursebuild.core.syntax.decode import Decoding, check_unique, decode
@@ -73,7 +51,7 @@ from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
 
 
-def parse_course_map(source: Source) -> Parsed[Course | None]:
+def parse_course_map(source: Source) -> Parsed[model.Course | None]:
     """The course that the map describes, its lessons and pages not read yet. Never raises."""
     parsed_toml = parse_toml(source)
     root = parsed_toml.value
@@ -92,7 +70,7 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
     ]
     unusable = bool(diagnostics)
     for level, level_node in zip(levels, root.objects("level"), strict=True):
-        for node, table in decoding.find_structs(LessonTable, level_node.objects("lesson")):
+        for node, table in decoding.find_structs(model.LessonTable, level_node.objects("lesson")):
             if level.id and not table.id.startswith(f"{level.id}."):
                 message = f"the lesson `{table.id}` is in the level `{shorten(level.id)}`"
                 help = f"an id in this level begins with `{shorten(level.id)}.`"
@@ -108,11 +86,18 @@ def parse_course_map(source: Source) -> Parsed[Course | None]:
 
 
 def _build_course(
-    source: Source, root: ObjectNode, fields: CourseFile, levels: tuple[Level, ...]
-) -> Course:
+    source: Source, root: ObjectNode, fields: CourseFile, levels: tuple[model.Level, ...]
+) -> model.Course:
     settings, verify = fields.course, fields.verify or VerifyTable()
     table, gate = root.object("course"), root.object("verify")
-    return Course(
+    launch = fields.launch
+    if launch is not None:
+        launch = replace(launch, repository=launch.repository or settings.repository)
+    kinds = {name: model.CalloutKind(name) for name in CALLOUTS}
+    for name, callout in fields.callouts.items():
+        texts = (callout,) if isinstance(callout, str) else (callout.label, callout.promise)
+        kinds[name] = model.CalloutKind(name, *texts)
+    return model.Course(
         map=source,
         title=settings.title,
         summary=settings.summary,
@@ -129,11 +114,11 @@ def _build_course(
         truth=verify.truth,
         truth_span=gate.place("truth"),
         filters=verify.filter,
-        callouts=callout_kinds(fields.callouts),
+        callouts=tuple(kinds.values()),
         silences=fields.silence,
         levels=levels,
         pages=tuple(
-            Page(
+            model.Page(
                 node.span, page.id, page.title, page.file, None, page.menu, page.names, page.section
             )
             for node, page in zip(root.objects("page"), fields.page, strict=True)
@@ -146,30 +131,31 @@ def _build_course(
         width=fields.format.width if fields.format is not None else 0,
         html=fields.security.html,
         limits=fields.limits,
-        launch=launch(fields.launch, settings),
+        launch=launch,
         theme=theme(root.object("theme"), fields.theme or ThemeTable()),
-        python=NamedPath(verify.python, gate.place("python")) if verify.python else None,
+        python=model.NamedPath(verify.python, gate.place("python")) if verify.python else None,
         strict=verify.strict,
         unproven=_named_paths(gate, "unproven", verify.unproven),
         names=verify.names,
     )
 
 
-def _named_paths(table: ObjectNode, field: str, paths: tuple[str, ...]) -> tuple[NamedPath, ...]:
+def _named_paths(
+    table: ObjectNode, field: str, paths: tuple[str, ...]
+) -> tuple[model.NamedPath, ...]:
     places = (item.span for item in table.items(field))
-    return tuple(map(NamedPath, paths, places))
+    return tuple(map(model.NamedPath, paths, places))
 
 
 # --------------------------------------------------------------------------- levels and lessons
 
 
-def _read_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Level]:
-    """The levels, with those of their lessons whose fields are right."""
+def _read_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[model.Level]:
     for node in root.objects("level"):
         name = _read_id(node.get("id"))
-        inner = decoding.find_structs(LessonTable, node.objects("lesson"))
+        inner = decoding.find_structs(model.LessonTable, node.objects("lesson"))
         lessons = tuple(
-            Lesson(
+            model.Lesson(
                 **asdict(table),
                 span=lesson.span,
                 prerequisite_spans=tuple(item.span for item in lesson.items("prerequisites")),
@@ -180,7 +166,7 @@ def _read_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[L
         )
         fields = decoding.structs.get(node)
         texts = (fields.title, fields.summary) if isinstance(fields, LevelTable) else ("", "")
-        yield Level(node.span, name, *texts, lessons)
+        yield model.Level(node.span, name, *texts, lessons)
 
 
 def _read_id(node: Node | None) -> str:
@@ -197,7 +183,6 @@ def _read_id(node: Node | None) -> str:
 # ---------------------------------------------------------------------------------------- checks
 
 RESERVED_IDS = frozenset({"index", "404"})
-"""Names of pages that every site has."""
 
 
 def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diagnostic]:
@@ -247,7 +232,7 @@ def _check_files(decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
 # ---------------------------------------------------------------------------------- prerequisites
 
 
-def _check_prerequisites(lessons: list[Lesson], ids: Iterable[str]) -> Iterator[Diagnostic]:
+def _check_prerequisites(lessons: list[model.Lesson], ids: Iterable[str]) -> Iterator[Diagnostic]:
     """Report unknown and repeated prerequisites, and lessons that require each other in a circle.
 
     `ids` has those of all lessons, even of those with mistakes in other fields.
@@ -304,7 +289,7 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
         repository = root.object("course").get("repository")
         address = repository.value if isinstance(repository, StringNode) else None
         yield from check_launch(node, places, address)
-    for node, filter in decoding.find_structs(Filter):
+    for node, filter in decoding.find_structs(model.Filter):
         if (mistake := pattern_mistake(filter.pattern)) is not None:
             message = f"the pattern does not compile: {mistake[0]}"
             yield diagnose("field-value", _place(node, "pattern", mistake[1]), message)
@@ -321,7 +306,7 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
             message = f"{format_name(name)} cannot be a kind of callout"
             help = "expected: lower-case letters and digits in words joined by single hyphens"
             yield diagnose("field-value", member.key.span, message, help=help)
-    for node, silence in decoding.find_structs(Silence):
+    for node, silence in decoding.find_structs(model.Silence):
         rule = RULES.get(silence.rule)
         if rule is None:
             warning_names = [name for name, entry in RULES.items() if entry.severity == "warning"]
@@ -336,12 +321,12 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
             yield diagnose("silence-rule", node.place("reason"), message, help=help)
 
 
-def comparison(node: ObjectNode, fields: VerifyTable) -> Comparison:
+def comparison(node: ObjectNode, fields: VerifyTable) -> model.Comparison:
     """The comparison of outputs whose fence names none; tolerances alone mean `rtol`."""
     rtol, atol = _decimal(node, "rtol"), _decimal(node, "atol")
     implied = "exact" if rtol is None and atol is None else "rtol"
-    mode = Mode(fields.compare or implied)
-    return Comparison(mode, rtol or Decimal(0), atol or Decimal(0), fields.ellipsis)
+    mode = model.Mode(fields.compare or implied)
+    return model.Comparison(mode, rtol or Decimal(0), atol or Decimal(0), fields.ellipsis)
 
 
 def _decimal(node: ObjectNode, name: str) -> Decimal | None:
@@ -358,12 +343,3 @@ def _place(node: ObjectNode, name: str, at: int | None) -> Span:
     if not isinstance(value, StringNode) or at is None or at >= len(value.value):
         return node.place(name)
     return value.excerpt.span(at, at + 1)
-
-
-def callout_kinds(tables: Mapping[str, str | CalloutTable]) -> tuple[CalloutKind, ...]:
-    """The kinds that every course has, perhaps with labels of its own, and its further kinds."""
-    kinds = {name: CalloutKind(name) for name in CALLOUTS}
-    for name, table in tables.items():
-        texts = (table,) if isinstance(table, str) else (table.label, table.promise)
-        kinds[name] = CalloutKind(name, *texts)
-    return tuple(kinds.values())

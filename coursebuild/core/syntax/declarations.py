@@ -1,14 +1,6 @@
 """The file beside a model, models/NAME.toml: its scenarios, and the findings of `diet` to keep.
 
-Entry point: `parse_declarations(source)`.
-
-1. The TOML is read into nodes, and these into the declared tables, from which the JSON Schema for
-   editors is made too.
-2. Rules that types cannot express are checked on every table whose own fields are right: names
-   differ, a duration is a whole number of samples and a sample one of timesteps, all commands have
-   the same length.
-3. If nothing is wrong, the tables become the declarations. What depends on the compiled model is
-   checked in `core/checks/compiled`.
+What depends on the compiled model is checked in `core/checks/compiled`.
 """
 
 from __future__ import annotations
@@ -45,7 +37,6 @@ from coursebuild.core.text.diagnostics import (
 from coursebuild.core.text.source import Source
 
 MOST_SAMPLES = 100_000
-"""The most samples of the state in a scenario."""
 MOST_VALUES, MOST_THREADS = 100, 256
 """The most values of a sweep, those of all parameters together, and the most threads."""
 _TOLERANCE = 1e-9

@@ -1,15 +1,8 @@
 """From nodes to declared structs, with every mistake at its place.
 
-Entry points: `decode(node, type, name, format)` → `Decoding`; `field_description` of a field; for
-rules of several fields, `has_value`, `require_one_of` and `check_unique`.
-
-1. One walk over the nodes, guided by what `msgspec.inspect` says of the type, reports everything
-   that is wrong: unknown and missing fields, wrong types, impossible values. (The parser that made
-   the nodes has reported repeated fields.)
-2. A struct is made as soon as all its own fields are right. An unknown field beside them is a
-   mistake, but no reason to leave the rest unchecked.
-3. These structs are kept by node, so that checks of rules that types cannot express run on them,
-   even if the whole is wrong.
+One walk over the nodes, guided by what `msgspec.inspect` says of the type, reports everything that
+is wrong. A struct is made as soon as all its own fields are right, and kept by its node, so that
+checks of rules that types cannot express run on it, even if the whole is wrong.
 """
 
 from __future__ import annotations
@@ -57,7 +50,6 @@ T = TypeVar("T", bound=Struct)
 
 _NO_REMARKS: Mapping[str, str] = {}
 _INVALID = object()
-"""Stands for the value of a node that is wrong."""
 
 
 class Decoding(Struct, Generic[S], frozen=True):
@@ -67,7 +59,6 @@ class Decoding(Struct, Generic[S], frozen=True):
     """The whole; it can be there along with diagnostics, as an unknown field does no harm."""
     diagnostics: tuple[Diagnostic, ...]
     structs: Mapping[ObjectNode, Struct]
-    """Every object whose own fields are all right."""
     texts: tuple[tuple[StringNode, str], ...]
     """Every string that is Markdown, with `blocks` or `inlines`."""
 
@@ -93,11 +84,7 @@ _type_info = functools.cache(inspect.type_info)
 
 
 class _Decoder:
-    """Collects the results of one walk.
-
-    A method returns the value of a node, or reports a diagnostic and returns `_INVALID`. `name` is
-    what messages call the node.
-    """
+    """One walk; methods return the value of a node, or report and return `_INVALID`."""
 
     def __init__(self, format: Format) -> None:
         self.format = format
@@ -175,7 +162,11 @@ class _Decoder:
     def decode_number(
         self, node: NumberNode, type: inspect.IntType | inspect.FloatType, name: str
     ) -> object:
-        double, problem = _to_double(node.value), ""
+        problem = ""
+        try:
+            double = float(node.value)
+        except OverflowError:
+            double = math.inf
         value = node.value if isinstance(type, inspect.IntType) else double
         if node.raw.strip("+-") in ("inf", "nan"):
             problem = f"must be a finite number, not {node.raw}"
@@ -241,11 +232,20 @@ class _Decoder:
         for key, member in node.members.items():
             if key in fields:
                 values[key] = self.decode_value(member.value, fields[key].type, key)
-            elif not variants or key != type.tag_field:
+            elif type.forbid_unknown_fields and not (variants and key == type.tag_field):
                 unknown.append(member.key)
         misspelt: set[str] = set()
-        if type.forbid_unknown_fields and unknown:
-            misspelt = self.report_unknown(unknown, fields, values, type, variants or {})
+        for key_node in unknown:
+            key, help = key_node.value, ""
+            if (likely := nearest(key, set(fields) - set(values) - misspelt)) is not None:
+                misspelt.add(likely)
+                help = propose(key, likely, fields)
+            elif owners := _variants_with_field(key, variants or {}):
+                names = " and ".join(f'`"{type.tag_field}": "{owner}"`' for owner in owners)
+                help = f"it is a field of {names}"
+            else:
+                help = did_you_mean(key, fields)
+            self.report("field-unknown", key_node.span, f"unknown field {format_name(key)}", help)
         missing = [field for field in type.fields if field.required and field.name not in values]
         for absent in missing:
             if absent.name not in misspelt:  # a misspelt field is one mistake
@@ -257,56 +257,27 @@ class _Decoder:
         self.structs[node] = struct
         return struct
 
-    def report_unknown(
-        self,
-        keys: Iterable[StringNode],
-        fields: Iterable[str],
-        present: Iterable[str],
-        type: inspect.StructType,
-        variants: Mapping[str, inspect.StructType],
-    ) -> set[str]:
-        """Report unknown fields; return the fields of which they are misspellings."""
-        misspelt: set[str] = set()
-        for key in keys:
-            likely = nearest(key.value, set(fields) - set(present) - misspelt)
-            owners = _variants_with_field(key.value, variants)
-            if likely is not None:
-                misspelt.add(likely)
-                help: str = propose(key.value, likely, fields)
-            elif owners:
-                names = " and ".join(f'`"{type.tag_field}": "{owner}"`' for owner in owners)
-                help = f"it is a field of {names}"
-            else:
-                help = did_you_mean(key.value, fields)
-            self.report("field-unknown", key.span, f"unknown field {format_name(key.value)}", help)
-        return misspelt
-
     def decode_tagged(self, node: ObjectNode, variants: Mapping[str, inspect.StructType]) -> object:
-        """The struct that the tag of an object names."""
+        """The struct that the tag of an object names, or the implied one.
+
+        That is meant unless the fields are clearly those of another.
+        """
         tag = str(next(iter(variants.values())).tag_field)
         tag_node = node.get(tag)
-        if tag_node is None:
-            return self.decode_untagged(node, tag, variants)
-        if not isinstance(tag_node, StringNode):
-            return self.report_wrong_type(
-                tag_node, inspect.StrType(), tag, did_you_mean("", variants)
-            )
-        if tag_node.value in variants:
-            return self.decode_struct(node, variants[tag_node.value], variants)
-        message = f"{format_name(tag)} cannot be {format_value(tag_node)}"
-        help = did_you_mean(tag_node.value, variants)
-        return self.report("field-value", tag_node.mark, message, help)
-
-    def decode_untagged(
-        self, node: ObjectNode, tag: str, variants: Mapping[str, inspect.StructType]
-    ) -> object:
-        """The struct of the implied variant, unless the fields are clearly those of another."""
+        if isinstance(tag_node, StringNode):
+            if tag_node.value in variants:
+                return self.decode_struct(node, variants[tag_node.value], variants)
+            message = f"{format_name(tag)} cannot be {format_value(tag_node)}"
+            help = did_you_mean(tag_node.value, variants)
+            return self.report("field-value", tag_node.mark, message, help)
+        help = did_you_mean("", variants)
+        if tag_node is not None:
+            return self.report_wrong_type(tag_node, inspect.StrType(), tag, help)
         owners = {key: _variants_with_field(key, variants) for key in node.members}
         for key, member in node.members.items():
             if not owners[key] and nearest(key, [tag], cutoff=0.7):
                 message, place = f"unknown field {format_name(key)}", member.key.span
                 return self.report("field-unknown", place, message, propose(key, tag))
-        help = did_you_mean("", variants)
         implied = next((t for t, v in variants.items() if getattr(v.cls, "implied", False)), None)
         if implied is not None:
             foreign = [tags for tags in owners.values() if tags and implied not in tags]
@@ -328,7 +299,6 @@ def _field_help(name: str, type: inspect.Type) -> str:
 
 
 def _variants_with_field(key: str, variants: Mapping[str, inspect.StructType]) -> list[str]:
-    """The tags of the variants that have the field `key`."""
     return [tag for tag, variant in variants.items() if key in variant.cls.__struct_fields__]
 
 
@@ -340,13 +310,6 @@ _BOUNDS = (
     ("le", "at most", operator.le),
     ("lt", "less than", operator.lt),
 )
-
-
-def _to_double(value: float) -> float:
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf if value > 0 else -math.inf
 
 
 def has_value(node: ObjectNode, name: str) -> bool:

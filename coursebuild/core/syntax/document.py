@@ -1,14 +1,4 @@
-"""The entry point of this package: a Markdown file of a course becomes a `Document`.
-
-Entry points: `parse_document`, which never raises, whatever the text; `find_conflict`, of any file.
-
-1. Line ends, NUL and a byte order mark are normalized; front matter is reported and left out.
-2. `tree` reads the blocks and, with `inline_tree`, their content; other modules read our fences.
-3. Footnotes are read last, in the order of their numbers.
-4. Terms and labels in wrong places are found in the whole document (`_check_placement`), and what
-   has the id of something else (`_check_ids`). Where a merge conflict was left (`find_conflict`),
-   that is all there is to say.
-"""
+"""A Markdown file of a course becomes a `Document`; merge conflicts that are left in a file."""
 
 from __future__ import annotations
 
@@ -17,26 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import (
-    AnchorOwner,
-    CodeBlock,
-    Document,
-    FeatureBlock,
-    Heading,
-    Label,
-    NumberBinding,
-    Paragraph,
-    Recording,
-    Script,
-    Table,
-    Term,
-    block_formulas,
-    block_inlines,
-    document_anchors,
-    document_blocks,
-    heading_anchors,
-    walk_inlines,
-)
+from coursebuild.core import model
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.vocabulary import ENGLISH, Words
 from coursebuild.core.model.walk import DisplayFormula, feature_block_ids
@@ -66,13 +37,11 @@ _TOML = re.compile(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
 
 def parse_document(
     source: Source, callouts: frozenset[str], *, lesson: bool, words: Words = ENGLISH
-) -> Parsed[Document]:
-    """Parse a lesson or a page.
+) -> Parsed[model.Document]:
+    """Parse a lesson or a page, whatever its text; the document holds all that could be read.
 
-    `callouts` are the known kinds, `words` those of the course's language. A lesson, unlike a
-    page, has no heading of level 1. The title with which a page may begin is not in the document.
-    Mistakes become diagnostics, in the order of their places; the document holds all that could be
-    read.
+    A lesson, unlike a page, has no heading of level 1. The title with which a page may begin is
+    not in the document.
     """
     state = ParsingState(callouts, lesson, words)
     base = read_markdown(source)
@@ -91,7 +60,7 @@ def parse_document(
     blocks = reader.read()
     anchor = "" if title is None else slug(title.text)
     is_free = not state.anchors.has(anchor)
-    document = Document(source, blocks, state.notes.finish(), anchor if is_free else "")
+    document = model.Document(source, blocks, state.notes.finish(), anchor if is_free else "")
     document = replace(document, unclaimed=tuple(_unclaimed_blocks(document, state.diagnostics)))
     conflict = find_conflict(source)
     if conflict is not None:  # the rest follows from it
@@ -118,75 +87,63 @@ _TEXTS = frozenset(
 
 
 def _unclaimed_blocks(
-    document: Document, diagnostics: Iterable[Diagnostic]
-) -> Iterator[CodeBlock | Table]:
+    document: model.Document, diagnostics: Iterable[Diagnostic]
+) -> Iterator[model.CodeBlock | model.Table]:
     """The texts and tables below a script of which nothing says what they are.
 
-    A table is claimed if one of its numbers is bound or given. Quizzes show what is wrong as well;
-    of a block with a mistake in its first line that is to be mended first.
+    A table is claimed if one of its numbers is bound or given.
     """
     in_features = feature_block_ids(document)
     mistakes = {d.span.line for d in diagnostics if d.is_error}
     has_script, recorded = False, None
-    for block in document_blocks(document):
-        if isinstance(block, Script):
+    for block in model.document_blocks(document):
+        if isinstance(block, model.Script):
             has_script = True
-        elif isinstance(block, Recording):
+        elif isinstance(block, model.Recording):
             recorded = block.body
         elif not has_script or id(block) in in_features or block.span.line in mistakes:
             pass
-        elif isinstance(block, CodeBlock):
+        elif isinstance(block, model.CodeBlock):
             if block.language in _TEXTS and ILLUSTRATION not in block.info.split():
                 yield block
-        elif isinstance(block, Table) and block is not recorded:
-            inlines = walk_inlines(block_inlines(block))
-            if not any(isinstance(inline, NumberBinding) for inline in inlines):
+        elif isinstance(block, model.Table) and block is not recorded:
+            inlines = model.walk_inlines(model.block_inlines(block))
+            if not any(isinstance(inline, model.NumberBinding) for inline in inlines):
                 yield block
 
 
-_MARKS = ("]{", "{#eq:")
-
-
-def _check_placement(document: Document) -> tuple[Diagnostic, ...]:
+def _check_placement(document: model.Document) -> Iterator[Diagnostic]:
     """Report terms and labels in places where no link could lead to them.
 
     The glossary shows the sentence around a term, so it is defined in a paragraph. The texts of
     quizzes, labs and headings are shown in several places, so no link can name one of them.
     """
-    if not any(mark in document.source.text for mark in _MARKS):
-        return ()
+    if not any(mark in document.source.text for mark in ("]{", "{#eq:")):
+        return
     elsewhere = feature_block_ids(document)
-    diagnostics: list[Diagnostic] = []
-    for block in document_blocks(document):
+    for block in model.document_blocks(document):
         is_elsewhere = id(block) in elsewhere
-        if is_elsewhere or not isinstance(block, Paragraph):
+        if is_elsewhere or not isinstance(block, model.Paragraph):
             message = "a term cannot be defined here"
             help = "define it in a paragraph of the text, whose sentence the glossary can show"
-            inlines = walk_inlines(block_inlines(block))
-            terms = (term.span for term in inlines if isinstance(term, Term))
-            diagnostics += [diagnose("term-place", span, message, help=help) for span in terms]
-        if is_elsewhere or isinstance(block, Heading):
+            for inline in model.walk_inlines(model.block_inlines(block)):
+                if isinstance(inline, model.Term):
+                    yield diagnose("term-place", inline.span, message, help=help)
+        if is_elsewhere or isinstance(block, model.Heading):
             message = "a formula has no label here"
             help = "label formulas of the text, but not those of quizzes, labs and headings"
-            formulas = block_formulas(block)
-            labels = (formula.label.span for formula in formulas if formula.label is not None)
-            diagnostics += [
-                diagnose("label-attribute", span, message, help=help) for span in labels
-            ]
-    return tuple(diagnostics)
+            for formula in model.block_formulas(block):
+                if formula.label is not None:
+                    yield diagnose("label-attribute", formula.label.span, message, help=help)
 
 
-def _check_ids(document: Document) -> Iterator[Diagnostic]:
-    """Report each node with an id that something above it has.
-
-    Some repetitions have a rule of their own; see `_is_reported`.
-    """
-    headings = heading_anchors(document)
-    owners: dict[str, tuple[AnchorOwner, Span]] = {}
+def _check_ids(document: model.Document) -> Iterator[Diagnostic]:
+    headings = model.heading_anchors(document)
+    owners: dict[str, tuple[model.AnchorOwner, Span]] = {}
     reported_places: set[int] = set()
-    anchors = sorted(document_anchors(document), key=lambda anchor: anchor[2].start)
+    anchors = sorted(model.document_anchors(document), key=lambda anchor: anchor[2].start)
     for name, node, span in anchors:
-        keys = node.progress_keys() if isinstance(node, FeatureBlock) else None
+        keys = node.progress_keys() if isinstance(node, model.FeatureBlock) else None
         if keys is not None and name == keys[0] and name in headings:
             continue
         entry = node, span
@@ -199,14 +156,14 @@ def _check_ids(document: Document) -> Iterator[Diagnostic]:
         yield diagnose("anchor-repeated", span.first_line(), message, help=help, notes=notes)
 
 
-def _is_reported(first: AnchorOwner, second: AnchorOwner) -> bool:
+def _is_reported(first: model.AnchorOwner, second: model.AnchorOwner) -> bool:
     """Whether it is a mistake by another rule, or found already, that two nodes have one id."""
-    if isinstance(first, FeatureBlock) and isinstance(second, FeatureBlock):
+    if isinstance(first, model.FeatureBlock) and isinstance(second, model.FeatureBlock):
         keys, other_keys = first.progress_keys(), second.progress_keys()
         return keys is not None and other_keys is not None and keys[0] == other_keys[0]
-    labelled_types = Heading | Label | DisplayFormula  # see `attributes.Anchors`
+    labelled_types = model.Heading | model.Label | DisplayFormula  # see `attributes.Anchors`
     return (isinstance(first, labelled_types) and isinstance(second, labelled_types)) or (
-        isinstance(first, Script | Term) and type(first) is type(second)
+        isinstance(first, model.Script | model.Term) and type(first) is type(second)
     )
 
 

@@ -1,14 +1,8 @@
 """Fences: code blocks of the text, of which other modules make scripts, quizzes and so on.
 
-Entry points: `read_fence`, which makes a `Fence` of a token; `find_likely_end` and
-`find_likely_start`, which guess where a fence was meant to end or begin; `TextParser` and
-`Prose.read`, for the Markdown in fences of features, which shares the footnotes, anchors and rules
-of its document.
-
-Info strings are `kind [name] [key=value | key="value with spaces" | flag]…`: `read_keys`
-compares the words after the kind with the keys that it has (for a `Fence`, call its method `keys`),
-`split_words` only splits. In a quoted value a backslash stands before a quote and a backslash.
-Mistakes are diagnostics at the word that is wrong; the rest is still read.
+Info strings are `kind [name] [key=value | key="value with spaces" | flag]…`. In a quoted value a
+backslash stands before a quote and a backslash. Mistakes are diagnostics at the word that is wrong;
+the rest is still read.
 """
 
 from __future__ import annotations
@@ -97,7 +91,6 @@ class FenceKeys(Struct, frozen=True):
     """The name and the keys of an info string."""
 
     name: Word | None
-    """The first word after the kind, if it is a name."""
     words: tuple[Word, ...]
     """The words whose keys the kind has, each key once."""
 
@@ -120,47 +113,6 @@ def kind_of(info: Excerpt) -> Excerpt:
     """The first word of an info string."""
     match = _KIND.match(info.text)
     return info.slice(*match.span(1)) if match else info
-
-
-def read_keys(
-    info: Excerpt, *, values: Sequence[str] = (), flags: Sequence[str] = (), has_name: bool = False
-) -> Parsed[FenceKeys]:
-    """Read the keys of a fence: those in `values` take a value, `flags` none, those in both may.
-
-    With `has_name` a first word without `=` is a name.
-    """
-    kind, split = kind_of(info).text, split_words(info)
-    words, diagnostics = list(split.value), list(split.diagnostics)
-    name = words.pop(0) if has_name and words and words[0].value is None else None
-    keys = [*values, *flags]
-    words_by_key: dict[str, Word] = {}
-    for word in words:
-        key = word.key
-        if key not in keys and (foreign := check_foreign_key(kind, word)) is not None:
-            diagnostics.append(foreign)
-        elif key not in keys:
-            message = f"`{kind}` has no key `{key}`" if keys else f"`{kind}` takes no keys"
-            help = did_you_mean(key, keys)
-            diagnostics.append(diagnose("fence-key-unknown", word.key_span, message, help=help))
-        elif key in words_by_key:
-            notes = [Note("first given here", words_by_key[key].key_span)]
-            message, is_same = f"`{key}` is given twice", words_by_key[key].value == word.value
-            help = Fix("delete one of them", edits=word.removal if is_same else (), safe=True)
-            diagnostic = diagnose(
-                "fence-key-repeated", word.key_span, message, help=help, notes=notes
-            )
-            diagnostics.append(diagnostic)
-        elif key not in values and word.value is not None:
-            is_yes = (word.value or "").lower() in ("true", "yes", "on", "1", key)
-            message = f"`{key}` takes no value"
-            help = Fix(f"write `{key}` alone", key if is_yes else None, safe=True)
-            diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
-        elif word.value == "" or (key not in flags and word.value is None):
-            message, help = f"`{key}` needs a value", f"write `{key}=…`"
-            diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
-        else:
-            words_by_key[key] = word
-    return Parsed(FenceKeys(name, tuple(words_by_key.values())), tuple(diagnostics))
 
 
 def check_foreign_key(kind: str, word: Word) -> Diagnostic | None:
@@ -195,8 +147,20 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
             place = info.span(equals, equals + 1)
             diagnostics.append(diagnose("fence-info", place, message, help=help))
         elif end < len(text) and not text[end].isspace():
-            diagnostic, end = _diagnose_malformed(info, at, end)
-            diagnostics.append(diagnostic)
+            start, rest = at, _REST.match(text, end)
+            advice: str
+            if text[end] == '"' and text.count('"', end) == 1:
+                start, end, message = end, len(text), "a quoted value is never closed"
+                place = info.span(start, end)
+                edit = Edit(Span(place.source, place.end, place.end), '"')
+                advice = Fix('close it with `"`', edits=(edit,))
+            else:
+                end = rest.end() if rest else end
+                message = f"`{text[at:end]}` cannot be read"
+                advice = 'write `key=value`, `key="value with spaces"` or a flag, '
+                advice += "with spaces between them"
+            place = info.span(start, end)
+            diagnostics.append(diagnose("fence-info", place, message, help=advice))
         elif not match[1]:
             message = f"`{match[0]}` has no key before the `=`"
             diagnostics.append(diagnose("fence-info", info.span(at, end), message))
@@ -210,23 +174,7 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
     return Parsed(tuple(words), tuple(diagnostics))
 
 
-def _diagnose_malformed(info: Excerpt, at: int, end: int) -> tuple[Diagnostic, int]:
-    """The diagnostic of a word that cannot be read, and where to go on."""
-    text = info.text
-    if text[end] == '"' and text.count('"', end) == 1:
-        span = info.span(end, len(text))
-        edit = Edit(Span(span.source, span.end, span.end), '"')
-        fix = Fix('close it with `"`', edits=(edit,))
-        return diagnose("fence-info", span, "a quoted value is never closed", help=fix), len(text)
-    rest = _REST.match(text, end)
-    word_end = rest.end() if rest else end
-    message = f"`{text[at:word_end]}` cannot be read"
-    help = 'write `key=value`, `key="value with spaces"` or a flag, with spaces between them'
-    return diagnose("fence-info", info.span(at, word_end), message, help=help), word_end
-
-
 def _unescape(value: Excerpt) -> Excerpt:
-    """A quoted value without its backslashes."""
     escapes = [(match.start(), match.start(1)) for match in _ESCAPE.finditer(value.text)]
     starts, ends = [0, *(b for _, b in escapes)], [*(a for a, _ in escapes), len(value.text)]
     return Excerpt.join([value.slice(a, b) for a, b in zip(starts, ends, strict=True)])
@@ -261,7 +209,6 @@ class Fence(Struct, frozen=True):
     body_span: Span
     """Those lines in the source, from the start of the first to that of the closing line."""
     prefix: str
-    """The text before each of those lines in the source."""
     is_closed: bool
     nested: bool
     """Whether it stands in a text of a quiz or lab, where no lines can be extracted or updated."""
@@ -272,14 +219,47 @@ class Fence(Struct, frozen=True):
 
     @property
     def kind(self) -> str:
-        """The first word of the info string."""
         return kind_of(self.info).text
 
     def keys(
         self, *, values: Sequence[str] = (), flags: Sequence[str] = (), has_name: bool = False
     ) -> Parsed[FenceKeys]:
-        """The keys in the info string after the kind; see `read_keys`."""
-        return read_keys(self.info, values=values, flags=flags, has_name=has_name)
+        """The keys after the kind: those in `values` take a value, `flags` none, those in both may.
+
+        With `has_name` a first word without `=` is a name.
+        """
+        kind, split = self.kind, split_words(self.info)
+        words, diagnostics = list(split.value), list(split.diagnostics)
+        name = words.pop(0) if has_name and words and words[0].value is None else None
+        keys = [*values, *flags]
+        words_by_key: dict[str, Word] = {}
+        for word in words:
+            key = word.key
+            if key not in keys and (foreign := check_foreign_key(kind, word)) is not None:
+                diagnostics.append(foreign)
+            elif key not in keys:
+                message = f"`{kind}` has no key `{key}`" if keys else f"`{kind}` takes no keys"
+                help = did_you_mean(key, keys)
+                diagnostics.append(diagnose("fence-key-unknown", word.key_span, message, help=help))
+            elif key in words_by_key:
+                notes = [Note("first given here", words_by_key[key].key_span)]
+                message, is_same = f"`{key}` is given twice", words_by_key[key].value == word.value
+                help = Fix("delete one of them", edits=word.removal if is_same else (), safe=True)
+                diagnostic = diagnose(
+                    "fence-key-repeated", word.key_span, message, help=help, notes=notes
+                )
+                diagnostics.append(diagnostic)
+            elif key not in values and word.value is not None:
+                is_yes = (word.value or "").lower() in ("true", "yes", "on", "1", key)
+                message = f"`{key}` takes no value"
+                help = Fix(f"write `{key}` alone", key if is_yes else None, safe=True)
+                diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
+            elif word.value == "" or (key not in flags and word.value is None):
+                message, help = f"`{key}` needs a value", f"write `{key}=…`"
+                diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
+            else:
+                words_by_key[key] = word
+        return Parsed(FenceKeys(name, tuple(words_by_key.values())), tuple(diagnostics))
 
     def code(self) -> CodeBlock:
         """The fence as an ordinary code block."""
@@ -327,13 +307,11 @@ def find_likely_end(fence: Fence) -> Span | None:
         except ValueError:
             return None
     elif fence.kind == "python":
-        try:
-            ast.parse(text)
-        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-            line = error.lineno or 0 if isinstance(error, SyntaxError) else 0
-            end = len("".join(text.splitlines(keepends=True)[: max(line - 1, 0)]).rstrip())
-        else:
+        error = _parse_error(text)
+        if error is None:
             return None
+        line = error.lineno or 0 if isinstance(error, SyntaxError) else 0
+        end = len("".join(text.splitlines(keepends=True)[: max(line - 1, 0)]).rstrip())
     else:
         match = _TEXT_AGAIN.search(text)
         end = 0 if match is None else match.start()
@@ -354,7 +332,7 @@ def find_likely_start(head: Span) -> Span | None:
             break
         if source.line_text(line).strip(" \t>") and not source.line_text(line - 1).strip(" \t>"):
             text = source.text[source.line_start(line) : source.line_start(head.line)]
-            if start is None or _is_python(text) or text.startswith("{"):
+            if start is None or _parse_error(text) is None or text.startswith("{"):
                 start = source.line_start(line)
     if start is None:
         return None
@@ -362,13 +340,12 @@ def find_likely_start(head: Span) -> Span | None:
     return source.span(start, end)
 
 
-def _is_python(text: str) -> bool:
-    """Whether a text parses as Python."""
+def _parse_error(text: str) -> Exception | None:
     try:
         ast.parse(text)
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return False
-    return True
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        return error
+    return None
 
 
 def line_prefix(place: Span) -> str:

@@ -1,8 +1,5 @@
 """Raw HTML: its tags, whether they balance, the files that it shows, and what it must not hold.
 
-Entry points: `tags` and `tag_at`, which scan; `Balance`, which tracks open elements; `find_media`;
-`find_address`, the place of an address; `find_forbidden`.
-
 Elements whose end tag may be left out, void elements, comments and raw text never give a false
 alarm. An element must be closed in the block, list item or emphasis in which it was opened, as it
 would break the structure of the page otherwise.
@@ -32,7 +29,6 @@ VOID = frozenset("area base br col embed hr img input link meta param source tra
 _IMPLIED_ELEMENTS = frozenset("body colgroup head html tbody tfoot thead".split())
 """Elements that exist without any tag."""
 _OPTIONAL = frozenset("caption dd dt li optgroup option p rp rt td th tr".split())
-"""Elements whose end tag may be left out."""
 _RAW_TEXT = frozenset("script style textarea title".split())
 LITERAL = frozenset("code kbd math pre samp svg".split()) | _RAW_TEXT
 """Elements in which a dollar is a dollar."""
@@ -43,7 +39,6 @@ _ATTRIBUTE = re.compile(
 )
 _LINK_ATTRIBUTES = frozenset("cite href poster src xlink:href".split())
 _MEDIA_ELEMENTS = frozenset("audio embed iframe img input object source track video".split())
-"""Elements that show a file."""
 _MEDIA_ATTRIBUTES = frozenset("data poster src srcset".split())
 _CANDIDATE = re.compile(r"[\s,]*([^\s,]+)[^,]*")
 """An address of a `srcset`, with the size that follows it."""
@@ -81,7 +76,6 @@ def tag_at(text: str, at: int) -> Tag | None:
 
 @functools.lru_cache(maxsize=4)
 def _end_tag_ends(text: str, name: str) -> list[int]:
-    """The offsets at which the end tags of an element end."""
     return [match.end() for match in re.finditer(rf"</{name}\s*>", text, re.IGNORECASE)]
 
 
@@ -140,22 +134,19 @@ class Balance:
                 self._opened_names.add(name)
             elif name not in self._opened_names:
                 self._report_stray(name, span)
-        elif tag.is_end_tag:
-            self._close(name, span)
-        else:
+        elif not tag.is_end_tag:
             self._open.append((name, span))
-
-    def _close(self, name: str, span: Span) -> None:
-        base = self._scopes[-1]
-        for i in range(len(self._open) - 1, max(base, len(self._open) - 200) - 1, -1):
-            if self._open[i][0] == name:
-                self._unwind(i + 1)
-                self._open.pop()
-                return
-        if self._reported[name]:
-            self._reported[name] -= 1
         else:
-            self._report_stray(name, span)
+            first = max(self._scopes[-1], len(self._open) - 200)
+            openings = range(len(self._open) - 1, first - 1, -1)
+            at = next((i for i in openings if self._open[i][0] == name), None)
+            if at is not None:
+                self._unwind(at + 1)
+                self._open.pop()
+            elif self._reported[name]:
+                self._reported[name] -= 1
+            else:
+                self._report_stray(name, span)
 
     def _unwind(self, base: int) -> None:
         for name, span in self._open[base:]:
@@ -172,46 +163,38 @@ class Balance:
 
 def find_media(html: Excerpt) -> tuple[MediaAddress, ...]:
     """The addresses of files that HTML shows."""
-    text = html.text
     return tuple(
-        MediaAddress(start, end, unescape(text[start:end]), html.span(start, end))
-        for tag in tags(text)
-        if tag.name in _MEDIA_ELEMENTS
-        for attribute in _attributes(text, tag)
-        if attribute[0] in _MEDIA_ATTRIBUTES
-        for start, end in _addresses(text, *attribute)
+        MediaAddress(start, end, unescape(html.text[start:end]), html.span(start, end))
+        for element, attribute, start, end in _addresses(html.text)
+        if element in _MEDIA_ELEMENTS and attribute in _MEDIA_ATTRIBUTES
     )
 
 
 def find_address(text: str, url: str) -> tuple[int, int] | None:
     """The place where HTML first names an address in an attribute, however it is escaped there."""
-    places = (
-        place
-        for tag in tags(text)
-        for attribute in _attributes(text, tag)
-        for place in _addresses(text, *attribute)
-        if attribute[0] in _LINK_ATTRIBUTES | _MEDIA_ATTRIBUTES
-    )
-    return next((place for place in places if unescape(text[slice(*place)]) == url), None)
+    for _, attribute, start, end in _addresses(text):
+        is_address = attribute in _LINK_ATTRIBUTES | _MEDIA_ATTRIBUTES
+        if is_address and unescape(text[start:end]) == url:
+            return start, end
+    return None
 
 
 def _attributes(text: str, tag: Tag) -> Iterator[tuple[str, int, int]]:
-    """The names of the attributes with a value, and where these values stand.
-
-    They are read one after the other, as the text of one may occur in the value of another.
-    """
+    """The attributes with a value, and its place; in order, as a value may hold others."""
     for match in _ATTRIBUTE.finditer(text, tag.start, tag.end) if tag.name else ():
         if match[1]:
             yield match[1].lower(), *match.span(match.lastindex or 0)
 
 
-def _addresses(text: str, attribute: str, start: int, end: int) -> Iterator[tuple[int, int]]:
-    """The places of the addresses in the value of an attribute."""
-    if attribute == "srcset":
-        for candidate in _CANDIDATE.finditer(text, start, end):
-            yield candidate.span(1)
-    elif start < end:
-        yield start, end
+def _addresses(text: str) -> Iterator[tuple[str, str, int, int]]:
+    """The element and the attribute of each address, and its place."""
+    for tag in tags(text):
+        for attribute, start, end in _attributes(text, tag):
+            if attribute == "srcset":
+                for candidate in _CANDIDATE.finditer(text, start, end):
+                    yield tag.name, attribute, *candidate.span(1)
+            elif start < end:
+                yield tag.name, attribute, start, end
 
 
 ELEMENTS = frozenset(
@@ -270,41 +253,34 @@ _HARMLESS = re.compile(
 
 def find_forbidden(html: Excerpt) -> tuple[ForbiddenHtml, ...]:
     """The parts of HTML that a page must not hold."""
-    parts = _check_html(html.text)
+    text, at = html.text, 0
+    parts: list[tuple[int, int, str]] = []
+    while at < len(text):
+        if (tag := _STRICT_TAG.match(text, at)) is not None:
+            element, end = tag[1].lower(), tag.end()
+            if element not in ELEMENTS:
+                parts.append((at, end, f"`<{tag[1]}>` is not allowed in a page"))
+            for attribute in (
+                _ATTRIBUTES.finditer(text, *tag.span(2)) if element in ELEMENTS else ()
+            ):
+                value = unescape((attribute[2] or "").strip("\"'"))
+                subject = _find_forbidden_part(element, attribute[1].lower(), value)
+                if subject:
+                    message = f"{subject} is not allowed in a page"
+                    parts.append((attribute.start(1), attribute.end(), message))
+        elif (harmless := _HARMLESS.match(text, at)) is not None:
+            end = harmless.end()
+        elif text.startswith("<!--", at) and "-->" not in text[at:]:
+            break  # an error in every course
+        else:
+            end = text.find(">", at) + 1 or len(text)
+            parts.append((at, end, "this is not HTML that every browser reads in the same way"))
+        at = end
     return tuple(ForbiddenHtml(html.span(start, end), message) for start, end, message in parts)
 
 
-def _check_html(html: str) -> Iterator[tuple[int, int, str]]:
-    """Yield the start, the end and the message of each part that is not allowed."""
-    at = 0
-    while at < len(html):
-        if (tag := _STRICT_TAG.match(html, at)) is not None:
-            yield from _check_tag(html, tag)
-            at = tag.end()
-        elif (harmless := _HARMLESS.match(html, at)) is not None:
-            at = harmless.end()
-        elif html.startswith("<!--", at) and "-->" not in html[at:]:
-            return  # an error in every course
-        else:
-            end = html.find(">", at) + 1 or len(html)
-            yield at, end, "this is not HTML that every browser reads in the same way"
-            at = end
-
-
-def _check_tag(html: str, tag: re.Match[str]) -> Iterator[tuple[int, int, str]]:
-    element = tag[1].lower()
-    if element not in ELEMENTS:
-        yield *tag.span(), f"`<{tag[1]}>` is not allowed in a page"
-        return
-    for attribute in _ATTRIBUTES.finditer(html, *tag.span(2)):
-        value = unescape((attribute[2] or "").strip("\"'"))
-        subject = _find_forbidden_part(element, attribute[1].lower(), value)
-        if subject:
-            yield attribute.start(1), attribute.end(), f"{subject} is not allowed in a page"
-
-
 def _find_forbidden_part(element: str, name: str, value: str) -> str:
-    """The part of an attribute that is forbidden, in words; empty if it is allowed."""
+    """The forbidden part of an attribute, in words; empty if it is allowed."""
     if "</title" in value.lower():  # ends a `<title>` of HTML even inside quotes
         return f"`{name}` with the end of a title"
     if name in _ADDRESSES:

@@ -1,33 +1,16 @@
-"""The inline parser: markdown-it's rules, and those for formulas, footnotes, terms, bound numbers.
-
-Entry point: `inline_tokens`. The next character decides which rules are tried; tokens get their
-places in the text.
-"""
+"""The inline parser: markdown-it's rules, and those for formulas, footnotes, terms and numbers."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import partial
 from typing import cast
 
-from markdown_it import MarkdownIt
+from markdown_it import MarkdownIt, rules_inline
 from markdown_it.helpers import parseLinkLabel
 from markdown_it.parser_inline import ParserInline
 from markdown_it.ruler import Ruler
-from markdown_it.rules_inline import (
-    StateInline,
-    autolink,
-    backtick,
-    emphasis,
-    entity,
-    escape,
-    html_inline,
-    image,
-    link,
-    newline,
-    strikethrough,
-    text,
-)
 from markdown_it.token import Token
 from markdown_it.utils import EnvType
 
@@ -43,22 +26,21 @@ MAX_RUN = 200
 
 
 def inline_tokens(src: str, env: EnvType, *, html: bool = False) -> list[PositionedToken]:
-    """The inline tokens of a block's content; `env` has its `references`.
-
-    In `html` only tags, entities and formulas are read.
-    """
+    """The inline tokens of a block; in `html` only tags, entities and formulas are read."""
     parser = _HTML if html else _MARKDOWN
     return cast(list[PositionedToken], parser.inline.parse(src, parser, env, []))
 
 
-def _emphasis(state: StateInline, silent: bool) -> bool:
+def _emphasis(state: rules_inline.StateInline, silent: bool) -> bool:
     """Emphasis marks and two tildes; an absurd run, or another number of tildes, is text."""
     start, mark = state.pos, state.src[state.pos]
     end = start
     while end < state.posMax and state.src[end] == mark:
         end += 1
     if end - start < MAX_RUN if mark != "~" else end - start == 2:
-        rule = strikethrough.tokenize if mark == "~" else emphasis.tokenize
+        rule = (
+            rules_inline.strikethrough.tokenize if mark == "~" else rules_inline.emphasis.tokenize
+        )
         return rule(state, silent)
     if not silent:
         state.append_pending(state.src[start:end])
@@ -71,14 +53,10 @@ _BINDING = re.compile(
 )
 
 
-def _code_span(state: StateInline, silent: bool) -> bool:
-    """A code span; with `{out}` after it a `number_binding`, the script's path in its `info`.
-
-    With `{given}` it is a `number_given`, and its `info` the source; with `{code}` it stays code,
-    and its `info` is `code`.
-    """
+def _code_span(state: rules_inline.StateInline, silent: bool) -> bool:
+    """A code span; with braces after it a `number_binding` or `number_given`, with its `info`."""
     start = state.pos
-    if not backtick(state, silent):
+    if not rules_inline.backtick(state, silent):
         return False
     end = state.pos
     match = _BINDING.match(state.src, end, state.posMax)
@@ -96,37 +74,25 @@ def _code_span(state: StateInline, silent: bool) -> bool:
     return True
 
 
-_FOOTNOTE = re.compile(r"\[\^([^\s\[\]]+)\]")
-
-
-def _footnote_reference(state: StateInline, silent: bool) -> bool:
-    """`[^label]`; whether the footnote exists is checked later."""
-    match = _FOOTNOTE.match(state.src, state.pos, state.posMax)
-    if match is None:
-        return False
-    if not silent:
-        token = state.push("footnote_ref", "", 0)
-        token.content = match[1]
-    state.pos = match.end()
-    return True
-
-
 _CITED = r"(?:[^\[\]{}@;]*\s)?@(?:[\w.:/+-]*\w)(?:[^\S\n]*,[^\[\]{};@]*)?\s*"
-_CITATION = re.compile(rf"\[({_CITED}(?:;{_CITED})*)\](?![\[({{:])")
+_LEAVES = {
+    "citation": re.compile(rf"\[({_CITED}(?:;{_CITED})*)\](?![\[({{:])"),
+    "footnote_ref": re.compile(r"\[\^([^\s\[\]]+)\]"),
+}
 
 
-def _citation(state: StateInline, silent: bool) -> bool:
-    """`[see @key, p. 12; @other]`; `content` has what stands between the brackets."""
-    match = _CITATION.match(state.src, state.pos, state.posMax) if "@" in state.src else None
+def _leaf(state: rules_inline.StateInline, silent: bool, *, kind: str) -> bool:
+    """`[see @key, p. 12; @other]` or `[^label]`; `content` has what stands between the brackets."""
+    match = _LEAVES[kind].match(state.src, state.pos, state.posMax)
     if match is None:
         return False
     if not silent:
-        state.push("citation", "", 0).content = match[1]
+        state.push(kind, "", 0).content = match[1]
     state.pos = match.end()
     return True
 
 
-def _term(state: StateInline, silent: bool) -> bool:
+def _term(state: rules_inline.StateInline, silent: bool) -> bool:
     """`[text]{term}`: tokens `term_open` and `term_close`; `map` of the second has the braces.
 
     In silent mode, which only looks for the end of a link's text, these are mere brackets: so a
@@ -151,17 +117,16 @@ def _term(state: StateInline, silent: bool) -> bool:
     return True
 
 
-def _link(state: StateInline, silent: bool) -> bool:
+def _link(state: rules_inline.StateInline, silent: bool) -> bool:
     """A link or image, unless no bracket closes after this one."""
     assert isinstance(state, InlineState)
     if state.pos > state.last_bracket:
         return False
-    rule = link if state.src[state.pos] == "[" else image
+    rule = rules_inline.link if state.src[state.pos] == "[" else rules_inline.image
     return rule(state, silent)
 
 
-def _html(state: StateInline, silent: bool) -> bool:
-    """A tag or a comment in a text that is HTML."""
+def _html(state: rules_inline.StateInline, silent: bool) -> bool:
     assert isinstance(state, InlineState)
     tag = tag_at(state.src, state.pos)
     if tag is None:
@@ -173,7 +138,7 @@ def _html(state: StateInline, silent: bool) -> bool:
     return True
 
 
-def _formula(state: StateInline, silent: bool) -> bool:
+def _formula(state: rules_inline.StateInline, silent: bool) -> bool:
     """A formula in a text that is HTML, or a dollar after a backslash."""
     assert isinstance(state, InlineState)
     if state.literal:
@@ -187,27 +152,25 @@ def _formula(state: StateInline, silent: bool) -> bool:
     return True
 
 
-def _line_end(state: StateInline, silent: bool) -> bool:
-    """A line end in a text that is HTML."""
+def _line_end(state: rules_inline.StateInline, silent: bool) -> bool:
     state.push("softbreak", "br", 0)
     state.pos += 1
     return True
 
 
-InlineRules = dict[str, tuple[Callable[[StateInline, bool], bool], ...]]
-"""Rules by the first character of what they read."""
+InlineRules = dict[str, tuple[Callable[[rules_inline.StateInline, bool], bool], ...]]
 
 _RULES: InlineRules = {
-    "\n": (newline,),
-    "\\": (escape,),
+    "\n": (rules_inline.newline,),
+    "\\": (rules_inline.escape,),
     "`": (_code_span,),
     "*": (_emphasis,),
     "_": (_emphasis,),
     "~": (_emphasis,),
-    "[": (_citation, _term, _link, _footnote_reference),
+    "[": (partial(_leaf, kind="citation"), _term, _link, partial(_leaf, kind="footnote_ref")),
     "!": (_link,),
-    "<": (autolink, html_inline),
-    "&": (entity,),
+    "<": (rules_inline.autolink, rules_inline.html_inline),
+    "&": (rules_inline.entity,),
     "$": (math_inline,),
 }
 _STOP = re.compile(r"[\n\\`*_~\[\]<&$!](?:(?<!!)|(?=\[))")
@@ -216,25 +179,25 @@ _HTML_RULES: InlineRules = {
     "\n": (_line_end,),
     "\\": (_formula,),
     "<": (_html,),
-    "&": (entity,),
+    "&": (rules_inline.entity,),
     "$": (_formula,),
 }
 _HTML_STOP = re.compile(r"[\n\\<&$]")
 
 
 class _InlineParser(ParserInline):
-    """markdown-it's inline parser with rules of ours."""
+    """Rules by the next character; tokens get their places in the text."""
 
     def __init__(self, rules: InlineRules, stop: re.Pattern[str]) -> None:
         super().__init__()
         self.rules = rules
         self.ruler = Ruler()
-        self.ruler.push("text", text)
+        self.ruler.push("text", rules_inline.text)
         self.ruler.push("by character", self.apply_rule)
         self.ruler2.disable("fragments_join")
         self.terminator_re = stop
 
-    def apply_rule(self, state: StateInline, silent: bool) -> bool:
+    def apply_rule(self, state: rules_inline.StateInline, silent: bool) -> bool:
         """Try the rules of the next character until one applies; give its tokens their places."""
         at, token_count = state.pos, len(state.tokens)
         for rule in self.rules.get(state.src[at], ()):

@@ -1,13 +1,8 @@
-r"""JSON in a fence, read strictly, every value with its place.
+"""JSON in a fence, read strictly (RFC 8259), every value with its place.
 
-Entry points: `parse_json(body, place)`; `to_one_line`, a value without its layout.
-
-1. One pass over the text gives the nodes. The grammar is RFC 8259 and nothing more; nesting is
-   limited to `MAX_DEPTH`.
-2. If the meaning is clear in spite of a mistake (a trailing or missing comma, a comment, `True`, a
-   bad escape, a malformed number, a repeated key), it is reported and reading goes on, so that one
-   run shows all of these.
-3. Any other mistake makes the rest unreliable: it is reported, and there is no value.
+If the meaning is clear in spite of a mistake, such as a missing comma or `True`, it is reported and
+reading goes on, so that one run shows all of these. Any other mistake makes the rest unreliable: it
+is reported, and there is no value.
 """
 
 from __future__ import annotations
@@ -17,22 +12,7 @@ import json
 import re
 from typing import NoReturn
 
-from coursebuild.core.syntax.nodes import (
-    ArrayNode,
-    BoolNode,
-    ErrorNode,
-    Member,
-    Node,
-    NullNode,
-    NumberNode,
-    ObjectNode,
-    StringNode,
-    check_tex_escapes,
-    odd_character,
-    replace_escapes,
-    shorten,
-    tex_word,
-)
+from coursebuild.core.syntax import nodes
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, Parsed, diagnose, write
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -59,7 +39,7 @@ _CONSTANTS |= dict.fromkeys(("None", "NULL", "Null", "nil", "undefined"), "null"
 _NOT_FINITE = frozenset(("NaN", "nan", "Infinity", "inf", "Inf"))
 
 
-def parse_json(body: Excerpt, place: Span) -> Parsed[Node | None]:
+def parse_json(body: Excerpt, place: Span) -> Parsed[nodes.Node | None]:
     """The value in `body`; `place` is what to point at if there is none. Never raises.
 
     There may be a value and diagnostics; a caller that finds any must not publish it.
@@ -76,7 +56,7 @@ def parse_json(body: Excerpt, place: Span) -> Parsed[Node | None]:
     return Parsed(value, tuple(reader.diagnostics))
 
 
-def to_one_line(node: Node) -> Excerpt:
+def to_one_line(node: nodes.Node) -> Excerpt:
     """A value on one line, each of its tokens as written and with its place."""
     text, pieces = "", []
     for token in _TOKEN.finditer(node.body.text, node.start, node.end):
@@ -98,7 +78,7 @@ class _Reader:
         self.offset = 0
         self.diagnostics: list[Diagnostic] = []
 
-    def read_document(self) -> Node:
+    def read_document(self) -> nodes.Node:
         value = self.read_value(0)
         char = self.peek()
         if char and char in "]}":
@@ -120,7 +100,7 @@ class _Reader:
                 help = Fix("remove it", edits=(edit,))
                 self.report(at, at + len(first_line), "JSON has no comments", help)
                 self.offset = comment.end()
-            elif odd := odd_character(char):
+            elif odd := nodes.odd_character(char):
                 help = Fix("replace it by a plain space, or remove it", " ", safe=True)
                 self.report(at, at + 1, f"{odd} is not white space in JSON", help)
                 self.offset += 1
@@ -129,7 +109,7 @@ class _Reader:
 
     # ----------------------------------------------------------------------- objects and arrays
 
-    def read_value(self, depth: int) -> Node:
+    def read_value(self, depth: int) -> nodes.Node:
         char, start = self.peek(), self.offset
         if char == '"':
             return self.read_string()
@@ -146,29 +126,29 @@ class _Reader:
         self.offset = scalar.end()
         return self.read_scalar(start, scalar[0])
 
-    def read_object(self, start: int, depth: int) -> ObjectNode:
-        members: dict[str, Member] = {}
+    def read_object(self, start: int, depth: int) -> nodes.ObjectNode:
+        members: dict[str, nodes.Member] = {}
         is_done = self.peek() == "}"
         while not is_done:
             if self.peek() != '"':
                 self.fail_expecting("a key in double quotes", opening=start)
             key = self.read_string()
             if first := members.get(key.value):
-                message = f"`{shorten(key.value)}` is given twice"
+                message = f"`{nodes.shorten(key.value)}` is given twice"
                 notes = (Note("the first one is here", first.key.span),)
                 self.diagnostics.append(diagnose("field-repeated", key.span, message, notes=notes))
             if self.peek() == "=":
                 self.report(self.offset, self.offset + 1, "`=` where JSON has `:`", write(":"))
             elif self.peek() != ":":
-                self.fail_expecting(f"`:` after the key `{shorten(key.value)}`")
+                self.fail_expecting(f"`:` after the key `{nodes.shorten(key.value)}`")
             self.offset += 1
-            members.setdefault(key.value, Member(key, self.read_value(depth + 1)))
+            members.setdefault(key.value, nodes.Member(key, self.read_value(depth + 1)))
             is_done = self.read_separator(start, "}")
         self.offset += 1
-        return ObjectNode(self.body, start, self.offset, (start, start + 1), members)
+        return nodes.ObjectNode(self.body, start, self.offset, (start, start + 1), members)
 
-    def read_array(self, start: int, depth: int) -> ArrayNode:
-        items: list[Node] = []
+    def read_array(self, start: int, depth: int) -> nodes.ArrayNode:
+        items: list[nodes.Node] = []
         is_done = self.peek() == "]"
         while not is_done:
             if not self.peek():
@@ -176,7 +156,7 @@ class _Reader:
             items.append(self.read_value(depth + 1))
             is_done = self.read_separator(start, "]")
         self.offset += 1
-        return ArrayNode(self.body, start, self.offset, (start, start + 1), items)
+        return nodes.ArrayNode(self.body, start, self.offset, (start, start + 1), items)
 
     def read_separator(self, opening: int, closer: str) -> bool:
         """Read what follows a value, the comma included; whether it was the last value."""
@@ -200,19 +180,19 @@ class _Reader:
 
     # ---------------------------------------------------------------------------------- scalars
 
-    def read_scalar(self, start: int, text: str) -> Node:
+    def read_scalar(self, start: int, text: str) -> nodes.Node:
         """A number or word; `ErrorNode` for one that is not JSON."""
         end = self.offset
         if text in ("true", "false"):
-            return BoolNode(self.body, start, end, text == "true")
+            return nodes.BoolNode(self.body, start, end, text == "true")
         if text == "null":
-            return NullNode(self.body, start, end)
+            return nodes.NullNode(self.body, start, end)
         number = _NUMBER.fullmatch(text)
         if number is not None and (number[1] or number[2]):
-            return NumberNode(self.body, start, end, float(text))
+            return nodes.NumberNode(self.body, start, end, float(text))
         if number is not None:
             try:
-                return NumberNode(self.body, start, end, int(text))
+                return nodes.NumberNode(self.body, start, end, int(text))
             except ValueError:  # Python converts no more than some thousand digits
                 message, help = f"a number of {end - start} digits is too long", ""
         elif text in _CONSTANTS:
@@ -220,14 +200,14 @@ class _Reader:
         elif text.lstrip("+-") in _NOT_FINITE:
             message, help = f"JSON has no `{text}`", "write a finite number"
         elif text[0] in "+-.0123456789":
-            message, help = f"`{shorten(text)}` is not a number of JSON", _number_help(text)
+            message, help = f"`{nodes.shorten(text)}` is not a number of JSON", _number_help(text)
         else:
             self.offset = start
             self.fail_expecting("a value")
         self.report(start, end, message, help)
-        return ErrorNode(self.body, start, end)
+        return nodes.ErrorNode(self.body, start, end)
 
-    def read_string(self) -> StringNode:
+    def read_string(self) -> nodes.StringNode:
         match = _STRING.match(self.text, self.offset)
         if match is None:
             line = self.text[self.offset :].split("\n", 1)[0].rstrip()
@@ -238,9 +218,9 @@ class _Reader:
         self.offset = match.end()
         escapes = _ESCAPE.finditer(self.text, *match.span(1))
         replacements = ((escape, self.decode_escape(escape)) for escape in escapes)
-        value = replace_escapes(self.body, match.span(1), replacements)
-        self.diagnostics += check_tex_escapes(value, _backslash_help)
-        return StringNode(self.body, *match.span(), value)
+        value = nodes.replace_escapes(self.body, match.span(1), replacements)
+        self.diagnostics += nodes.check_tex_escapes(value, _backslash_help)
+        return nodes.StringNode(self.body, *match.span(), value)
 
     def decode_escape(self, match: re.Match[str]) -> str:
         """The character that an escape stands for; a wrong one is reported."""
@@ -249,7 +229,7 @@ class _Reader:
             char = json.loads(f'"{match[0]}"')
         if char and not _SURROGATE.match(char):
             return char
-        escape, word = match[0], tex_word(self.text, match.start() + 1)
+        escape, word = match[0], nodes.tex_word(self.text, match.start() + 1)
         if char:
             name = f"`{escape}`" if len(escape) > 1 else f"U+{ord(char):04X}"
             message, help = f"{name} is half of a character", "write the character itself"
@@ -292,7 +272,7 @@ class _Reader:
         if expected.startswith("`,`") and (char.isalnum() or char == "\\"):
             return 'a double quote inside a string is written `\\"`'
         if expected == "a key in double quotes" and is_letter:
-            return write(f'"{shorten(word)}"')
+            return write(f'"{nodes.shorten(word)}"')
         if expected == "a value" and is_letter:
             is_alone = re.match(r"[ \t]*[,\]}\n]", rest)
             return Fix("text stands between double quotes", f'"{word}"' if is_alone else None)
@@ -325,7 +305,7 @@ class _Reader:
         if opening is not None and word in "]}:":
             place = self.body.span(opening, opening + 1)
             notes = (Note(f"`{text[opening]}` is opened here", place),)
-        name = "a string" if word == '"' else f"`{shorten(word)}`"
+        name = "a string" if word == '"' else f"`{nodes.shorten(word)}`"
         help = self.help_with(word, noun)
         self.report(at, at + len(word), f"expected {noun}, found {name}", help, notes)
         raise _UnreadableError
@@ -348,7 +328,6 @@ def _backslash_help(command: str) -> str:
 
 
 def _number_help(text: str) -> str:
-    """How to write a malformed number in JSON, if that is clear."""
     for read in (lambda: int(text, 0), lambda: int(text), lambda: float(text)):
         try:
             value = read()

@@ -1,9 +1,7 @@
 """The kinds of markup that readers would see as it is written.
 
-Entry points: `BROKEN`, markup of ours that is not whole; `FOREIGN`, that of other tools; `IN_HTML`,
-what is unread between tags; `ONCE`; `REWRITES`, what to write instead; `LANGUAGES` and
-`PLAIN_TEXTS`, of blocks. Patterns are searched for in a text in which NUL stands for all that was
-read, so that a mark directly after a NUL stands directly after a link, code and so on.
+Patterns are searched for in a text in which NUL stands for all that was read, so that a mark
+directly after a NUL stands directly after a link, code and so on.
 """
 
 from __future__ import annotations
@@ -71,7 +69,8 @@ FOREIGN = {
     "attributes": MarkupKind(
         r"\{:?[ \t]*[.#][A-Za-z][\w:.-]*[^{}\n\0]*\}?|\{:[^{}\n\0]+\}"
         r"|\{#?(?:eq|fig|lab|lst|tab):[^{}\n\0]*\}?"
-        r"|(?<![{\w&\0])[#.][A-Za-z][\w:.-]*\}",
+        r"|(?<![{\w&\0])[#.][A-Za-z][\w:.-]*\}|#(?:eq|fig|lab|lst|tab):[\w.-]+\}"
+        r"|(?<!\])\(#(?:eq|fig|lab|lst|tab):[\w.-]+\)|\(\.further\)$",
         "only headings have attributes, and only formulas, captions and fences have labels",
         "in a heading, `## Title {#id .class}` ends the line; a label ends a caption, "
         "`Figure: … {#fig:name}`, or a fence's first line; write HTML for a class or a size",
@@ -166,7 +165,6 @@ FOREIGN = {
         "type the emoji itself",
     ),
 }
-"""Markup of other tools."""
 BROKEN = {
     "binding": MarkupKind(
         rf"(?:`{_NUMBER}[^`{{}}\n\0]{{0,20}}|(?:{_NUMBER})?`?)"
@@ -178,7 +176,8 @@ BROKEN = {
         "binding-attribute",
     ),
     "mark": MarkupKind(
-        r"\{[ \t]*(?:term|symbol|further)\b[^{}\n\0]*\}",
+        r"\{[ \t]*(?:term|symbol|further)\b[^{}\n\0]*\}"
+        r"|(?<=\])term\b[^\s{}\0]*\}|(?<=\0)(?:symbol|unit|value)=\"[^{}\0]*\}",
         "braces stand directly after what they mark",
         'write `[word]{term}`, `$x${symbol="meaning"}`, `## Heading {.further}`',
     ),
@@ -192,7 +191,7 @@ BROKEN = {
         rf"|(?<![\w:/.])(?-i:{_SCHEME})[\w.#/-]*\w"
         r"|(?<!\\)\[[^\[\]]{0,200}\(" + _ADDRESS + r"[^()\s]*\)(?![^\[\n]*\])"
         r"|(?<!\\)\[[^\[\]]{0,200}\]?\(?\]?\S?" + _ADDRESS + r"[^()\s\]]*\)(?![^\[\n]*\])"
-        r"|(?<!\\)\[[^\[\]]{0,200}\]#\([^()\s]*\)|(?<=\0)\]|\[(?=\0)",
+        r"|(?<!\\)\[[^\[\]]{0,200}\]#\([^()\s]*\)|(?<=\0)[\])]|\[(?=\0)",
         "this is not a complete link",
         "a link is `[text](address)`, with no blank before the `(` and none in the address",
     ),
@@ -337,6 +336,5 @@ LANGUAGES = tuple(
     "bash console cpp css diff html ini javascript json julia markdown matlab python rust sh text "
     "toml xml yaml".split()
 )
-"""Languages that texts often show."""
 PLAIN_TEXTS = ("ascii", "ino", "jsonc", "hjson", "none", "plain", "plaintext", "raw", "txt")
 """Names of ordinary code and text that no highlighter knows."""

@@ -1,12 +1,7 @@
-"""Targets of links, schemes that a page must not have, and mentions.
-
-Entry points: `classify`, `check_scheme`, `check_raw_scheme`; `may_mention`, `text_inlines` and
-`link_mentions`, which make links of "Lesson 2.2" and "Level 18" in prose, in the words of the
-course's language.
+"""Targets of links, schemes that a page must not have, and mentions as in "Lesson 2.2".
 
 Text and soft line ends that follow each other make one run, as a mention may be broken over two
-lines. A mention becomes a `Link` whose `target_span` is the number; the text around it becomes
-`Text` and `SoftBreak`.
+lines.
 """
 
 from __future__ import annotations
@@ -36,14 +31,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.inlines import LABEL_KINDS
 from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.syntax.attributes import term_id
-from coursebuild.core.text.diagnostics import (
-    Diagnostic,
-    Fix,
-    diagnose,
-    misspelt,
-    nearest,
-    propose,
-)
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, misspelt, nearest, propose
 from coursebuild.core.text.source import Excerpt, Span
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
@@ -113,10 +101,10 @@ _NUMBERED = re.compile(r"(?:[^\W\d_]+ )?(\d+(?:\.\d+)+)")
 
 
 def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> Diagnostic | None:
-    """The diagnostic of a text that is another lesson, or almost the name of a model or script.
-
-    A link without a text shows the name of what has a number.
-    """
+    """The diagnostic of a text that is missing, another lesson, or almost its target's name."""
+    if target == UrlTarget(""):
+        message, help = "this link has no address", "write one in the brackets behind its text"
+        return diagnose("link-text", span, message, help=help)
     if not children:
         address = getattr(target, "url", None) or f"#{getattr(target, 'anchor', None) or ''}"
         if address.partition("#")[2].partition(":")[0] in LABEL_KINDS:

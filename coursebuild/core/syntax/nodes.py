@@ -1,14 +1,7 @@
-"""Values of JSON and TOML that know where they stand.
+"""Values of JSON and TOML that know where they stand, and the words of messages for them.
 
-Entry points: the union `Node`, `Member`; for the parsers `replace_escapes`, `check_tex_escapes`,
-`tex_word` and `odd_character`. Both languages give the same nodes, so that one decoder serves both.
-
-A node keeps offsets into the excerpt that was parsed; its `span` in the lesson is worked out on
-demand. Nodes compare by identity: two equal numbers at two places are two nodes. Only their parser
-changes them.
-
-The words of messages for types and for the author's values: `Format` (`JSON`, `TOML`), `accepts`,
-`wrong_type_message`, `type_help`, `format_name`, `format_value`, `shorten`.
+Both languages give the same nodes, so that one decoder serves both. Nodes compare by identity: two
+equal numbers at two places are two nodes. Only their parser changes them.
 """
 
 from __future__ import annotations
@@ -17,7 +10,7 @@ import re
 import unicodedata
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator
-from typing import Literal, TypeAlias, assert_never
+from typing import Literal, TypeAlias
 
 import msgspec.inspect as inspect
 from msgspec import Struct
@@ -35,7 +28,6 @@ class _PositionedNode(Struct, eq=False):
 
     @property
     def span(self) -> Span:
-        """The whole node in the source."""
         return self.body.span(self.start, self.end)
 
     @property
@@ -56,7 +48,6 @@ class StringNode(_PositionedNode, eq=False):
 
     @property
     def value(self) -> str:
-        """The text, escapes resolved."""
         return self.excerpt.text
 
 
@@ -220,7 +211,6 @@ def odd_character(char: str) -> str:
 
 
 _MAX_LENGTH = 40
-"""The most characters of an author's text in a message."""
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
@@ -242,6 +232,12 @@ _TYPES: dict[type[inspect.Type], tuple[str, str, type[Node]]] = {
     inspect.NoneType: ("", "", NullNode),
 }
 """The words for one value and for several of a type, and the type of its node."""
+_KINDS_OF_NODES: dict[type[Node], str] = {
+    ObjectNode: "an object",
+    ArrayNode: "an array",
+    StringNode: "a string",
+    DateNode: "a date or time",
+}
 
 
 def _union_members(type: inspect.Type) -> list[inspect.Type]:
@@ -256,7 +252,6 @@ def _union_members(type: inspect.Type) -> list[inspect.Type]:
 
 
 def _describe_type(type: inspect.Type) -> tuple[str, str]:
-    """A type in words: for one value, and for several."""
     singulars, plurals = [], []
     for member in _union_members(type):
         singular, plural, _ = _TYPES[member.__class__]
@@ -299,21 +294,9 @@ def format_value(node: Node) -> str:
 
 def wrong_type_message(node: Node, name: str, type: inspect.Type, format: Format) -> str:
     """The message for a value of the wrong type."""
-    match node:
-        case ObjectNode():
-            value = "an object"
-        case ArrayNode():
-            value = "an array"
-        case StringNode():
-            value = "a string"
-        case NumberNode():
-            value = f"the number {shorten(node.raw)}"
-        case DateNode():
-            value = "a date or time"
-        case BoolNode() | NullNode() | ErrorNode():
-            value = f"`{shorten(node.raw)}`"
-        case _:
-            assert_never(node)
+    value = _KINDS_OF_NODES.get(node.__class__, f"`{shorten(node.raw)}`")
+    if isinstance(node, NumberNode):
+        value = f"the number {shorten(node.raw)}"
     problem = f"must be {_describe_type(type)[0]}, not {value}"
     if format == TOML:
         problem = problem.replace("an object", "a table").replace("objects", "tables")

@@ -1,25 +1,24 @@
-"""The state that the readers of one document share: diagnostics, anchors, footnotes, scripts.
-
-Entry point: `ParsingState`. A document is read once, from its first line to its last, with the
-texts inside quizzes and labs.
-"""
+"""The state that the readers of one document share: diagnostics, anchors, footnotes, scripts."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from itertools import islice
 from typing import TypeVar
 
 from msgspec import Struct, field
 
-from coursebuild.core.model import Block, Footnote, FootnoteRef
+from coursebuild.core.model import LABEL_KINDS, Block, Footnote, FootnoteRef, Label
 from coursebuild.core.model.vocabulary import Words
-from coursebuild.core.syntax.attributes import Anchors
+from coursebuild.core.syntax.attributes import Anchors, read_pairs, value_text
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
-from coursebuild.core.text.source import Span
+from coursebuild.core.text.source import Excerpt, Span
 
 T = TypeVar("T")
+
+_LABEL_ID = re.compile(rf"\{{#((?P<kind>{'|'.join(LABEL_KINDS)}):[\w-]+)(?=[\s}}])")
 
 
 class ParsingState:
@@ -34,7 +33,6 @@ class ParsingState:
         self.diagnostics: list[Diagnostic] = []
         self.report = self.diagnostics.append
         self.script: str | None = None
-        """The path of the nearest script above."""
         self.figures: list[str] = []
         """Names of figures of scripts above that no paragraph has shown yet."""
         self.has_invalid_script = False
@@ -42,7 +40,6 @@ class ParsingState:
         self.closes_indented = False
         """Whether a fence above was indented, so that its closing line seems to open a fence."""
         self.level = 1
-        """The level of the heading above."""
         self.stars: list[tuple[bool, Diagnostic]] = []
         """Stars of which one may be a footnote's, with whether it stands before its word."""
         self.notes = FootnoteList(self.report)
@@ -56,6 +53,36 @@ class ParsingState:
         del self.diagnostics[start:]
         return Parsed(value, diagnostics)
 
+    def take_label(self, braces: Excerpt | None, kind: str) -> Label | None:
+        """The label in braces, whose id nothing else may have; `None` for none, or a mistake."""
+        if braces is None:
+            return None
+        is_closed, subject = braces.text.endswith("}"), LABEL_KINDS[kind]
+        match = _LABEL_ID.match(braces.text) if is_closed else None
+        help = f"write `{{#{kind}:name}}`"
+        if match is None or match["kind"] != kind:
+            message = f"the label of {subject} is never closed"
+            if is_closed:
+                message = f"`{braces.text}` is not a label of {subject}"
+            self.reject_label(braces, message, f"{help}, of letters, digits, `-` and `_`")
+            return None
+        end, keys = match.end(), ("check", "given") if kind == "eq" else ()
+        if keys:
+            help = 'write `{#eq:name check}`, or `{#eq:name given="its source"}`'
+        values = read_pairs(braces.slice(end - 1), keys, "label-attribute", help)
+        if isinstance(values, Diagnostic):
+            self.report(values)
+            values = {}
+        source = value_text(values["given"]) if "given" in values else None
+        check = braces.span(end, len(braces.text) - 1) if "check" in values else None
+        label = Label(braces.span(2, end), match[1], source, check)
+        self.anchors.take(label.id, label.span)
+        return label
+
+    def reject_label(self, braces: Excerpt, message: str, help: str) -> None:
+        """Report a label that cannot be read, or that stands where none may."""
+        self.report(diagnose("label-attribute", braces.span(), message, help=help))
+
 
 class FootnoteText(Struct):
     """A footnote as it is written."""
@@ -68,7 +95,6 @@ class FootnoteText(Struct):
     number: int = 0
     """0 until it is referred to."""
     references: int = 0
-    """How often it is referred to."""
 
 
 class FootnoteList(Struct):
@@ -79,7 +105,6 @@ class FootnoteList(Struct):
 
     report: Callable[[Diagnostic], None]
     by_label: dict[str, FootnoteText] = field(default_factory=dict)
-    """All footnotes by their labels, case-folded."""
     by_number: list[FootnoteText] = field(default_factory=list)
     """The footnotes with a reference, in the order of their numbers."""
 

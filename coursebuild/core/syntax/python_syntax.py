@@ -1,8 +1,4 @@
-"""What is wrong with the Python of a block before it runs: its syntax, and windows that it opens.
-
-Entry points: `check_syntax`, whose diagnostics have edits where it is clear what was meant;
-`find_windows`, for figures that are shown in a window and on no page.
-"""
+"""What is wrong with Python before it runs: its syntax, and windows that it opens."""
 
 from __future__ import annotations
 
@@ -19,7 +15,6 @@ _LINE_REFERENCE = re.compile(r"\b(on|at) line ([0-9]+)")
 _SHOWS = re.compile(
     r"(?:matplotlib\.pyplot|plotly\.io)\.show|mediapy\.show_\w+|IPython\.display\.(?:display|Image|Video)"
 )
-"""Functions that show a picture in a window or a notebook."""
 
 
 def find_windows(code: Excerpt) -> Iterator[Diagnostic]:
@@ -93,7 +88,6 @@ _PYTHON_CHARACTERS = {**dict.fromkeys("“”„", '"'), **dict.fromkeys("‘’
 
 
 def _python_edits(row: Excerpt, message: str, place: Span) -> tuple[Edit, ...]:
-    """The edits that mend a line of Python, where it is clear what is wrong."""
     start = Span(place.source, place.start, place.start)
     if message == "expected ':'":
         return (Edit(start, ":"),)
@@ -110,10 +104,7 @@ def _python_edits(row: Excerpt, message: str, place: Span) -> tuple[Edit, ...]:
 
 
 def _diagnose_mixed_tab(rows: Sequence[Excerpt]) -> Diagnostic | None:
-    """The diagnostic of the first tab before code of which other lines are indented by blanks.
-
-    Its edits put blanks in the place of all such tabs, if the code is read then.
-    """
+    """The diagnostic of the first tab before code of which other lines are indented by blanks."""
     leads = [row.text[: len(row.text) - len(row.text.lstrip())] for row in rows]
     tab = next(
         (

@@ -1,8 +1,6 @@
 """What scripts print and draw: `output` fences, `Output…:` above a fence or table, figures.
 
-Entry points: `is_caption`; `record_fence` and `record_table`, which read a caption and its body;
-`read_figure`; and diagnostics of captions and bodies without each other. The word of a caption is
-that of the course's language, or the English one.
+The word of a caption is that of the course's language, or the English one.
 """
 
 from __future__ import annotations
@@ -10,18 +8,8 @@ from __future__ import annotations
 import posixpath
 import re
 from decimal import Decimal
-from functools import lru_cache
 
-from coursebuild.core.model import (
-    Comparison,
-    Image,
-    Inline,
-    Mode,
-    Recording,
-    Table,
-    Text,
-    plain_text,
-)
+from coursebuild.core import model
 from coursebuild.core.model.blocks import volatile_pattern
 from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.syntax.fence import Fence, FenceKeys, Word
@@ -54,20 +42,19 @@ ILLUSTRATION = "illustration"
 """The flag of a `text` fence that resembles an output and is none."""
 
 
-def is_caption(inlines: tuple[Inline, ...], words: Words) -> bool:
+def is_caption(inlines: tuple[model.Inline, ...], words: Words) -> bool:
     """Whether a paragraph begins with a word for "output" and ends with a colon."""
-    return _caption(words.output).fullmatch(plain_text(inlines)) is not None
+    return _match_caption(inlines, words) is not None
 
 
-def _is_bare(caption: tuple[Inline, ...], words: Words) -> bool:
-    """Whether a caption is the word alone."""
-    match = _caption(words.output).fullmatch(plain_text(caption))
+def _is_bare(caption: tuple[model.Inline, ...], words: Words) -> bool:
+    match = _match_caption(caption, words)
     return match is not None and not match[1].strip()
 
 
-@lru_cache(maxsize=8)
-def _caption(names: tuple[str, ...]) -> re.Pattern[str]:
-    return re.compile(rf"\s*(?:{'|'.join(map(re.escape, names))})\b(.*):\s*", re.DOTALL)
+def _match_caption(caption: tuple[model.Inline, ...], words: Words) -> re.Match[str] | None:
+    names = "|".join(map(re.escape, words.output))
+    return re.fullmatch(rf"\s*(?:{names})\b(.*):\s*", model.plain_text(caption), re.DOTALL)
 
 
 def find_misspelt_caption(
@@ -75,7 +62,7 @@ def find_misspelt_caption(
 ) -> Diagnostic | None:
     """The diagnostic of a paragraph that begins with a misspelt name and ends with a colon.
 
-    One that consists of the name may lack the colon. Words in `unlike` are not misspelt.
+    One that consists of the name may lack the colon.
     """
     match = _FIRST_WORD.match(content.text)
     is_alone = match is not None and match.end() == len(content.text)
@@ -93,11 +80,11 @@ def find_misspelt_caption(
 
 
 def check_near_caption(
-    inlines: tuple[Inline, ...], span: Span, info: str, words: Words
+    inlines: tuple[model.Inline, ...], span: Span, info: str, words: Words
 ) -> list[Diagnostic]:
     """Warn if a paragraph looks like the caption of the fence below it, whose info is given."""
     kind, *keys = info.split() or [""]
-    text = plain_text(inlines)
+    text = model.plain_text(inlines)
     is_near = kind == "text" and (
         _NEAR_CAPTION.fullmatch(text)
         or re.fullmatch(
@@ -124,17 +111,13 @@ def _help_to_mark(words: Words) -> str:
 def diagnose_missing_caption(fence: Span, words: Words) -> Diagnostic:
     """The warning for a `text` block directly below a script."""
     message = "this looks like the output of the script above it, but nothing is compared"
-    help = _help_to_mark(words)
-    return diagnose("recording-caption", fence.first_line(), message, help=help)
+    return diagnose("recording-caption", fence.first_line(), message, help=_help_to_mark(words))
 
 
 def record_fence(
-    caption: tuple[Inline, ...], caption_span: Span, fence: Fence, state: ParsingState
-) -> Recording | None:
-    """The recording with this fence as its body; `None` if the fence is none.
-
-    An `output` fence needs no caption; then the place of the caption is that of its first line.
-    """
+    caption: tuple[model.Inline, ...], caption_span: Span, fence: Fence, state: ParsingState
+) -> model.Recording | None:
+    """The recording with this fence, which needs no caption, as its body; `None` if it is none."""
     if not fence.is_closed or fence.inner is not None:
         return None
     if fence.kind not in _BODY_KINDS:
@@ -156,7 +139,7 @@ def record_fence(
     own_words = tuple(word for word in keys.value.words if word is not mark)
     comparison = _read_comparison(FenceKeys(None, own_words), diagnostics)
     state.diagnostics += diagnostics
-    return Recording(
+    return model.Recording(
         caption_span.to(fence.span),
         _own_caption(caption, state.words),
         caption_span,
@@ -170,8 +153,8 @@ def record_fence(
 
 
 def record_table(
-    caption: tuple[Inline, ...], caption_span: Span, table: Table, state: ParsingState
-) -> Recording:
+    caption: tuple[model.Inline, ...], caption_span: Span, table: model.Table, state: ParsingState
+) -> model.Recording:
     """The recording with a caption and a table as its body."""
     span, script = caption_span.to(table.span), _find_script(caption_span, state)
     if not any(cell.text.text for row in table.rows for cell in row):
@@ -179,17 +162,16 @@ def record_table(
         help = "write what the script prints into the rows below the header"
         state.report(diagnose("recording-body", table.span.first_line(), message, help=help))
     caption = _own_caption(caption, state.words)
-    return Recording(span, caption, caption_span, table, table.span, "", None, script)
+    return model.Recording(span, caption, caption_span, table, table.span, "", None, script)
 
 
-def _own_caption(caption: tuple[Inline, ...], words: Words) -> tuple[Inline, ...]:
-    """The caption to be shown; none for the word alone, instead of which a page has its own."""
-    is_plain = all(isinstance(inline, Text) for inline in caption)
+def _own_caption(caption: tuple[model.Inline, ...], words: Words) -> tuple[model.Inline, ...]:
+    is_plain = all(isinstance(inline, model.Text) for inline in caption)
     return () if is_plain and _is_bare(caption, words) else caption
 
 
 def check_missing_body(
-    caption: tuple[Inline, ...], span: Span, words: Words, following: Span | None = None
+    caption: tuple[model.Inline, ...], span: Span, words: Words, following: Span | None = None
 ) -> list[Diagnostic]:
     """Report a caption without a body, if it can be nothing but a caption."""
     if not _is_bare(caption, words):
@@ -211,7 +193,6 @@ def diagnose_wrong_body(span: Span, subject: str) -> Diagnostic:
 
 
 def _find_script(caption_span: Span, state: ParsingState) -> str | None:
-    """The path of the script above a recording; reports if there is none."""
     if state.script is None and not state.has_invalid_script:
         message = "there is no script above this recorded output"
         help = "it records what the nearest ```` ```python file=examples/….py ```` above it prints"
@@ -219,7 +200,7 @@ def _find_script(caption_span: Span, state: ParsingState) -> str | None:
     return state.script
 
 
-def _read_comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparison | None:
+def _read_comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> model.Comparison | None:
     """The comparison that the keys of a `text` fence ask for; `None` without keys."""
     rtol = _read_tolerance(keys.get("rtol"), diagnostics)
     atol = _read_tolerance(keys.get("atol"), diagnostics)
@@ -245,13 +226,13 @@ def _read_comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Comparis
         else:
             volatile = pattern
     if keys.get("volatile") and not volatile:
-        return Comparison(Mode.VOLATILE)
-    mode = Mode.DIGITS if keys.get("digits") else Mode.EXACT
+        return model.Comparison(model.Mode.VOLATILE)
+    mode = model.Mode.DIGITS if keys.get("digits") else model.Mode.EXACT
     if rtol is not None or atol is not None:
-        mode = Mode.TOLERANCE
+        mode = model.Mode.TOLERANCE
     if not keys.words:
         return None
-    return Comparison(mode, rtol or Decimal(0), atol or Decimal(0), ellipsis, volatile)
+    return model.Comparison(mode, rtol or Decimal(0), atol or Decimal(0), ellipsis, volatile)
 
 
 def check_stray_keys(fence: Fence, state: ParsingState) -> None:
@@ -280,17 +261,17 @@ def _read_tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal
 
 
 def read_figure(
-    children: tuple[Inline, ...], span: Span, figure_names: list[str]
-) -> tuple[tuple[Inline, ...], bool]:
+    children: tuple[model.Inline, ...], span: Span, figure_names: list[str]
+) -> tuple[tuple[model.Inline, ...], bool]:
     """The inlines of a paragraph that begins with `Figure:`, and whether it shows an image.
 
-    `figure_names` has the figures of scripts above that nothing has shown yet. A paragraph without
-    an image shows the first of them, a file beside the lesson, with its text as the alternative.
+    Without an image it shows the first of `figure_names`, those of scripts above that nothing
+    has shown yet, with its text as the alternative.
     """
-    image = next((child for child in children if isinstance(child, Image)), None)
+    image = next((child for child in children if isinstance(child, model.Image)), None)
     if image is None and figure_names:
-        text = " ".join(plain_text(children).removeprefix(FIGURE).split())
-        image = Image(span, figure_names[0], text, "", span)
+        text = " ".join(model.plain_text(children).removeprefix(FIGURE).split())
+        image = model.Image(span, figure_names[0], text, "", span)
         children = (*children, image)
     name = "" if image is None else posixpath.basename(image.url)
     if name in figure_names:

@@ -1,10 +1,4 @@
-"""JSON Schemas of what an author writes in JSON and TOML, for editors.
-
-Entry points: `json_schema(name)`; `schema_roots`, the schemas that there are.
-
-They are made from the declarations that the decoder uses, so that an editor and a build say the
-same. What later checks find (an answer that is none of the options) is not in them.
-"""
+"""JSON Schemas of what an author writes in JSON and TOML, made from what the decoder uses."""
 
 from __future__ import annotations
 

@@ -1,13 +1,4 @@
-"""Tokens and parser states of markdown-it that keep positions.
-
-Entry points: `BlockState`, `InlineState` (markdown-it's parser states, whose tokens are
-`PositionedToken`s); `read_markdown`, `normalize`, `trim`.
-
-1. Block rules cut lines out of the text, a whole file or a text in JSON, by `getLines`;
-   `BlockState` cuts them as an excerpt.
-2. Inline rules work on one block's content; `InlineState` keeps the start and the end of each token
-   in it.
-"""
+"""Tokens and parser states of markdown-it that keep positions."""
 
 from __future__ import annotations
 
@@ -34,7 +25,6 @@ class PositionedToken(Token):
     start: int = -1
     end: int = -1
     text: Excerpt = NO_TEXT
-    """The content of a block."""
 
     def __post_init__(self) -> None:
         """Take the attributes as they are; a token of markdown-it would take lists of them, too."""

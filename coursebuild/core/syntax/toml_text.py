@@ -1,11 +1,7 @@
 """TOML, every value with its place.
 
-Entry points: `parse_toml(text)`; `toml_string`, which writes a string.
-
-1. `tomllib` decides whether the text is TOML. If it is not, the diagnostic says more than
-   its message does.
-2. tree-sitter finds the places of keys, values and headers, which become the same nodes as those of
-   JSON. Headers and dotted keys may add to a table above, so tables grow until the end.
+`tomllib` decides whether the text is TOML; tree-sitter finds the places of keys, values and
+headers. Headers and dotted keys may add to a table above, so tables grow until the end.
 """
 
 from __future__ import annotations
@@ -18,21 +14,7 @@ from typing import Any
 import tree_sitter
 import tree_sitter_toml
 
-from coursebuild.core.syntax.nodes import (
-    ArrayNode,
-    BoolNode,
-    DateNode,
-    Member,
-    Node,
-    NumberNode,
-    ObjectNode,
-    StringNode,
-    check_tex_escapes,
-    odd_character,
-    replace_escapes,
-    shorten,
-    tex_word,
-)
+from coursebuild.core.syntax import nodes
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose, write
 from coursebuild.core.text.source import Excerpt, Source
 
@@ -41,11 +23,12 @@ _NOT_ASCII = re.compile(r"[^\x00-\x7f]")
 _ESCAPE = re.compile(r"\\(?:[ \t]*\n[ \t\n]*|u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|x[0-9A-Fa-f]{2}|.)")
 
 
-def parse_toml(text: Source | Excerpt, *, rule: str = "map-syntax") -> Parsed[ObjectNode | None]:
+def parse_toml(
+    text: Source | Excerpt, *, rule: str = "map-syntax"
+) -> Parsed[nodes.ObjectNode | None]:
     """A file or the body of a fence as a table; no value, and one diagnostic, if it is not TOML.
 
-    `rule` is that of this diagnostic. There may be a value and diagnostics; a caller that finds any
-    must not publish it. Never raises.
+    `rule` is that of this diagnostic. A caller that finds any must not publish the value.
     """
     # As `tomllib` reads a file; a lone CR stays, since TOML refuses it.
     body = text.excerpt("\r\n") if isinstance(text, Source) else text
@@ -56,10 +39,9 @@ def parse_toml(text: Source | Excerpt, *, rule: str = "map-syntax") -> Parsed[Ob
     except RecursionError:
         diagnostic = diagnose(rule, body.span(0, 0), "tables, arrays or keys are nested too deeply")
     except ValueError as error:
-        repeated_key = _diagnose_repeated_key(body, str(error))
         start, end, message, help = _describe_mistake(body.text, str(error))
         mistake = diagnose(rule, body.span(start, end), message, help=help)
-        diagnostic = repeated_key or mistake
+        diagnostic = _diagnose_repeated_key(body, str(error)) or mistake
     return Parsed(None, (diagnostic,))
 
 
@@ -69,7 +51,6 @@ def toml_string(text: str) -> str:
 
 
 def _diagnose_repeated_key(body: Excerpt, message: str) -> Diagnostic | None:
-    """The diagnostic of a key or table that is given twice, if that is why `tomllib` refuses."""
     if not message.startswith(("Cannot", "Duplicate")):
         return None
     end = body.text.find("\n", error_offset(body.text, message))
@@ -99,13 +80,13 @@ class _Reader:
         # these, offsets in the tree are offsets in the text.
         plain = _NOT_ASCII.sub("x", body.text).encode()
         self.root = tree_sitter.Parser(_LANGUAGE).parse(plain).root_node
-        self.repetition: tuple[StringNode, StringNode] | None = None
+        self.repetition: tuple[nodes.StringNode, nodes.StringNode] | None = None
         """The key that the last statement repeats, and its first occurrence."""
         self.diagnostics: list[Diagnostic] = []
 
-    def read_document(self) -> ObjectNode:
+    def read_document(self) -> nodes.ObjectNode:
         """The table of the whole text."""
-        root = ObjectNode(self.body, 0, len(self.text), (0, 0), {})
+        root = nodes.ObjectNode(self.body, 0, len(self.text), (0, 0), {})
         for statement in self.root.named_children:
             if statement.type == "pair":
                 self.read_pair(root, statement)
@@ -115,7 +96,7 @@ class _Reader:
 
     # ------------------------------------------------------------------------------- statements
 
-    def read_table(self, root: ObjectNode, statement: tree_sitter.Node) -> None:
+    def read_table(self, root: nodes.ObjectNode, statement: tree_sitter.Node) -> None:
         """Read `[name]` or `[[name]]`, and the pairs below it."""
         _, name, closing, *rest = statement.children
         pairs = [child for child in rest if child.type == "pair"]
@@ -126,10 +107,10 @@ class _Reader:
         self.repetition = None
         *outer, last = self.read_key_path(name)
         parent = self.open_table(root, outer, end)
-        table = ObjectNode(self.body, start, end, opening, {})
+        table = nodes.ObjectNode(self.body, start, end, opening, {})
         if statement.type == "table_array_element":
-            array = self.add(parent, last, ArrayNode(self.body, start, end, opening, []))
-            if isinstance(array, ArrayNode):
+            array = self.add(parent, last, nodes.ArrayNode(self.body, start, end, opening, []))
+            if isinstance(array, nodes.ArrayNode):
                 array.items.append(table)
                 array.end = end
         elif self.add(parent, last, table) is not table:  # that of a table inside it stands above
@@ -138,7 +119,7 @@ class _Reader:
         for pair in pairs:
             self.read_pair(table, pair)
 
-    def read_pair(self, table: ObjectNode, pair: tree_sitter.Node) -> None:
+    def read_pair(self, table: nodes.ObjectNode, pair: tree_sitter.Node) -> None:
         """Read `key = value` in a table."""
         name, value_node = pair.named_children[:2]
         self.repetition = None
@@ -146,42 +127,45 @@ class _Reader:
         *outer, last = self.read_key_path(name)
         self.add(self.open_table(table, outer, value.end), last, value)
 
-    def open_table(self, table: ObjectNode, keys: list[StringNode], end: int) -> ObjectNode:
+    def open_table(
+        self, table: nodes.ObjectNode, keys: list[nodes.StringNode], end: int
+    ) -> nodes.ObjectNode:
         """Return the table to which keys lead, made if need be and extended to `end`."""
         for key in keys:
-            new = ObjectNode(self.body, key.start, key.end, (key.start, key.end), {})
+            new = nodes.ObjectNode(self.body, key.start, key.end, (key.start, key.end), {})
             item = self.add(table, key, new)
-            if isinstance(item, ArrayNode) and item.items:
+            if isinstance(item, nodes.ArrayNode) and item.items:
                 item.end = max(item.end, end)
                 item = item.items[-1]
-            table = item if isinstance(item, ObjectNode) else new
+            table = item if isinstance(item, nodes.ObjectNode) else new
             table.end = max(table.end, end)
         return table
 
-    def add(self, table: ObjectNode, key: StringNode, value: Node) -> Node:
+    def add(self, table: nodes.ObjectNode, key: nodes.StringNode, value: nodes.Node) -> nodes.Node:
         """Give a key its value; return that which it has, another one if the key is repeated."""
-        member = table.members.setdefault(key.value, Member(key, value))
+        member = table.members.setdefault(key.value, nodes.Member(key, value))
         if member.key is not key:
             self.repetition = (key, member.key)
         return member.value
 
     # ------------------------------------------------------------------------------------ values
 
-    def read_key_path(self, node: tree_sitter.Node) -> list[StringNode]:
+    def read_key_path(self, node: tree_sitter.Node) -> list[nodes.StringNode]:
         """The parts of a key; the grammar nests them to the left."""
         parts: list[tree_sitter.Node] = []
         while node.type == "dotted_key":
             node, last = node.named_children
             parts.append(last)
-        return [self.read_key(part) for part in (node, *reversed(parts))]
+        keys = []
+        for part in (node, *reversed(parts)):
+            if part.type == "quoted_key":
+                keys.append(self.read_string(part))
+            else:
+                place = part.byte_range
+                keys.append(nodes.StringNode(self.body, *place, self.body.slice(*place)))
+        return keys
 
-    def read_key(self, node: tree_sitter.Node) -> StringNode:
-        if node.type == "quoted_key":
-            return self.read_string(node)
-        start, end = node.byte_range
-        return StringNode(self.body, start, end, self.body.slice(start, end))
-
-    def read_value(self, node: tree_sitter.Node) -> Node:
+    def read_value(self, node: tree_sitter.Node) -> nodes.Node:
         start, end = node.byte_range
         match node.type:
             case "string":
@@ -189,20 +173,20 @@ class _Reader:
             case "array":
                 inner = (child for child in node.named_children if child.type != "comment")
                 items = [self.read_value(child) for child in inner]
-                return ArrayNode(self.body, start, end, (start, start + 1), items)
+                return nodes.ArrayNode(self.body, start, end, (start, start + 1), items)
             case "inline_table":
-                table = ObjectNode(self.body, start, end, (start, start + 1), {})
+                table = nodes.ObjectNode(self.body, start, end, (start, start + 1), {})
                 for pair in node.named_children:
                     self.read_pair(table, pair)
                 return table
             case "boolean":
-                return BoolNode(self.body, start, end, self.text[start:end] == "true")
+                return nodes.BoolNode(self.body, start, end, self.text[start:end] == "true")
             case "integer" | "float":
-                return NumberNode(self.body, start, end, _value_of(self.text[start:end]))
+                return nodes.NumberNode(self.body, start, end, _value_of(self.text[start:end]))
             case _:
-                return DateNode(self.body, start, end)
+                return nodes.DateNode(self.body, start, end)
 
-    def read_string(self, node: tree_sitter.Node) -> StringNode:
+    def read_string(self, node: tree_sitter.Node) -> nodes.StringNode:
         start, end = node.byte_range
         quote = self.text[start]
         width = 3 if end - start >= 6 and self.text.startswith(quote * 3, start) else 1
@@ -211,9 +195,9 @@ class _Reader:
             content = (content[0] + 1, content[1])
         escapes = _ESCAPE.finditer(self.text, *content) if quote == '"' else ()
         replacements = ((escape, _value_of(f'"""{escape[0]}"""')) for escape in escapes)
-        value = replace_escapes(self.body, content, replacements)
-        self.diagnostics += check_tex_escapes(value, double_backslash)
-        return StringNode(self.body, start, end, value)
+        value = nodes.replace_escapes(self.body, content, replacements)
+        self.diagnostics += nodes.check_tex_escapes(value, double_backslash)
+        return nodes.StringNode(self.body, start, end, value)
 
 
 def _value_of(text: str) -> Any:
@@ -256,7 +240,7 @@ _Mistake = tuple[int, int, str, str]
 def _describe_mistake(text: str, message: str) -> _Mistake:
     at = error_offset(text, message)
     char, words = text[at : at + 1], _PLACE.sub("", message)
-    if odd := "a lone carriage return" if char == "\r" else odd_character(char):
+    if odd := "a lone carriage return" if char == "\r" else nodes.odd_character(char):
         help: str = Fix("replace it by a plain space, or remove it", " ", safe=char != "\r")
         if at == 0:
             encoding = "save the file as UTF-8 without a byte order mark"
@@ -273,7 +257,7 @@ def _describe_mistake(text: str, message: str) -> _Mistake:
         return opening, end, "the string is not closed on its line", help
     if re.match("Unescaped|Escaped|Invalid hex", words):
         start = text.rindex("\\", 0, at)
-        help = double_backslash(tex_word(text, start + 1))
+        help = double_backslash(nodes.tex_word(text, start + 1))
         return start, start + 2, f"`{text[start : start + 2]}` is not an escape of TOML", help
     if opening is not None and at >= len(text):
         return opening, opening + 1, f"`{bracket}` is never closed", ""
@@ -314,31 +298,27 @@ def _innermost_opening(text: str, at: int) -> int | None:
 
 
 def _wrong_value(text: str, start: int) -> _Mistake:
-    """Describe what stands in the place of a value."""
     scalar = _SCALAR.match(text, start)
     value = scalar[0].rstrip() if scalar else ""
     if not value:
         return start, start, "a value is missing", 'an empty text is written `""`'
-    message = f"`{shorten(value)}` is not a valid TOML value"
-    return start, start + len(value), message, _value_help(value)
-
-
-def _value_help(text: str) -> str:
-    if text in _BOOLEANS:
-        return write(_BOOLEANS[text])
-    if text in _NULLS:
-        return "TOML has no such value; leave the field out"
-    if text[0] in _CURLY_QUOTES:
-        return _QUOTES_HELP
-    if re.fullmatch(r"[+-]?[0-9]*\.?[0-9]*", text):
-        return "a number has no leading zeros, and digits on both sides of its point"
-    if '"' in text or "'" in text:
-        return ""
-    new = None if "\\" in text or "#" in text else f'"{text}"'
-    return Fix(f'text needs quotes: `"{shorten(text)}"`', new, safe=True)
+    help = ""
+    if value in _BOOLEANS:
+        help = write(_BOOLEANS[value])
+    elif value in _NULLS:
+        help = "TOML has no such value; leave the field out"
+    elif value[0] in _CURLY_QUOTES:
+        help = _QUOTES_HELP
+    elif re.fullmatch(r"[+-]?[0-9]*\.?[0-9]*", value):
+        help = "a number has no leading zeros, and digits on both sides of its point"
+    elif '"' not in value and "'" not in value:
+        new = None if "\\" in value or "#" in value else f'"{value}"'
+        help = Fix(f'text needs quotes: `"{nodes.shorten(value)}"`', new, safe=True)
+    message = f"`{nodes.shorten(value)}` is not a valid TOML value"
+    return start, start + len(value), message, help
 
 
 def _expected_instead(text: str, at: int, noun: str, help: str) -> _Mistake:
     word = _WORD.match(text, at)
-    quotation = f"`{shorten(word[0])}`" if word else "the end of the line"
+    quotation = f"`{nodes.shorten(word[0])}`" if word else "the end of the line"
     return at, word.end() if word else at, f"expected {noun}, found {quotation}", help

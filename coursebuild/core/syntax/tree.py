@@ -1,15 +1,4 @@
-"""Block content: markdown-it's block tokens become `Block` nodes with spans.
-
-Entry points: `TextReader`, which reads the blocks of a text; `NestedTextParser`, the `TextParser`
-for quizzes and labs.
-
-1. `TextReader` makes the tokens, and collects the explicit ids and the footnotes in them
-   (`_scan_tokens`), which must be known before the first reference.
-2. It walks the flat tokens once, with a method for each kind of block; containers read the blocks
-   inside them by recursion.
-3. A paragraph looks ahead: `Output:` and the block below it are one `Recording`, as is an `output`
-   fence without it.
-"""
+"""Block content: markdown-it's flat block tokens become `Block` nodes with spans."""
 
 from __future__ import annotations
 
@@ -33,7 +22,6 @@ from coursebuild.core.syntax.containers import (
 from coursebuild.core.syntax.fence import read_fence
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_tree import read_inlines
-from coursebuild.core.syntax.labels import reject_label, take_label
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
@@ -73,7 +61,6 @@ class TextReader:
         self._scan_tokens()
 
     def _scan_tokens(self) -> None:
-        """Collect explicit ids and footnotes, and report what nests too deep."""
         for i, token in enumerate(self.tokens):
             if token.type == "heading_open" and self.tokens[i + 1].content.endswith("}"):
                 name = read_attributes(trim(token.text)).value.id
@@ -83,11 +70,11 @@ class TextReader:
                 label, at = token.content, token.start + 2
                 label_span = self.base.span(at, at + len(label))
                 read = partial(self._read_footnote, i + 1)
-                self.state.notes.add(FootnoteText(label, label_span, self._span(token), read))
+                self.state.notes.add(FootnoteText(label, label_span, self.span(token), read))
         deep_token = next((token for token in self.tokens if token.info == TOO_DEEP), None)
         if deep_token is not None:
             message = "quotations, lists or footnotes are nested too deeply here"
-            place = self._span(deep_token).first_line()
+            place = self.span(deep_token).first_line()
             self.state.report(diagnose("nesting-deep", place, message))
 
     def _read_footnote(self, at: int) -> tuple[model.Block, ...]:
@@ -103,7 +90,6 @@ class TextReader:
     # -- walking
 
     def _read_blocks(self, stop: str | None) -> tuple[model.Block, ...]:
-        """The blocks up to a closing token, which is skipped."""
         blocks: list[model.Block] = []
         self.balance.enter()
         while self.index < len(self.tokens):
@@ -118,7 +104,8 @@ class TextReader:
         self.balance.leave()
         return tuple(blocks)
 
-    def _span(self, token: PositionedToken) -> Span:
+    def span(self, token: PositionedToken) -> Span:
+        """Where a token stands."""
         return self.base.span(token.start, token.end)
 
     # -- leaves
@@ -146,18 +133,19 @@ class TextReader:
         caption, braces = split_label(content)
         span, following = content.span(), self._peek()
         if caption.text.startswith(TABLE) and following and following.type == "table_open":
-            label = take_label(braces, "tab", self.state)
+            label = self.state.take_label(braces, "tab")
             inlines = self.inlines(trim(caption.slice(len(TABLE))))
-            table, self.index = self._table_at(self.index)
+            self.index += 1
+            table = self._read_table(following)
             return replace(table, span=span.to(table.span), label=label, caption=inlines)
         if braces is None:
             return None
         if caption.text.startswith(FIGURE):
-            label = take_label(braces, "fig", self.state)
+            label = self.state.take_label(braces, "fig")
             inlines, shows_image = read_figure(self.inlines(caption), span, self.state.figures)
             if not shows_image:
                 message = "no image stands in the paragraph of this label"
-                reject_label(braces, message, "show one: `![…](file.svg)`", self.state)
+                self.state.reject_label(braces, message, "show one: `![…](file.svg)`")
             return model.Paragraph(span, inlines, False, shows_image, label=label)
         words = (TABLE, *self.state.words.output)
         if not any(word in caption.text[:24] for word in words):
@@ -166,13 +154,13 @@ class TextReader:
         if is_caption(inlines, self.state.words):
             recording = self._read_recording(inlines, caption.span())
         if recording is not None and isinstance(recording.body, model.Table):
-            label = take_label(braces, "tab", self.state)
+            label = self.state.take_label(braces, "tab")
             return replace(recording, body=replace(recording.body, label=label))
         message, help = "no table follows the caption of this label", "put one directly below it"
         if recording is not None:
             message = "an output that is no table has no label"
             help = "write `{#lst:name}` on the first line of its script"
-        reject_label(braces, message, help, self.state)
+        self.state.reject_label(braces, message, help)
         return recording or model.Paragraph(span, inlines)
 
     def _is_caption(self, content: Excerpt, inlines: tuple[model.Inline, ...]) -> bool:
@@ -203,13 +191,12 @@ class TextReader:
         return self.tokens[self.index] if self.index < len(self.tokens) else None
 
     def _peek_info(self) -> str | None:
-        """The info string of the next block, if it is a fence."""
         token = self._peek()
         return token.info if token is not None and token.type == "fence" else None
 
     def _read_heading(self, token: PositionedToken) -> model.Heading:
         self.index += 2
-        span = self._span(token)
+        span = self.span(token)
         attributes = read_attributes(trim(token.text))
         self.state.diagnostics += attributes.diagnostics
         children = self.inlines(attributes.value.title, mentions=False)
@@ -233,7 +220,7 @@ class TextReader:
         if isinstance(block, model.Script) and not block.norun:
             info = self._peek_info() or ""
             if info.split() == ["text"]:  # with keys, these are reported instead
-                place = self._span(self.tokens[self.index])
+                place = self.span(self.tokens[self.index])
                 self.state.report(diagnose_missing_caption(place, self.state.words))
         return block
 
@@ -241,7 +228,7 @@ class TextReader:
         code = token.text
         check_indented_fence(code, self.state)
         return model.CodeBlock(
-            self._span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
+            self.span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
         )
 
     def _read_html(self, token: PositionedToken) -> model.HtmlBlock | model.HtmlFlow:
@@ -265,10 +252,7 @@ class TextReader:
             texts.append((end, html.text[end:]))
             self.state.diagnostics += check_unread_markup(html, texts, html=True)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
-        return model.HtmlBlock(self._span(token), text, find_media(html), find_forbidden(html))
-
-    def _read_thematic_break(self, token: PositionedToken) -> model.ThematicBreak:
-        return model.ThematicBreak(self._span(token))
+        return model.HtmlBlock(self.span(token), text, find_media(html), find_forbidden(html))
 
     def _read_math(self, token: PositionedToken) -> model.MathBlock:
         text = token.text
@@ -281,15 +265,15 @@ class TextReader:
             place, message = text.span(start - 2, start), "display math is never closed"
             self.state.report(diagnose("math-unclosed", place, message, help=help))
         elif not tex.text:
-            self.state.report(diagnose("math-syntax", self._span(token), "the formula is empty"))
+            self.state.report(diagnose("math-syntax", self.span(token), "the formula is empty"))
         braces = LABEL.match(text.text, end + 2)
-        label = take_label(text.slice(*braces.span(1)) if braces else None, "eq", self.state)
-        return model.MathBlock(self._span(token), tex, label=label)
+        label = self.state.take_label(text.slice(*braces.span(1)) if braces else None, "eq")
+        return model.MathBlock(self.span(token), tex, label=label)
 
     # -- containers
 
     def _read_quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
-        span, first_token = self._span(token), self.tokens[self.index]
+        span, first_token = self.span(token), self.tokens[self.index]
         self.state.diagnostics += check_quotation(span)
         if first_token.type == "paragraph_open":
             head = read_head(trim(first_token.text), self.state.callouts)
@@ -319,18 +303,15 @@ class TextReader:
         if ordered:
             self.state.diagnostics += check_numbers([item.span for item in items])
         return model.ListBlock(
-            self._span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
+            self.span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
         )
 
     def _read_table(self, token: PositionedToken) -> model.Table:
-        table, self.index = self._table_at(self.index - 1)
+        at, report = self.index - 1, self.state.report
+        table, self.index = read_table(self.tokens, at, self.base, self.inlines, report)
         return table
 
-    def _table_at(self, at: int) -> tuple[model.Table, int]:
-        return read_table(self.tokens, at, self.base, self.inlines, self.state.report)
-
     def _skip_footnote(self, token: PositionedToken) -> None:
-        """Skip a footnote, which is read later."""
         depth = 1
         while depth:
             kind = self.tokens[self.index].type
@@ -342,21 +323,20 @@ class TextReader:
     def _read_recording(
         self, caption: tuple[model.Inline, ...], span: Span
     ) -> model.Recording | None:
-        """The recording with the caption just read, if the next block is its body."""
         match self._peek():
-            case PositionedToken(type="table_open"):
-                table, self.index = self._table_at(self.index)
-                return record_table(caption, span, table, self.state)
+            case PositionedToken(type="table_open") as token:
+                self.index += 1
+                return record_table(caption, span, self._read_table(token), self.state)
             case PositionedToken(type="fence") as token:
                 fence = read_fence(token, self.base, nested=False)
                 recording = record_fence(caption, span, fence, self.state)
                 self.index += recording is not None
                 return recording
             case PositionedToken(type="code_block") as token:
-                place = self._span(token).first_line()
+                place = self.span(token).first_line()
                 self.state.report(diagnose_wrong_body(place, "an indented block"))
             case token:
-                following = None if token is None else self._span(token)
+                following = None if token is None else self.span(token)
                 state = self.state
                 state.diagnostics += check_missing_body(caption, span, state.words, following)
         return None
@@ -375,7 +355,7 @@ _READERS: dict[str, Callable[[TextReader, PositionedToken], model.Block | None]]
     "fence": TextReader._read_fence,
     "code_block": TextReader._read_code,
     "html_block": TextReader._read_html,
-    "hr": TextReader._read_thematic_break,
+    "hr": lambda reader, token: model.ThematicBreak(reader.span(token)),
     "math_block": TextReader._read_math,
     "blockquote_open": TextReader._read_quote,
     "bullet_list_open": TextReader._read_list,

@@ -37,21 +37,14 @@ from coursebuild.core.syntax.markup_kinds import (
 )
 from coursebuild.core.syntax.nodes import shorten
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.text.diagnostics import (
-    Diagnostic,
-    Fix,
-    diagnose,
-    misspelt,
-    nearest,
-    propose,
-)
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, misspelt, nearest, propose
 from coursebuild.core.text.source import Excerpt, Span
 
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
 _MARKS = r"{}\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f"
 _SIGN = re.compile(
     rf"[{_MARKS}!?=:._'´‘’(](?:(?<=[{_MARKS}])|(?<=[!?=:._'])[!?=:._']|(?<=:)\w"
-    r"|(?<=[´‘’])[´‘’]{2}|(?<=\()(?:out|given)\))|[^\W\d_]> [a-z]|\w <[a-z]{2}"
+    r"|(?<=[´‘’])[´‘’]{2}|(?<=\()(?:out\)|given\)|\.further))|[^\W\d_]> [a-z]|\w <[a-z]{2}"
 )
 _FIRST_SIGN = re.compile(
     r"\d{1,2}[.,;)][^\d\s]|\d{1,2}[,;] |-[A-Z]|[0=_.)] |h\d\. |[A-Z?!]> |1 |import "
@@ -130,6 +123,7 @@ def _may_be_unread(whole: str, at: int, text: str) -> bool:
         or any(map(_FIRST_SIGN.match, text.split("\n")))
         or ("Lesson " in text and _MENTION.search(text) is not None)
         or (at > 0 and whole[at - 1] == "$" and _LETTER.match(text) is not None)
+        or (at > 0 and whole[at - 1] == text[:1] == ")")
     )
 
 
@@ -191,6 +185,8 @@ def _diagnose(
             is_adjacent_mark = before[-1:] in ("]", ")") if markup == "]" else after[:1] == "["
             if not is_adjacent_mark or whole.count("[") == whole.count("]"):
                 return None
+        case "link" if markup == ")" and (before != ")" or "(" in match.string[: match.start()]):
+            return None
         case "emphasis" if markup == "*" and "**" not in before[-1:] + markup + after[:1]:
             if match[0] == "*" and not re.match(r"[^\W\d_]{2}|[aA] ", after):
                 return None

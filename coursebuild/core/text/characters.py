@@ -1,8 +1,4 @@
-"""Characters: what HTML and XML forbid, and how wide a text is on a terminal.
-
-Entry points: `visible(text)`, with symbols for what HTML forbids; `clean_xml`, without what XML
-forbids; `cells`, the width in columns.
-"""
+"""Characters: what HTML and XML forbid, and how wide a text is on a terminal."""
 
 from __future__ import annotations
 

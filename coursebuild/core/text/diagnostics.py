@@ -1,12 +1,8 @@
 """Messages to the author: diagnostics, their notes and edits, and the `Parsed` values with them.
 
-Entry points: `diagnose(rule, span, message, …)`; `did_you_mean` and `propose`, whose help is an
-edit as well. A rule is a member of the closed catalogue `RULES`; its severity comes from there, so
-that a rule means the same wherever it is raised. A message says what is wrong and where, in lower
-case without a full stop; `help` says how to mend it.
-
-A `Fix` is a help with the edits that follow it. `coursebuild check --fix` makes those that are
-safe, and the others where its user asks for them.
+A message says what is wrong and where, in lower case without a full stop; `help` says how to mend
+it. `coursebuild check --fix` makes the edits of a `Fix` that are safe, and others where its user
+asks.
 """
 
 from __future__ import annotations
@@ -41,9 +37,9 @@ class Edit(Struct, frozen=True):
 class Fix(str):
     """A help with the edits that follow it, where it is known what to write.
 
-    With `new`, the edit is the text that replaces what the diagnostic marks; or `old`, if that
-    stands there once, as it does not in a string with escapes. `edits` are of other places. It is
-    `safe` where nothing else can have been meant.
+    `new` replaces what the diagnostic marks; or `old`, if that stands there once, as it does
+    not in a string with escapes. `edits` are of other places. It is `safe` where nothing else
+    can be meant.
     """
 
     new: str | None
@@ -89,14 +85,11 @@ class Diagnostic(Struct, frozen=True):
     """One mistake or doubt, at one place."""
 
     rule: str
-    """A name of the catalogue."""
     span: Span
     """The smallest stretch of text that is wrong."""
     message: str
     label: str = ""
-    """A remark beside the marked text."""
     help: str = ""
-    """How to mend it."""
     notes: tuple[Note, ...] = ()
     edits: tuple[Edit, ...] = ()
     """What mends it, if that is known: all of them, or none."""
@@ -132,9 +125,7 @@ def diagnose(
 ) -> Diagnostic:
     """A diagnostic of a rule of the catalogue; a `Fix` as its help has the edits as well.
 
-    Raises:
-        KeyError: there is no such rule.
-        TypeError: the place is no span.
+    Raises KeyError for an unknown rule, TypeError for a place that is no span.
     """
     if not isinstance(span, Span):
         raise TypeError("the place of a diagnostic is a Span, as `excerpt.span()` gives it")
@@ -174,10 +165,7 @@ def misspelt(word: str, names: Iterable[str]) -> str | None:
 
 
 def _misspelt_names(word: str, names: Iterable[str]) -> Iterator[tuple[str, tuple[int, int]]]:
-    """All names of which a word may be a misspelling, in their order, and how much they differ.
-
-    The first number does not count capitals as letters of their own, the second does.
-    """
+    """The names of which a word may be a misspelling, and by how much, without case first."""
     for name in sorted(set(names) - {word}):
         difference = _difference(word.lower(), name.lower())
         if difference <= (1 if len(name) < 5 else 2) and difference < len(name):
@@ -260,28 +248,21 @@ def is_one_edit(word: str, name: str) -> bool:
 
 
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:
-    """The fix that writes the nearest known name instead, or a help that lists them if few.
-
-    It is empty where they are many and none is near.
-    """
+    """The fix that writes the nearest known name, or a help that lists them if few; or nothing."""
     names = sorted(set(known_names))
-    likely = nearest(name, names)
-    if likely is not None:
+    if (likely := nearest(name, names)) is not None:
         return propose(name, likely, names)
-    if names and len(names) <= 12:
-        return "known: " + ", ".join(f"`{n}`" for n in names)
-    return ""
+    return "known: " + ", ".join(f"`{n}`" for n in names) if 0 < len(names) <= 12 else ""
 
 
 _IDS = re.compile(r"\d+|(?<![^\W_])[^\W\d_](?![^\W_])")
-"""Numbers and single letters."""
 
 
 def propose(name: str, likely: str, names: Iterable[str] = ()) -> Fix:
     """The fix that writes the likely one of `names` for a name.
 
     It is safe where the name differs from that one by a letter or two, and from others by more.
-    Names that differ in numbers or single letters are of different things: there the help has no
+    Names that differ in numbers or single letters are of different things: there it has no
     edit.
     """
     help = f"did you mean `{likely}`?"

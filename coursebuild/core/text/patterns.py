@@ -1,9 +1,6 @@
 """Regular expressions that authors write, searched for in a time that grows with the text only.
 
-Entry points: `replacements`; `pattern_mistake`, `matches_empty_text`.
-
-This is what RE2 does, as it never backtracks. It knows nearly all that Python's `re` knows, but no
-lookaround, back-reference or possessive quantifier.
+This is what RE2 does, which knows no lookaround, back-reference or possessive quantifier.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The closed catalogue of rules: every mistake that the tool can name.
 
-Entry points: `RULES`, from name to `Rule`, and `GROUPS`. `docs/reference/rules.md` is written from
-them; a fixture in `tests/fixtures/rules/` shows for each rule what an author sees.
+A fixture in `tests/fixtures/rules/` shows for each rule what an author sees.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ class Rule(Struct, frozen=True):
     name: str
     severity: Severity
     summary: str
-    """Its meaning in one sentence, for the catalogue's page."""
     no_fix: str = ""
     """Why no diagnostic of it has an edit, in one clause; empty where one may have."""
 
@@ -88,10 +86,12 @@ GROUPS: dict[str, dict[str, str]] = {
         "heading-empty": "A heading has no text.",
         "heading-attributes": "The attributes after a heading cannot be read.",
         "anchor-repeated": "Two things on a page have the same anchor.",
-        "text-repeated": "A line begins with the same words twice, or a heading is repeated.",
+        "text-repeated": "A line begins with the same words twice, or a heading or a row of a "
+        "table is repeated.",
         "markup-unread": "Markdown, or an attribute in braces, is incomplete, so readers would see "
         "its characters.",
         "markup-foreign": "Markup of another tool would be shown as it is written.",
+        "number-form": "A number has two points, a letter among its digits or a sign too many.",
         "label-attribute": "A label cannot be read, or stands where no label may.",
         "table-cells": "A row of a table has more or fewer cells than its header.",
         "footnote-undefined": "A footnote is used but not defined.",
@@ -143,7 +143,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "link-lesson": "A link or mention names a lesson that is not in the map.",
         "link-level": "A mention names a level that is not in the map.",
         "link-page": "A link names a page that is not in the map.",
-        "link-text": "A link has no text, or one that names another lesson or model.",
+        "link-text": "A link has no text or no address, or its text names another lesson or model.",
         "link-term": "A link names a term that no lesson defines.",
         "link-model": "A link names a model that is not in `models/`.",
         "link-example": "A link names a script that is in no lesson.",
@@ -241,7 +241,6 @@ GROUPS: dict[str, dict[str, str]] = {
         "package-reduced": "A QTI package cannot hold a question as the page shows it.",
     },
 }
-"""The meaning of each rule in one sentence, by the sections of the page of rules."""
 _WARNINGS = frozenset(
     """
     draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
@@ -288,7 +287,6 @@ _NO_FIX = {
     "leave it out, or allow it in the map": "html-forbidden",
     "leave it out, or silence the warning": "package-reduced",
 }
-"""Why rules have no edits: a reason, and the names of the rules."""
 _REASONS = {name: reason for reason, names in _NO_FIX.items() for name in names.split()}
 
 RULES: dict[str, Rule] = {

@@ -1,16 +1,8 @@
 """Text with positions: where each character of a course file stands.
 
-Entry points: `Source` (a file's path and text), `Span` (a stretch of it), `Excerpt` (text taken out
-of a source, of which every character still knows its place). Everything else keeps offsets; this is
-the only module that counts lines.
-
-1. A `Source` holds the text exactly as decoded from disk: line ends are kept, so offsets serve
-   edits byte for byte.
-2. A `Span` is a half-open range of offsets. Lines and columns are worked out only when a message is
-   made.
-3. An `Excerpt` is what a parser of an inner language reads (a fence's JSON, a quiz's Markdown):
-   prefixes, indentation and escapes are gone from its text, and its pieces say where each part
-   came from.
+Line ends are kept as on disk, so offsets serve edits byte for byte; lines and columns are worked
+out only when a message is made. An `Excerpt` is what a parser of an inner language reads: prefixes,
+indentation and escapes are gone from its text, and its pieces say where each part came from.
 """
 
 from __future__ import annotations
@@ -50,7 +42,6 @@ class Source(Struct, frozen=True, dict=True):
     path: str
     """POSIX path relative to the course's root."""
     text: str
-    """The decoded text, line ends as on disk."""
 
     def __repr__(self) -> str:
         return f"Source({self.path!r})"

@@ -1,8 +1,7 @@
 """Units as authors write them: `kg m²`, `N*m/rad`, `mm`.
 
-Entry points: `find_unit`, how large a unit is; `check_unit`, what is wrong with one, and which was
-likely meant. The units of mechanics are known here. Pint is asked about others only, as its import
-takes longer than the build of a page.
+The units of mechanics are known here. Pint is asked about others only, as its import takes longer
+than the build of a page.
 """
 
 from __future__ import annotations
@@ -43,7 +42,6 @@ _NAMES = dict(
     """.split()
 )
 _PRODUCT_UNITS = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
-"""Units that are often written without the space between them."""
 
 _WORD = r"(?:°C|[^\W\d_⁰¹²³⁴-⁹]+|[°%‰])"
 _POWER = r"(?:\^?(?:[-−]?\d{1,2}|\{[-−]?\d{1,2}\}|\([-−]?\d{1,2}(?:/\d)?\))|[⁻⁰¹²³⁴-⁹]+)"

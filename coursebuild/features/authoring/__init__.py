@@ -1,11 +1,4 @@
-"""Commands that begin a course and change it.
-
-- `init`: writes a small complete course, from the files in `course/`
-- `new`: adds a lesson, level, page or feature to the map (`course_map`), a model, a template
-- `rename`: gives a lesson another id, wherever the course names it (`course_map`)
-- `fmt`: formats lessons (`format`)
-- `doctor`: checks which of the things that courses need work here
-"""
+"""Commands that begin a course and change it."""
 
 from coursebuild.core.features import Command, Feature
 

@@ -1,10 +1,5 @@
 """Edits of the course map: what is added, a lesson that is renamed; and of what names it.
 
-Entry points: `with_lesson`, `with_level`, `with_page`, `with_feature`, `with_lesson_renamed`; each
-returns the new text.
-`rename_references`, the edits of the places that name a lesson; `doubtful_places`, which may mean
-it but are no links: in code, in a comment, in a range such as "Lessons 1.3 to 1.5".
-
 An entry is inserted or moved as a whole, with the comments directly above it, and with the line
 ends and the indentation of the map. The rest stays as its author wrote it. The new text is parsed,
 and refused where it is no valid map, as where all lessons are on one line.
@@ -181,7 +176,6 @@ def _check_free(course: Course, id: str) -> None:
 
 
 def _insert(course: Course, id: str, lines: Sequence[str]) -> str:
-    """Return the map with the lines of an entry inserted in its level, in the order of ids."""
     text = course.map.text
     level = next(level for level in course.levels if level.id == _level_id(id))
     preceding = [lesson for lesson in level.lessons if id_order(lesson.id) < id_order(id)]
@@ -248,7 +242,6 @@ def _end_of_line(text: str, offset: int) -> int:
 
 
 def _indent(lines: Sequence[str], indent: str) -> list[str]:
-    """Indent lines as the entries around them."""
     return [indent + line.removeprefix(indent) for line in lines] if indent.isspace() else [*lines]
 
 
@@ -321,7 +314,6 @@ def doubtful_places(
 
 
 def _silenced_paths(root: ObjectNode) -> Iterator[StringNode]:
-    """Yield the paths and patterns of the map's entries that silence warnings."""
     paths = (silence.get("path") for silence in root.objects("silence"))
     return (path for path in paths if isinstance(path, StringNode))
 

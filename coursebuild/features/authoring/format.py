@@ -1,12 +1,7 @@
 """Formats a lesson or page without changing its meaning.
 
-Entry point: `format_document`. `split_words`, `fill_lines`, `align_table` and `layout_json` are
-layouts of parts without another meaning.
-
-1. Edits are collected for JSON in fences, tables, white space, empty lines, and, if there is a
-   width, for paragraphs.
-2. The text with all edits is parsed again. If its meaning has changed, each half of the edits is
-   tried by itself, down to single ones, and those that change it are left out.
+The text with all edits is parsed again. If its meaning has changed, each half of the edits is tried
+by itself, down to single ones, and those that change it are left out.
 """
 
 from __future__ import annotations
@@ -69,7 +64,6 @@ def _errors(document: Parsed[model.Document]) -> tuple[Diagnostic, ...]:
 def _select_harmless(
     edits: list[Edit], selection: list[Edit], is_harmless: Callable[[Sequence[Edit]], bool]
 ) -> list[Edit]:
-    """Return the selection with as many further edits as are harmless together."""
     if not edits or is_harmless(selection + edits):
         return selection + edits
     if len(edits) == 1:
@@ -176,7 +170,6 @@ class _Layout:
         yield from self._separate_blocks()
 
     def _wrap(self, paragraph: model.Paragraph) -> Iterator[Edit]:
-        """Fill the lines of a paragraph, unless it has forced line breaks."""
         span, inlines = paragraph.span, list(model.walk_inlines(paragraph.children))
         if any(isinstance(inline, model.HardBreak) for inline in inlines):
             return
@@ -300,8 +293,8 @@ def align_table(rows: Sequence[str], width: int) -> list[str]:
     table.insert(
         1,
         [
-            _write_delimiter(*mark)
-            for mark in zip(marks, widths if fits else min_widths, strict=True)
+            re.sub("-+", "-" * (width - mark.count(":")), mark)
+            for mark, width in zip(marks, widths if fits else min_widths, strict=True)
         ],
     )
     return ["|" + "".join(f" {cell} |" if cell else " |" for cell in row) for row in table]
@@ -311,11 +304,6 @@ def _pad(cell: str, width: int, mark: str) -> str:
     room = width - cells(cell)
     left = 0 if not mark.endswith(":") else room // 2 if mark.startswith(":") else room
     return " " * left + cell + " " * (room - left)
-
-
-def _write_delimiter(mark: str, width: int) -> str:
-    left, right = mark.startswith(":"), mark.endswith(":")
-    return ":" * left + "-" * (width - left - right) + ":" * right
 
 
 # --- JSON

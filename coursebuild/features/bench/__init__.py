@@ -1,9 +1,4 @@
-"""Measurements of models, and their recorded reports on the pages of models and in texts.
-
-`model_page` is the part of a model's page: its `scenarios`, and what the model could do without. A
-`bench` fence in a text names a model (`parse`): `checks` compares it with the course, and `page`
-shows a scenario as the page of the model does. `commands` measures and records.
-"""
+"""Measurements of models, and their recorded reports on models' pages and in `bench` fences."""
 
 from __future__ import annotations
 

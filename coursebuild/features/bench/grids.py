@@ -1,8 +1,4 @@
-"""Measured figures as a page shows them: numbers in print style, and tables.
-
-Entry points: `Grid`, a table; `power`, `bounded`, `percent`, `factor`, `size`, for numbers;
-`phrase`, `sentence`, `machine_text`, for words.
-"""
+"""Measured figures as a page shows them: numbers in print style, and tables."""
 
 from __future__ import annotations
 

@@ -1,12 +1,7 @@
 """A recorded report that a text shows: the `bench` fence, read and compared with the course.
 
-Entry points: `Bench`, `declared_scenarios`; `parse_bench`, of a fence; `check_benches`;
-`check_keyframes`, for models that declare no scenarios, whose keyframes are known only once the
-model is compiled.
-
 The first word of a fence is the name of the model, as in a link (`%20` is a space). Keys:
-`scenario=swing` (default: the first), `show="plot,table"` (see `PARTS`), or `sweep=softness`. What
-other engines do, `show=engines`, is a report of its own.
+`scenario=swing` (default: the first), `show="plot,table"` (see `PARTS`), or `sweep=softness`.
 """
 
 from __future__ import annotations
@@ -18,7 +13,7 @@ from urllib.parse import unquote
 from coursebuild.core.model import Course, Document, FeatureBlock, find_blocks
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.model.scenarios import keyframe_scenarios
-from coursebuild.core.syntax.fence import Fence, TextParser, Word, kind_of
+from coursebuild.core.syntax.fence import Fence, TextParser, kind_of
 from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
@@ -71,7 +66,17 @@ def parse_bench(fence: Fence, _: TextParser) -> Parsed[Bench | None]:
         help = "write `bench NAME`, with the name of a file in models/, without `.xml`"
         diagnostics.append(diagnose("fence-info", kind_of(fence.info).span(), message, help=help))
     show = keys.get("show")
-    shows = _DEFAULT if show is None else _parse_parts(show, diagnostics)
+    shows = _DEFAULT
+    if show is not None:
+        parts = {part.text: part for part in reversed(show.parts()) if part.text}
+        for name, part in parts.items():
+            if name not in PARTS:
+                message, help = f"nothing of a report is called `{name}`", did_you_mean(name, PARTS)
+                diagnostics.append(diagnose("fence-key-value", part.span(), message, help=help))
+        if not parts:
+            message, help = "`show` names nothing", "for example `show=plot,table`"
+            diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
+        shows = tuple(name for name in PARTS if name in parts)
     body = trim(fence.body, " \t\n")
     if body.text:
         message = "a `bench` block shows a recorded report and takes no text"
@@ -84,19 +89,6 @@ def parse_bench(fence: Fence, _: TextParser) -> Parsed[Bench | None]:
     sweep, sweep_place = keys.value("sweep"), keys.place("sweep")
     bench = Bench(fence.span, model, place, scenario, scenario_place, sweep, sweep_place, shows)
     return Parsed(bench)
-
-
-def _parse_parts(show: Word, diagnostics: list[Diagnostic]) -> tuple[BenchPart, ...]:
-    """Read which parts to show, in the order of `PARTS`."""
-    parts = {part.text: part for part in reversed(show.parts()) if part.text}
-    for name, part in parts.items():
-        if name not in PARTS:
-            message, help = f"nothing of a report is called `{name}`", did_you_mean(name, PARTS)
-            diagnostics.append(diagnose("fence-key-value", part.span(), message, help=help))
-    if not parts:
-        message, help = "`show` names nothing", "for example `show=plot,table`"
-        diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
-    return tuple(name for name in PARTS if name in parts)
 
 
 def check_benches(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:

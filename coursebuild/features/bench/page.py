@@ -1,17 +1,12 @@
 """Recorded reports as pages show them: on the page of a model, and in a text.
 
-Entry points: `measurements_view(library, place, model)`, `draw_measurements`, `measurement_facts`;
-of a block `bench_view`, the values that a page needs, `draw_bench`, `bench_markdown`,
-`index_bench`.
-
-A block shows the same as the page of the model. For what is missing, or does not fit the course,
-the page shows the command that measures it.
+For what is missing, or does not fit the course, a block shows the command that measures it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup, escape
 from msgspec import Struct
@@ -23,19 +18,16 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import escape_marks, guard_lines
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.strings import Strings
-from coursebuild.features.bench.engine_view import EngineView, engine_plots, engine_view
-from coursebuild.features.bench.grids import (
-    Grid,
-    factor,
-    machine_text,
-    power,
-    sentence,
-    size,
-    unbroken,
-)
+from coursebuild.features.bench import grids
 from coursebuild.features.bench.model import Bench, declared_scenarios
-from coursebuild.features.bench.scenario_view import ScenarioView, plots, scenario_view
-from coursebuild.numerics.reports.diet_report import DietReport, Finding, Saving
+from coursebuild.features.bench.scenario_view import (
+    EngineView,
+    ScenarioView,
+    engine_view,
+    plots,
+    scenario_view,
+)
+from coursebuild.numerics.reports.diet_report import DietReport, Finding
 from coursebuild.numerics.reports.engine_report import EngineReport
 from coursebuild.numerics.reports.records import BENCH, DIET, ENGINES
 from coursebuild.numerics.reports.scene_report import ScenarioReport, SceneReport, SweepReport
@@ -54,8 +46,8 @@ class BenchView(Struct, frozen=True):
     command: str
     scenario: ScenarioView | None = None
     """`None` if no report fits the course."""
-    tables: tuple[Grid, ...] = ()
-    folded_table: Grid | None = None
+    tables: tuple[grids.Grid, ...] = ()
+    folded_table: grids.Grid | None = None
     """The table of settings, if it is folded below something else."""
     machine: str = ""
     engines: EngineView | None = None
@@ -88,8 +80,8 @@ def bench_view(library: Library, place: urls.Place, bench: Bench) -> BenchView:
         return view
     scenario = scenario_view(library.words, report)
     only_table, is_sweep = bench.shows == ("table",), isinstance(report, SweepReport)
-    grids = {"stable": scenario.stable, "orders": scenario.orders}
-    tables = [grid for name in bench.shows if (grid := grids.get(name)) is not None]
+    by_name = {"stable": scenario.stable, "orders": scenario.orders}
+    tables = [grid for name in bench.shows if (grid := by_name.get(name)) is not None]
     if not is_sweep and {"plot", "table"}.isdisjoint(bench.shows):  # these are about settings
         scenario = replace(scenario, verdict="", notes=())
     has_fold = not only_table and (is_sweep or "table" in bench.shows)
@@ -98,7 +90,7 @@ def bench_view(library: Library, place: urls.Place, bench: Bench) -> BenchView:
         scenario=scenario,
         tables=(scenario.settings,) if only_table else tuple(tables),
         folded_table=scenario.settings if has_fold else None,
-        machine=machine_text(library.words, scene.machine),
+        machine=grids.machine_text(library.words, scene.machine),
     )
 
 
@@ -117,7 +109,7 @@ def _with_engines(library: Library, place: urls.Place, bench: Bench, view: Bench
     return replace(
         view,
         engines=engine_view(library.words, scenario, report),
-        engines_machine=machine_text(library.words, report.machine),
+        engines_machine=grids.machine_text(library.words, report.machine),
     )
 
 
@@ -128,15 +120,13 @@ _ENGINES = "engines"
 def draw_bench(page: PageContext, block: Bench) -> Markup:
     """Draw the report, with its plots, each for wide and for narrow screens."""
     view = _view(page, block)
-    drawings: tuple[tuple[Markup, ...], ...] = ()
-    engine_drawings: tuple[tuple[Markup, ...], ...] = ()
     # The blocks of a page are numbered.
     places = [b.span.start for b in find_blocks(page.document, Bench)]
     number = places.index(block.span.start) + 1
-    if view.scenario is not None and "plot" in block.shows:
-        drawings = plots(f"_bench-{number}", view.scenario.report)
-    if view.engines is not None:
-        engine_drawings = engine_plots(f"_bench-engines-{number}", view.engines.scenario)
+    report = view.scenario.report if view.scenario and "plot" in block.shows else None
+    drawings = plots(f"_bench-{number}", report) if report else ()
+    engines = view.engines
+    engine_drawings = plots(f"_bench-engines-{number}", engines.scenario) if engines else ()
     return page.template(
         "bench/bench.html", bench=view, plots=drawings, engine_plots=engine_drawings
     )
@@ -229,7 +219,7 @@ def measurements_view(library: Library, place: urls.Place, model: MjcfModel) -> 
             for scenario, anchor in anchors.items()
             if scenario not in {report.name for report in scenarios}
         ),
-        machine="" if scene is None else machine_text(words, scene.machine),
+        machine="" if scene is None else grids.machine_text(words, scene.machine),
         file="" if scene is None else place.href(urls.file_path(BENCH.path(name))),
         diet=None if diet is None else _diet(words, place, diet),
         numerics=place.href(urls.NUMERICS) if library.reports.cases else "",
@@ -239,25 +229,25 @@ def measurements_view(library: Library, place: urls.Place, model: MjcfModel) -> 
         engines=()
         if engines is None
         else tuple(engine_view(words, scenario, engines) for scenario in engines.scenarios),
-        engines_machine="" if engines is None else machine_text(words, engines.machine),
+        engines_machine="" if engines is None else grids.machine_text(words, engines.machine),
         engines_file="" if engines is None else place.href(urls.file_path(ENGINES.path(name))),
     )
 
 
 def draw_measurements(renderer: Renderer, view: MeasurementsView) -> Markup:
     """Draw the part of the page."""
-    scenario_plots = [
-        plots(f"_plot-{n}", scenario.report) for n, scenario in enumerate(view.scenarios, 1)
-    ]
-    sweep_plots = [plots(f"_sweep-{n}", sweep.report) for n, sweep in enumerate(view.sweeps, 1)]
-    engine_drawings = [
-        engine_plots(f"_engines-{n}", engines.scenario) for n, engines in enumerate(view.engines, 1)
-    ]
+
+    def draw(kind: str, reports: Iterable[Any]) -> list[Any]:
+        return [plots(f"_{kind}-{n}", report) for n, report in enumerate(reports, 1)]
+
     return renderer.render(
         "bench/measurements.html",
         measurements=view,
-        plots=scenario_plots + sweep_plots,
-        engine_plots=engine_drawings,
+        plots=[
+            *draw("plot", (scenario.report for scenario in view.scenarios)),
+            *draw("sweep", (sweep.report for sweep in view.sweeps)),
+        ],
+        engine_plots=draw("engines", (engines.scenario for engines in view.engines)),
     )
 
 
@@ -267,17 +257,17 @@ def measurement_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, st
     scene: SceneReport | None = library.reports.scenes.get(model.name)
 
     def speed(times: float | None) -> str:
-        return "" if times is None else words("measured.times", factor=factor(times))
+        return "" if times is None else words("measured.times", factor=grids.factor(times))
 
     native = browser = None
     if scene is not None and scene.scenarios:
         native = next((row.realtime for row in scene.scenarios[0].rows if row.own), None)
-    text = size(len(model.source.text.encode()))
+    text = grids.size(len(model.source.text.encode()))
     facts = {"mjcf_file": text}
     if scene is not None and (card := scene.card) is not None:
         browser = card.browser
         facts = {"possible": str(card.possible), "touched": str(card.touched)}
-        facts |= {"mjcf": size(card.mjcf), "mjb": size(card.mjb)}
+        facts |= {"mjcf": grids.size(card.mjcf), "mjb": grids.size(card.mjb)}
     facts |= {"native": speed(native), "browser": speed(browser)}
     return tuple((words(f"measured.{name}"), fact) for name, fact in facts.items() if fact)
 
@@ -295,26 +285,23 @@ def _diet(words: Strings, place: urls.Place, diet: DietReport) -> DietView:
     return DietView(
         summary,
         tuple(_finding(words, finding) for finding in diet.findings),
-        machine_text(words, diet.machine),
+        grids.machine_text(words, diet.machine),
         place.href(urls.file_path(DIET.path(diet.model))),
     )
 
 
 def _finding(words: Strings, finding: Finding) -> FindingView:
-    label = escape(finding.label)
+    label, saving = escape(finding.label), finding.saving
     if finding.difference:  # a figure alone where its words were not recorded
-        label += Markup(" ({})").format(finding.shown or unbroken(power(finding.difference, 2)))
-    saving = _saving(words, finding.saving)
-    return FindingView(finding, sentence(finding.message), label, saving)
-
-
-def _saving(words: Strings, saving: Saving) -> str:
+        label += Markup(" ({})").format(
+            finding.shown or grids.unbroken(grids.power(finding.difference, 2))
+        )
     parts = []
     if saving.time is not None:
         text = words("measured.saves_time", factor=f"{saving.time:.3g}")
         parts.append(text if saving.certain else words("measured.saves_none"))
     if saving.memory:
-        parts.append(words("measured.saves_memory", size=size(saving.memory)))
+        parts.append(words("measured.saves_memory", size=grids.size(saving.memory)))
     if saving.text:
-        parts.append(words("measured.saves_text", size=size(saving.text)))
-    return ", ".join(parts)
+        parts.append(words("measured.saves_text", size=grids.size(saving.text)))
+    return FindingView(finding, grids.sentence(finding.message), label, ", ".join(parts))

@@ -1,33 +1,24 @@
-"""The report on a scenario as pages show it: the page of a model, and a lesson's `bench`.
-
-Entry points: `scenario_view(words, report, anchor)`, `plots`; `orders_table`, and
-`integrator_table`, of what else is known of integrators; `stable_title`, `stable_cells` and
-`stable_again`, for largest stable timesteps; `lost_runs`.
-"""
+"""Reports as pages show them: of a scenario, of a sweep, and of a scenario in other engines."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.pages.strings import Strings
-from coursebuild.features.bench.grids import (
-    FigurePart,
-    Grid,
-    NamedRow,
-    bounded,
-    factor,
-    grid,
-    merge_rows,
-    percent,
-    phrase,
-    power,
-    sentence,
+from coursebuild.features.bench import grids
+from coursebuild.numerics.reports.engine_report import (
+    BatchCost,
+    EngineReport,
+    EngineRow,
+    EngineScenario,
+    row_name,
 )
 from coursebuild.numerics.reports.scene_report import (
     FIGURES,
+    FLOORS,
     FittedOrder,
     MeasuredRun,
     OrderRow,
@@ -75,7 +66,7 @@ class ScenarioView(Struct, frozen=True):
     anchor: str
     """Its id on the page."""
     title: str
-    settings: Grid
+    settings: grids.Grid
     """The table of settings; of a sweep, of its parameters."""
     notes: tuple[str, ...]
     """Remarks on runs that failed, or whose model was changed."""
@@ -84,8 +75,8 @@ class ScenarioView(Struct, frozen=True):
     description: tuple[str, ...] = ()
     """Sentences: how long it lasts, and with what it was compared."""
     verdict: str = ""
-    orders: Grid | None = None
-    stable: Grid | None = None
+    orders: grids.Grid | None = None
+    stable: grids.Grid | None = None
 
 
 def scenario_view(
@@ -93,16 +84,38 @@ def scenario_view(
 ) -> ScenarioView:
     """Make the view of a scenario or a sweep; `anchor` is its id on the page, if it has one."""
     if isinstance(report, SweepReport):
-        return _sweep_view(words, report, anchor)
+        columns = [
+            (words("measured.parameter"), [row.parameter for row in report.rows]),
+            (words("measured.value"), [row.value for row in report.rows]),
+            *((name, [cell(row, key) for row in report.rows]) for key, name in FIGURES.items()),
+        ]
+        figures = shown_figures(report)
+        minor = tuple(name for key, name in FIGURES.items() if key not in figures)
+        own_rows = tuple(n for n, row in enumerate(report.rows) if row.own)
+        notes = lost_runs((f"{row.parameter} {row.value}", row) for row in report.rows)
+        table = grids.grid(report.title, columns, minor=minor, highlights=own_rows)
+        return ScenarioView(anchor, report.title, table, tuple(notes), report)
+    names = [setting_text(row.setting, report.own_setting) for row in report.rows]
+    notes = lost_runs(zip(names, report.rows, strict=True))
+    softened = [name for name, row in zip(names, report.rows, strict=True) if row.refsafe]
+    if softened:
+        notes.append(words("measured.refsafe", settings="; ".join(softened)))
+    rows = []
+    for row in report.stable:
+        remark = stable_again(words, row)
+        if row.largest is None and is_cut_short(report):
+            remark = words("measured.stable_short", steps=FEWEST_STEPS)
+        rows.append((row.integrator, (*stable_cells(words, row), remark)))
+    label = stable_title(words, report.stable[0]) if rows else ""
     return ScenarioView(
         anchor=anchor,
         title=report.title or report.name,
         description=tuple(_describe(words, report)),
-        verdict=sentence(report.verdict.text),
+        verdict=grids.sentence(report.verdict.text),
         settings=_settings_table(words, report),
-        notes=tuple(_notes(words, report)),
+        notes=tuple(notes),
         orders=orders_table(words, words("measured.orders"), report.orders),
-        stable=_stability_table(words, report),
+        stable=integrator_table(words, label, (*STABLE, "measured.remark"), rows),
         report=report,
     )
 
@@ -113,29 +126,31 @@ def _describe(words: Strings, report: ScenarioReport) -> list[str]:
         sentences.append(words("measured.horizon", time=seconds_text(report.horizon)))
         if report.lyapunov is not None and report.horizons is not None:
             first, last = map(seconds_text, report.horizons)
-            rate = power(report.lyapunov)
+            rate = grids.power(report.lyapunov)
             error = horizon_error_text(report.horizon_error)
             values = {"first": first, "last": last, "rate": rate, "error": error}
-            sentences.append(phrase(words, "measured.chaotic", **values))
+            sentences.append(grids.phrase(words, "measured.chaotic", **values))
     if report.hold:
         sentences.append(words("measured.hold", time=seconds_text(report.hold)))
     parts = [] if report.own_setting is None else solving_parts(report.own_setting)
     if parts:
         sentences.append(words("measured.usual", setting=", ".join(parts)))
-    reference, floor = f"measured.reference_{report.reference}", power(report.floor, 1)
-    sentences.append(phrase(words, reference, source=report.source, floor=floor))
+    reference, floor = f"measured.reference_{report.reference}", grids.power(report.floor, 1)
+    sentences.append(grids.phrase(words, reference, source=report.source, floor=floor))
     if report.second:
         sentences.append(words("measured.second", source=report.second))
     if report.agreement is not None:
-        sentences.append(phrase(words, "measured.agreement", difference=power(report.agreement, 2)))
+        sentences.append(
+            grids.phrase(words, "measured.agreement", difference=grids.power(report.agreement, 2))
+        )
     return sentences
 
 
-def _settings_table(words: Strings, report: ScenarioReport) -> Grid:
+def _settings_table(words: Strings, report: ScenarioReport) -> grids.Grid:
     rows = [row for row in report.rows if not is_idle(row)]
 
     def error_column(quantity: Quantity) -> tuple[str, list[str]]:
-        errors: list[str] = [bounded(quantity.value_of(row), quantity.least) for row in rows]
+        errors: list[str] = [grids.bounded(quantity.value_of(row), quantity.least) for row in rows]
         key = _QUANTITIES.get(quantity.name)
         return quantity.label if key is None else words(key), errors
 
@@ -147,7 +162,7 @@ def _settings_table(words: Strings, report: ScenarioReport) -> Grid:
             [setting_text(row.setting, report.own_setting) for row in rows],
         ),
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
-        (speed, [factor(row.realtime) for row in rows]),
+        (speed, [grids.factor(row.realtime) for row in rows]),
         (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
         (evaluations, [f"{row.work:,}" for row in rows]),
         (iterations, ["" if r.iterations is None else f"{r.iterations:,.0f}" for r in rows]),
@@ -156,17 +171,17 @@ def _settings_table(words: Strings, report: ScenarioReport) -> Grid:
             words("measured.parted", error=horizon_error_text(report.horizon_error)),
             ["" if r.parted is None else seconds_text(r.parted, 3) for r in rows],
         ),
-        (words("measured.energy"), [percent(row.energy_drift) for row in rows]),
-        (words("measured.momentum"), [power(row.momentum_drift, 2) for row in rows]),
-        (words("measured.depth"), [power(row.penetration or None, 2) for row in rows]),
-        (words("measured.slip"), [power(row.slip, 2) for row in rows]),
-        (words("measured.model_error"), [power(row.model_error, 2) for row in rows]),
+        (words("measured.energy"), [grids.percent(row.energy_drift) for row in rows]),
+        (words("measured.momentum"), [grids.power(row.momentum_drift, 2) for row in rows]),
+        (words("measured.depth"), [grids.power(row.penetration or None, 2) for row in rows]),
+        (words("measured.slip"), [grids.power(row.slip, 2) for row in rows]),
+        (words("measured.model_error"), [grids.power(row.model_error, 2) for row in rows]),
         (remarks, [_remark(words, report, row) for row in rows]),
     ]
     own_rows = tuple(n for n, row in enumerate(rows) if row.own)
     label = words("measured.settings", title=report.title or report.name)
     minor = (speed, time, evaluations, iterations)
-    return grid(label, columns, words=(remarks,), minor=minor, highlights=own_rows)
+    return grids.grid(label, columns, words=(remarks,), minor=minor, highlights=own_rows)
 
 
 def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> str:
@@ -185,17 +200,6 @@ def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> st
     return "; ".join(parts)
 
 
-def _notes(words: Strings, report: ScenarioReport) -> list[str]:
-    """Say why runs were lost, and in which MuJoCo changed the model."""
-    notes = lost_runs((setting_text(row.setting, report.own_setting), row) for row in report.rows)
-    softened_settings = [
-        setting_text(row.setting, report.own_setting) for row in report.rows if row.refsafe
-    ]
-    if softened_settings:
-        notes.append(words("measured.refsafe", settings="; ".join(softened_settings)))
-    return notes
-
-
 def lost_runs(runs: Iterable[tuple[str, MeasuredRun | SweepRow]]) -> list[str]:
     """Say why runs were lost; runs with the same reasons stand together."""
     names_by_reasons: dict[tuple[str, ...], list[str]] = {}
@@ -209,7 +213,7 @@ def lost_runs(runs: Iterable[tuple[str, MeasuredRun | SweepRow]]) -> list[str]:
 
 def orders_table(
     words: Strings, label: str, orders: Iterable[OrderRow], *, merge: bool = False
-) -> Grid | None:
+) -> grids.Grid | None:
     """Make a table of fitted orders; `None` if there are none."""
     rows = []
     for row in orders:
@@ -223,36 +227,23 @@ def integrator_table(
     words: Strings,
     label: str,
     titles: Sequence[str],
-    rows: Sequence[NamedRow],
+    rows: Sequence[grids.NamedRow],
     *,
     merge: bool = False,
-    parts: tuple[FigurePart, ...] = (),
-) -> Grid | None:
+    parts: tuple[grids.FigurePart, ...] = (),
+) -> grids.Grid | None:
     """Make a table of integrators; `None` without rows.
 
     `titles`: keys of the columns' titles; `merge`: integrators with the same cells share a row.
     """
     if not rows:
         return None
-    rows = merge_rows(rows) if merge else rows
+    rows = grids.merge_rows(rows) if merge else rows
     columns = [(words("measured.integrator"), [name for name, _ in rows])]
     columns += [(words(key), [cells[n] for _, cells in rows]) for n, key in enumerate(titles)]
-    return grid(
+    return grids.grid(
         label, columns, words=(words("measured.map"), words("measured.remark")), parts=parts
     )
-
-
-def _stability_table(words: Strings, report: ScenarioReport) -> Grid | None:
-    short = is_cut_short(report)
-
-    def remark(row: StableRow) -> str:
-        if row.largest is None and short:
-            return words("measured.stable_short", steps=FEWEST_STEPS)
-        return stable_again(words, row)
-
-    rows = [(row.integrator, (*stable_cells(words, row), remark(row))) for row in report.stable]
-    label = stable_title(words, report.stable[0]) if rows else ""
-    return integrator_table(words, label, (*STABLE, "measured.remark"), rows)
 
 
 STABLE = (
@@ -315,31 +306,126 @@ def stable_again(words: Strings, row: StableRow) -> str:
     return words("measured.islands", first=first, last=last)
 
 
-def _sweep_view(words: Strings, sweep: SweepReport, anchor: str) -> ScenarioView:
-    columns = [
-        (words("measured.parameter"), [row.parameter for row in sweep.rows]),
-        (words("measured.value"), [row.value for row in sweep.rows]),
-        *((name, [cell(row, key) for row in sweep.rows]) for key, name in FIGURES.items()),
-    ]
-    minor = tuple(name for key, name in FIGURES.items() if key not in shown_figures(sweep))
-    own_rows = tuple(n for n, row in enumerate(sweep.rows) if row.own)
-    notes = lost_runs((f"{row.parameter} {row.value}", row) for row in sweep.rows)
-    table = grid(sweep.title, columns, minor=minor, highlights=own_rows)
-    return ScenarioView(anchor, sweep.title, table, tuple(notes), sweep)
+class EngineView(Struct, frozen=True):
+    """The view of a scenario in other engines."""
+
+    title: str
+    description: tuple[str, ...]
+    """Sentences: the setting, the reference, what is compared with what."""
+    table: grids.Grid
+    notes: tuple[str, ...]
+    """What was not measured."""
+    scenario: EngineScenario
+    """For its plot."""
 
 
-def plots(name: str, report: ScenarioReport | SweepReport) -> tuple[tuple[Markup, ...], ...]:
-    """Draw the plots, each for wide and for narrow screens; `name` is unique on the page."""
-    from coursebuild.numerics.reports.report_plots import (
-        plot_svgs,  # late: few pages need it
-        sweep_svg,
+_BUSY = 0.2
+"""Processes of others from which on a machine is said to be busy."""
+_FELT = 0.05
+"""Seconds from which on it is said how long an engine compiles."""
+_UNCERTAIN = 0.1
+"""The relative half width of an interval from which on both of its ends are told."""
+
+
+def engine_view(words: Strings, scenario: EngineScenario, report: EngineReport) -> EngineView:
+    """Make the view of a scenario in other engines."""
+    title = scenario.title or scenario.name
+    return EngineView(
+        title=title,
+        description=tuple(_describe_engines(words, scenario, report)),
+        table=_engine_table(words, scenario, words("measured.engines_of", title=title)),
+        notes=tuple(
+            f"{row_name(row)}, {words('measured.worlds', n=cost.worlds)}: {cost.remark}."
+            for row in scenario.rows
+            for cost in row.costs
+            if cost.remark
+        ),
+        scenario=scenario,
     )
+
+
+def _describe_engines(
+    words: Strings, scenario: EngineScenario, report: EngineReport
+) -> Iterator[str]:
+    yield words("measured.usual", setting=setting_text(scenario.setting))
+    yield words("measured.duration", time=seconds_text(scenario.duration))
+    if scenario.horizon < scenario.duration:
+        yield words("measured.horizon", time=seconds_text(scenario.horizon))
+    key, floor = f"measured.reference_{scenario.reference}", grids.power(scenario.floor, 1)
+    yield grids.phrase(words, key, source=scenario.source, floor=floor)
+    yield words("measured.engines_cost")
+    versions = dict(pair for row in scenario.rows for pair in row.versions)
+    texts = (f"{name} {version}" for name, version in versions.items())
+    yield words("measured.engines_versions", versions=", ".join(texts))
+    if report.load >= _BUSY:
+        load, count = f"{report.load:.1f}", f"{report.machine.processors}"
+        yield words("measured.engines_load", load=load, processors=count)
+
+
+def _engine_table(words: Strings, scenario: EngineScenario, label: str) -> grids.Grid:
+    rows = scenario.rows
+    place, speed = FLOORS * scenario.floor, FLOORS * scenario.velocity_floor
+
+    def errors(name: str, least: float) -> list[str]:
+        pairs = [getattr(row, name) for row in rows]
+        return ["" if pair is None else grids.bounded(pair[0], least) for pair in pairs]
+
+    def compile_text(row: EngineRow) -> str:
+        times = [row.compile_seconds, *(cost.compile_seconds for cost in row.costs)]
+        longest = max((seconds for seconds in times if seconds is not None), default=0.0)
+        return f"{longest:.2g} s" if longest >= _FELT else ""
+
+    def remark(row: EngineRow) -> str:
+        if row.status == "ok":
+            return ""
+        if row.status == "diverged":
+            return f"{status_text(row.status)}: {row.message}"
+        return words(f"measured.{row.status}", reason=row.message)
+
+    counts = sorted({cost.worlds for row in rows for cost in row.costs})
+    columns: list[tuple[str, list[str]]] = [
+        (words("measured.engine"), [row_name(row) for row in rows]),
+        (words("measured.position"), errors("position", place)),
+        (words("measured.attitude"), errors("attitude", place)),
+        (words("measured.velocity"), errors("velocity", speed)),
+        (
+            words("measured.apart"),
+            ["" if r.apart is None else grids.power(r.apart, 2) for r in rows],
+        ),
+        (words("measured.energy"), [grids.percent(row.energy_drift) for row in rows]),
+        (words("measured.compile"), [compile_text(row) for row in rows]),
+        *((words("measured.worlds", n=n), [_cost_text(row, n) for row in rows]) for n in counts),
+        (words("measured.remark"), [remark(row) for row in rows]),
+    ]
+    minor = tuple(words(f"measured.{name}") for name in ("velocity", "compile"))
+    return grids.grid(label, columns, words=(words("measured.remark"),), minor=minor)
+
+
+def _cost_text(row: EngineRow, worlds: int) -> str:
+    """The time of a step, and how many times that of MuJoCo in one world, or between which."""
+    cost = next((cost for cost in row.costs if cost.worlds == worlds), BatchCost(worlds))
+    if cost.seconds is None or cost.ratio is None:
+        return "–" if cost.remark else ""
+    ratio = grids.factor(cost.ratio.value, 2)
+    if cost.ratio.half_width > _UNCERTAIN:
+        ratio = f"{grids.factor(cost.ratio.low, 2)} – {grids.factor(cost.ratio.high, 2)}"
+    return Markup("{} <br>×{}").format(seconds_text(cost.seconds.value, 3), ratio)
+
+
+def plots(
+    name: str, report: ScenarioReport | SweepReport | EngineScenario
+) -> tuple[tuple[Markup, ...], ...]:
+    """Draw the plots, each for wide and for narrow screens; `name` is unique on the page."""
+    from coursebuild.numerics.reports import report_plots  # late: few pages need it
 
     def draw(kind: str) -> tuple[str, ...]:
         key, narrow = f"{name}-{kind}", kind == "narrow"
         if isinstance(report, ScenarioReport):
-            return plot_svgs(report, name=key, narrow=narrow)
-        svg = sweep_svg(report, name=key, narrow=narrow)
+            return report_plots.plot_svgs(report, name=key, narrow=narrow)
+        if isinstance(report, SweepReport):
+            svg = report_plots.sweep_svg(report, name=key, narrow=narrow)
+        else:
+            svg = report_plots.engine_svg(report, name=key, narrow=narrow)
         return (svg,) if svg else ()
 
     pairs = zip(draw("wide"), draw("narrow"), strict=True)

@@ -1,8 +1,7 @@
-"""Takes lessons from the pages of a site: with other ids and links, and nothing for scripts.
+"""Lessons from the pages of a site, with other ids and links, and the whole course on one page.
 
-Entry points: `render_lesson`; `rewrite(content, rules)`; `page_file(context)`, the whole course on
-one page, to be read without a network and to be printed. That page contains its style sheet, fonts
-and pictures. It loads nothing and runs nothing, as its security policy says.
+That page contains its style sheet, fonts and pictures; it loads nothing and runs nothing, as its
+security policy says.
 """
 
 from __future__ import annotations
@@ -41,7 +40,6 @@ _ID_ATTRIBUTES = frozenset(
     "aria-activedescendant aria-controls aria-describedby aria-details aria-errormessage"
     " aria-flowto aria-labelledby aria-owns for headers list".split()
 )
-"""Attributes that hold ids."""
 _ADDRESSES = frozenset(("href", "xlink:href", "src"))
 _IN_SVG = re.compile(r"url\(#([^)]+)\)")
 
@@ -50,7 +48,6 @@ class RewriteRules(Struct, frozen=True):
     """How a lesson is rewritten."""
 
     place: urls.Place
-    """Its page."""
     address: Callable[[str, str], str]
     """Return the address for a site path and an anchor; empty if the link has no target."""
     picture: Callable[[str], str]
@@ -58,7 +55,6 @@ class RewriteRules(Struct, frozen=True):
     id: Callable[[str], str]
     """Return the new id for an old one."""
     heading_shift: int = 0
-    """Levels that headings move down."""
     closed_classes: frozenset[str] = frozenset()
     """Classes of the folds that stay closed."""
     section: str = ""
@@ -102,7 +98,6 @@ def _rewrite_element(element: HtmlElement, rules: RewriteRules) -> HtmlContent:
 def _rewrite_attribute(
     element: HtmlElement, name: str, value: str, rules: RewriteRules
 ) -> str | None:
-    """Return the new value of an attribute; `None` if it is left out."""
     if name in _LEFT_OUT or name.startswith("on"):
         return None
     if name == "tabindex" or name.startswith("data-"):

@@ -1,16 +1,8 @@
-"""The whole course as an e-book: EPUB 3.
+"""The whole course as an e-book (W3C, EPUB 3.3; EPUB Accessibility 1.1).
 
-Entry point: `epub_files(context)`, the files of the archive.
-
-1. Each lesson is a chapter of XHTML, as on its page: formulas are MathML, folds are open, labs are
-   their recorded pictures. Links between lessons lead to chapters; others lead to the site, and are
-   plain text where the course has no address.
-2. It has the fonts of the course's theme with their licences, and the accent, where the reading
-   system says whether its pages are light or dark.
-3. EPUB requires a date of last change. It is a constant, so that the same course gives the same
-   bytes.
-
-Sources: W3C, EPUB 3.3; EPUB Accessibility 1.1.
+Each lesson is a chapter of XHTML, as on its page, with open folds and recorded pictures of labs.
+Links between lessons lead to chapters; others lead to the site, and are plain text where the course
+has no address. EPUB requires a date of last change: here a constant, for the same bytes.
 """
 
 from __future__ import annotations
@@ -35,18 +27,9 @@ from coursebuild.core.pages.html_tree import to_xml
 from coursebuild.core.pages.strings import direction
 from coursebuild.core.pages.theme import accents
 from coursebuild.core.text.characters import visible
-from coursebuild.features.book.chapters import (
-    PICTURES,
-    RewriteRules,
-    extension,
-    render_lesson,
-    site_address,
-    style_path,
-    summary_line,
-)
+from coursebuild.features.book import chapters
 
 _MODIFICATION_TIME = "2000-01-01T00:00:00Z"
-"""A constant, see the module."""
 _CONTAINER = """\
 <?xml version="1.0" encoding="utf-8"?>
 <container xmlns="urn:oasis:names:tc:opendocument:xmlns:container" version="1.0">
@@ -122,13 +105,13 @@ class _Epub:
         yield _page_item("title.xhtml", self._title())
         yield _page_item("nav.xhtml", self._nav(), "nav")
         cover = OutputFile(f"{_FOLDER}cover.svg", self._cover())
-        yield EpubItem(cover, PICTURES["svg"], "cover-image")
+        yield EpubItem(cover, chapters.PICTURES["svg"], "cover-image")
         style, site = self._style(), self._context.site()
         yield EpubItem(OutputFile(f"{_FOLDER}style.css", style.encode()), "text/css")
-        folder = posixpath.dirname(style_path(self._context))
+        folder = posixpath.dirname(chapters.style_path(self._context))
         for name in _FONT.findall(style):
             font = CachedFile(f"{_FOLDER}{name}", "", site[f"{folder}/{name}"].make)
-            yield EpubItem(font, f"font/{extension(name)}")
+            yield EpubItem(font, f"font/{chapters.extension(name)}")
         for number, family in enumerate(self._course.theme.fonts, 1):
             licence = OutputFile(f"{_FOLDER}fonts/licence-{number}.txt", family.licence.data)
             yield EpubItem(licence, "text/plain")
@@ -138,19 +121,18 @@ class _Epub:
             yield _page_item(_level_name(level), page)
             for lesson in level.lessons:
                 place = urls.Place(urls.lesson_path(lesson))
-                rules = RewriteRules(place, self._address, self._picture, xml_id)
-                text = render_lesson(self._context, lesson, rules, to_xml, "_top")
+                rules = chapters.RewriteRules(place, self._address, self._picture, xml_id)
+                text = chapters.render_lesson(self._context, lesson, rules, to_xml, "_top")
                 chapter = self._page(f"{lesson.id} {lesson.title}", text, "bodymatter")
                 properties = [key for key in ("mathml", "svg") if f"<{key[:4]}".encode() in chapter]
                 yield _page_item(_lesson_name(lesson), chapter, " ".join(properties))
         for path, name in self._pictures.items():
             picture = CachedFile(f"{_FOLDER}{name}", "", site[path].make)
-            yield EpubItem(picture, PICTURES[extension(path)])
+            yield EpubItem(picture, chapters.PICTURES[chapters.extension(path)])
 
     def _style(self) -> str:
-        """Return the style sheet, with rules of the theme, and of the site for single elements."""
         theme = self._course.theme
-        site = self._context.site()[style_path(self._context)].make().decode()
+        site = self._context.site()[chapters.style_path(self._context)].make().decode()
         style = self._context.assets.template("book/epub.css")
         for scheme, accent in zip(("light", "dark"), accents(theme), strict=True):
             if theme.accent or theme.accent_dark:
@@ -174,7 +156,6 @@ class _Epub:
         return visible(text).encode()
 
     def _cover(self) -> bytes:
-        """Draw the title of the course as a picture, with a bar in the accent colour."""
         title = " ".join(self._course.title.split())
         widths = [
             1.0 if unicodedata.east_asian_width(c) in "WF" else 0.7 if c.isupper() else 0.52
@@ -194,7 +175,7 @@ class _Epub:
             "book/epub-title.html",
             title=self._course.title,
             summary=self._course.summary,
-            facts=summary_line(self._context),
+            facts=chapters.summary_line(self._context),
             licence=self._course.licence,
             address=self._course.base_url,
         )
@@ -234,15 +215,15 @@ class _Epub:
         """Return the address for a link of a chapter; empty if it has no target here."""
         name = self._chapters.get(path)
         if name is None:
-            return site_address(self._context, path, anchor)
+            return chapters.site_address(self._context, path, anchor)
         return f"{name}#{urls.quote_anchor(xml_id(anchor))}" if anchor else name
 
     def _picture(self, path: str) -> str:
         """Add a picture to the package and return its address; empty if that is impossible."""
-        if extension(path) not in PICTURES or path not in self._context.site():
+        if chapters.extension(path) not in chapters.PICTURES or path not in self._context.site():
             return ""
         digest = hashlib.sha256(path.encode()).hexdigest()[:12]
-        return self._pictures.setdefault(path, f"images/{digest}.{extension(path)}")
+        return self._pictures.setdefault(path, f"images/{digest}.{chapters.extension(path)}")
 
 
 def _page_item(name: str, page: bytes, properties: str = "") -> EpubItem:

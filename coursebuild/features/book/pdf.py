@@ -1,14 +1,9 @@
 """The whole course as a PDF, printed from its page by a Chromium of the machine.
 
-Entry point: `pdf_file(context)`.
-
-1. The page is printed twice: the first PDF says on which page each lesson begins, the second has
-   these numbers in its contents. Headings become the outline.
-2. Chromium runs without a network, in a profile of its own, within a time limit. The page runs
-   nothing, as its security policy says, but pictures and fonts in it are a stranger's: so Chromium
-   keeps its sandbox, which it has for every user but root.
-3. Chromium notes the time of printing. That note is replaced by one of the same length that says
-   what made the file, so that the same course and the same Chromium give the same bytes.
+It is printed twice: the first PDF says on which page each lesson begins, the second has these
+numbers in its contents. Chromium runs without a network, in a profile of its own. Pictures and
+fonts are a stranger's, so it keeps its sandbox, which it has for every user but root. Its note of
+the time of printing is replaced by one of the same length, for the same bytes.
 """
 
 from __future__ import annotations
@@ -83,7 +78,6 @@ def pdf_file(context: ExportContext) -> OutputFile:
 
 
 def _print(program: str, folder: Path, html: str) -> bytes:
-    """Print a page in a folder of its own."""
     page, pdf = folder / "course.html", folder / "course.pdf"
     page.write_text(html, encoding="utf-8")
     pdf.unlink(missing_ok=True)
@@ -136,7 +130,6 @@ def _with_numbers(html: str, numbers: Mapping[str, int]) -> str:
 
 
 def _page_numbers(pdf: bytes) -> dict[str, int]:
-    """The page of each anchor in a PDF of Chromium, from 1."""
     objects = {int(number): text for number, text in _OBJECT.findall(pdf)}
     root = _ROOT.search(pdf)
     pages = {} if root is None else {p: n for n, p in enumerate(_pages(objects, int(root[1])), 1)}
@@ -148,7 +141,6 @@ def _page_numbers(pdf: bytes) -> dict[str, int]:
 
 
 def _pages(objects: Mapping[int, bytes], number: int, depth: int = 0) -> Iterator[int]:
-    """The pages below a node of the tree of pages, in order."""
     kids = _KIDS.search(objects.get(number, b""))
     if kids is None or depth > 50:
         yield number

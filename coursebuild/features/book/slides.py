@@ -1,15 +1,11 @@
 """A lesson as slides: one HTML file that needs no other, with labs and quizzes that work.
 
-Entry point: `slides_file(context)`.
+A slide begins at each heading of the second or third level; below the latter's stands the title of
+its section. What authors fold stays folded, and so does the code of scripts.
 
-1. A slide begins at each heading of the second or third level; below the latter's stands the title
-   of its section. Footnotes and references are slides of their own. A slide that is higher than
-   the screen scrolls: where to end it is left to who writes the headings.
-2. What authors fold stays folded, and so does the code of scripts, above their outputs.
-3. Files that labs and quizzes load are in the page, compressed; `site/js/slides.js` gives them
-   addresses. The page's security policy lets it run this one script and these files, and load
-   nothing. The engine makes functions of texts; its worker has the policy of a page from which its
-   code comes. So only a page with an engine allows this.
+Files that labs and quizzes load are in the page, compressed; `site/js/slides.js` gives them
+addresses. The security policy allows this one script and these files. Only a page with an engine
+allows functions made of texts, as a worker has the policy of the page from which its code comes.
 """
 
 from __future__ import annotations
@@ -30,15 +26,7 @@ from coursebuild.core.pages.context import ExportContext
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, to_html
 from coursebuild.core.pages.strings import direction
 from coursebuild.core.text.characters import visible
-from coursebuild.features.book.chapters import (
-    RewriteRules,
-    data_address,
-    embed_fonts,
-    extension,
-    lesson_text,
-    rewrite,
-    site_address,
-)
+from coursebuild.features.book import chapters
 
 _POLICY = (
     "default-src 'none'; script-src 'sha256-{}' data:{}; worker-src data:; "
@@ -63,17 +51,23 @@ def slides_file(context: ExportContext) -> OutputFile:
     path = urls.lesson_path(lesson)
     place = urls.Place(path)
     files: dict[str, bytes] = {}
-    text = lesson_text(context, path)
+    text = chapters.lesson_text(context, path)
     for lab in (element for element in _elements(text) if "data-config" in element.attributes):
         _embed_lab(context, place, lab, files)
-    rules = RewriteRules(
+
+    def address(target: str, anchor: str) -> str:
+        if target == path:
+            return f"#{urls.quote_anchor(anchor or '_slide-1')}"
+        return chapters.site_address(context, target, anchor)
+
+    rules = chapters.RewriteRules(
         place,
-        functools.partial(_address, context, path),
-        functools.cache(functools.partial(data_address, context)),
+        address,
+        functools.cache(functools.partial(chapters.data_address, context)),
         lambda id: f"_{id}" if _OWN_ID.match(id) else id,
         live=True,
     )
-    content = list(rewrite(text, rules))
+    content = list(chapters.rewrite(text, rules))
     for element in _elements(content):
         if element.name == "figure" and "script" in element.classes:
             _fold_code(element, words("code.label"))
@@ -91,7 +85,9 @@ def slides_file(context: ExportContext) -> OutputFile:
         language=language,
         direction=direction(language),
         policy=_POLICY.format(digest, evaluation),
-        style=Markup(embed_fonts(context) + context.assets.file("css/slides.css").decode()),
+        style=Markup(
+            chapters.embed_fonts(context) + context.assets.file("css/slides.css").decode()
+        ),
         head_title=f"{lesson.id} {lesson.title} · {course.title}",
         course=course,
         lesson=lesson,
@@ -100,15 +96,11 @@ def slides_file(context: ExportContext) -> OutputFile:
         words=Markup(page_words),
         quiz_script=quiz_script,
         script=Markup(script),
-        files=[(path, _TYPES.get(extension(path), ""), _pack(files[path])) for path in files],
+        files=[
+            (path, _TYPES.get(chapters.extension(path), ""), _pack(files[path])) for path in files
+        ],
     )
     return OutputFile("slides.html", visible(html).encode())
-
-
-def _address(context: ExportContext, own_path: str, path: str, anchor: str) -> str:
-    if path == own_path:
-        return f"#{urls.quote_anchor(anchor or '_slide-1')}"
-    return site_address(context, path, anchor)
 
 
 def _elements(content: Iterable[HtmlContent]) -> Iterator[HtmlElement]:
@@ -157,7 +149,6 @@ def _pack(data: bytes) -> str:
 
 
 def _fold_code(figure: HtmlElement, label: str) -> None:
-    """Put the code of a script into one fold, above its outputs."""
     code = [
         child for child in figure.elements if child.name == "pre" or child.classes & {"fold", "run"}
     ]

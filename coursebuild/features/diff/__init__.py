@@ -1,8 +1,4 @@
-"""The command `diff`, which reports what a change does to a course, for its reviewers.
-
-Two states of a course, and their sites, are read from the disk, or the earlier one from git.
-Nothing is run.
-"""
+"""The command `diff` compares two states of a course and their sites; nothing is run."""
 
 from coursebuild.core.features import Command, Feature
 

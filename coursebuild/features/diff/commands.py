@@ -1,8 +1,4 @@
-"""`coursebuild diff`: say what a change does to the course, as Markdown for those who review it.
-
-Entry points besides the command's: `CourseState`, `report(base, old, new)`, of two states of a
-course; `weight_section(old, new)`, of two sites.
-"""
+"""`coursebuild diff`: say what a change does to the course, as Markdown for those who review it."""
 
 from __future__ import annotations
 
@@ -64,7 +60,6 @@ class ScriptState(Struct, frozen=True):
     """A script with its recorded outputs."""
 
     owner: str
-    """The id of its lesson or page."""
     code: str
     outputs: tuple[Recording, ...]
     """Each with its comparison; tables as their text."""
@@ -77,7 +72,6 @@ class LabState(Struct, frozen=True):
     data: Mapping[str, object]
     """The values in its text, if that is JSON."""
     models: Mapping[str, str]
-    """The texts of its models, by name."""
 
 
 def report(base: str, old: CourseState, new: CourseState) -> str:
@@ -90,7 +84,11 @@ def report(base: str, old: CourseState, new: CourseState) -> str:
         ", ".join(f"{escape_text(id)} {change}" for id, change in _changes(before, now))
         or "no change"
     )
-    figures = _changes(_figures(old), _figures(new), _describe_figure_change)
+    figures = _changes(
+        _figures(old),
+        _figures(new),
+        lambda a, b: describe_difference(*a, b[1]) or "less than can be seen",
+    )
     labs = _changes(_labs(old.course), _labs(new.course), _describe_lab_change)
     parts = (
         f"## What this change does\n\nCompared with {base}. Lessons and pages: {texts}.\n",
@@ -194,18 +192,12 @@ def _text(recording: Recording | None) -> str:
 
 
 def _figures(state: CourseState) -> dict[str, tuple[str, bytes]]:
-    """Return the paths and bytes of recorded figures and their data, by path."""
     documents = state.course.documents
     paths = (figure.path for document in documents for figure in recorded_figures(document))
     return {path: (path, data) for path in paths if (data := state.read(path)) is not None}
 
 
-def _describe_figure_change(before: tuple[str, bytes], now: tuple[str, bytes]) -> str:
-    return describe_difference(*before, now[1]) or "less than can be seen"
-
-
 def _labs(course: Course) -> dict[tuple[str, str], LabState]:
-    """Return the labs in texts, by the id of the lesson or page, and their title or name."""
     texts = {model.name: model.source.text for model in course.models}
     labs: dict[tuple[str, str], LabState] = {}
     for _, trial in feature_trials(course).values():
@@ -224,7 +216,6 @@ def _labs(course: Course) -> dict[tuple[str, str], LabState]:
 
 
 def _describe_lab_change(before: LabState, now: LabState) -> str:
-    """List the fields of a lab that differ, with their values if short, and the models."""
     parts = []
     for name in dict.fromkeys((*before.data, *now.data)):
         values = [json.dumps(lab.data.get(name), ensure_ascii=False) for lab in (before, now)]
@@ -343,7 +334,6 @@ def _load_state(root: Path) -> CourseState:
 
 @contextlib.contextmanager
 def _open_base(root: Path, name: str) -> Iterator[tuple[str, Path]]:
-    """Provide the earlier state: its name in Markdown, and its folder."""
     if (Path(name) / MAP).is_file():
         yield f"`{name}`", Path(name).resolve()
         return

@@ -1,8 +1,5 @@
 """Fences, directives and callouts of other tools as Markdown of coursebuild.
 
-Entry points: `convert_segment`; `runnable_code` of a cell, `join_cells`, `join_outputs`,
-`code_for_readers`.
-
 Scripts of coursebuild are complete. So all cells of a lesson, which share their names, become one
 script, which stands where the last of them stood; the ones before are shown where they stood, as
 parts of it.
@@ -11,6 +8,7 @@ parts of it.
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import json
 import re
@@ -179,9 +177,10 @@ def convert_segment(segment: Segment, context: LessonContext) -> str:
                 head = "text"
             elif kind not in (*CORE_FENCES, *fence_names()):
                 head = head.strip("{}. ").partition(" ")[0].rstrip(",}")
-                if head != "json" and _is_json(text):
-                    context.add_leftover(f"a block `{head}`, which is shown as JSON")
-                    head = "json"
+                with contextlib.suppress(ValueError, RecursionError):
+                    if head != "json" and isinstance(json.loads(text), dict):
+                        context.add_leftover(f"a block `{head}`, which is shown as JSON")
+                        head = "json"
             return fence(head, text)
 
 
@@ -263,13 +262,6 @@ def _highlighted_languages() -> frozenset[str]:
     from pygments.lexers import get_all_lexers
 
     return frozenset(alias for _, aliases, _, _ in get_all_lexers() for alias in aliases)
-
-
-def _is_json(text: str) -> bool:
-    try:
-        return isinstance(json.loads(text), dict)
-    except (ValueError, RecursionError):
-        return False
 
 
 def _reverse_camera(camera: re.Match[str]) -> str:

@@ -1,7 +1,4 @@
-"""`coursebuild import`: convert, write, try, check.
-
-Each script of the new course is run once, which shows what its fence needs and what it prints.
-"""
+"""`coursebuild import`: convert, write, try, check."""
 
 from __future__ import annotations
 
@@ -189,7 +186,6 @@ def _is_blank(recording: Recording) -> bool:
 
 
 def _describe_changes(changes: Sequence[Change]) -> str:
-    """Say what became of a recorded output that did not hold, by the first difference."""
     recorded, printed = (
         f"`{text}`" if text else "nothing"
         for text in (

@@ -1,7 +1,5 @@
 """The course of another tool → the files of one of coursebuild.
 
-Entry points: `convert`, `write_course`, `change_tried_lessons`.
-
 The map of a course without a `course.json` is the table of contents of its tool: `_toc.yml` of
 Jupyter Book, `myst.yml` of MyST, `_quarto.yml` of Quarto, `mkdocs.yml` of MkDocs; without one the
 files, in the order of their names, a folder for a level.
@@ -150,7 +148,6 @@ def _convert_texts(
     ids: Mapping[str, str],
     files: SourceFiles,
 ) -> tuple[dict[str, bytes], LessonContext]:
-    """Return the files of lessons and pages, and the context that has collected the rest."""
     texts = [text for text in texts if text.path]
     context = LessonContext(
         targets={stem_of(text.file): text.link for text in texts},
@@ -229,7 +226,6 @@ def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator
 
 
 def _model_files(files: SourceFiles) -> Iterator[tuple[str, bytes]]:
-    """Yield the models, and the meshes and textures in their folders."""
     for path in files:
         folders = posixpath.dirname(path).split("/")
         if "models" in folders:
@@ -305,7 +301,6 @@ def _get(settings: object, *path: str) -> object:
 
 
 def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
-    """Yield the lessons and groups of lessons in the table of contents of any of the tools."""
     if isinstance(value, str):
         if path := _find_text(value, files):
             yield ImportedText(file=path)
@@ -354,14 +349,12 @@ def _find_text(name: object, files: SourceFiles) -> str:
     return next((path for end in TEXTS if (path := files.find(name + end))), "")
 
 
-def _natural_order(path: str) -> list[tuple[int, int | str]]:
-    """Return a key that sorts names in natural order: numbers by their values."""
-    parts = re.split(r"(\d+)", path)
-    return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
-
-
 def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
-    texts = sorted((path for path in files if path.endswith(TEXTS)), key=_natural_order)
+    def natural_order(path: str) -> list[tuple[int, int | str]]:
+        parts = re.split(r"(\d+)", path)
+        return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
+
+    texts = sorted((path for path in files if path.endswith(TEXTS)), key=natural_order)
     for folder, paths in itertools.groupby(texts, posixpath.dirname):
         lessons = [
             ImportedText(file=path)

@@ -1,8 +1,7 @@
 """The map of the new course.
 
-Entry points: `read_texts`, which reads the texts and gives each an id and a path; `map_lines`;
-`read_course_json`. People write `course.json` by hand in many dialects, so a field can have several
-names; unknown fields are reported once, with their number.
+People write `course.json` by hand in many dialects, so a field can have several names; unknown
+fields are reported once, with their number.
 """
 
 from __future__ import annotations
@@ -103,7 +102,6 @@ class _Reader:
         return {_field_name(key): item for key, item in value.items()}
 
     def level(self, value: object) -> ImportedLevel:
-        """Read a level with its lessons."""
         level = self.fields(value, _LEVEL_FIELDS)
         return ImportedLevel(
             id=_read_text(level, "id"),
@@ -113,7 +111,6 @@ class _Reader:
         )
 
     def lesson(self, value: object) -> ImportedText:
-        """Read a lesson or a page."""
         lesson = self.fields(value, _LESSON_FIELDS)
         minutes = re.search(r"\d+", _read_text(lesson, "minutes"))
         return ImportedText(
@@ -254,12 +251,13 @@ def map_lines(
         yield from ("", "[[level]]")
         yield from _field_lines(id=level.id, title=level.title, summary=level.summary)
         for lesson in level.lessons:
+            status = "complete" if lesson.status.lower() in _COMPLETE else "draft"
             yield from ("", "[[level.lesson]]")
             yield from _field_lines(
                 id=lesson.id,
                 slug=lesson.slug,
                 title=lesson.title,
-                status=_status(lesson),
+                status=status if lesson.path else "planned",
                 summary=lesson.summary,
                 objectives=lesson.objectives,
                 prerequisites=tuple(ids[p] for p in lesson.prerequisites if p in ids),
@@ -268,12 +266,6 @@ def map_lines(
     for page in course.pages:
         yield from ("", "[[page]]")
         yield from _field_lines(id=page.id, title=page.title, file=page.path)
-
-
-def _status(lesson: ImportedText) -> str:
-    if not lesson.path:
-        return "planned"
-    return "complete" if lesson.status.lower() in _COMPLETE else "draft"
 
 
 def _field_lines(**values: str | tuple[str, ...] | int | None) -> Iterator[str]:

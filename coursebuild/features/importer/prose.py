@@ -1,7 +1,4 @@
-r"""Convert lines of prose: links, pictures, mentions, formulas, roles.
-
-Entry points: `rewrite_prose`, `display_formula`, `find_anchors`; `LessonContext`, what the
-conversion of a lesson needs to know of the whole course.
+"""Convert lines of prose: links, pictures, mentions, formulas, roles.
 
 Code is left alone, in lines and in blocks within quotations and lists, and so is whatever else is
 not recognized here.
@@ -164,8 +161,15 @@ _COMMENT = re.compile(r"^%[^\n]*\n?", re.MULTILINE)
 
 def rewrite_prose(text: str, context: LessonContext) -> str:
     """Return prose of any dialect as Markdown of coursebuild."""
+
+    def write_target(match: re.Match[str]) -> str:
+        anchor = to_anchor(match["name"])
+        if match["heading"] is None:
+            return f'<a id="{anchor}"></a>'
+        return f"{match['heading'].rstrip()} {{#{anchor}}}"
+
     text = normalize_formulas(_COMMENT.sub("", text))
-    text = _TARGET.sub(_write_target, text)
+    text = _TARGET.sub(write_target, text)
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
         fence_line = _FENCE.match(line)
@@ -191,13 +195,6 @@ def normalize_formulas(text: str) -> str:
 def display_formula(tex: str, label: str) -> str:
     """Return a displayed formula in Markdown."""
     return f"$$\n{tex.strip()}\n$$" + (f" {{#eq:{formula_anchor(label)}}}" if label else "")
-
-
-def _write_target(match: re.Match[str]) -> str:
-    anchor = to_anchor(match["name"])
-    if match["heading"] is None:
-        return f'<a id="{anchor}"></a>'
-    return f"{match['heading'].rstrip()} {{#{anchor}}}"
 
 
 def _label_formula(match: re.Match[str]) -> str:

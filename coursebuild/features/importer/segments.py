@@ -1,7 +1,4 @@
-"""A file as segments: prose, cells of code, fences and directives of MyST, Quarto or MkDocs.
-
-Entry points: `read_segments`, for a file of Markdown or a notebook; `read_markdown`, for a text.
-"""
+"""A file as segments: prose, cells of code, fences and directives of MyST, Quarto or MkDocs."""
 
 from __future__ import annotations
 
@@ -37,7 +34,10 @@ def read_segments(text: str, name: str) -> tuple[str, list[Segment], dict[str, b
     pictures: dict[str, bytes] = {}
     metadata: Mapping[str, object] = {}
     if name.endswith(".ipynb"):
-        segments, pictures = _read_notebook(text, name)
+        try:
+            segments, pictures = _read_cells(json.loads(text)["cells"])
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            raise UsageError(f"{name} is not a notebook of format 4") from None
     else:
         match, size = _FRONT_MATTER.match(text), 0
         if match is not None and isinstance(value := read_yaml(match[1] or "{}"), dict):
@@ -119,19 +119,8 @@ _PARSER.block.ruler.before("fence", "div", _parse_div, {"alt": ["paragraph", "li
 # --- notebooks
 
 
-def _read_notebook(text: str, name: str) -> tuple[list[Segment], dict[str, bytes]]:
-    """Return its cells as segments, and the pictures that are attached to them, by name.
-
-    Raises:
-        UsageError: it is not a notebook of format 4.
-    """
-    try:
-        return _read_cells(json.loads(text)["cells"])
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        raise UsageError(f"{name} is not a notebook of format 4") from None
-
-
 def _read_cells(cells: list[dict[str, Any]]) -> tuple[list[Segment], dict[str, bytes]]:
+    """Return cells as segments, and the pictures that are attached to them, by name."""
     segments: list[Segment] = []
     attachments: dict[str, bytes] = {}
     for number, cell in enumerate(cells, 1):

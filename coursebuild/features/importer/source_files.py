@@ -1,12 +1,8 @@
 """A course of another tool: its files and the one way to read them, and what it says, as values.
 
-Entry points: `SourceFiles`, with `find` and `read`; `ImportedCourse`; `read_yaml`.
-
-1. Hidden files are left out, and what tools have made.
-2. A link is followed only to a file that is imported itself, or within a folder that is. All other
-   links, and what is no regular file, are leftovers with their reasons.
-3. A file is opened from the folder downwards, one part of its real path after the other, and none
-   may be a link by then.
+A link is followed only to a file that is imported itself, or within a folder that is. All other
+links, and what is no regular file, are leftovers with their reasons. A file is opened from the
+folder downwards, one part of its real path after the other, and none may be a link by then.
 """
 
 from __future__ import annotations
@@ -256,7 +252,6 @@ class SourceFiles:
         return text.replace("\r\n", "\n").replace("\r", "\n")
 
     def _list(self) -> None:
-        """Find all files; links last, since they lead to others."""
         links, folders = [], {"."}
         pending = [""]
         while pending:

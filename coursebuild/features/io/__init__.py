@@ -1,20 +1,16 @@
-"""Io cards: three lines that say what a script takes, does and gives.
-
-A line that begins with `INPUT:`, `PROCESS:` or `OUTPUT:` starts a part; the lines after it continue
-it. All three must be there, once, in this order.
-"""
+"""Io cards: three parts, each after its label, that say what a script takes, does and gives."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter
 from coursebuild.core.model import FeatureBlock, Inline
+from coursebuild.core.pages.context import PageContext
 from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import (
@@ -51,8 +47,6 @@ class Io(FeatureBlock, frozen=True):
 
 
 class _Part(Struct, frozen=True):
-    """The lines that stand under a label."""
-
     label: str
     span: Span
     lines: list[Excerpt]
@@ -109,7 +103,6 @@ def _split_at_labels(body: Excerpt) -> list[_Part]:
 def _diagnose_missing(
     label: str, parts: Mapping[str, _Part], all_parts: Iterable[_Part], fence: Fence
 ) -> Diagnostic:
-    """Say that a part is missing or empty, and point at lines whose label looks misspelt."""
     if label in parts:
         return diagnose("io-missing", parts[label].span, f"nothing follows `{label}:`")
     notes, fix = [], Fix("")
@@ -123,10 +116,6 @@ def _diagnose_missing(
             fix = Fix(f"write `{label}:`", edits=(Edit(place, label),), safe=is_safe)
     message = f"the io block has no line `{label}:`"
     return diagnose("io-missing", fence.head, message, help=fix, notes=notes)
-
-
-if TYPE_CHECKING:
-    from coursebuild.core.pages.context import PageContext
 
 
 def draw(page: PageContext, card: Io) -> Markup:

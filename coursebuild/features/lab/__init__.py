@@ -1,8 +1,7 @@
 """Labs: simulations that a learner plays with, tried when the course is verified.
 
-A `lab` fence holds JSON (`schema`). `parse` makes a `Lab` of it (`model`), `relations` compares
-it with the course and its models, `page` shows it. `trial` runs it in the engine that browsers use
-and natively; `picture` draws what was recorded, and `export` writes the lab as a Python script.
+`schema` declares a fence, `parse` makes a `Lab` (`model`) of it, `relations` compares it with the
+course, `page` shows it, `trial` runs it in both engines, `picture` draws and `export` rewrites it.
 Labs of formulas and equations, which need no engine, are read and tried in `equations`.
 """
 
@@ -17,18 +16,10 @@ from coursebuild.core.features import (
     TrialRun,
     Trials,
 )
+from coursebuild.features.lab import page
 from coursebuild.features.lab.equations.declared import OdeLab, PlotLab
 from coursebuild.features.lab.inputs import lab_trials, trial_inputs
 from coursebuild.features.lab.model import Lab
-from coursebuild.features.lab.page import (
-    draw_lab,
-    draw_model,
-    index_lab,
-    lab_markdown,
-    lab_picture,
-    model_picture,
-    model_view,
-)
 from coursebuild.features.lab.parse import parse_fence
 from coursebuild.features.lab.relations import check_labs, check_model_names
 from coursebuild.features.lab.reply import publish_labs
@@ -58,15 +49,17 @@ FEATURE = Feature(
             block=Lab,
             parse=parse_fence,
             label="lab",
-            draw=draw_lab,
-            markdown=lab_markdown,
-            index=index_lab,
-            picture=lab_picture,
+            draw=page.draw_lab,
+            markdown=page.lab_markdown,
+            index=page.index_lab,
+            picture=page.lab_picture,
             docked=lambda lab: lab.fields.dock,
             tasks=lambda lab: 1,
         ),
     ),
-    model_part=ModelPart(values=model_view, draw=draw_model, opens=True, picture=model_picture),
+    model_part=ModelPart(
+        values=page.model_view, draw=page.draw_model, opens=True, picture=page.model_picture
+    ),
     check=check_labs,
     check_models=check_model_names,
     parts=(_LIVE,),

@@ -1,15 +1,11 @@
 """A lab's code as an ES module, and its data for JSON.
 
-Entry points: `compile_lab(lab, name)`, `pieces(lab)`.
-
-1. Every piece of code that an author writes becomes a function of its own, whose first parameter
-   holds what lab code sees (`model`, `data`, `mj`, `sim`, `ctx`, `lib`); a setter's second is
-   `value`. A module is strict, so a misspelt assignment is an error and no new global.
-2. The same functions serve the browser's worker (`code`, a module) and the trial (`literal`, an
-   expression). A page needs no `eval`, so its policy can forbid it.
-3. A piece is put into the module only if it parses both by itself and as its function (`pieces`
-   yields both), so that no piece can end its function and begin another, and none keeps the others
-   from loading.
+1. Every piece of code becomes a function whose first parameter holds what lab code sees; a setter's
+   second is `value`. A module is strict, so a misspelt assignment is an error and no new global.
+2. The same functions serve the browser's worker (a module) and the trial (an expression). A page
+   needs no `eval`, so its policy can forbid it.
+3. A piece must parse both by itself and as its function, so that none can end its function and
+   begin another, and none keeps the others from loading.
 """
 
 from __future__ import annotations
@@ -20,17 +16,17 @@ from typing import Any, Literal
 
 from msgspec import Struct, to_builtins
 
+from coursebuild.features.lab import schema
 from coursebuild.features.lab.model import MJCF, Entry, Lab
-from coursebuild.features.lab.schema import (
-    Button,
-    Control,
-    LogEntry,
-    Overlays,
-    Select,
-    SimLab,
-)
 
 _NAMES = "{model, data, mj, sim, ctx, lib}"
+_FUNCTIONS = {
+    "statements": "({}) => {{ {}\n}}",
+    "setter": "({}, value) => {{ {}\n}}",
+    "expression": "({}) => ({}\n)",
+    "target": "({}, value) => {{ ({}\n) = value;\n}}",
+}
+"""Functions by their form, of names and code; a line end closes a comment with which it may end."""
 
 
 class LabCode(Struct, frozen=True):
@@ -45,16 +41,7 @@ class LabCode(Struct, frozen=True):
     @property
     def function(self) -> str:
         """The piece as a function, as it stands in the module."""
-        # A line end closes a comment with which a piece may end.
-        match self.form:
-            case "target":
-                return f"({_NAMES}, value) => {{ ({self.code}\n) = value;\n}}"
-            case "expression":
-                return f"({_NAMES}) => ({self.code}\n)"
-            case "setter":
-                return f"({_NAMES}, value) => {{ {self.code}\n}}"
-            case "statements":
-                return f"({_NAMES}) => {{ {self.code}\n}}"
+        return _FUNCTIONS[self.form].format(_NAMES, self.code)
 
 
 class LabModule(Struct, frozen=True):
@@ -67,7 +54,6 @@ class LabModule(Struct, frozen=True):
     literal: str
     """The code as a JavaScript expression, for an engine without modules."""
     config: dict[str, Any]
-    """The data, as JSON has it."""
 
 
 def pieces(lab: Lab) -> Iterator[LabCode]:
@@ -76,7 +62,7 @@ def pieces(lab: Lab) -> Iterator[LabCode]:
         if code := getattr(lab.fields, name):
             yield LabCode((name,), "statements", code)
     for i, control in enumerate(lab.fields.controls):
-        if isinstance(control, Button):
+        if isinstance(control, schema.Button):
             yield LabCode(("controls", i, "run"), "statements", control.run)
         elif control.set is not None:
             yield LabCode(("controls", i, "set"), "target", control.set)
@@ -101,7 +87,7 @@ def compile_lab(lab: Lab, name: str) -> LabModule:
     literal = "{" + ", ".join(f"{member}: {text}" for member, text in members) + "}"
     fields = lab.fields
     overlays = fields.overlays
-    switches = Overlays.__struct_fields__ if isinstance(overlays, Overlays) else ()
+    switches = schema.Overlays.__struct_fields__ if isinstance(overlays, schema.Overlays) else ()
     config = {"id": name} | {field: getattr(fields, field) for field in _FIELDS}
     config |= {
         "overlays": [o for o in switches if getattr(overlays, o)] if switches else overlays,
@@ -148,7 +134,7 @@ def _list(items: Iterator[str]) -> str:
     return "[" + ", ".join(items) + "]"
 
 
-def _control(functions: Mapping[Entry, str], i: int, control: Control) -> str:
+def _control(functions: Mapping[Entry, str], i: int, control: schema.Control) -> str:
     for field, member in (("run", "run"), ("set", "set"), ("apply", "set")):
         if ("controls", i, field) in functions:
             return f"{{{member}: {functions['controls', i, field]}}}"
@@ -167,7 +153,9 @@ _PLOT = ("ylabel", "xlabel", "window", "ymin", "ymax", "height", "refLines")
 """Fields of a plot that are passed on as written."""
 
 
-def _log_data(fields: SimLab, log: tuple[LogEntry, ...]) -> Iterator[tuple[float | str, ...]]:
+def _log_data(
+    fields: schema.SimLab, log: tuple[schema.LogEntry, ...]
+) -> Iterator[tuple[float | str, ...]]:
     """Yield each act: its time, the number of its control and, except for a button, the value."""
     numbers = {control.label: i for i, control in enumerate(fields.controls)}
     for entry in log:
@@ -185,9 +173,9 @@ _CONTROL = {
 """Fields of a control, of whatever kind, and their defaults."""
 
 
-def control_data(control: Control) -> dict[str, Any]:
+def control_data(control: schema.Control) -> dict[str, Any]:
     """Return a control as the page needs it."""
     fields = to_builtins(control)
-    if isinstance(control, Select):
+    if isinstance(control, schema.Select):
         fields["value"] = control.start
     return {name: fields.get(name, default) for name, default in _CONTROL.items()}

@@ -1,7 +1,4 @@
-"""What the trial of a lab depends on besides its model's files; computed without an engine.
-
-Entry points: `lab_trials(course)`, `trial_inputs(trial)`.
-"""
+"""What the trial of a lab depends on besides its model's files; computed without an engine."""
 
 from __future__ import annotations
 
@@ -16,12 +13,7 @@ from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.script_environment import package_version
 from coursebuild.core.text.source import key_of
 from coursebuild.features.lab.compile import LabModule, compile_lab
-from coursebuild.features.lab.engines.native import (
-    LAB_ENGINE,
-    engine_digest,
-    equation_script_digest,
-    lab_digest,
-)
+from coursebuild.features.lab.engines import native
 from coursebuild.features.lab.model import BUILT_IN_KINDS, ODE, PLOT, Lab
 from coursebuild.features.lab.page import gallery_labs
 
@@ -57,9 +49,9 @@ def inputs_of(lab: Lab, module: LabModule) -> Inputs:
         lab.xml.text if lab.xml is not None else f"models/{lab.fields.model}.xml",
     )
     conditions = (
-        ("MuJoCo", LAB_ENGINE),
-        ("how a lab is repeated natively", lab_digest("engines/native_worker.py")[:12]),
-        ("the browser's engine and its trial", engine_digest()[:12]),
+        ("MuJoCo", native.LAB_ENGINE),
+        ("how a lab is repeated natively", native.lab_digest("engines/native_worker.py")[:12]),
+        ("the browser's engine and its trial", native.asset_digest(native.WASM, native.TRIAL)[:12]),
     )
     return Inputs(f"lab {module.name}", text, (), LIMITS.lab, (), conditions)
 
@@ -68,8 +60,8 @@ def equation_inputs(lab: Lab, name: str) -> Inputs:
     """Return what the trial of a lab without an engine depends on."""
     conditions = (
         ("SciPy", package_version("scipy")),
-        ("how a lab without an engine is tried", lab_digest("equations")[:12]),
-        ("the page's own code", equation_script_digest()[:12]),
+        ("how a lab without an engine is tried", native.lab_digest("equations")[:12]),
+        ("the page's own code", native.asset_digest(native.EQUATION_TRIAL)[:12]),
     )
     return Inputs(f"lab {name}", key_of(lab.config), (), LIMITS.lab, (), conditions)
 

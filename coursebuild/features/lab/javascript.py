@@ -1,15 +1,10 @@
-"""Parses the JavaScript of labs, with tree-sitter.
-
-Entry points: `parse(code)`; `parse_statements(code)` and `parse_expression(code)`, for code that is
-to be translated; to read nodes, `walk`, `field`, `children`, `text_of`, `string_value`,
-`template_parts`, `dotted_name`.
+"""The JavaScript of labs as trees of `tree_sitter`.
 
 V8 has parsed the code before, so mistakes in the JavaScript need no explanation here.
 """
 
 from __future__ import annotations
 
-import functools
 import re
 from collections.abc import Iterator
 from itertools import pairwise
@@ -34,14 +29,12 @@ _ESCAPE = re.compile(
 _ESCAPED_CHARACTERS = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "v": "\v", "0": "\0"}
 
 
-@functools.cache
-def _parser() -> Parser:
-    return Parser(Language(tree_sitter_javascript.language()))
+_PARSER = Parser(Language(tree_sitter_javascript.language()))
 
 
 def parse(code: str) -> Node:
     """Parse a piece of code, even one with mistakes."""
-    return _parser().parse(code.encode("utf-8", "replace")).root_node
+    return _PARSER.parse(code.encode("utf-8", "replace")).root_node
 
 
 def walk(node: Node) -> Iterator[Node]:
@@ -52,11 +45,7 @@ def walk(node: Node) -> Iterator[Node]:
 
 
 def parse_statements(code: str) -> list[Node]:
-    """Parse a piece of code into its statements.
-
-    Raises:
-        UntranslatableError: the code cannot be parsed.
-    """
+    """Parse a piece of code into its statements; this may raise `UntranslatableError`."""
     if any("\ud800" <= character <= "\udfff" for character in code):
         raise UntranslatableError("half of a character")
     root = parse(code)
@@ -66,11 +55,7 @@ def parse_statements(code: str) -> list[Node]:
 
 
 def parse_expression(code: str) -> Node:
-    """Parse a piece of code that is one expression.
-
-    Raises:
-        UntranslatableError: the code cannot be parsed, or is not a single expression.
-    """
+    """Parse a piece of code that is one expression; this may raise `UntranslatableError`."""
     body = parse_statements(f"({code}\n)")
     if len(body) == 1 and body[0].type == "expression_statement":
         (whole,) = children(body[0])
@@ -182,11 +167,7 @@ class CountingLoop(Struct, frozen=True):
 
 
 def counting_loop(node: Node) -> CountingLoop:
-    """Read a `for` loop that counts.
-
-    Raises:
-        UntranslatableError: it does anything else.
-    """
+    """Read a `for` loop that counts; any other raises `UntranslatableError`."""
     refusal = UntranslatableError("a `for` loop that does not count")
     begin, test = field(node, "initializer"), field(node, "condition")
     step = node.child_by_field_name("increment")

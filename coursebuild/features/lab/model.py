@@ -1,7 +1,4 @@
-"""A lab as a value.
-
-Entry points: `Lab`; `values_in`, the values of its JSON or TOML with their paths.
-"""
+"""A lab as a value."""
 
 from __future__ import annotations
 
@@ -44,12 +41,10 @@ class Lab(FeatureBlock, frozen=True):
     """What the author wrote; for a course's own kind, only the fields that all labs have."""
     note: tuple[Block, ...] = ()
     goal: tuple[Inline, ...] = ()
-    """The text of the goal."""
     xml: Excerpt | None = None
     places: tuple[tuple[Entry, Span], ...] = ()
     """The place of each value in the JSON."""
     code: tuple[tuple[Entry, Excerpt], ...] = ()
-    """The pieces of JavaScript in it."""
 
     @property
     def is_of_text(self) -> bool:

@@ -1,23 +1,20 @@
-"""Labs as a page shows them before they run: their subject, controls, displays and recording.
+"""Labs as pages and copies show them before they run: subject, controls, displays and recording.
 
-Entry points: `draw_lab(page, block)`, `index_lab`; `lab_markdown`, the same as plain Markdown;
-`page_view` and `lab_view`, the values of the template; `gallery_labs(course)`, the labs made for
-models that no text shows; `model_view`, `draw_model`, `model_picture`, of the first lab of a model
-in a text, or of the one made for it. No control is drawn, as none would work yet: the page's script
-puts the live instrument into `data-lab` when it starts, and reads its configuration there.
+No control is drawn, as none would work yet: the page's script puts the live instrument into
+`data-lab` when it starts, and reads its configuration there. A model that no lab of a text shows
+gets a lab of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from markupsafe import Markup, escape
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.features import IndexReader, Picture
+from coursebuild.core.features import IndexReader, MarkdownWriter, Picture
 from coursebuild.core.model import (
     Course,
     Document,
@@ -27,6 +24,7 @@ from coursebuild.core.model import (
     find_blocks,
 )
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.library import BY_LAB, Library
 from coursebuild.core.pages.marks import (
     code_span,
@@ -45,9 +43,6 @@ from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
 from coursebuild.features.lab.reply import LabRecord, PublishedLab
 from coursebuild.features.lab.schema import Control, Overlay, Plot, Select, SimLab, Slider
-
-if TYPE_CHECKING:
-    from coursebuild.core.pages.context import PageContext
 
 
 class RecordedView(Struct, frozen=True):
@@ -187,31 +182,23 @@ def index_lab(reader: IndexReader, lab: Lab) -> None:
 def _recorded_view(
     words: Strings, place: Place, title: str, live: PublishedLab | None
 ) -> RecordedView | None:
-    """Describe what the trial recorded; `None` if it did not come to its end."""
     record = live.record if live is not None else None
     if live is None or record is None:
         return None
+    count = str(live.attempt_count)
     if record.scale is None:
-        return RecordedView(
-            record,
-            place.href(live.picture),
-            words("lab.curves", title=title),
-            "",
-            words("lab.at_place", place=record.place),
-            words("lab.computed", tried=str(live.attempt_count), parity=live.parity),
-        )
-    return RecordedView(
-        record,
-        place.href(live.picture),
-        words("lab.picture", title=title, t=number(record.time, 4)),
-        f"{number(record.scale[0])} m",
-        words("lab.at", t=number(round(record.end, 3))),
-        words("lab.proven", engine=LAB_ENGINE, tried=str(live.attempt_count), parity=live.parity),
-    )
+        alt, length = words("lab.curves", title=title), ""
+        at = words("lab.at_place", place=record.place)
+        verification = words("lab.computed", tried=count, parity=live.parity)
+    else:
+        alt = words("lab.picture", title=title, t=number(record.time, 4))
+        length = f"{number(record.scale[0])} m"
+        at = words("lab.at", t=number(round(record.end, 3)))
+        verification = words("lab.proven", engine=LAB_ENGINE, tried=count, parity=live.parity)
+    return RecordedView(record, place.href(live.picture), alt, length, at, verification)
 
 
 def _values(words: Strings, control: Control) -> str:
-    """Say what a control can be set to, and its initial value."""
     match control:
         case Slider():
             ends = words("lab.between", min=number(control.min), max=number(control.max))
@@ -263,7 +250,6 @@ def _labs_by_model(document: Document) -> dict[str, Lab]:
 
 
 def _gallery_lab(model: MjcfModel) -> Lab:
-    """Make a lab in which a model starts from its first keyframe and is left to itself."""
     place = model.source.span(0, 0)
     fields = SimLab(model=model.name, title=model.name, toggles=_TOGGLES, setup=START)
     return Lab(place, SIMLAB, place, "", fields)
@@ -318,10 +304,6 @@ def qr_svg(text: str, label: str) -> Markup:
         return Markup()
     svg = code.svg_inline(omitsize=True, svgclass="qr", lineclass=None)
     return Markup(svg.replace("<svg", f'<svg role="img" aria-label="{escape(label)}"', 1))
-
-
-if TYPE_CHECKING:
-    from coursebuild.core.features import MarkdownWriter
 
 
 def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:

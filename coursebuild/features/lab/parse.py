@@ -1,13 +1,8 @@
 """`lab` fences.
 
-Entry points: `parse_fence`, `sim_lab` (a lab that stands inside other JSON, as in a quiz).
-
-1. The text of a fence `lab mjcf` is a model, and keys say the rest; `equations` reads labs without
-   an engine; the text of any other is JSON.
-2. The JSON is read into nodes, and these into the declared fields.
-3. A `simlab` is checked completely; of another kind only the fields that all labs have are checked,
-   since the rest is for its own code.
-4. The Markdown in it is parsed, and all becomes a `Lab`.
+The text of a fence `lab mjcf` is a model, and keys say the rest; `equations` reads labs without an
+engine; the text of any other is JSON. A `simlab` is checked completely; of a course's own kind only
+the fields that all labs have, since the rest is for its own code.
 """
 
 from __future__ import annotations
@@ -61,7 +56,6 @@ def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Lab | None]:
 
 
 def _parse_mjcf(fence: Fence, name: Word) -> Parsed[Lab | None]:
-    """Parse a lab whose model the reader edits."""
     keys = fence.keys(values=tuple(_KEYS), flags=("dock", "deep"), has_name=True)
     diagnostics, values = list(keys.diagnostics), dict[str, Any]()
     for word in keys.value.words:

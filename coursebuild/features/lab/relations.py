@@ -1,8 +1,4 @@
-"""Checks how the fields of a `simlab` fit together, and labs with their course.
-
-Entry points: `check_lab(node, structs)`, and its parts for labs of other kinds, `check_controls`,
-`check_axes`; `check_steps`, for a field that presses and sets controls; `check_labs`, their kind
-and model exist; `check_model_names`, once models are compiled.
+"""Checks how the fields of a lab fit together, and labs with their course.
 
 Every part whose own fields are right is checked, so that a misspelt field does not hide what is
 wrong elsewhere.
@@ -10,6 +6,7 @@ wrong elsewhere.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from msgspec import Struct
@@ -43,8 +40,22 @@ def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
     controls = known_controls(node, structs)
     yield from check_controls(node, structs, ("set", "apply", "param"))
     yield from check_axes(node, structs)
-    for claim in node.objects("expect"):
-        yield from _check_expect(claim, controls, structs)
+    for claim_node in node.objects("expect"):
+        claim = structs.get(claim_node)
+        if not isinstance(claim, Expect):
+            continue
+        yield from require_one_of(claim_node, Expect, ("expr", "diverges"))
+        if claim.expr is not None:
+            yield from require_one_of(claim_node, Expect, ("min", "max"), only=False)
+        elif claim.min is not None or claim.max is not None:
+            name = "min" if claim.min is not None else "max"
+            message = f"`{name}` bounds an `expr`, and this claim has none"
+            yield diagnose("field-value", claim_node.place(name), message)
+        if claim.min is not None and claim.max is not None and claim.min > claim.max:
+            message = f"`max` must be at least `min`, which is {claim.min:g}"
+            yield diagnose("field-value", claim_node.place("max"), message)
+        if (after := claim_node.get("after")) is not None:
+            yield from check_steps(after, "after", controls)
     goal = node.get("goal")
     if isinstance(goal, ObjectNode):
         before = 0.0
@@ -74,12 +85,31 @@ def check_controls(
     yield from check_unique(spans, "field-value", "two controls are called `{}`")
     for control in node.objects("controls"):
         match structs.get(control):
-            case Slider() as slider:
+            case Slider(min=low, max=high) as slider:
                 yield from require_one_of(control, Slider, targets)
-                yield from _check_slider(control, slider)
+                if not low < high:
+                    message = f"`max` must be greater than `min`, which is {low:g}"
+                    yield diagnose("field-value", control.place("max"), message)
+                    continue
+                if not low <= slider.value <= high:
+                    message = f"`value` must lie between `min` and `max`: {low:g} to {high:g}"
+                    yield diagnose("field-value", control.place("value"), message)
+                if slider.step is not None and slider.step > high - low:
+                    message = f"`step` is larger than the range from `min` to `max`, {high - low:g}"
+                    yield diagnose("field-value", control.place("step"), message)
             case Select() as select:
                 yield from require_one_of(control, Select, targets)
-                yield from _check_select(control, select)
+                pairs = [p.items for p in control.items("options") if isinstance(p, ArrayNode)]
+                for part, message in (
+                    (0, "two options are called `{}`"),
+                    (1, "two options have the value `{}`"),
+                ):
+                    texts = zip(select.options, pairs, strict=True)
+                    places = [(option[part], pair[part].span) for option, pair in texts]
+                    yield from check_unique(places, "field-value", message)
+                value = control.get("value")
+                if select.value is not None and value is not None:
+                    yield from _check_choice(value, "value", select.value, select)
             case _:
                 pass
 
@@ -95,31 +125,6 @@ def check_axes(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
                 yield diagnose("field-value", plot.place(high), message)
 
 
-def _check_slider(node: ObjectNode, slider: Slider) -> Iterator[Diagnostic]:
-    low, high = slider.min, slider.max
-    if not low < high:
-        message = f"`max` must be greater than `min`, which is {low:g}"
-        yield diagnose("field-value", node.place("max"), message)
-        return
-    if not low <= slider.value <= high:
-        message = f"`value` must lie between `min` and `max`: {low:g} to {high:g}"
-        yield diagnose("field-value", node.place("value"), message)
-    if slider.step is not None and slider.step > high - low:
-        message = f"`step` is larger than the range from `min` to `max`, {high - low:g}"
-        yield diagnose("field-value", node.place("step"), message)
-
-
-def _check_select(node: ObjectNode, select: Select) -> Iterator[Diagnostic]:
-    pairs = [pair.items for pair in node.items("options") if isinstance(pair, ArrayNode)]
-    labels = [(o[0], pair[0].span) for o, pair in zip(select.options, pairs, strict=True)]
-    yield from check_unique(labels, "field-value", "two options are called `{}`")
-    values = [(o[1], pair[1].span) for o, pair in zip(select.options, pairs, strict=True)]
-    yield from check_unique(values, "field-value", "two options have the value `{}`")
-    value = node.get("value")
-    if select.value is not None and value is not None:
-        yield from _check_choice(value, "value", select.value, select)
-
-
 def _check_choice(
     node: Node, name: str, value: float | str, select: Select
 ) -> Iterator[Diagnostic]:
@@ -131,24 +136,6 @@ def _check_choice(
         help = f"`{value}` is the label of an option whose value is `{texts[str(value)]}`"
     message = f"`{name}` cannot be {format_value(node)}: no option has this value"
     yield diagnose("field-value", node.mark, message, help=help)
-
-
-def _check_expect(node: ObjectNode, controls: Controls, structs: Structs) -> Iterator[Diagnostic]:
-    claim = structs.get(node)
-    if not isinstance(claim, Expect):
-        return
-    yield from require_one_of(node, Expect, ("expr", "diverges"))
-    if claim.expr is not None:
-        yield from require_one_of(node, Expect, ("min", "max"), only=False)
-    elif claim.min is not None or claim.max is not None:
-        name = "min" if claim.min is not None else "max"
-        message = f"`{name}` bounds an `expr`, and this claim has none"
-        yield diagnose("field-value", node.place(name), message)
-    if claim.min is not None and claim.max is not None and claim.min > claim.max:
-        message = f"`max` must be at least `min`, which is {claim.min:g}"
-        yield diagnose("field-value", node.place("max"), message)
-    if (after := node.get("after")) is not None:
-        yield from check_steps(after, "after", controls)
 
 
 def check_steps(node: Node, name: str, controls: Controls) -> Iterator[Diagnostic]:
@@ -163,8 +150,14 @@ def check_steps(node: Node, name: str, controls: Controls) -> Iterator[Diagnosti
 def _check_step(node: Node, name: str, controls: Controls) -> Iterator[Diagnostic]:
     """Check one step; messages call it `name`."""
     match node:
-        case StringNode():
-            yield from _check_button(node, controls)
+        case StringNode(value=name):
+            buttons = [b for b, struct in controls.items() if isinstance(struct, Button | None)]
+            if name in controls and name not in buttons:
+                help = f'give the value that it is set to: `{{"{name}": …}}`'
+                yield diagnose("lab-name", node.span, f"`{name}` is not a button", help=help)
+            elif name not in buttons:
+                help = did_you_mean(name, buttons)
+                yield diagnose("lab-name", node.span, f"the lab has no button `{name}`", help=help)
         case ObjectNode():
             if not node.members:
                 yield diagnose("field-value", node.mark, f"`{name}` names no control")
@@ -178,19 +171,6 @@ def _check_step(node: Node, name: str, controls: Controls) -> Iterator[Diagnosti
                     yield from _check_setting(member.key, member.value, controls)
         case _:
             pass
-
-
-def _check_button(label: StringNode, controls: Controls) -> Iterator[Diagnostic]:
-    buttons = [name for name, struct in controls.items() if isinstance(struct, Button | None)]
-    if label.value in buttons:
-        return
-    if label.value in controls:
-        message = f"`{label.value}` is not a button"
-        help = f'give the value that it is set to: `{{"{label.value}": …}}`'
-    else:
-        message = f"the lab has no button `{label.value}`"
-        help = did_you_mean(label.value, buttons)
-    yield diagnose("lab-name", label.span, message, help=help)
 
 
 def _check_setting(label: StringNode, value: Node, controls: Controls) -> Iterator[Diagnostic]:
@@ -215,26 +195,18 @@ def _check_setting(label: StringNode, value: Node, controls: Controls) -> Iterat
             pass
 
 
-_FOLDER = "content/labs/"
-
-
-def lab_kinds(course: Course) -> frozenset[str]:
-    """The built-in kinds, and one for each `content/labs/NAME.js` of the course."""
-    files = (path.removeprefix(_FOLDER) for path in course.files if path.startswith(_FOLDER))
-    kinds = (file.removesuffix(".js") for file in files if file.endswith(".js"))
-    return frozenset((*BUILT_IN_KINDS, *(kind for kind in kinds if "/" not in kind)))
+_OWN_KIND = re.compile(r"content/labs/([^/]*)\.js")
 
 
 def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
     """Report unknown kinds and models of the labs in some documents."""
-    kinds = lab_kinds(course)
+    own_kinds = (match[1] for path in course.files if (match := _OWN_KIND.fullmatch(path)))
+    kinds = frozenset((*BUILT_IN_KINDS, *own_kinds))
     models = {model.name for model in course.models}
     for lab in (lab for document in documents for lab in find_blocks(document, Lab)):
         if lab.kind not in kinds:
-            message, help = (
-                f"`{lab.kind}` is not a known kind of lab",
-                did_you_mean(lab.kind, kinds),
-            )
+            message = f"`{lab.kind}` is not a known kind of lab"
+            help = did_you_mean(lab.kind, kinds)
             yield diagnose("lab-kind", lab.kind_span, message, help=help)
         for name in lab.models():
             if name not in models:
@@ -259,8 +231,6 @@ def check_model_names(
                 ("trail", "site", lab.fields.trail, facts.sites),
             ):
                 if isinstance(name, str) and name not in names:
-                    message, help = (
-                        f"the model has no {element} `{name}`",
-                        did_you_mean(name, names),
-                    )
+                    message = f"the model has no {element} `{name}`"
+                    help = did_you_mean(name, names)
                     yield diagnose("lab-name", lab.place((field,)), message, help=help)

@@ -1,7 +1,4 @@
-"""The reply of the browser's engine to the trial of a lab, and what is published of a trial.
-
-Entry points: `read_reply`, `reply_bytes`; `Parity`; `unpack_arrays`, for arrays in base64;
-`publish_labs(results, assets)`. `site/js/lab/trial/trial.js` says what a reply means.
+"""The reply of the browser's engine to a trial (see `trial.js`), and what is published of a trial.
 
 Every published file has a hash of its content in its name, so that a browser may cache it for ever.
 Addresses inside a lab's configuration are relative to it: all of its files lie in one folder.
@@ -154,7 +151,6 @@ class TrialReply(Struct, frozen=True):
     failures: tuple[TrialFailure, ...]
     main: MainRun | None
     seconds: Annotated[float, Meta(ge=0)] = 0.0
-    """How long the trial took."""
     timestamp: Moment = msgspec.field(name="made", default=0)
     steps_per_second: Count | None = msgspec.field(name="stepsPerSecond", default=None)
 
@@ -205,7 +201,6 @@ class LabRecord(Struct, frozen=True):
     end: float
     """Simulated time of the readouts and of the end of the plots, s."""
     plots: tuple[Markup, ...]
-    """One SVG element for each plot."""
     place: str = ""
     """Where on the axis the readouts were taken, for a lab without an engine."""
 
@@ -214,11 +209,9 @@ class LabOutput(Struct, frozen=True):
     """What a page needs to show and run a lab."""
 
     module: str
-    """The lab's code as an ES module."""
     config: dict[str, Any]
     """The lab's data, as JSON has it."""
     mjb: bytes = b""
-    """The model."""
     record: LabRecord | None = None
     picture: bytes = b""
     """PNG on a transparent ground, if there is a record; SVG of a lab without an engine."""
@@ -265,39 +258,31 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
     for line, lab in trials:
         name = line.name
         if lab.config.get("kind") in (PLOT, ODE):
-            data = {key: value for key, value in lab.config.items() if key not in _CLAIMS}
-            picture = publish(f"{name}.svg", lab.picture) if lab.record is not None else ""
-            address = publish(f"{name}.json", _json(data))
-            labs[name] = PublishedLab(
-                name, address, equation_script, lab.record, picture, line.tried, line.parity
-            )
-            continue
-        is_editable, model = (
-            "xml" in lab.config,
-            lab.config.get("model") or name,
-        )  # the page compiles the model, in a worker of its own
-        # Labs of the same model share its file.
-        parts = {
-            "module": publish(f"{name}.js", lab.module.encode()),
-            "mjb": "" if is_editable else publish(f"{model}.mjb", lab.mjb),
-            "worker": f"{worker}#{name}" if is_editable else worker,
-            "wasm": wasm,
-        }
-        addresses = {key: path.removeprefix(f"{_FOLDER}/") for key, path in parts.items()}
-        config = lab.config | addresses
-        if lab.script is not None:
-            config["exportPython"] = dict(zip(("name", "text"), lab.script, strict=True))
-        picture = publish(f"{name}.png", lab.picture) if lab.record is not None else ""
-        address = publish(f"{name}.json", _json(config))
+            script, ending = equation_script, "svg"
+            config = {key: value for key, value in lab.config.items() if key not in _CLAIMS}
+        else:
+            script, ending = lab_script, "png"
+            # The page compiles a model that the reader edits, in a worker of its own; other labs of
+            # the same model share its file.
+            is_editable, model = "xml" in lab.config, lab.config.get("model") or name
+            parts = {
+                "module": publish(f"{name}.js", lab.module.encode()),
+                "mjb": "" if is_editable else publish(f"{model}.mjb", lab.mjb),
+                "worker": f"{worker}#{name}" if is_editable else worker,
+                "wasm": wasm,
+            }
+            addresses = {key: path.removeprefix(f"{_FOLDER}/") for key, path in parts.items()}
+            config = lab.config | addresses
+            if lab.script is not None:
+                config["exportPython"] = dict(zip(("name", "text"), lab.script, strict=True))
+        picture = publish(f"{name}.{ending}", lab.picture) if lab.record is not None else ""
+        data = json.dumps(config, ensure_ascii=False, separators=(",", ":")).encode()
+        address = publish(f"{name}.json", data)
         labs[name] = PublishedLab(
-            name, address, lab_script, lab.record, picture, line.tried, line.parity
+            name, address, script, lab.record, picture, line.tried, line.parity
         )
     return PublishedTrials(labs, tuple(files.values()))
 
 
 _CLAIMS = ("expect", "verify")
 """Data of a lab without an engine that only its trial needs."""
-
-
-def _json(data: dict[str, Any]) -> bytes:
-    return json.dumps(data, ensure_ascii=False, separators=(",", ":")).encode()

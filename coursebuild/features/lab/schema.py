@@ -1,9 +1,4 @@
-"""The fields of a `lab` fence.
-
-Entry points: `SimLab` (a live MuJoCo simulation), `CommonLab` (the fields of labs of every kind).
-The decoder checks a fence against them, and the JSON Schema for editors is made from `SimLab`;
-`relations` checks how fields fit together (`min` below `max`, an `expect` that names a control).
-"""
+"""The fields of a `lab` fence; `relations` checks how they fit together."""
 
 # No `from __future__ import annotations` here: msgspec would evaluate each annotation, a text then,
 # again in every struct that inherits it.

@@ -1,16 +1,9 @@
 """Trials of all labs of a course: models → V8 and native MuJoCo → results and diagnostics.
 
-Entry point: `LabTrials`.
-
-1. Each lab's model is compiled natively and saved; the same bytes go to the browser.
-2. Each piece of its code must parse; then the trial takes the lab through everything that a reader
-   can do with it, in the engine that the browser has.
-3. The main run is repeated natively and compared; for a build, its recording becomes the static
-   form.
-4. The script that the page offers is run natively and compared with the main run too.
-
-Saved models, trials and pictures are stored by the hash of all that they depend on, so that neither
-engine is started if nothing has changed.
+A lab's model is compiled natively, and the same bytes go to the browser's engine, which takes the
+lab through everything that a reader can do with it. The main run and the exported script are
+repeated natively and compared. Saved models, trials and pictures are stored by the hash of all that
+they depend on, so that neither engine is started if nothing has changed.
 """
 
 from __future__ import annotations
@@ -35,6 +28,7 @@ from coursebuild.core.run.mjcf import model_files, model_key
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import fingerprint
+from coursebuild.features.lab import verdict
 from coursebuild.features.lab.compile import LabModule, compile_lab, pieces
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError, lab_digest
@@ -49,13 +43,6 @@ from coursebuild.features.lab.inputs import equation_inputs, inputs_of, trial_da
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
 from coursebuild.features.lab.reply import LabOutput, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
-from coursebuild.features.lab.verdict import (
-    code_diagnostic,
-    failure_diagnostics,
-    name_diagnostics,
-    references,
-    remark_diagnostics,
-)
 
 _PARITY_SECONDS = 1.0
 """Simulated time over which the size of a difference counts, unless a lab says how much is allowed.
@@ -144,7 +131,6 @@ class LabTrials:
         return result, diagnostics if lab.is_of_text else []
 
     def _try_equations(self, trial: Trial, lab: Lab) -> tuple[TrialResult | None, list[Diagnostic]]:
-        """Try a lab without an engine, or read what an earlier trial found."""
         inputs, runs, start = equation_inputs(lab, trial.name), self._context.run_store, time.time()
         config = json.loads(lab.config)
         missing = tuple(add_points(config, self._context.course))
@@ -212,7 +198,6 @@ class LabTrials:
 
 
 def _find_model(context: TrialContext, name: str) -> Source | None:
-    """Return a model of the course; `None` if there is none that compiles."""
     compilation = context.models.get(name)
     if compilation is None or not compilation.facts:
         return None
@@ -220,7 +205,6 @@ def _find_model(context: TrialContext, name: str) -> Source | None:
 
 
 def _save_model(context: TrialContext, native: NativeEngine, model: Source) -> bytes:
-    """Return a model as an MJB file; from the store if nothing in it has changed."""
     store, key = context.run_store.store, model_key(context.root, model.path, model.text)
     mjb = store.get("mjb", key, bytes)
     if mjb is None:
@@ -231,8 +215,6 @@ def _save_model(context: TrialContext, native: NativeEngine, model: Source) -> b
 
 
 class _Evaluation(Struct, frozen=True):
-    """What follows from the reply of a trial."""
-
     reply: TrialReply
     failures: tuple[Diagnostic, ...]
     """Diagnostics with which the lab cannot be published."""
@@ -243,8 +225,6 @@ class _Evaluation(Struct, frozen=True):
 
 
 class _LabTrial(Struct, frozen=True):
-    """The trial of one lab."""
-
     context: TrialContext
     engines: Engines
     seconds: float
@@ -253,7 +233,6 @@ class _LabTrial(Struct, frozen=True):
     model: Source
 
     def run(self) -> tuple[TrialResult, list[Diagnostic]]:
-        """Run the trial, or read the reply of an earlier one, and evaluate it."""
         lab, store = self.lab, self.context.run_store.store
         module = compile_lab(lab, self.trial.name)
         inputs = inputs_of(lab, module)
@@ -283,6 +262,10 @@ class _LabTrial(Struct, frozen=True):
             seconds=reply.seconds,
             timestamp=reply.timestamp,
         )
+        parity = None if reply.main is None else reply.main["parity"]
+        parity_text = "" if parity is None else parity.describe()
+        if parity is not None and parity.unrepeated and export.script is not None:
+            parity_text = "compared with native MuJoCo as its Python export"
         line = TrialLine(
             name=module.name,
             title=lab.fields.title,
@@ -291,7 +274,7 @@ class _LabTrial(Struct, frozen=True):
             seconds=reply.seconds,
             steps_per_second=reply.steps_per_second,
             tried=len(reply.attempts),
-            parity=_parity_text(reply, export),
+            parity=parity_text,
             fill=None if reply.main is None else reply.main["fill"],
             cached=cached_evaluation is not None,
             unexported=export.reason,
@@ -306,7 +289,6 @@ class _LabTrial(Struct, frozen=True):
         return TrialResult(self.lab.span, line, LabOutput(module.code, module.config)), diagnostics
 
     def _check_size(self, mjb: bytes) -> Diagnostic | None:
-        """Report a compiled model for which a trial, and a reader's page, need too much memory."""
         memory = self.context.course.limits.memory
         size, largest = len(mjb) >> 20, memory // _PART_OF_MODEL
         if size <= largest:
@@ -328,8 +310,8 @@ class _LabTrial(Struct, frozen=True):
         lab, reply = self.lab, read_reply(data)
         if reply.main is None and not reply.failures:
             raise ValueError("a reply without a main run has a failure")
-        failures = tuple(failure_diagnostics(lab, reply)) if lab.is_of_text else ()
-        remarks, main = tuple(remark_diagnostics(lab, reply)), reply.main
+        failures = tuple(verdict.failure_diagnostics(lab, reply)) if lab.is_of_text else ()
+        remarks, main = tuple(verdict.remark_diagnostics(lab, reply)), reply.main
         config = module.config
         if main is not None:
             # The camera that the trial worked out
@@ -357,15 +339,15 @@ class _LabTrial(Struct, frozen=True):
         browser, code = self.engines.browser, tuple(pieces(self.lab))
         messages = browser.check_code(code)
         diagnostics = [
-            code_diagnostic(self.lab, piece, message)
+            verdict.code_diagnostic(self.lab, piece, message)
             for piece, message in zip(code, messages, strict=True)
             if message is not None
         ]
         if diagnostics:
             return diagnostics
-        names = references(self.lab)
+        names = verdict.references(self.lab)
         replies = browser.look_up([name.path for name in names], mjb, self.seconds)
-        return list(name_diagnostics(names, replies))
+        return list(verdict.name_diagnostics(names, replies))
 
     def _run_trial(self, module: LabModule, mjb: bytes, key: str) -> bytes:
         """Run the trial, and replace its recorded states by their comparison with a native run."""
@@ -388,7 +370,6 @@ class _LabTrial(Struct, frozen=True):
         return data
 
     def _compare_natively(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any]:
-        """Compare the main run with native MuJoCo, or say why it cannot be repeated."""
         run = main["parity"]
         if main["diverged"]:
             run["steps"] -= 1  # the last state, which is not finite, may differ
@@ -410,14 +391,4 @@ class _LabTrial(Struct, frozen=True):
 
 
 def _is_lasting(reply: TrialReply) -> bool:
-    """Whether the same trial would have the same result next time."""
     return all(failure.kind not in _TRANSIENT for failure in reply.failures)
-
-
-def _parity_text(reply: TrialReply, export: LabExport) -> str:
-    parity = reply.main["parity"] if reply.main is not None else None
-    if parity is None:
-        return ""
-    if parity.unrepeated and export.script is not None:
-        return "compared with native MuJoCo as its Python export"
-    return parity.describe()

@@ -1,10 +1,4 @@
-"""The reply of a trial as diagnostics at the entries of the lab.
-
-Entry points: `failure_diagnostics` and `remark_diagnostics` of a lab and its trial;
-`code_diagnostic`; `references(lab)`, names in its code, of which `name_diagnostics` reports those
-that the engine has not found (`site/js/lab/trial/names.js`), such as `data.qps`, `math.sin` or
-`data.qpos[5]`.
-"""
+"""The reply of a trial as diagnostics at the entries of the lab, and names that do not exist."""
 
 from __future__ import annotations
 
@@ -150,10 +144,24 @@ def remark_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
         failures = [f for f in trial.failures if f.kind == "deep"]
         of_main_run = [f for f in failures if f.entry == ()]
         yield from (_make_diagnostic(lab, failure) for failure in of_main_run or failures)
-    yield from _check_reset(lab, trial)
-    # Report a camera of the lab's own that shows what moves too small
     main = trial.main
-    if main is None or (fill := main["fill"]) is None or (most := main["mostFill"]) is None:
+    if main is None:
+        return
+    if (difference := main["resetDiffers"]) is not None:
+        entry = difference["entry"]
+        message = f"a reset does not return to the start: `{difference['what']}` differs"
+        match entry:
+            case ("controls", int(i), *_) if not getattr(lab.fields.controls[i], "init", False):
+                help = f'{_entry_name(lab, entry)} is not applied again; give it `"init": true`'
+            case _:
+                help = (
+                    "chance from `lib.random()` begins anew with each reset, from `Math.random()` "
+                    "it does not; what code has changed in `ctx` or `model` stays until `setup` "
+                    "puts it back"
+                )
+        yield diagnose("lab-reset", lab.place(entry), message, help=help)
+    # Report a camera of the lab's own that shows what moves too small
+    if (fill := main["fill"]) is None or (most := main["mostFill"]) is None:
         return
     if fill < _SMALL and fill < most / 2:
         message = (
@@ -164,7 +172,6 @@ def remark_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
 
 
 def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
-    """Whether the simulation diverges there, and the lab claims that it does."""
     if failure.kind != "diverged":
         return False
     claims = [claim for claim in lab.fields.expect if claim.diverges]
@@ -227,25 +234,6 @@ def _make_diagnostic(lab: Lab, failure: TrialFailure) -> Diagnostic:
     )
 
 
-def _check_reset(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
-    """Report a reset after the main run that did not lead back to the start."""
-    difference = trial.main["resetDiffers"] if trial.main is not None else None
-    if difference is None:
-        return
-    entry = difference["entry"]
-    message = f"a reset does not return to the start: `{difference['what']}` differs"
-    match entry:
-        case ("controls", int(i), *_) if not getattr(lab.fields.controls[i], "init", False):
-            help = f'{_entry_name(lab, entry)} is not applied again; give it `"init": true`'
-        case _:
-            help = (
-                "chance from `lib.random()` begins anew with each reset, from `Math.random()` it "
-                "does not; what code has changed in `ctx` or `model` stays until `setup` puts it "
-                "back"
-            )
-    yield diagnose("lab-reset", lab.place(entry), message, help=help)
-
-
 _SPELLINGS = {
     "diverges": ('"expect": [{"t": …, "diverges": true}]', "diverges=…"),
     "deep": ('"verify": {"deep": true}', "deep"),
@@ -270,9 +258,7 @@ class NameReference(Struct, frozen=True):
 
     path: tuple[str, ...]
     places: tuple[Span, ...]
-    """The place of each part of the path."""
     index: int | None = None
-    """The number in brackets after it."""
     element: Span | None = None
     """The place of all of it, brackets included."""
 
@@ -287,7 +273,14 @@ def references(lab: Lab) -> list[NameReference]:
 def _references(code: Excerpt) -> Iterator[NameReference]:
     data = code.text.encode("utf-8", "replace")
     nodes = list(walk(parse(code.text)))
-    declared_names = {text_of(name) for node in nodes for name in _declarations(node)}
+    declared_names: set[str] = set()
+    for node in nodes:
+        if node.type in ("formal_parameters", "array_pattern", "object_pattern"):
+            declared_names.update(map(text_of, node.named_children))
+        for field in ("name", "parameter", "left"):
+            child = node.child_by_field_name(field)
+            if child is not None and child.type == "identifier":
+                declared_names.add(text_of(child))
 
     def place(node: Node) -> Span:
         start, end = (len(data[:at].decode()) for at in (node.start_byte, node.end_byte))
@@ -306,15 +299,6 @@ def _references(code: Excerpt) -> Iterator[NameReference]:
             yield NameReference(path, places, int(text_of(index)), place(outer))
         else:
             yield NameReference(path, places)
-
-
-def _declarations(node: Node) -> Iterator[Node]:
-    if node.type in ("formal_parameters", "array_pattern", "object_pattern"):
-        yield from node.named_children
-    for field in ("name", "parameter", "left"):
-        child = node.child_by_field_name(field)
-        if child is not None and child.type == "identifier":
-            yield child
 
 
 def name_diagnostics(

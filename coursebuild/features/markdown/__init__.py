@@ -1,9 +1,4 @@
-"""Every page as Markdown, and a list of them for language models.
-
-1. `writer` writes a document as Markdown.
-2. `copies` writes a page as Markdown: from its document, or from its HTML where it has none
-   (`from_html`), and lists these copies.
-"""
+"""Every page as Markdown, and a list of them for language models."""
 
 from coursebuild.core.features import Feature, PageCopy
 from coursebuild.features.markdown.copies import markdown_files, note_markdown

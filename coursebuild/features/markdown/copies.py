@@ -1,14 +1,10 @@
-"""Writes pages as plain Markdown, for people, feeds and language models, and the list `llms.txt`.
+"""Pages as plain Markdown, for people, feeds and language models, and the list `llms.txt`.
 
-Entry points: `note_markdown`, the text of a page; `markdown_files`, the files of all pages; `head`
-and `markdown_href`, parts of them; `write_llms(library)`.
+A lesson or page of the course is written from its document; all others (home, levels, models,
+measured figures) from their HTML, so that both say the same.
 
-A lesson or page of the course is written from its document. All other pages (home, levels, models,
-measured figures) are written from their HTML, so that both say the same.
-
-`llms.txt` (<https://llmstxt.org>) leads language models to these copies. There is no
-`llms-full.txt`: for thousands of lessons it would have tens of megabytes, more than any model
-reads, and every edit would write it again.
+There is no `llms-full.txt` (<https://llmstxt.org>): for thousands of lessons it would have tens of
+megabytes, more than any model reads, and every edit would write it again.
 """
 
 from __future__ import annotations
@@ -49,26 +45,10 @@ def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> by
     """Return the text of a page; empty if it has no copy."""
     if not has_copies(inputs.head.path):
         return b""
-    if page is not None and inputs.head.kind != "home":
-        text = _document_copy(inputs, page)
-    else:
-        place = urls.Place(inputs.head.path)
-        text = html_to_markdown(body, lambda href: markdown_href(place, href))
-    return visible(f"{text}\n").encode()
-
-
-def markdown_href(place: urls.Place, href: str) -> str:
-    """Return the address for a link in a page's copy: links to pages lead to their copies."""
-    path, _ = place.target(href)
-    if path is None or path.startswith("files/") or not has_copies(path):
-        return href
-    parts = urlsplit(href)
-    if not parts.path.endswith(".html"):
-        return href
-    return parts._replace(path=urls.copy_path(parts.path, _EXTENSION)).geturl()
-
-
-def _document_copy(inputs: PageInputs, page: PageContext) -> str:
+    if page is None or inputs.head.kind == "home":
+        path = urls.Place(inputs.head.path)
+        text = html_to_markdown(body, lambda href: markdown_href(path, href))
+        return visible(f"{text}\n").encode()
     place, words, document = page.place, page.renderer.words, page.document
     page_href = place.href(place.path)
     writer = DocumentWriter(page, lambda href: markdown_href(place, href), page_href)
@@ -92,7 +72,19 @@ def _document_copy(inputs: PageInputs, page: PageContext) -> str:
         writer.references(),
         *(["___", "\n".join(f"- {row}" for row in rows)] if rows else []),
     )
-    return "\n\n".join(filter(None, parts))
+    text = "\n\n".join(filter(None, parts))
+    return visible(f"{text}\n").encode()
+
+
+def markdown_href(place: urls.Place, href: str) -> str:
+    """Return the address for a link in a page's copy: links to pages lead to their copies."""
+    path, _ = place.target(href)
+    if path is None or path.startswith("files/") or not has_copies(path):
+        return href
+    parts = urlsplit(href)
+    if not parts.path.endswith(".html"):
+        return href
+    return parts._replace(path=urls.copy_path(parts.path, _EXTENSION)).geturl()
 
 
 def head(inputs: PageInputs, words: Strings, locate: Locate) -> list[str]:

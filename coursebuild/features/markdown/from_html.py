@@ -1,11 +1,7 @@
-"""Converts HTML of our own templates to Markdown: the course map, levels, models, figures.
+"""HTML of our own templates as Markdown: the course map, levels, models, figures.
 
-Entry point: `html_to_markdown(html, locate)`.
-
-1. The HTML becomes a tree of blocks and lines, by its tags.
-2. What only serves the page is left out: navigation, buttons, drawings.
-3. Headings, lists, tables, definition lists, code and links become Markdown; of other elements
-   their text remains.
+What only serves the page is left out: navigation, buttons, drawings. Headings, lists, tables,
+definition lists, code and links become Markdown; of other elements their text remains.
 """
 
 from __future__ import annotations
@@ -13,18 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
+from coursebuild.core.pages import marks
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
-from coursebuild.core.pages.marks import (
-    block_quote,
-    code_span,
-    escape_marks,
-    fence,
-    guard_lines,
-    hang,
-    link,
-    picture,
-    table,
-)
 
 _SKIPPED_ELEMENTS = frozenset(
     "nav script style svg template button form input select label dialog".split()
@@ -55,7 +41,7 @@ class _Converter:
                 if isinstance(child, str) or child.name not in _SKIPPED_ELEMENTS:
                     line.append(child)
                 continue
-            text = guard_lines(self._line(line))
+            text = marks.guard_lines(self._line(line))
             line = []
             blocks += [text] if text else []
             if isinstance(child, HtmlElement):
@@ -70,13 +56,17 @@ class _Converter:
         elif name in ("ul", "ol"):
             yield self._list(node)
         elif name == "pre":
-            yield fence(_language(node), node.text)
+            names = (
+                n for code in node.nearest("code") for n in code.attributes.get("class", "").split()
+            )
+            languages = (n.removeprefix("language-") for n in names if n.startswith("language-"))
+            yield marks.fence(next(languages, ""), node.text)
         elif name == "table":
             yield self._table(node)
         elif name == "dl":
             yield self._terms(node)
         elif name == "blockquote":
-            yield block_quote("\n\n".join(self.blocks(node.children)))
+            yield marks.block_quote("\n\n".join(self.blocks(node.children)))
         elif name == "hr":
             yield "___"
         elif name in ("summary", "figcaption", "caption"):
@@ -94,7 +84,7 @@ class _Converter:
             number = int(value) if value and value.isdigit() else number
             mark = "- " if node.name == "ul" else f"{number}. "
             number += 1
-            texts.append(hang(mark, "\n\n".join(self.blocks(item.children))))
+            texts.append(marks.hang(mark, "\n\n".join(self.blocks(item.children))))
         is_loose = any("\n\n" in text for text in texts)
         return ("\n\n" if is_loose else "\n").join(texts)
 
@@ -120,7 +110,7 @@ class _Converter:
         texts = [[*row, *[""] * (width - len(row))] for row in texts]
         has_head = not any(cell.name == "td" for cell in rows[0])
         head = texts.pop(0) if has_head else [""] * width
-        return table(head, texts)
+        return marks.table(head, texts)
 
     # --- lines
 
@@ -129,7 +119,7 @@ class _Converter:
 
     def _inline(self, node: HtmlContent) -> str:
         if isinstance(node, str):
-            return escape_marks(node)
+            return marks.escape_marks(node)
         inner = "".join(map(self._inline, node.children))
         match node.name:
             case name if name in _SKIPPED_ELEMENTS:
@@ -137,10 +127,10 @@ class _Converter:
             case "a":
                 href = node.attributes.get("href")
                 text = " ".join(inner.split())
-                return link(text, self.locate(href)) if href and text else inner
+                return marks.link(text, self.locate(href)) if href and text else inner
             case "code" | "kbd" | "samp":
                 text = " ".join(node.text.split())
-                return code_span(text) if text else ""
+                return marks.code_span(text) if text else ""
             case "strong" | "b":
                 return f"**{inner.strip()}**" if inner.strip() else ""
             case "em" | "i" | "dfn":
@@ -148,7 +138,9 @@ class _Converter:
             case "img":
                 source = node.attributes.get("src")
                 return (
-                    picture(node.attributes.get("alt") or "", self.locate(source)) if source else ""
+                    marks.picture(node.attributes.get("alt") or "", self.locate(source))
+                    if source
+                    else ""
                 )
             case "sup" | "sub":
                 return f"<{node.name}>{inner}</{node.name}>" if inner else ""
@@ -156,16 +148,8 @@ class _Converter:
                 return " "
             case "math":
                 tex = next((annotation.text for annotation in node.nearest("annotation")), "")
-                return f"${tex.strip()}$" if tex else escape_marks(node.text)
+                return f"${tex.strip()}$" if tex else marks.escape_marks(node.text)
             case "span" if node.attributes.get("class") == "sep":
                 return f" {inner} "
             case _:
                 return inner
-
-
-def _language(node: HtmlElement) -> str:
-    for code in node.nearest("code"):
-        for name in code.attributes.get("class", "").split():
-            if name.startswith("language-"):
-                return name.removeprefix("language-")
-    return ""

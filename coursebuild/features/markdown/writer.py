@@ -1,12 +1,8 @@
-"""Writes documents as CommonMark with tables, footnotes and `$`, for readers elsewhere.
+"""Documents as CommonMark with tables, footnotes and `$`, for readers elsewhere.
 
-Entry points: `DocumentWriter`, for one document on one page: a script is a fence below its name, a
-lab its recorded picture and values, a quiz a list with its answers.
-
-1. A text that has no escapes or entities is copied from its source, where it was read as text
-   between the same neighbours. In any other text (also that from JSON) all marks are escaped.
-2. What can begin another block at the start of a line is escaped when a paragraph is complete.
-3. Containers indent their blocks.
+A text that has no escapes or entities is copied from its source, where it was read as text between
+the same neighbours. In any other text (also that from JSON) all marks are escaped. What can begin
+another block at the start of a line is escaped when a paragraph is complete.
 """
 
 from __future__ import annotations
@@ -20,18 +16,8 @@ from typing import Literal, TypeAlias, assert_never
 from markupsafe import Markup
 
 from coursebuild.core import model
+from coursebuild.core.pages import marks
 from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.marks import (
-    block_quote,
-    code_span,
-    escape_marks,
-    fence,
-    guard_lines,
-    hang,
-    link,
-    picture,
-    table,
-)
 from coursebuild.core.pages.markup import escape, is_tight, raw_html
 from coursebuild.core.pages.page_writer import output_receipt, script_receipt
 from coursebuild.core.registry import kind_of_block
@@ -72,7 +58,7 @@ class DocumentWriter:
     def footnotes(self, footnotes: Iterable[model.Footnote]) -> str:
         """Write the definitions of footnotes, for references such as `[^1]`."""
         return "\n\n".join(
-            hang(f"[^{note.number}]: ", self.blocks(note.blocks), 4) for note in footnotes
+            marks.hang(f"[^{note.number}]: ", self.blocks(note.blocks), 4) for note in footnotes
         )
 
     # --- blocks
@@ -104,16 +90,16 @@ class DocumentWriter:
                 text = self._inlines(block.children)
                 if number := self.number(block.label):
                     text = text.removeprefix("Figure:").lstrip()
-                    text = f"**{escape_marks(number)}:** {text}"
+                    text = f"**{marks.escape_marks(number)}:** {text}"
                 return text
             case model.HtmlFlow():
                 return "".join(map(self._in_html, block.children))
             case model.ListBlock():
                 return self._list(block, after_list=isinstance(previous, model.ListBlock))
             case model.BlockQuote():
-                return block_quote(self.blocks(block.blocks))
+                return marks.block_quote(self.blocks(block.blocks))
             case model.CodeBlock():
-                code = fence(re.sub(r"[\s`]", "", block.language), block.code.text)
+                code = marks.fence(re.sub(r"[\s`]", "", block.language), block.code.text)
                 return self._below_caption(block, code)
             case model.HtmlBlock():
                 return raw_html(block, self.url).rstrip("\n")
@@ -125,33 +111,33 @@ class DocumentWriter:
             case model.Table():
                 rows = (map(self._cell, row) for row in block.rows)
                 header, align = map(self._cell, block.header), (mark or "" for mark in block.align)
-                text = table(header, rows, align)
+                text = marks.table(header, rows, align)
                 return self._below_caption(block, text, self.inlines(block.caption))
             case model.Callout():
-                label = f"**{escape_marks(self.page.inputs.callouts[block.kind].label)}**"
+                label = f"**{marks.escape_marks(self.page.inputs.callouts[block.kind].label)}**"
                 title = self.inlines(block.title)
                 head = f"{label} {title}" if title else label
                 inner = self.blocks(block.blocks)
-                return block_quote(f"{head}\n\n{inner}" if inner else head)
+                return marks.block_quote(f"{head}\n\n{inner}" if inner else head)
             case model.PlainCode():
-                return self._below_caption(block, fence("python", block.code.text))
+                return self._below_caption(block, marks.fence("python", block.code.text))
             case model.Script():
                 href = self.locate(self.page.place.href(block.path))
-                name = link(code_span(block.path), href)
+                name = marks.link(marks.code_span(block.path), href)
                 if number := self.number(block.label):
-                    name = f"**{escape_marks(number)}** {name}"
+                    name = f"**{marks.escape_marks(number)}** {name}"
                 if self.notebook:
                     return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
-                command = code_span(shlex.join(("python", block.path, *block.args)))
+                command = marks.code_span(shlex.join(("python", block.path, *block.args)))
                 run = f"{self.words('code.run')}: {command}"
                 if block.requires:
                     run += f" ({self.words('code.requires', modules=', '.join(block.requires))})"
-                parts = [f"{name}:", fence("python", block.code.text), run]
+                parts = [f"{name}:", marks.fence("python", block.code.text), run]
                 recordings = self.page.script_outputs.get(block.span.start, ())
                 parts += [self.recording(recording) for recording in recordings]
                 if not recordings:
                     receipt = script_receipt(self.page, block)
-                    parts.append(f"*{escape_marks(receipt.text)}*")
+                    parts.append(f"*{marks.escape_marks(receipt.text)}*")
                 return "\n\n".join(parts)
             case model.Recording():
                 is_joined = any(block in outputs for outputs in self.page.script_outputs.values())
@@ -163,12 +149,12 @@ class DocumentWriter:
                     if block.fragment
                     else self.words("mjcf.label")
                 )
-                verdict = f"*{self.words('mjcf.compiles', engine=engine)}*"
-                if block.error is not None:
-                    verdict = (
-                        f"*{self.words('mjcf.fails', engine=engine)}* {code_span(block.error)}"
-                    )
-                text = f"{label}:\n\n{fence('xml', block.code.text)}\n\n{verdict}"
+                if block.error is None:
+                    verdict = f"*{self.words('mjcf.compiles', engine=engine)}*"
+                else:
+                    fails = self.words("mjcf.fails", engine=engine)
+                    verdict = f"*{fails}* {marks.code_span(block.error)}"
+                text = f"{label}:\n\n{marks.fence('xml', block.code.text)}\n\n{verdict}"
                 return self._below_caption(block, text)
             case model.FeatureBlock():
                 return self._below_caption(block, kind_of_block(block).markdown(self, block))
@@ -176,9 +162,8 @@ class DocumentWriter:
                 assert_never(block)
 
     def _below_caption(self, block: model.Labelled, text: str, caption: str = "") -> str:
-        """Write a block below its number and its caption, if it has one of the two."""
         if number := self.number(block.label):
-            caption = f"**{escape_marks(number)}:** {caption}".rstrip()
+            caption = f"**{marks.escape_marks(number)}:** {caption}".rstrip()
         return f"{caption}\n\n{text}" if caption else text
 
     def _in_html(self, inline: model.Inline) -> str:
@@ -209,7 +194,7 @@ class DocumentWriter:
             text = f"[{'x' if item.checked else ' '}] {text or '&nbsp;'}"
         elif item.blocks and isinstance(item.blocks[0], model.ListBlock):
             text = f"\n{text}"  # three marks on one line would be a thematic break
-        return hang(mark, text, len(mark))
+        return marks.hang(mark, text, len(mark))
 
     def _cell(self, cell: model.Cell) -> str:
         return self._inlines(cell.children, "cell").replace("\n", " ")
@@ -218,7 +203,7 @@ class DocumentWriter:
 
     def _inlines(self, inlines: Iterable[model.Inline], room: _Room = "block") -> str:
         text = self._join_inlines(inlines, room)
-        return guard_lines(text) if room == "block" else text
+        return marks.guard_lines(text) if room == "block" else text
 
     def _join_inlines(self, inlines: Iterable[model.Inline], room: _Room) -> str:
         return "".join([self._inline(inline, room) for inline in inlines])
@@ -236,9 +221,9 @@ class DocumentWriter:
             case model.CodeSpan():
                 source = inline.span.text
                 ticks = source[: len(source) - len(source.lstrip("`"))]
-                return _escape_pipes(code_span(inline.text, ticks), room)
+                return _escape_pipes(marks.code_span(inline.text, ticks), room)
             case model.NumberBinding():
-                return escape_marks(_MINUS.sub("\u2212", inline.text))
+                return marks.escape_marks(_MINUS.sub("\u2212", inline.text))
             case model.Math():
                 tag = self._tag(inline.span.start) if inline.display else ""
                 tex = inline.tex.text  # which can end with a comment
@@ -250,15 +235,18 @@ class DocumentWriter:
                 elif "\n" in tex:
                     tex = " ".join(part.strip() for part in tex.split("\n"))
                 return f"$${tex}$$" if inline.display else f"${tex}$"
-            case model.Emphasis() | model.Strong() | model.Term() | model.Strikethrough():
-                mark = _delimiter(inline)
+            case model.Strikethrough():
+                return f"~~{self._join_inlines(inline.children, room)}~~"
+            case model.Emphasis() | model.Strong() | model.Term():
+                mark = "_" if inline.span.text[:1] == "_" else "*"  # as in its source
+                mark *= 2 if isinstance(inline, model.Strong) else 1
                 return f"{mark}{self._join_inlines(inline.children, room)}{mark}"
             case model.Link():
                 text = self._join_inlines(inline.children, room)
                 return self._link(inline, text, room)
             case model.Image():
                 url = self.url(inline.url)
-                return _escape_pipes(picture(inline.alt, url, inline.title), room)
+                return _escape_pipes(marks.picture(inline.alt, url, inline.title), room)
             case model.RawInline():
                 return _escape_pipes(raw_html(inline, self.url), room)
             case model.FootnoteRef():
@@ -277,8 +265,8 @@ class DocumentWriter:
         if source == f"<{model.plain_text(node.children)}>" and room != "cell":
             return source
         href = self.href(node.target)
-        text = text or escape_marks(self.link_text(node.target))
-        return link(text, href.replace("|", "%7C") if room == "cell" else href, node.title)
+        text = text or marks.escape_marks(self.link_text(node.target))
+        return marks.link(text, href.replace("|", "%7C") if room == "cell" else href, node.title)
 
     # --- what depends on the page
 
@@ -314,7 +302,7 @@ class DocumentWriter:
     def references(self) -> str:
         """Return the list of the sources that the document cites; perhaps empty."""
         entries = (self.html(entry.html) for entry in self.page.inputs.citations.entries)
-        items = "\n".join(hang("- ", entry) for entry in entries)
+        items = "\n".join(marks.hang("- ", entry) for entry in entries)
         return f"**{self.words('references.title')}**\n\n{items}" if items else ""
 
     def html(self, html: Markup) -> str:
@@ -323,7 +311,7 @@ class DocumentWriter:
 
     def words(self, key: str, **values: str | int | float) -> str:
         """Return a text of the interface as Markdown."""
-        return escape_marks(self.page.renderer.words(key, **values))
+        return marks.escape_marks(self.page.renderer.words(key, **values))
 
     # --- scripts and outputs
 
@@ -332,16 +320,16 @@ class DocumentWriter:
         if isinstance(block.body, model.Table):
             body = self.blocks((block.body,))
         else:
-            body = fence("text", block.body.text)
+            body = marks.fence("text", block.body.text)
         return f"{self.caption(block)}\n\n{body}\n\n{self.receipt(block)}"
 
     def caption(self, block: model.Recording) -> str:
         """Write the caption of an output."""
-        return self.inlines(block.caption) or escape_marks(self.words("code.caption"))
+        return self.inlines(block.caption) or marks.escape_marks(self.words("code.caption"))
 
     def receipt(self, block: model.Recording) -> str:
         """Write the receipt of an output: how it was verified."""
-        return f"*{escape_marks(output_receipt(self.page, block).text)}*"
+        return f"*{marks.escape_marks(output_receipt(self.page, block).text)}*"
 
     def folded(self, label: str, text: str) -> str:
         """Write a text with its label; in a notebook it is folded."""
@@ -355,7 +343,7 @@ def _text(node: model.Text, room: _Room) -> str:
     """Write a text, copied from its source if that is the same."""
     source = node.span.text
     if source != node.text:
-        text = escape_marks(node.text)
+        text = marks.escape_marks(node.text)
         if text[:1].isspace() and not source[:1].isspace():
             text = f"&#{ord(text[0])};{text[1:]}"
         if text[-1:].isspace() and not source[-1:].isspace():
@@ -367,14 +355,6 @@ def _text(node: model.Text, room: _Room) -> str:
 
 def _escape_pipes(text: str, room: _Room) -> str:
     return _PIPE.sub(r"\\|", text) if room == "cell" else text
-
-
-def _delimiter(node: model.Emphasis | model.Strong | model.Term | model.Strikethrough) -> str:
-    """Return the marks around a text; those of emphasis are as in its source."""
-    if isinstance(node, model.Strikethrough):
-        return "~~"
-    mark = "_" if node.span.text[:1] == "_" else "*"
-    return mark * 2 if isinstance(node, model.Strong) else mark
 
 
 def _remove_empty_lines(tex: str) -> str:

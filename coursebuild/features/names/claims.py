@@ -53,7 +53,10 @@ ENGINE_WORD = re.compile(r"(?:mj[A-Z]|mj[a-z]{0,2}_|mjt[A-Z]|Mj[A-Z])\w+")
 """A name that only MuJoCo has."""
 _ATTRIBUTES = re.compile(r'\s*([A-Za-z_][\w:-]*)\s*=\s*"[^"]*"')
 _TAG = re.compile(rf"<(/?)([A-Za-z]\w*)((?:{_ATTRIBUTES.pattern[:-7]}\"[^\"]*\")*)\s*/?>")
-_HALF = re.compile(r"(?=.*[<>])(?!<.*>\Z)[^\w\s]?/?[A-Za-z]\w*/?[^\w\s]?|<\w+/\w+>|<<[a-z]+[ >/].*")
+_HALF = re.compile(
+    r"(?=.*[<>])(?!<.*>\Z)[^\w\s]?/?[A-Za-z]\w*/?[^\w\s]?|<\w+/\w+>|<<[a-z]+[ >/].*"
+    r"|<\w*[^\w\s<>/]\w*>"
+)
 """Perhaps an element that lost a bracket."""
 _TABLE = re.compile(r"(\[\[?)([a-z][\w.]*)\]\]?(?: (\w+)(?: =.*)?)?")
 _FILE = re.compile(r"(?:content|examples|models)/(?!.*[A-Z]{3})[\w./-]*\w\.[a-z]+")
@@ -74,7 +77,7 @@ _PLAIN = re.compile(
 """A word of inline code that is no part of a path."""
 _TOKEN = re.compile(
     r"(?<!\S)(?=\S*[A-Za-z_]{4})(?!\w+(?!\S))\S{6,}(?!\S)"
-    r"|(?<!\S)\w*[\\<;,'\[\]]\w{3,}(?!\S)"
+    r"|(?<!\S)\w*[\\<;,'\[\]]\w{3,}(?!\S)|(?<!\S)\w{3,}[\\'´](?!\S)"
 )
 """What stands between blanks, with a word of some length and more than that."""
 _TAIL = re.compile(r"(?<!\s`)[A-Za-z0-9]+(?![\w{}=`])")

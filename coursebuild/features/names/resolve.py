@@ -81,14 +81,12 @@ class Resolver:
     @functools.cached_property
     def words(self) -> frozenset[str]:
         """The words of all code of the course."""
-        words: set[str] = {model.name for model in self.course.models}
-        for model in self.course.models:
-            words |= claims.words_of(model.source.text)
-        for names in course_names(self.course):
-            words |= names.words | names.definitions.keys()
-        for package in self.course.packages:
-            words.add(package.path)
-        return frozenset(words)
+        course = self.course
+        words = {model.name for model in course.models} | {p.path for p in course.packages}
+        return frozenset(words).union(
+            *(claims.words_of(model.source.text) for model in course.models),
+            *(names.words | names.definitions.keys() for names in course_names(course)),
+        )
 
     @functools.cached_property
     def imports(self) -> dict[str, str]:
@@ -226,7 +224,7 @@ class Resolver:
             for word in slips
             if len(word) >= lengths.get(word, len(word) + 1)
             # `fields` is no slip of `hfields`
-            and (word[0] == name[0] or len(word) > 8 or self.uses[word] > 1)
+            and (word[0] == name[0] or len(word) > 7 or self.uses[word] > 1)
             and (
                 sorted(word) == sorted(name)
                 or (is_english and (len(word) > 6 or re.sub(r"(.)\1", r"\1", name) == word))
@@ -234,8 +232,7 @@ class Resolver:
         }
         if is_english and name.isascii() and (len(name) > 5 or re.search("[0-9]", name)):
             letters = ("", *"abcdefghijklmnopqrstuvwxyz_")
-            middle = range(1, len(name) - 1)
-            words = {name[:n] + letter + name[n + 1 :] for n in middle for letter in letters}
+            words = {name[:n] + x + name[n + 1 :] for n in range(1, len(name) - 1) for x in letters}
             near |= words & self.long_words
         if (likely := min(near, default=None)) is None:
             return None
@@ -261,14 +258,17 @@ class Resolver:
         if self.uses[name] > 1:
             return None
         message = f"nothing that the course knows is called `{name}`"
-        sign = re.fullmatch(r"([\w.]*)([\\<;,]|(?<=.)['\[\]])([\w.]*\w)", name)
-        if sign is not None:
-            head, tail = sign[1], sign[3]  # the sign took the place of a letter, or came beside one
-            lengths = {len(name), len(name) - 1} if head else {len(name)}
+        sign = re.fullmatch(r"([\w.]*)(?:([\\<;,]|(?<=.)['\[\]])([\w.]*\w)|[\\'´])", name)
+        if sign is not None:  # it took the place of a letter, or came beside one
+            head, tail = sign[1], sign[3] or ""
+            lengths = {len(name), len(name) - 1} if head and tail else {len(name) - (not tail)}
             candidates = self._page_names(names) | self.file_names | self.long_words
             likely = (c for c in candidates if c.startswith(head) and c.endswith(tail))
             if fitting := sorted(c for c in likely if len(c) in lengths):
                 return Unknown(message, f"did you mean `{fitting[0]}`?", name)
+        path = re.sub(r"^(\w+)\.\.(?=\w)", r"\1.", name)
+        if path != name and isinstance(self._path(path, names), KnownName):
+            return Unknown(message, f"did you mean `{path}`?", name)
         words = [word.span() for word in re.finditer("[A-Za-z_]{4,}", name)]
         for candidate in slips_of(name):
             is_word = len(candidate) > 5 and candidate in self.plain_words
@@ -389,11 +389,12 @@ class Resolver:
         return Unknown(message, did_you_mean(name, engine.elements), name)
 
     def _half(self, text: str) -> Answer:
-        """An element of which a bracket is lost, or is another key."""
-        name = re.sub(r"\W", "", text.split()[0])
-        letters = {name, name[1:] if text[0] == name[0] else name}
+        """An element of which a bracket is lost or another key, or has a sign for a letter."""
+        name, sign = re.sub(r"\W", "", text.split()[0]), re.fullmatch(r"<(\w*)[^\w/](\w*)>", text)
+        pattern = f"{sign[1]}.?{sign[2]}" if sign else f"{name}|{name[1:]}"
         elements = set() if self.engine is None or not self.has_engine else self.engine.elements
-        if (element := next((word for word in letters if word in elements), None)) is None:
+        element = next((word for word in sorted(elements) if re.fullmatch(pattern, word)), None)
+        if element is None:
             return None
         return Unknown(f"`{text}` is not a whole tag", f"did you mean `<{element}>`?", text)
 
@@ -445,6 +446,5 @@ class Resolver:
         """The files that the course has."""
         course = self.course
         scripts = (s.path for document in course.documents for s in document_scripts(document))
-        lessons = (lesson.path for lesson in course.lessons)
         sources = (source.path for source in course.sources)
-        return frozenset((*course.files, *scripts, *sources, *lessons))
+        return frozenset((*course.files, *scripts, *sources, *(p.path for p in course.lessons)))

@@ -1,19 +1,14 @@
 """Lessons as Jupyter notebooks that run.
 
-Entry points: `note_cells`, the cells of the lesson itself; `notebook_files`, the notebooks of a
-site.
-
-1. A new Markdown cell begins at each heading and after each script. Links get the course's address;
-   if it has none, they stay as they are on the page.
+1. A new Markdown cell begins at each heading and after each script. The id of a cell depends on the
+   heading above it, or on its script.
 2. Each script is a cell of its own. The magic `%%example`, defined by a cell at the start, writes
    the cell to its file and runs it in a process of its own, under the conditions of recorded
    outputs: `__file__`, `sys.argv`, `sys.exit`, imports of other scripts and the hash seed are as
    they are when the course is checked, and scripts do not share state.
-3. A recorded output is the output of its cell.
-4. The id of a cell depends on the heading above it, or on its script.
-5. Where the course map says in `[launch]` where notebooks can be run, the first cell with code
+3. Where the course map says in `[launch]` where notebooks can be run, the first cell with code
    installs the packages, in the versions of the runs that were verified.
-6. A cell at the start contains the files that scripts need (models, `mjcourse`, other scripts),
+4. A cell at the start contains the files that scripts need (models, `mjcourse`, other scripts),
    packed, and writes those that are missing.
 """
 
@@ -32,18 +27,9 @@ from urllib.parse import quote, urljoin, urlsplit
 
 import msgspec
 
+from coursebuild.core import model
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.features import Feature, PageCopy
-from coursebuild.core.model import (
-    Block,
-    Course,
-    Heading,
-    Lesson,
-    Script,
-    Table,
-    document_scripts,
-    walk_blocks,
-)
 from coursebuild.core.model.results import CachedFile, Outcome
 from coursebuild.core.pages import urls, zips
 from coursebuild.core.pages.context import PageContext, SiteContext
@@ -64,7 +50,10 @@ def note_cells(inputs: PageInputs, page: PageContext | None, body: str) -> bytes
     if page is None or inputs.head.kind != "lesson":
         return b""
     words, address = page.renderer.words, page.inputs.address
-    locate = functools.partial(_make_absolute, address)
+
+    def locate(href: str) -> str:
+        return urljoin(address, href) if address and not urlsplit(href).scheme else href
+
     page_address = locate(page.place.href(inputs.head.path))
     writer = DocumentWriter(page, locate, page_address, notebook=True)
     parts = head(inputs, words, locate)
@@ -102,15 +91,10 @@ def _lines(text: str, end: str = "") -> list[str]:
     return [*[f"{line}\n" for line in lines[:-1]], f"{lines[-1]}{end}"]
 
 
-def _make_absolute(address: str, href: str) -> str:
-    """Make a link of the page at an address absolute."""
-    return urljoin(address, href) if address and not urlsplit(href).scheme else href
-
-
-def _block_cells(writer: DocumentWriter, blocks: Iterable[Block]) -> Iterator[Cell]:
+def _block_cells(writer: DocumentWriter, blocks: Iterable[model.Block]) -> Iterator[Cell]:
     """Yield the cells of blocks, with ids that are not numbered yet."""
     section = "start"
-    pending: list[Block] = []
+    pending: list[model.Block] = []
     script_outputs = writer.page.script_outputs.values()
     output_ids = {id(output) for outputs in script_outputs for output in outputs}
 
@@ -123,10 +107,10 @@ def _block_cells(writer: DocumentWriter, blocks: Iterable[Block]) -> Iterator[Ce
     for block in blocks:
         if id(block) in output_ids:
             continue
-        if isinstance(block, Heading) and block.level <= _MAX_LEVEL:
+        if isinstance(block, model.Heading) and block.level <= _MAX_LEVEL:
             yield from flush()
             section = block.anchor
-        if not isinstance(block, Script):
+        if not isinstance(block, model.Script):
             pending.append(block)
         if scripts := _find_scripts((block,)):
             yield from flush()
@@ -135,8 +119,8 @@ def _block_cells(writer: DocumentWriter, blocks: Iterable[Block]) -> Iterator[Ce
     yield from flush()
 
 
-def _find_scripts(blocks: tuple[Block, ...]) -> list[Script]:
-    return [block for block in walk_blocks(blocks) if isinstance(block, Script)]
+def _find_scripts(blocks: tuple[model.Block, ...]) -> list[model.Script]:
+    return [block for block in model.walk_blocks(blocks) if isinstance(block, model.Script)]
 
 
 def _footnote_cells(writer: DocumentWriter) -> Iterator[Cell]:
@@ -152,15 +136,14 @@ def _footnote_cells(writer: DocumentWriter) -> Iterator[Cell]:
             yield from _script_cells(writer, "footnotes", script)
 
 
-def _script_cells(writer: DocumentWriter, section: str, block: Script) -> Iterator[Cell]:
-    """Yield the cell of a script, and a cell of remarks about its outputs."""
+def _script_cells(writer: DocumentWriter, section: str, block: model.Script) -> Iterator[Cell]:
     recordings = writer.page.script_outputs.get(block.span.start, ())
     run = writer.page.inputs.runs.get(block.path)
     is_run = run is not None and run.outcome is Outcome.OK
     output = None
     remarks: list[str] = []
     for recording in recordings:
-        if is_run and output is None and not isinstance(recording.body, Table):
+        if is_run and output is None and not isinstance(recording.body, model.Table):
             output = f"{recording.body.text.rstrip()}\n"
             remarks.append(f"{writer.caption(recording)} {writer.receipt(recording)}")
         else:
@@ -193,7 +176,6 @@ def _slug(name: str) -> str:
 _MAX_SIZE = 4 << 20
 """The limit for the files in a notebook, in bytes."""
 _PLACEHOLDER = "\ue000"
-"""Stands for a name in a text."""
 
 
 def notebook_files(site: SiteContext) -> Iterator[CachedFile]:
@@ -211,7 +193,7 @@ def notebook_files(site: SiteContext) -> Iterator[CachedFile]:
 
 
 def _write_notebook(
-    site: SiteContext, lesson: Lesson, page: str, archive: zips.Archive | None
+    site: SiteContext, lesson: model.Lesson, page: str, archive: zips.Archive | None
 ) -> bytes:
     head, *cells = json.loads(site.note(page))
     setup = () if archive is None else _setup_cells(site, lesson, archive)
@@ -237,12 +219,12 @@ def _write_notebook(
     return msgspec.json.format(text.encode("utf-8", "replace"), indent=1) + b"\n"
 
 
-def _setup_cells(site: SiteContext, lesson: Lesson, archive: zips.Archive) -> Iterator[Cell]:
+def _setup_cells(site: SiteContext, lesson: model.Lesson, archive: zips.Archive) -> Iterator[Cell]:
     assert lesson.document is not None, "a notebook is of a written lesson"
     files = {path.partition("/")[2]: data for path, data in archive.files.items()}
     packages = sorted(files.pop("requirements.txt", b"").decode().split())
     files.pop("README.md", None)
-    scripts = [script.path for script in document_scripts(lesson.document)]
+    scripts = [script.path for script in model.document_scripts(lesson.document)]
     early = _imported_early(site, scripts, files)
     files = {path: data for path, data in files.items() if path not in scripts or path in early}
     room, included = _MAX_SIZE, {}
@@ -295,7 +277,7 @@ def _imported_early(site: SiteContext, scripts: list[str], files: Mapping[str, b
     return early
 
 
-def launch_services(course: Course, path: str) -> tuple[tuple[str, str], ...]:
+def launch_services(course: model.Course, path: str) -> tuple[tuple[str, str], ...]:
     """The services that can run the notebook at a site path, each with the address for it.
 
     A name of a branch or folder may hold anything that Git and file systems allow.

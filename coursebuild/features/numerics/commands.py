@@ -1,16 +1,11 @@
 """`coursebuild stability`: MuJoCo on hard cases, beside what theory says.
 
-Entry points: `stability(options, names)`, `check_stability`; `stability_text`, what the page of a
-case says, and the errors of its plots.
-
 1. A name means a problem, or a family of them (`damped-spring` is all of its damping ratios), or a
    model of the course whose exact motion it gives, or of which it knows theory: what `bench`
    measures of it is a hard case too.
-2. Measurements are cached by the machine, its versions and the code that measures. `--check`
-   measures again.
-3. All problems are recorded in one file. Where some are named, recording them leaves the others as
+2. All problems are recorded in one file. Where some are named, recording them leaves the others as
    they are, and checking them ignores the others.
-4. Where the two references of a case are further apart than they may be, it is an error, and
+3. Where the two references of a case are further apart than they may be, it is an error, and
    nothing is recorded.
 """
 
@@ -45,6 +40,8 @@ from coursebuild.features.bench.commands.measurement import (
     write_records,
 )
 from coursebuild.features.numerics.page import case_view
+from coursebuild.numerics.cases import DisagreementError, measure_case
+from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.reports.case_report import (
     CaseReport,
     ErrorLine,
@@ -116,44 +113,32 @@ def run(arguments: argparse.Namespace) -> int:
 def stability(
     options: Options, names: tuple[str, ...] = (), *, record: bool = False
 ) -> Measurement[CaseReport]:
-    """Measure the cases of these names, or all without names.
-
-    `record`: also write the measurements into the course.
-
-    Raises:
-        UsageError: no case is called so.
-    """
+    """Measure the cases of these names, or all without names; `record` writes them down."""
     own_models, built_in = _split(options, names)
     problems = _select_problems(built_in) if built_in or not own_models else []
     measurement: Measurement[CaseReport] = Measurement(())
     if problems:
         measurement = _CaseRun(options).all(problems)
         if record and not measurement.failures:
-            measurement = _record(options, measurement, whole=not names)
+            old: tuple[CaseReport, ...] | ReportFailure = ()
+            if names and (options.root / STABILITY.path()).exists():
+                old = read_record(options.root, STABILITY)
+            if isinstance(old, ReportFailure):
+                measurement = replace(measurement, failures=(old,))
+            else:
+                rest = [c for c in old if c.name in all_problems() and c.name not in problems]
+                cases = (*rest, *measurement.reports)
+                whole = tuple(sorted(cases, key=lambda case: (case.case, case.name)))
+                records = [(STABILITY.path(), STABILITY.encode(whole))]
+                measurement = write_records(options.root, measurement, records)
     if not own_models:
         return measurement
     return _join_reports(measurement, bench.bench(options, own_models, record=record))
 
 
-def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The names of models of the course, and those of hard cases.
-
-    Raises:
-        UsageError: a model is named of which the course knows nothing in theory.
-    """
-    models = tuple(name for name in names if (options.root / f"models/{name}.xml").is_file())
-    for scene in find_scenes(options.root, models).value if models else ():
-        has_theory = any(scenario.expected for scenario in scene.declarations.scenarios)
-        if not has_theory and not (options.root / exact_file(scene.name)).is_file():
-            help = f"give its motion in {exact_file(scene.name)}, or `expected` of a scenario"
-            raise UsageError(f"no theory is known for `{scene.name}`", help=help)
-    return models, tuple(name for name in names if name not in models)
-
-
 def _join_reports(
     measurement: Measurement[CaseReport], of_course: Measurement[SceneReport]
 ) -> Measurement[CaseReport]:
-    """What was measured on hard cases, with those of the course's own models."""
     course_reports = [case for scene in of_course.reports for case in course_cases(scene)]
     return Measurement(
         reports=(*measurement.reports, *course_reports),
@@ -164,27 +149,19 @@ def _join_reports(
     )
 
 
-def _record(
-    options: Options, measurement: Measurement[CaseReport], *, whole: bool
-) -> Measurement[CaseReport]:
-    unchanged: list[CaseReport] = []
-    if not whole and (options.root / STABILITY.path()).exists():
-        old = read_record(options.root, STABILITY)
-        if isinstance(old, ReportFailure):
-            return replace(measurement, failures=(old,))
-        new = {case.name for case in measurement.reports}
-        unchanged = [case for case in old if case.name in _problem_names() and case.name not in new]
-    cases = sorted([*unchanged, *measurement.reports], key=lambda case: (case.case, case.name))
-    records = [(STABILITY.path(), STABILITY.encode(tuple(cases)))]
-    return write_records(options.root, measurement, records)
+def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The names of models of the course, and those of hard cases."""
+    models = tuple(name for name in names if (options.root / f"models/{name}.xml").is_file())
+    for scene in find_scenes(options.root, models).value if models else ():
+        has_theory = any(scenario.expected for scenario in scene.declarations.scenarios)
+        if not has_theory and not (options.root / exact_file(scene.name)).is_file():
+            help = f"give its motion in {exact_file(scene.name)}, or `expected` of a scenario"
+            raise UsageError(f"no theory is known for `{scene.name}`", help=help)
+    return models, tuple(name for name in names if name not in models)
 
 
 def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
-    """Measure again, and compare with the record; without a record nothing is measured.
-
-    Raises:
-        UsageError: no case is called so.
-    """
+    """Measure again, and compare with the record; without a record nothing is measured."""
     own_models, built_in = _split(options, names)
     measurement: Measurement[CaseReport] = Measurement(())
     if built_in or not own_models:
@@ -199,14 +176,11 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
             engine = engine_version()
             other_engines = sorted({case.machine.engine for case in old} - {engine})
             remarks = tuple(
-                f"recorded with MuJoCo {engine_then}, measured with {engine}"
-                for engine_then in other_engines
+                f"recorded with MuJoCo {name}, measured with {engine}" for name in other_engines
             )
             departures = case_departures(old, measurement.reports)
-            measurement = replace(
-                measurement,
-                checked=(RecordCheck("stability", STABILITY.path(), departures, remarks),),
-            )
+            check = RecordCheck("stability", STABILITY.path(), departures, remarks)
+            measurement = replace(measurement, checked=(check,))
     if not own_models:
         return measurement
     return _join_reports(measurement, bench.check(options, own_models))
@@ -220,13 +194,14 @@ class _CaseRun(MeasuringRun):
     def all(self, problems: list[str]) -> Measurement[CaseReport]:
         """Measure the problems of these names."""
         self.machine, self.code = machine(pinned=True), code_digest(*_CODE)
-        with one_processor():
-            return self.measure_each(problems, self._measure_once)
 
-    def _measure_once(self, name: str) -> CaseReport | None:
-        return self.load_or_measure(
-            name, "stability", self._parts(name), CaseReport, lambda: self._measure(name)
-        )
+        def measure_once(name: str) -> CaseReport | None:
+            return self.load_or_measure(
+                name, "stability", self._parts(name), CaseReport, lambda: self._measure(name)
+            )
+
+        with one_processor():
+            return self.measure_each(problems, measure_once)
 
     def _parts(self, name: str) -> tuple[object, ...]:
         return name, self.code, self.machine
@@ -237,9 +212,6 @@ class _CaseRun(MeasuringRun):
             yield (name,)
 
     def _measure(self, name: str) -> CaseReport | None:
-        from coursebuild.numerics.cases import DisagreementError, measure_case
-        from coursebuild.numerics.problems import all_problems
-
         if (report := decode(self.results.pop((name,), b""), CaseReport)) is not None:
             return report
         try:
@@ -252,9 +224,6 @@ class _CaseRun(MeasuringRun):
 
 def measure_part(root: Path, data: bytes) -> bytes:
     """Measure a hard case, as a task of `Executor.map`."""
-    from coursebuild.numerics.cases import DisagreementError, measure_case
-    from coursebuild.numerics.problems import all_problems
-
     if (request := read_task(data)) is None:
         return b""
     (name,), timed_machine = request
@@ -265,22 +234,12 @@ def measure_part(root: Path, data: bytes) -> bytes:
         return b""
 
 
-def _problem_names() -> tuple[str, ...]:
-    from coursebuild.numerics.problems import all_problems
-
-    return tuple(all_problems())
-
-
 def _select_problems(names: tuple[str, ...]) -> list[str]:
     """The names of all problems that these names mean; of all problems without names."""
-    problem_names = _problem_names()
+    problem_names = tuple(all_problems())
     selection = set() if names else set(problem_names)
     for name in names:
-        matches = {
-            problem
-            for problem in problem_names
-            if problem == name or problem.startswith(f"{name}-")
-        }
+        matches = {p for p in problem_names if p == name or p.startswith(f"{name}-")}
         if not matches:
             suggestion = nearest(name, problem_names)
             all_of_them = "known: " + ", ".join(problem_names)
@@ -299,7 +258,7 @@ def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
         lines = [style.paint(report.name, BOLD) + f"  {number}{report.title}"]
         for text in (*view.sentences, *view.notes):
             lines += style.wrap(plain_text(text), "  ")
-        for block in (*(grid_lines(grid, style) for grid in view.grids), _errors(report)):
+        for block in (*(grid_lines(grid, style) for grid in view.tables), _errors(report)):
             lines += ["", *(f"  {line}".rstrip() for line in block)] if block else []
         texts.append("\n".join(lines) + "\n")
     return "\n".join(texts)

@@ -1,7 +1,4 @@
-"""The values for the page of the hard cases.
-
-Entry points: `numerics_values(library)`; `case_view`, of one case.
-"""
+"""The values for the page of the hard cases."""
 
 from __future__ import annotations
 
@@ -15,28 +12,8 @@ from msgspec import Struct
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.strings import Strings
-from coursebuild.features.bench.grids import (
-    FigurePart,
-    Grid,
-    NamedRow,
-    machine_text,
-    merge_rows,
-    percent,
-    phrase,
-    power,
-    sentence,
-)
-from coursebuild.features.bench.scenario_view import (
-    STABLE,
-    integrator_table,
-    lost_runs,
-    orders_table,
-    stable_again,
-    stable_cells,
-    stable_title,
-)
+from coursebuild.features.bench import grids, scenario_view
 from coursebuild.numerics.reports.case_report import (
-    BoundaryLine,
     CaseReport,
     case_quantities,
     case_svgs,
@@ -56,7 +33,7 @@ _RIGHT = 1e-3
 """m or rad: the error at which costs are compared."""
 _DIGITS = 3
 _BOUNDARY = (
-    *STABLE,
+    *scenario_view.STABLE,
     "measured.difference",
     "measured.beyond",
     "measured.growth",
@@ -78,7 +55,7 @@ class CaseView(Struct, frozen=True):
     plots: tuple[Markup, ...]
     """The error against time and against evaluations."""
     folded_plots: tuple[Markup, ...]
-    grids: tuple[Grid, ...]
+    tables: tuple[grids.Grid, ...]
     notes: tuple[str, ...]
     page: str
     """The address of the model's page, for a case of the course's own; else empty."""
@@ -102,70 +79,70 @@ def numerics_values(library: Library) -> dict[str, object]:
         *sorted(library.reports.cases, key=attrgetter("case")),
         *course_reports,
     ]
-    groups = tuple(
-        _group(words, place, number, tuple(group))
-        for number, group in groupby(cases, key=attrgetter("case"))
-    )
-    return {
-        "groups": groups,
-        "tables": tuple(_tables(groups)),
-        "integrators": INTEGRATORS,
-        "where": dict.fromkeys(machine_text(words, report.machine) for report in cases),
-        "file": place.href(urls.file_path(STABILITY.path())),
-    }
-
-
-def _tables(groups: Sequence[CaseGroup]) -> Iterator[tuple[str, int, list[list[CaseView]]]]:
-    """The tables of all cases: a name, the column of `matrix`, and by group the cases with cells.
-
-    A table without a case is none.
-    """
+    groups = []
+    for number, group_reports in groupby(cases, key=attrgetter("case")):
+        views = tuple(case_view(words, place, report) for report in group_reports)
+        key = f"numerics.case_{number}"
+        has_own_title = (not number or len(views) > 1) and words.has(key)
+        groups.append(CaseGroup(number, words(key) if has_own_title else views[0].title, views))
+    tables = []  # of all cases: name, column of `matrix`, and by group the cases with cells
     for column, name in enumerate(("order", "largest", "cost")):
         bodies = [[case for case in group.cases if any(case.matrix[column])] for group in groups]
         if any(bodies):
-            yield name, column, [cases for cases in bodies if cases]
-
-
-def _group(
-    words: Strings, place: urls.Place, number: int, cases: Sequence[CaseReport]
-) -> CaseGroup:
-    key = f"numerics.case_{number}"
-    has_group_title = not number or len(cases) > 1
-    title = words(key) if has_group_title and words.has(key) else cases[0].title
-    return CaseGroup(number, title, tuple(case_view(words, place, report) for report in cases))
+            tables.append((name, column, [members for members in bodies if members]))
+    return {
+        "groups": tuple(groups),
+        "tables": tuple(tables),
+        "integrators": INTEGRATORS,
+        "where": dict.fromkeys(grids.machine_text(words, report.machine) for report in cases),
+        "file": place.href(urls.file_path(STABILITY.path())),
+    }
 
 
 def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
     quantity = next(iter(case_quantities(report)), None)
     part = None if quantity is None or quantity.name == "energy_drift" else quantity.name
     fits = {row.integrator: getattr(row, part) for row in report.orders} if part else {}
-    limits = {line.integrator: line for line in report.boundaries}
+    limits = {}
+    for line in report.boundaries:
+        if line.largest == 0:
+            limits[line.integrator] = words("numerics.none")
+        elif line.largest is None and line.bracket is None:
+            limits[line.integrator] = words("numerics.all")
+        else:
+            limits[line.integrator] = limit_text(line)
     orders = (fits.get(integrator) for integrator in INTEGRATORS)
     costs = (report.cost_to(integrator, _RIGHT) for integrator in INTEGRATORS)
     return (
         tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
-        tuple(_limit(words, limits.get(integrator)) for integrator in INTEGRATORS),
+        tuple(limits.get(integrator, "") for integrator in INTEGRATORS),
         tuple("" if cost is None else seconds_text(cost, _DIGITS) for cost in costs),
     )
-
-
-def _limit(words: Strings, line: BoundaryLine | None) -> str:
-    if line is None:
-        return ""
-    if line.largest == 0 or (line.largest is None and line.bracket is None):
-        return words("numerics.all" if line.largest is None else "numerics.none")
-    return limit_text(line)
 
 
 def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
     """A case as the page shows it."""
     model = "" if report.case else report.name.rpartition("/")[0]
     label = words("numerics.orders", title=report.title)
-    orders = orders_table(words, label, report.orders, merge=True)
-    rows = [(line.integrator, _boundary(words, line)) for line in report.boundaries]
-    label = f"{report.title}: {stable_title(words, report.boundaries[0])}" if rows else ""
-    boundaries = integrator_table(words, label, _BOUNDARY, rows, merge=True)
-    grids = (boundaries, _figures(words, report), orders)
+    orders = scenario_view.orders_table(words, label, report.orders, merge=True)
+    rows = [
+        (
+            line.integrator,
+            (
+                *scenario_view.stable_cells(words, line),
+                grids.percent(line.difference),
+                status_text(line.beyond) if line.beyond else "",
+                grids.power(line.growth),
+                scenario_view.stable_again(words, line),
+            ),
+        )
+        for line in report.boundaries
+    ]
+    label = (
+        f"{report.title}: {scenario_view.stable_title(words, report.boundaries[0])}" if rows else ""
+    )
+    boundaries = scenario_view.integrator_table(words, label, _BOUNDARY, rows, merge=True)
+    tables = (boundaries, _figures(words, report), orders)
     quantities = case_quantities(report)
     name = urls.encode(report.name)
     drawings = [case_svgs(report, q, f"{name}-{q.name}") for q in quantities]
@@ -176,7 +153,7 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
         tuple(_describe(words, report, quantities)),
         tuple(map(Markup, drawings[0] if drawings else ())),
         tuple(Markup(svg) for svgs in drawings[1:] for svg in svgs),
-        tuple(grid for grid in grids if grid is not None),
+        tuple(grid for grid in tables if grid is not None),
         tuple(_notes(words, report)),
         place.href(urls.model_page_path(model)) if model else "",
     )
@@ -197,52 +174,41 @@ def _describe(words: Strings, report: CaseReport, quantities: Sequence[Quantity]
     elif quantities:
         yield words("numerics.out_of_reach")
     if report.note:
-        yield sentence(report.note)
+        yield grids.sentence(report.note)
 
 
-def _boundary(words: Strings, line: BoundaryLine) -> tuple[str, ...]:
-    return (
-        *stable_cells(words, line),
-        percent(line.difference),
-        status_text(line.beyond) if line.beyond else "",
-        power(line.growth),
-        stable_again(words, line),
-    )
+def _figures(words: Strings, report: CaseReport) -> grids.Grid | None:
+    def cells(line: FigureLine) -> tuple[str, ...]:
+        value = words("numerics.infinite") if line.measured is None else grids.power(line.measured)
+        difference: str = ""
+        if line.exact is not None and line.measured is not None:
+            difference = grids.power(line.measured - line.exact, 2)
+        spread = "" if line.spread is None else " … ".join(map(grids.power, line.spread))
+        return value, spread, grids.power(line.exact), difference
 
-
-def _figures(words: Strings, report: CaseReport) -> Grid | None:
-    named_rows: list[NamedRow] = []
-    parts: list[FigurePart] = []
+    named_rows: list[grids.NamedRow] = []
+    parts: list[grids.FigurePart] = []
     for name in dict.fromkeys(line.name for line in report.figures):
         lines = [line for line in report.figures if line.name == name]
-        rows = merge_rows((line.integrator, _figure(words, line)) for line in lines)
+        rows = grids.merge_rows((line.integrator, cells(line)) for line in lines)
         named_rows += rows
         unit = lines[0].unit
         sources = dict.fromkeys(figure.source for figure in lines if figure.source)
-        title = sentence(f"{name} ({unit})" if unit else name).removesuffix(".")
-        parts.append(FigurePart(title, "; ".join(sources), len(rows)))
+        title = grids.sentence(f"{name} ({unit})" if unit else name).removesuffix(".")
+        parts.append(grids.FigurePart(title, "; ".join(sources), len(rows)))
     label = words("numerics.figures", title=report.title)
-    return integrator_table(words, label, _FIGURE, named_rows, parts=tuple(parts))
-
-
-def _figure(words: Strings, line: FigureLine) -> tuple[str, ...]:
-    measured_text = words("numerics.infinite") if line.measured is None else power(line.measured)
-    difference: str = ""
-    if line.exact is not None and line.measured is not None:
-        difference = power(line.measured - line.exact, 2)
-    spread = "" if line.spread is None else " … ".join(map(power, line.spread))
-    return measured_text, spread, power(line.exact), difference
+    return scenario_view.integrator_table(words, label, _FIGURE, named_rows, parts=tuple(parts))
 
 
 def _notes(words: Strings, report: CaseReport) -> list[str]:
     reference = report.reference
     place, speed = (
-        power(error, 1)
+        grids.power(error, 1)
         for error in (max(reference.position, reference.attitude), reference.velocity)
     )
     notes: list[str] = [
         words("numerics.references", first=reference.source, second=reference.second),
-        phrase(words, "numerics.known", place=place, speed=speed),
+        grids.phrase(words, "numerics.known", place=place, speed=speed),
     ]
     formulas = dict.fromkeys(line.formula for line in report.boundaries if line.formula)
     if formulas:
@@ -252,4 +218,4 @@ def _notes(words: Strings, report: CaseReport) -> list[str]:
         times = ", ".join(seconds_text(step) for step in softened_steps)
         notes.append(words("measured.refsafe", settings=times))
     runs = ((f"{run.integrator} at {seconds_text(run.timestep)}", run) for run in report.errors)
-    return [*notes, *lost_runs(runs)]
+    return [*notes, *scenario_view.lost_runs(runs)]

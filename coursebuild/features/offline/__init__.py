@@ -1,14 +1,9 @@
 """The site without a network, and the page about it, which is also shown for missing pages.
 
-Entry point: `offline_files(site)`: the manifest, its icons and the service worker; and the list of
-all files, which the worker reads.
-
-1. The worker is the same in every build of the same tool: what changes with a course is in the
-   list. So an edit of a page changes that page and its line in the list.
-2. The list has three groups. `shell` is what every page needs, `text` what pages show, `rest` what
-   is large or rarely needed: the engine and the data of labs, models, scripts. Copies of the course
-   in other forms (archives, books) are in no group.
-3. The list has the first digits of each file's hash, unless its name contains one.
+The service worker is the same in every build of the same tool: what changes with a course is in the
+list of files, each with the first digits of its hash unless its name has one. Of its groups,
+`shell` is what every page needs, `text` what pages show, `rest` what is large or rarely needed: the
+engine and the data of labs, models, scripts. Archives and books are in no group.
 """
 
 from __future__ import annotations
@@ -24,7 +19,7 @@ from coursebuild.core.features import Feature, PageKind, PagePart
 from coursebuild.core.model.course import ThemeFile
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.assets import Names, hashed_name, page_script
+from coursebuild.core.pages.assets import hashed_name, page_script
 from coursebuild.core.pages.context import SiteContext
 from coursebuild.core.pages.strings import direction
 from coursebuild.core.pages.theme import picture_size
@@ -79,12 +74,14 @@ def offline_files(site: SiteContext) -> Iterator[OutputFile | FileList]:
     text = json.dumps({k: v for k, v in manifest.items() if v}, ensure_ascii=False, indent=1)
     yield OutputFile(urls.MANIFEST, f"{text}\n".encode("utf-8", "replace"))
     yield OutputFile(urls.WORKER, page_script(assets.file("js/service-worker.js")))
+    # What every page needs, except fonts, and the pages for when nothing else is there
+    shell = {urls.HOME, "offline/index.html", urls.MANIFEST}
+    shell |= {path for path in names.paths() if path.endswith(_SHELL)}
     key = step_key("list of files", names)
-    yield FileList(urls.FILES, key, functools.partial(listing, shell_of(names)))
+    yield FileList(urls.FILES, key, functools.partial(listing, frozenset(shell)))
 
 
 def _entry(path: str, file: ThemeFile | None) -> dict[str, str]:
-    """Return an icon's entry in the manifest; the tool's own icon is an SVG."""
     if file is None or file.ending == "svg":
         return {"src": path, "type": "image/svg+xml", "sizes": "any"}
     width, height = picture_size(file) or (0, 0)
@@ -101,15 +98,6 @@ def short_name(title: str) -> str:
     lines = textwrap.wrap(line, _MAX_NAME, break_long_words=False, break_on_hyphens=False)
     # Punctuation and dashes are removed at the cut.
     return "".join(lines[:1]).rstrip(" ,;:–—-") or title
-
-
-# ---------------------------------------------------------------------------------- the list
-
-
-def shell_of(names: Names) -> frozenset[str]:
-    """Return what every page needs, except fonts, and the pages for when nothing else is there."""
-    pages = {urls.HOME, "offline/index.html", urls.MANIFEST}
-    return frozenset(pages | {path for path in names.paths() if path.endswith(_SHELL)})
 
 
 def listing(shell: frozenset[str], files: Iterable[FileFacts]) -> bytes:

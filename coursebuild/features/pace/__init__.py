@@ -1,8 +1,7 @@
 """Checks how long lessons take, by the pace that the course map states.
 
-Entry point: `FEATURE`. The effort of a document, on its main path and in further sections, is
-counted when it is read, and stored with it. The map says how many minutes a lesson takes; an
-estimate that differs by more than a quarter, and by more than five minutes, is a warning.
+The effort of a document, on its main path and in further sections, is counted when it is read. An
+estimate that differs from the map's by more than a quarter and five minutes is a warning.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""The pages about the reader's progress: what is read and answered, and what to review.
-
-Nothing about a reader is known here. The pages list the lessons with their questions, explain what
-is stored and where, and have places that the page's script fills from the reader's own browser.
-"""
+"""The pages about the reader's progress, filled by the page's script from the browser's storage."""
 
 from __future__ import annotations
 
@@ -52,7 +48,6 @@ def review_values(library: Library) -> dict[str, object]:
 
 
 def _question_pages(library: Library, place: urls.Place) -> tuple[QuestionPage, ...]:
-    """Return everything with questions, in the order of the course."""
     pages = []
     for owner in library.course.owners:
         text = library.quiz_index.get(owner.path, "")

@@ -1,20 +1,15 @@
 """IMS QTI 2.1: the quizzes as a package for question banks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from coursebuild.core.features import Exporter, Feature
-
-if TYPE_CHECKING:
-    from coursebuild.core.model.results import SiteFile
-    from coursebuild.core.pages.context import ExportContext
-    from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.model.results import SiteFile
+from coursebuild.core.pages.context import ExportContext
+from coursebuild.core.text.diagnostics import Diagnostic
 
 
 def export(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
-    """Yield the files of the package."""
+    """Yield the files of the package; this needs the feature `quiz`, which may not be there."""
     from coursebuild.features.qti.items import package_files
 
     return package_files(context)

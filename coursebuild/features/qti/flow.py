@@ -1,26 +1,21 @@
-"""Turns the HTML of pages into the part of XHTML that QTI 2.1 allows.
-
-Entry points: `Flow(link, picture)`, and its `blocks` and `line`; `losses` says what was not kept.
+"""The HTML of pages as the part of XHTML that QTI 2.1 allows.
 
 QTI 2.1 has the text of XHTML (information model, chapter "Content Model"), pictures, links, tables
-and MathML, and nothing that moves, plays or asks. Of an element that it does not
-have, only the content is kept (of a box, of a mark of highlighted code), or the element is left out
-and listed in `losses`. Formulas on pages are MathML Core with classes and styles of the site; of
-these, MathML 2.0 and its attributes are kept.
+and MathML, and nothing that moves, plays or asks. Of an element that it does not have, only the
+content is kept, or it is left out and listed in `losses`. Of the MathML Core of pages, MathML 2.0
+and its attributes are kept.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TypeGuard
 from urllib.parse import urlsplit
 
 from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
 from coursebuild.core.pages.xml import Element, add, element
 
 STRIKE_CLASS = "struck"
-"""A class of the package's style sheet."""
 _BLOCKS = frozenset(
     "address article aside blockquote center details dialog div dl fieldset figcaption figure"
     " footer form h1 h2 h3 h4 h5 h6 header hgroup hr main nav ol p pre section summary table"
@@ -108,7 +103,9 @@ class Flow:
             if node.attributes.get("start", "1") != "1" or "reversed" in node.attributes:
                 self.lose("a numbered list counts from 1")
             items = [
-                self._container("li", child if _is_item(child) else HtmlElement("li", {}, [child]))
+                self._container("li", child)
+                if isinstance(child, HtmlElement) and child.name == "li"
+                else self._container("li", HtmlElement("li", {}, [child]))
                 for child in node.children
                 if not isinstance(child, str) or child.strip()
             ]
@@ -226,13 +223,11 @@ class Flow:
 
 
 def _numbers(node: HtmlElement, names: Sequence[str]) -> dict[str, str]:
-    """Return those of some attributes of an element that are whole numbers."""
     attributes = node.attributes.items()
     return {k: value for k, value in attributes if k in names and _NUMBER.fullmatch(value)}
 
 
 def _trim_line_ends(code: Element) -> None:
-    """Remove the line ends at the end of a block of code."""
     while len(code) and not (code[-1].tail or "").strip("\n"):
         code[-1].tail = None
         code = code[-1]
@@ -271,12 +266,7 @@ def _unwrap_spans(content: Iterable[HtmlContent]) -> Iterator[HtmlContent]:
             yield child
 
 
-def _is_item(content: HtmlContent) -> TypeGuard[HtmlElement]:
-    return isinstance(content, HtmlElement) and content.name == "li"
-
-
 def _is_inline_math(node: HtmlElement) -> bool:
-    """Whether an element is a formula in a line of text."""
     return node.name == "math" and node.attributes.get("display") != "block"
 
 
@@ -336,7 +326,6 @@ def _convert(node: HtmlElement) -> Element:
 
 
 def _convert_as(node: HtmlElement, name: str) -> Element:
-    """Make an element of this name with the attributes and the content of a node."""
     names = _ATTRIBUTES[name].split()
     attributes = {key: value for key, value in node.attributes.items() if key in names}
     if name == "mtd":

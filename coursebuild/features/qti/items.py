@@ -1,13 +1,8 @@
 """Quizzes as a content package of IMS QTI 2.1, and questions as its items.
 
-Entry points: `package_files(context)`: one test for each quiz, one item for each question, the
-pictures that they show, and a manifest that lists every file with the item that shows it;
-`quiz_items(page, quiz, course)`.
-
-The texts of a quiz are drawn as on its page, and converted to what QTI allows (`flow`). Names
-are those of the IMS QTI 2.1 Assessment Test, Section, and Item Information Model, 2012; the
-template `item.jinja` holds them. Response processing says which feedback is shown: that of each
-option that was chosen, and the explanation.
+The texts of a quiz are drawn as on its page, and converted (`flow`). Names are those of the IMS QTI
+2.1 Assessment Test, Section, and Item Information Model, 2012; `item.jinja` holds them. Response
+processing says which feedback is shown: that of each option chosen, and the explanation.
 """
 
 from __future__ import annotations
@@ -28,15 +23,7 @@ from coursebuild.core.pages.context import ExportContext, PageContext
 from coursebuild.core.pages.xml import element, identifier, markup, render_xml
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.qti.flow import STRIKE_CLASS, Flow
-from coursebuild.features.quiz.model import (
-    AnyQuestion,
-    ChoiceQuestion,
-    NumericQuestion,
-    OpenQuestion,
-    OrderQuestion,
-    OutputQuestion,
-    Quiz,
-)
+from coursebuild.features.quiz import model
 from coursebuild.features.quiz.page import letter, output_line, shuffle, unit_html
 
 STYLE = "style.css"
@@ -64,7 +51,7 @@ class QuizItems(Struct, frozen=True):
     """What an item cannot hold of its question, or why a question has no item."""
 
 
-def quiz_items(page: PageContext, quiz: Quiz, course: Course) -> QuizItems:
+def quiz_items(page: PageContext, quiz: model.Quiz, course: Course) -> QuizItems:
     """Write a quiz as items."""
     items, losses = [], []
     for number, question in enumerate(quiz.questions, 1):
@@ -79,9 +66,7 @@ def quiz_items(page: PageContext, quiz: Quiz, course: Course) -> QuizItems:
 
 
 class _Writer:
-    """Writes one item."""
-
-    def __init__(self, page: PageContext, quiz: Quiz, number: int, course: Course) -> None:
+    def __init__(self, page: PageContext, quiz: model.Quiz, number: int, course: Course) -> None:
         self.page = page
         self.words = page.renderer.words
         self.quiz = quiz
@@ -90,8 +75,7 @@ class _Writer:
         self.pictures: dict[str, None] = {}
         self.flow = Flow(self._link, self._picture)
 
-    def item(self, question: AnyQuestion) -> QuestionItem | None:
-        """Write the item; `None` if the question has no answer."""
+    def item(self, question: model.AnyQuestion) -> QuestionItem | None:
         response = self._response(question)
         if response is None:
             return None
@@ -114,11 +98,11 @@ class _Writer:
         data = render_xml(_TEMPLATE, **values)
         return QuestionItem(name, data, tuple(self.pictures))
 
-    def _explanation(self, question: AnyQuestion) -> Markup:
+    def _explanation(self, question: model.AnyQuestion) -> Markup:
         """What every learner reads after an answer, right or wrong."""
-        html = self._reference(question) if isinstance(question, OpenQuestion) else Markup()
+        html = self._reference(question) if isinstance(question, model.OpenQuestion) else Markup()
         html += self._blocks(question.explain)
-        if isinstance(question, ChoiceQuestion) and question.sim is not None:
+        if isinstance(question, model.ChoiceQuestion) and question.sim is not None:
             address = self._link(f"#{self.quiz.anchor(question.key)}")
             if address is None:
                 self.flow.lose("its simulation is on its page alone, and left out")
@@ -159,10 +143,10 @@ class _Writer:
 
     # --- kinds of questions
 
-    def _response(self, question: AnyQuestion) -> dict[str, Any] | None:
+    def _response(self, question: model.AnyQuestion) -> dict[str, Any] | None:
         """The values of the template that depend on the kind; `None` if the answer is unknown."""
         match question:
-            case ChoiceQuestion():
+            case model.ChoiceQuestion():
                 options = [(letter(index), option) for index, option in enumerate(question.options)]
                 feedback = [(name, o.feedback) for name, o in options if o.feedback]
                 return {
@@ -173,7 +157,7 @@ class _Writer:
                     "options": [(name, self._line(option.text)) for name, option in options],
                     "feedback": [(name, self._blocks(blocks)) for name, blocks in feedback],
                 }
-            case NumericQuestion():
+            case model.NumericQuestion():
                 unit = self.flow.line(unit_html(question.unit)) if question.unit else []
                 return {
                     "cardinality": "single",
@@ -183,14 +167,14 @@ class _Writer:
                     "unit": markup([" ", *unit] if unit else []),
                     "tolerance": _double(question.tolerance),
                 }
-            case OutputQuestion():
+            case model.OutputQuestion():
                 return self._output(question)
-            case OpenQuestion():
+            case model.OpenQuestion():
                 reference = self._reference(question)
                 return {
                     "cardinality": "single", "base": "string", "right": [], "reference": reference
                 }  # fmt: skip
-            case OrderQuestion():
+            case model.OrderQuestion():
                 order = shuffle(len(question.items), f"{self.quiz.id}/{self.number}")
                 names = {index: letter(place) for place, index in enumerate(order)}
                 return {
@@ -203,7 +187,7 @@ class _Writer:
             case _:
                 assert_never(question)
 
-    def _output(self, question: OutputQuestion) -> dict[str, Any] | None:
+    def _output(self, question: model.OutputQuestion) -> dict[str, Any] | None:
         answer = output_line(self.page, question)
         if answer is None:
             self.flow.lose("it is left out: its script was not run, so nobody knows the key")
@@ -217,7 +201,7 @@ class _Writer:
             "unit": "",
         }
 
-    def _reference(self, question: OpenQuestion) -> Markup:
+    def _reference(self, question: model.OpenQuestion) -> Markup:
         title = element("p", {}, self.words("package.reference"))
         return markup([title]) + self._blocks(question.reference)
 
@@ -240,10 +224,10 @@ def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
     quizzes: list[QuizItems] = []
     for owner in context.course.owners:
         summary = owner.document
-        if not summary or not any(find_blocks(summary, Quiz)):
+        if not summary or not any(find_blocks(summary, model.Quiz)):
             continue
         page = context.page(summary)
-        for block in find_blocks(page.document, Quiz):
+        for block in find_blocks(page.document, model.Quiz):
             quiz = quiz_items(page, block, context.course)
             yield from quiz.losses
             if quiz.items:

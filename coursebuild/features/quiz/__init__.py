@@ -1,15 +1,159 @@
-"""Quizzes: questions that a learner answers in the page, and whose answers the build checks.
+"""Quizzes across the course: ids are unique, questions name scripts and labs that there are."""
 
-A `quiz` fence holds JSON (`schema`). `parse` makes a `Quiz` of it (`model`), `checks` compares it
-with the course and with what scripts printed, `page` shows it.
-"""
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from itertools import chain
+
+from msgspec import Struct
 
 from coursebuild.core.features import Feature, FenceKind, PagePart
-from coursebuild.features.quiz.checks import check_output_lines, check_predictions, check_quizzes
-from coursebuild.features.quiz.model import Quiz
-from coursebuild.features.quiz.page import index_quiz, quiz, quiz_markdown
+from coursebuild.core.model import (
+    CodeBlock,
+    Course,
+    Document,
+    Heading,
+    Math,
+    ThematicBreak,
+    block_inlines,
+    document_scripts,
+    find_blocks,
+    plain_text,
+    walk_blocks,
+    walk_inlines,
+)
+from coursebuild.core.model.results import Mathml, Outcome, ScriptRun
+from coursebuild.core.scripts.numbers import scan_prose
+from coursebuild.core.syntax.json_text import parse_json
+from coursebuild.core.text.diagnostics import (
+    Diagnostic,
+    Fix,
+    Note,
+    Parsed,
+    diagnose,
+    did_you_mean,
+    is_one_edit,
+)
+from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.relations import check_steps
+from coursebuild.features.quiz.model import ChoiceQuestion, NumericQuestion, Quiz
+from coursebuild.features.quiz.page import draw_quiz, index_quiz, quiz_markdown
 from coursebuild.features.quiz.parse import parse_fence
 from coursebuild.features.quiz.schema import QuizFile
+
+
+def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
+    """Report repeated ids, and output questions about scripts that nothing runs.
+
+    Only `documents` are checked; ids are compared with those of the whole course.
+    """
+    first: dict[str, Quiz] = {}
+    for document in course.documents:
+        for quiz in find_blocks(document, Quiz):
+            first.setdefault(quiz.id, quiz)  # the id is empty where it cannot be read
+    norun = {s.path: s.norun for document in course.documents for s in document_scripts(document)}
+    for document in documents:
+        for quiz in find_blocks(document, Quiz):
+            if quiz.id and first[quiz.id] is not quiz:
+                yield diagnose(
+                    "quiz-id-repeated",
+                    quiz.id_span,
+                    f"the quiz id `{quiz.id}` is used twice",
+                    help="a learner's progress is kept under the id; give each quiz its own",
+                    notes=[Note("the first one is here", first[quiz.id].id_span)],
+                )
+            for question in quiz.output_questions():
+                script, place = question.script, question.script_span
+                if script not in norun:
+                    message = f"no lesson has a script `{script}`"
+                    help = did_you_mean(script, norun)
+                    yield diagnose("quiz-output", place, message, help=help)
+                elif norun[script]:
+                    message = f"`{script}` is marked `norun`, so it has no output"
+                    yield diagnose("quiz-output", place, message)
+
+
+def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | None]:
+    """Report predictions with nothing to hide below them, or no lab there to run."""
+    diagnostics = (_check_predictions(quiz, document) for quiz in find_blocks(document, Quiz))
+    return Parsed(None, tuple(chain.from_iterable(diagnostics)))
+
+
+def _check_predictions(quiz: Quiz, document: Document) -> Iterator[Diagnostic]:
+    # The blocks after a quiz, up to the next heading or rule; none if it is inside a block
+    at = next((at for at, block in enumerate(document.blocks) if block is quiz), None)
+    rest = () if at is None else document.blocks[at + 1 :]
+    ends = (i for i, block in enumerate(rest) if isinstance(block, Heading | ThematicBreak))
+    end = next(ends, len(rest))
+    blocks = rest[:end]
+    stops = [Note("what can be hidden ends here", b.span.first_line()) for b in rest[end:][:1]]
+    labs = [block for block in blocks if isinstance(block, Lab)]
+    above = [b for b in document.blocks[: at or 0] if isinstance(b, Heading)][-1:]
+    for title in (plain_text(heading.children) for heading in above):
+        if quiz.title and quiz.title != title and is_one_edit(quiz.title, title):
+            start = quiz.span.start + max(quiz.span.text.find(quiz.title), 0)
+            place = quiz.span.source.span(start, start + len(quiz.title))
+            message = f"the title `{quiz.title}` is almost that of the heading above"
+            fix = Fix(f"did you mean `{title}`?", title)
+            yield diagnose("field-value", place, message, help=fix)
+    for question in quiz.questions:
+        if isinstance(question, NumericQuestion):
+            yield from _check_answer(question)
+        if not isinstance(question, ChoiceQuestion):
+            continue
+        if question.gate and blocks in ((), tuple(labs[:1])):
+            message = "nothing follows that could be hidden"
+            help = "what answers the question stands below the quiz, before the next heading"
+            yield diagnose("quiz-gate", question.gate_span, message, help=help, notes=stops)
+        run = question.run
+        if run is not None and labs:
+            node = parse_json(run, run.span()).value
+            controls = {control.label: control for control in labs[0].fields.controls}
+            yield from () if node is None else check_steps(node, "run", controls)
+        elif run is not None and not any(
+            isinstance(block, CodeBlock) and block.language == "lab" for block in blocks
+        ):
+            message = "no lab follows that could be run"
+            help = "the lab stands below the quiz, before the next heading"
+            later = [block.span.first_line() for block in rest if isinstance(block, Lab)][:1]
+            notes = [Note("the next lab is here", span) for span in later]
+            yield diagnose("quiz-gate", run.span(), message, help=help, notes=notes)
+
+
+def _check_answer(question: NumericQuestion) -> Iterator[Diagnostic]:
+    """Report an answer that is a number of its explanation, but for the order of its digits."""
+    text = " ".join(
+        inline.tex.text if isinstance(inline, Math) else getattr(inline, "text", "")
+        for block in walk_blocks(question.explain)
+        for inline in walk_inlines(block_inlines(block))
+    )
+    numbers = [n for n in scan_prose(text.replace("\\cdot", "·")) if n.is_finite]
+    if any(abs(float(n.value) - question.answer) <= question.tolerance for n in numbers):
+        return
+    digits = re.sub(r"\D", "", question.answer_text).strip("0")
+    for number in numbers:
+        number_digits = re.sub(r"\D", "", number.text).strip("0")
+        if len(digits) > 2 and digits != number_digits and sorted(digits) == sorted(number_digits):
+            place = question.span
+            if match := re.search(r'"answer"\s*:\s*([^\s,}]+)', place.text):
+                place = place.source.span(place.start + match.start(1), place.start + match.end(1))
+            message = f"the explanation says {number.text}, and not {question.answer_text}"
+            yield diagnose("quiz-answer", place, message)
+            return
+
+
+def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
+    """Report `output` questions about a line that the script, run to its end, did not print."""
+    printed = {run.path: run.stdout for run in runs if run.outcome is Outcome.OK}
+    course_quizzes = (quiz for document in course.documents for quiz in find_blocks(document, Quiz))
+    for question in (q for quiz in course_quizzes for q in quiz.output_questions()):
+        if question.script in printed:
+            count = len(printed[question.script].rstrip().split("\n"))
+            if question.line > count:
+                message = f"`{question.script}` has no line {question.line}: it prints {count}"
+                yield diagnose("quiz-output", question.line_span, message)
+
 
 FEATURE = Feature(
     name="quiz",
@@ -19,7 +163,7 @@ FEATURE = Feature(
             name="quiz",
             block=Quiz,
             parse=parse_fence,
-            draw=quiz,
+            draw=draw_quiz,
             markdown=quiz_markdown,
             index=index_quiz,
             wide=False,

@@ -1,7 +1,4 @@
-"""A quiz as a value.
-
-Entry points: `Quiz`, the union `AnyQuestion`.
-"""
+"""A quiz as a value."""
 
 from __future__ import annotations
 

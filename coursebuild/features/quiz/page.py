@@ -1,11 +1,9 @@
 """Quizzes as Markdown, and as a page shows them before any script runs: the answers folded.
 
-Entry points: `quiz(page, block)`, `index_quiz`, `quiz_markdown`. The page's script finds each
-question by `data-question`, its key, and its kind by `data-kind`; further data attributes hold what
-it needs to grade an answer.
-
-The items of an order question stand in an order that looks shuffled, is never the right one, and
-depends only on how many they are, on the quiz's id and on the question's number.
+The page's script finds each question by `data-question`, its key, and its kind by `data-kind`;
+further data attributes hold what it needs to grade an answer. The items of an order question stand
+in an order that looks shuffled, is never the right one, and depends only on how many they are, on
+the quiz's id and on the question's number.
 """
 
 from __future__ import annotations
@@ -14,45 +12,26 @@ import functools
 import hashlib
 import re
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, assert_never
+from typing import assert_never
 
 from markupsafe import Markup, escape
 
-from coursebuild.core.features import IndexReader
-from coursebuild.core.model import (
-    Comparison,
-    Document,
-    Heading,
-    Mode,
-    Recording,
-    find_blocks,
-    heading_anchors,
-    plain_text,
-)
+from coursebuild.core import model
+from coursebuild.core.features import IndexReader, MarkdownWriter
 from coursebuild.core.model.results import Outcome
+from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.marks import escape_marks, fence, hang
-from coursebuild.features.quiz.model import (
-    AnyQuestion,
-    ChoiceQuestion,
-    NumericQuestion,
-    OpenQuestion,
-    OrderQuestion,
-    OutputQuestion,
-    Quiz,
-)
-
-if TYPE_CHECKING:
-    from coursebuild.core.pages.context import PageContext
+from coursebuild.features.quiz import model as quizzes
 
 
-def quiz(page: PageContext, block: Quiz) -> Markup:
+def draw_quiz(page: PageContext, block: quizzes.Quiz) -> Markup:
     """Draw a quiz with its questions."""
     return page.template(
         "quiz/quiz.html",
         quiz=block,
         page=page,
         titled=bool(block.title) and not is_heading(page.document, block.title),
-        anchored=block.id not in heading_anchors(page.document),
+        anchored=block.id not in model.heading_anchors(page.document),
         kind_of=_kind,
         grading_attributes=functools.partial(_grading_attributes, page),
         output_line=functools.partial(output_line, page),
@@ -62,85 +41,79 @@ def quiz(page: PageContext, block: Quiz) -> Markup:
     )
 
 
-def index_quiz(reader: IndexReader, block: Quiz) -> None:
+def index_quiz(reader: IndexReader, block: quizzes.Quiz) -> None:
     """Give the search a quiz's title, its questions and options, and no answer."""
     reader.add("text", block.title)
     for question in block.questions:
         reader.blocks(question.text)
-        if isinstance(question, ChoiceQuestion):
+        if isinstance(question, quizzes.ChoiceQuestion):
             for option in question.options:
                 reader.add("text", reader.text(option.text))
-        elif isinstance(question, OrderQuestion):
+        elif isinstance(question, quizzes.OrderQuestion):
             # In the order of their texts: how they are written is the answer.
             for text in sorted(map(reader.text, question.items)):
                 reader.add("text", text)
 
 
-def is_heading(document: Document, title: str) -> bool:
+def is_heading(document: model.Document, title: str) -> bool:
     """Whether a heading of the document reads like the title."""
-    headings = find_blocks(document, Heading)
-    return any(plain_text(h.children).strip() == title.strip() for h in headings)
+    headings = model.find_blocks(document, model.Heading)
+    return any(model.plain_text(h.children).strip() == title.strip() for h in headings)
 
 
-def _kind(question: AnyQuestion) -> str:
-    """The kind of a question, as the page's script knows it."""
+def _kind(question: quizzes.AnyQuestion) -> str:
     match question:
-        case ChoiceQuestion():
+        case quizzes.ChoiceQuestion():
             return "predict" if question.predict else "several" if question.several else "mcq"
-        case NumericQuestion():
+        case quizzes.NumericQuestion():
             return "numeric"
-        case OpenQuestion():
+        case quizzes.OpenQuestion():
             return "open"
-        case OutputQuestion():
+        case quizzes.OutputQuestion():
             return "output"
-        case OrderQuestion():
+        case quizzes.OrderQuestion():
             return "order"
         case _:
             assert_never(question)
 
 
-def _grading_attributes(page: PageContext, question: AnyQuestion) -> Iterator[tuple[str, str]]:
-    """Yield the data attributes by which the page's script grades an answer."""
+def _grading_attributes(
+    page: PageContext, question: quizzes.AnyQuestion
+) -> Iterator[tuple[str, str]]:
     match question:
-        case ChoiceQuestion():
+        case quizzes.ChoiceQuestion():
             yield "answer", " ".join(question.options[at].key for at in question.answers)
             if question.gate:
                 yield "gate", ""
             if question.run is not None:
                 yield "run", question.run.text
-        case NumericQuestion():
+        case quizzes.NumericQuestion():
             yield "answer", question.answer_text
             yield "tolerance", repr(question.tolerance)
             yield "unit", question.unit
-        case OpenQuestion():
+        case quizzes.OpenQuestion():
             return
-        case OutputQuestion():
+        case quizzes.OutputQuestion():
             if line := output_line(page, question):
                 yield "answer", line
                 yield "compare", _comparison_rule(page, question.script)
-        case OrderQuestion():
+        case quizzes.OrderQuestion():
             yield "answer", " ".join(question.item_keys)
         case _:
             assert_never(question)
 
 
 def _comparison_rule(page: PageContext, script: str) -> str:
-    """Say for the page's script how the numbers in the output of a lesson's script compare."""
-    for recording in find_blocks(page.document, Recording):
-        if recording.script == script:
-            verdict = page.inputs.verdicts.get(recording.span.start)
-            if verdict is not None:
-                return _format_rule(verdict.comparison)
-    return _format_rule(Comparison(Mode.DIGITS))
-
-
-def _format_rule(comparison: Comparison) -> str:
+    recordings = model.find_blocks(page.document, model.Recording)
+    starts = (recording.span.start for recording in recordings if recording.script == script)
+    verdict = next(filter(None, map(page.inputs.verdicts.get, starts)), None)
+    comparison = model.Comparison(model.Mode.DIGITS) if verdict is None else verdict.comparison
     match comparison.mode:
-        case Mode.EXACT:
+        case model.Mode.EXACT:
             return "exact"
-        case Mode.DIGITS | Mode.VOLATILE:
+        case model.Mode.DIGITS | model.Mode.VOLATILE:
             return "digits"
-        case Mode.TOLERANCE:
+        case model.Mode.TOLERANCE:
             return f"rtol={float(comparison.rtol)!r} atol={float(comparison.atol)!r}"
         case _:
             assert_never(comparison.mode)
@@ -166,7 +139,7 @@ def letter(index: int) -> str:
     return name
 
 
-def output_line(page: PageContext, question: OutputQuestion) -> str | None:
+def output_line(page: PageContext, question: quizzes.OutputQuestion) -> str | None:
     """Return the line of output asked for; `None` if the script did not run to its end."""
     run = page.inputs.runs.get(question.script)
     if run is None or run.outcome is not Outcome.OK:
@@ -182,11 +155,7 @@ def shuffle(count: int, key: str) -> tuple[int, ...]:
     return tuple(order)
 
 
-if TYPE_CHECKING:
-    from coursebuild.core.features import MarkdownWriter
-
-
-def quiz_markdown(writer: MarkdownWriter, block: Quiz) -> str:
+def quiz_markdown(writer: MarkdownWriter, block: quizzes.Quiz) -> str:
     """Write a quiz as a list of its questions, each with its answer."""
     has_heading = is_heading(writer.page.document, block.title)
     texts = [] if has_heading else [f"**{escape_marks(block.title)}**"]
@@ -202,10 +171,10 @@ def quiz_markdown(writer: MarkdownWriter, block: Quiz) -> str:
     return "\n\n".join(filter(None, texts))
 
 
-def _task(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
+def _task(writer: MarkdownWriter, question: quizzes.AnyQuestion) -> list[str]:
     """Say how to answer, and list what there is to choose from."""
     match question:
-        case ChoiceQuestion():
+        case quizzes.ChoiceQuestion():
             instruction = "quiz.commit" if question.predict else ""
             instruction = "quiz.choose_all" if question.several else instruction
             options = (
@@ -213,15 +182,15 @@ def _task(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
                 for at, option in enumerate(question.options)
             )
             return [f"*{writer.words(instruction)}*" if instruction else "", "\n".join(options)]
-        case NumericQuestion():
+        case quizzes.NumericQuestion():
             unit = f"{writer.words('quiz.unit')} {escape_marks(question.unit)}"
             return [f"*{unit}*"] if question.unit else []
-        case OpenQuestion():
+        case quizzes.OpenQuestion():
             return []
-        case OutputQuestion():
+        case quizzes.OutputQuestion():
             task = writer.words("quiz.output_of", path=question.script, line=question.line)
             return [f"*{task}*"]
-        case OrderQuestion():
+        case quizzes.OrderQuestion():
             solution = [writer.inlines(item) for item in question.items]
             items = sorted(solution)
             items = [*items[1:], items[0]] if items == solution else items
@@ -233,10 +202,10 @@ def _task(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
             assert_never(question)
 
 
-def _answer(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
+def _answer(writer: MarkdownWriter, question: quizzes.AnyQuestion) -> list[str]:
     explain = writer.blocks(question.explain)
     match question:
-        case ChoiceQuestion():
+        case quizzes.ChoiceQuestion():
             right = ", ".join(letter(at) for at in question.answers)
             feedback = [
                 f"- {writer.words('quiz.feedback', option=letter(at))}: "
@@ -246,17 +215,17 @@ def _answer(writer: MarkdownWriter, question: AnyQuestion) -> list[str]:
             ]
             sim = writer.blocks((question.sim,)) if question.sim is not None else ""
             return [f"{right}.", explain, "\n".join(feedback), sim]
-        case NumericQuestion():
+        case quizzes.NumericQuestion():
             unit = f" {escape_marks(question.unit)}" if question.unit else ""
             tolerance = writer.words("quiz.tolerance", tolerance=f"{question.tolerance:.3g}")
             return [f"{escape_marks(question.answer_text)}{unit} ({tolerance}).", explain]
-        case OpenQuestion():
+        case quizzes.OpenQuestion():
             return [writer.blocks(question.reference), explain]
-        case OutputQuestion():
+        case quizzes.OutputQuestion():
             line = output_line(writer.page, question)
             answer = writer.words("quiz.none") if line is None else fence("text", line)
             return [answer, explain]
-        case OrderQuestion():
+        case quizzes.OrderQuestion():
             right = "\n".join(
                 f"{at}. {writer.inlines(item)}" for at, item in enumerate(question.items, 1)
             )

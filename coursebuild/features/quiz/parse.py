@@ -1,15 +1,10 @@
 """`quiz` fences.
 
-Entry points: `parse_fence`; `parse_quiz`, from the text inside one.
+If some questions have mistakes, the quiz holds the others, so that diagnostics that only later
+steps can make (of a formula, a link, a script that no lesson has) come in the same run.
 
-1. The JSON is read into nodes, and these into the declared fields.
-2. Each question whose own fields are right is checked for what no type can say: an answer that is
-   one of the options, as many feedbacks as options, a tolerance where the answer is 0.
-3. The Markdown in it is parsed, and all becomes a `Quiz`. If some questions have mistakes, the quiz
-   holds the others, so that diagnostics that only later steps can make (of a formula, a link, a
-   script that no lesson has) come in the same run.
-4. A question's key is its `id`, or else a hash of its kind and its text; the key of an option or
-   an item is a hash of its text. So answers lead back to their question, whatever else changes.
+A question's key is its `id`, or else a hash of its kind and its text; the key of an option or an
+item is a hash of its text. So answers lead back to their question, whatever else changes.
 """
 
 from __future__ import annotations
@@ -28,38 +23,21 @@ from coursebuild.core.syntax.nodes import JSON, Node, ObjectNode, StringNode
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
 from coursebuild.core.text.source import Excerpt, Span, key_of, unique_name
 from coursebuild.core.text.units import check_unit
-from coursebuild.features.quiz.model import (
-    AnyQuestion,
-    Choice,
-    ChoiceQuestion,
-    NumericQuestion,
-    OpenQuestion,
-    OrderQuestion,
-    OutputQuestion,
-    Quiz,
-)
-from coursebuild.features.quiz.schema import (
-    AnyFields,
-    MultipleChoice,
-    Numeric,
-    Open,
-    OrderFields,
-    OutputFields,
-    Predict,
-    QuizFile,
-)
+from coursebuild.features.lab.parse import sim_lab
+from coursebuild.features.lab.relations import check_lab
+from coursebuild.features.quiz import model, schema
 
 TOLERANCE = 0.02
 """The tolerance of a numeric question that gives none, as a share of the answer."""
 
 
-def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Quiz | None]:
+def parse_fence(fence: Fence, texts: TextParser) -> Parsed[model.Quiz | None]:
     """Parse a `quiz` fence, which has no keys."""
     quiz = parse_quiz(fence.span, fence.body, texts)
     return Parsed(quiz.value, (*fence.keys().diagnostics, *quiz.diagnostics))
 
 
-def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | None]:
+def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[model.Quiz | None]:
     """Parse the quiz of a fence; `span` is all of the fence and `body` the text inside.
 
     Never raises. A quiz that comes with diagnostics is not to be published.
@@ -68,7 +46,7 @@ def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | No
     node = json.value
     if node is None:
         return Parsed(None, sort_diagnostics(json.diagnostics))
-    decoding = decode(node, QuizFile, "the quiz", JSON)
+    decoding = decode(node, schema.QuizFile, "the quiz", JSON)
     prose = Prose.read(decoding.texts, texts)
     diagnostics = [*json.diagnostics, *decoding.diagnostics, *prose.diagnostics]
     if not isinstance(node, ObjectNode):
@@ -80,42 +58,36 @@ def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[Quiz | No
     message = "the question id `{}` is used twice in this quiz"
     diagnostics += check_unique(places, "question-id-repeated", message, help=help)
     keys = _keys(nodes, decoding)
-    questions: list[AnyQuestion] = []
+    questions: list[model.AnyQuestion] = []
     for question_node in nodes:
         diagnostics += _check(question_node, decoding)
     for question_node in nodes:
         # If its JSON is wrong, nobody knows what its texts were meant to be.
         is_garbled = any(question_node.span.contains(d.span) for d in json.diagnostics)
         question = _question(question_node, keys.get(question_node, ""), decoding, prose)
-        if question is not None and not is_garbled:
-            questions.append(_without_broken_lab(question, diagnostics))
-    fields = decoding.value
-    id, title = (fields.id, fields.title) if fields is not None else (_id(node, diagnostics), "")
+        if question is None or is_garbled:
+            continue
+        if isinstance(question, model.ChoiceQuestion) and question.sim is not None:
+            sim_span = question.sim.span
+            if any(sim_span.contains(d.span) for d in diagnostics):
+                question = replace(question, sim=None)  # so that no trial runs it
+        questions.append(question)
+    fields, id_node, id, title = decoding.value, node.get("id"), "", ""
+    if fields is not None:
+        id, title = fields.id, fields.title
+    elif isinstance(id_node, StringNode) and all(d.span != id_node.mark for d in diagnostics):
+        id = id_node.value
     question_keys = tuple(question.key for question in questions)
-    quiz = Quiz(span, id, node.place("id"), title, tuple(questions), question_keys)
+    quiz = model.Quiz(span, id, node.place("id"), title, tuple(questions), question_keys)
     return Parsed(quiz, sort_diagnostics(diagnostics))
 
 
-def _id(node: ObjectNode, diagnostics: list[Diagnostic]) -> str:
-    """Return the id of a quiz with mistakes; empty if the id is one of them."""
-    id = node.get("id")
-    if not isinstance(id, StringNode) or any(d.span == id.mark for d in diagnostics):
-        return ""
-    return id.value
-
-
-def _without_broken_lab(question: AnyQuestion, diagnostics: list[Diagnostic]) -> AnyQuestion:
-    """Take away a question's simulation if it has mistakes, so that no trial runs it."""
-    if not isinstance(question, ChoiceQuestion) or question.sim is None:
-        return question
-    is_broken = any(question.sim.span.contains(diagnostic.span) for diagnostic in diagnostics)
-    return replace(question, sim=None) if is_broken else question
-
-
-def _keys(nodes: tuple[ObjectNode, ...], decoding: Decoding[QuizFile]) -> dict[ObjectNode, str]:
+def _keys(
+    nodes: tuple[ObjectNode, ...], decoding: Decoding[schema.QuizFile]
+) -> dict[ObjectNode, str]:
     """Map each question to its key: its id, or one made of its text that is nobody's id."""
     structs = ((node, decoding.structs.get(node)) for node in nodes)
-    questions = [(node, fields) for node, fields in structs if isinstance(fields, AnyFields)]
+    questions = [(node, fields) for node, fields in structs if isinstance(fields, schema.AnyFields)]
     ids = {node: fields.id for node, fields in questions if fields.id is not None}
     without_id = [(node, fields) for node, fields in questions if node not in ids]
     texts = ((str(fields.__struct_config__.tag), fields.q) for _, fields in without_id)
@@ -126,10 +98,10 @@ def _keys(nodes: tuple[ObjectNode, ...], decoding: Decoding[QuizFile]) -> dict[O
 # ---------------------------------------------------------------------------------------- checks
 
 
-def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnostic]:
+def _check(node: ObjectNode, decoding: Decoding[schema.QuizFile]) -> Iterator[Diagnostic]:
     sim = node.get("sim")
     match decoding.structs.get(node):
-        case MultipleChoice() | Predict() as fields:
+        case schema.MultipleChoice() | schema.Predict() as fields:
             yield from _check_distinct(node, "options", "two options are the same: `{}`")
             count = len(fields.options)
             spans = [item.span for item in node.items("answer")] or [node.place("answer")]
@@ -145,7 +117,7 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
                 help = 'an option without feedback has `""`'
                 place = (node.get("feedback") or node).span
                 yield diagnose("field-value", place, message, help=help)
-        case Numeric() as fields:
+        case schema.Numeric() as fields:
             if fields.answer == 0 and fields.tol is None:
                 message = (
                     "`tol` is missing: the usual tolerance is a share of the answer, which is 0"
@@ -153,13 +125,11 @@ def _check(node: ObjectNode, decoding: Decoding[QuizFile]) -> Iterator[Diagnosti
                 yield diagnose("field-missing", node.place("answer"), message)
             if isinstance(unit := node.get("unit"), StringNode):
                 yield from check_unit(unit.excerpt)
-        case OrderFields():
+        case schema.OrderFields():
             yield from _check_distinct(node, "items", "two items are the same: `{}`")
         case _:
             pass
     if isinstance(sim, ObjectNode) and sim in decoding.structs:
-        from coursebuild.features.lab.relations import check_lab
-
         yield from check_lab(sim, decoding.structs)
 
 
@@ -172,55 +142,55 @@ def _check_distinct(node: ObjectNode, name: str, message: str) -> Iterator[Diagn
 
 
 def _question(
-    node: ObjectNode, key: str, decoding: Decoding[QuizFile], prose: Prose
-) -> AnyQuestion | None:
+    node: ObjectNode, key: str, decoding: Decoding[schema.QuizFile], prose: Prose
+) -> model.AnyQuestion | None:
     fields = decoding.structs.get(node)
-    if not isinstance(fields, AnyFields):
+    if not isinstance(fields, schema.AnyFields):
         return None
     text, explain = prose.blocks(node.get("q")), prose.blocks(node.get("explain"))
     common = (node.span, key, fields.label, text, explain, prose.each_item(node.get("hints")))
     match fields:
-        case MultipleChoice() | Predict():
+        case schema.MultipleChoice() | schema.Predict():
             sim = node.get("sim")
             lab = None
             if isinstance(sim, ObjectNode):
-                from coursebuild.features.lab.parse import sim_lab
-
                 lab = sim_lab(sim.span, sim.mark, sim, decoding.structs, prose)
             run = node.get("run") if has_value(node, "run") else None
-            return ChoiceQuestion(
+            return model.ChoiceQuestion(
                 *common,
                 options=_choices(node, fields.options, prose),
                 answers=tuple(sorted(fields.answers)),
                 several=isinstance(fields.answer, tuple),
                 sim=lab,
-                predict=isinstance(fields, Predict),
-                gate=isinstance(fields, Predict) and fields.gate,
+                predict=isinstance(fields, schema.Predict),
+                gate=isinstance(fields, schema.Predict) and fields.gate,
                 gate_span=node.place("gate"),
                 run=None if run is None else to_one_line(run),
             )
-        case Numeric():
+        case schema.Numeric():
             answer: Node | None = node.get("answer")
             answer_text = answer.raw if answer is not None else ""
             tolerance = TOLERANCE * abs(fields.answer) if fields.tol is None else fields.tol
-            return NumericQuestion(*common, fields.answer, answer_text, tolerance, fields.unit)
-        case Open():
-            return OpenQuestion(*common, prose.blocks(node.get("reference")))
-        case OutputFields():
+            return model.NumericQuestion(
+                *common, fields.answer, answer_text, tolerance, fields.unit
+            )
+        case schema.Open():
+            return model.OpenQuestion(*common, prose.blocks(node.get("reference")))
+        case schema.OutputFields():
             script, line = node.place("of"), node.place("line")
-            return OutputQuestion(*common, fields.of, script, fields.line, line)
-        case OrderFields():
+            return model.OutputQuestion(*common, fields.of, script, fields.line, line)
+        case schema.OrderFields():
             keys = tuple(unique_keys(("item", text) for text in fields.items))
-            return OrderQuestion(*common, prose.each_item(node.get("items")), keys)
+            return model.OrderQuestion(*common, prose.each_item(node.get("items")), keys)
         case _:
             assert_never(fields)
 
 
-def _choices(node: ObjectNode, texts: tuple[str, ...], prose: Prose) -> tuple[Choice, ...]:
+def _choices(node: ObjectNode, texts: tuple[str, ...], prose: Prose) -> tuple[model.Choice, ...]:
     feedback = prose.each_item(node.get("feedback"))
     keys = unique_keys(("option", text) for text in texts)
     return tuple(
-        Choice(item.span, key, prose.inlines(item), text)
+        model.Choice(item.span, key, prose.inlines(item), text)
         for item, key, text in zip(
             node.items("options"), keys, chain(feedback, repeat(())), strict=False
         )

@@ -1,9 +1,4 @@
-"""The fields of a `quiz` fence.
-
-Entry point: `QuizFile`. The decoder checks a fence against it, and the JSON Schema for editors is
-made from it; `parse` checks what no declaration of types can say (that an answer is one of the
-options).
-"""
+"""The fields of a `quiz` fence; `parse` checks what no declaration of types can say."""
 
 # No `from __future__ import annotations` here: msgspec would evaluate each annotation, a text then,
 # again in every struct that inherits it.

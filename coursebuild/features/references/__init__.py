@@ -1,30 +1,22 @@
 """Sources: `content/references.bib`, cited by `[@euler1758, p. 12]`, with a page that lists all.
 
-1. `bibtex` reads the list, `csl` formats what is cited by a style of the Citation Style Language.
-2. `citing` gives each page its citations and the references below its text, checks both, and lists
-   all references of the course with the lessons that cite them.
-
 The packages that read and format are an extra, `coursebuild[references]`, and are imported where a
 course has a list of sources.
 """
 
 from coursebuild.core.features import Feature, PageKind
 from coursebuild.core.text.rules import Rule
-from coursebuild.features.references.citing import (
-    check_sources,
-    document_citations,
-    references_values,
-)
+from coursebuild.features.references import citing
 
 FEATURE = Feature(
     name="references",
-    citations=document_citations,
-    check=check_sources,
+    citations=citing.document_citations,
+    check=citing.check_sources,
     pages=(
         PageKind(
             name="references",
-            values=references_values,
-            exists=lambda library: bool(references_values(library)["entries"]),
+            values=citing.references_values,
+            exists=lambda library: bool(citing.references_values(library)["entries"]),
             order=25,
         ),
     ),

@@ -1,7 +1,7 @@
-"""Reads a list of sources in BibTeX, each with its place.
+"""A list of sources in BibTeX, each with its place.
 
-Entry point: `read_works`. `bibtexparser` reads the text; LaTeX in it becomes plain text. Nothing in
-it is HTML: whatever is shown of a source is escaped where it is drawn.
+LaTeX in it becomes plain text. Nothing in it is HTML: what is shown of a source is escaped where it
+is drawn.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import contextlib
 import functools
 import logging
 import re
-from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
 
@@ -18,7 +17,6 @@ from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Source, Span
 
 NAMES = ("author", "editor", "translator")
-"""Fields that hold names of people."""
 _KEY = re.compile(r"@\s*\w+\s*[{(]\s*([^,\s{}()]*)")
 _ENTRY = re.compile(r"^[ \t]*@", re.MULTILINE)
 _DOI = re.compile(r"(?:https?://(?:dx\.)?doi\.org/|doi:\s*)?(10\.\d{4,9}/\S+)", re.IGNORECASE)
@@ -119,8 +117,18 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
         for match in _ENTRY.finditer(comment.comment or ""):
             line = (comment.start_line or 0) + comment.comment[: match.start()].count("\n")
             report(line, "no entry begins here", "an entry is `@article{key, title = {…}, …}`")
-    works = tuple(_read_works(library.entries, source))
-    return Parsed(works, tuple(diagnostics))
+    works: list[Work] = []
+    for entry in library.entries:
+        fields: list[tuple[str, str]] = []
+        people: list[tuple[str, tuple[PersonName, ...]]] = []
+        for field in entry.fields:
+            if field.key in NAMES and isinstance(field.value, list):
+                people.append((field.key, tuple(map(_read_name, field.value))))
+            else:
+                fields.append((field.key, _plain(str(field.value), field.key)))
+        kind, span = entry.entry_type.lower(), _line(source, entry.start_line or 0)
+        works.append(Work(entry.key, kind, tuple(fields), tuple(people), span))
+    return Parsed(tuple(works), tuple(diagnostics))
 
 
 def _line(source: Source, index: int) -> Span:
@@ -129,22 +137,6 @@ def _line(source: Source, index: int) -> Span:
     text = source.line_text(line)
     start = source.line_start(line) + len(text) - len(text.lstrip())
     return source.span(start, start + len(text.strip()))
-
-
-def _read_works(entries: Iterable[object], source: Source) -> Iterator[Work]:
-    from bibtexparser.model import Entry
-
-    for entry in entries:
-        assert isinstance(entry, Entry)
-        fields: list[tuple[str, str]] = []
-        people: list[tuple[str, tuple[PersonName, ...]]] = []
-        for field in entry.fields:
-            if field.key in NAMES and isinstance(field.value, list):
-                people.append((field.key, tuple(map(_read_name, field.value))))
-            else:
-                fields.append((field.key, _plain(str(field.value), field.key)))
-        span = _line(source, entry.start_line or 0)
-        yield Work(entry.key, entry.entry_type.lower(), tuple(fields), tuple(people), span)
 
 
 def _read_name(name: object) -> PersonName:

@@ -1,8 +1,4 @@
-"""Citations on pages, the references of the course, and what is wrong with both.
-
-Entry points: `document_citations`, for one page; `references_values`, for the page of all
-references; `check_sources`; `works_of` and `reference_text`, for editors.
-"""
+"""Citations on pages, the references of the course, and what is wrong with both."""
 
 from __future__ import annotations
 
@@ -59,7 +55,6 @@ def works_of(course: Course) -> Mapping[str, Work]:
 
 
 def _reference(formatted: FormattedWorks, work: Work) -> Markup:
-    """A reference, with links to what identifies the work."""
     html = formatted.entries[work.key]
     links: list[Markup] = []
     if work.doi and work.doi not in html:

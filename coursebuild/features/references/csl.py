@@ -1,10 +1,8 @@
 """Formats citations and references by a style in CSL, with `citeproc`.
 
-Entry point: `format_works`. The course's own style is `content/references.csl`; otherwise it is
-`style.csl`, author and year. Marks of the style, such as italics, are private characters until all
-text is escaped.
-
-`citeproc` gives no letters to works of one author and year; they get them here (1758a, 1758b).
+The course's own style is `content/references.csl`; otherwise it is `style.csl`, author and year.
+Marks of the style, such as italics, are private characters until all text is escaped. `citeproc`
+gives no letters to works of one author and year; they get them here (1758a, 1758b).
 """
 
 from __future__ import annotations
@@ -105,7 +103,6 @@ class _Formatter:
 
 
 def _finish(text: object) -> Markup:
-    """A text of `citeproc` as HTML."""
     html = str(escape(str(text)))
     for number, tag in enumerate(_MARKS.values()):
         start, end = chr(_FIRST + 2 * number), chr(_FIRST + 2 * number + 1)
@@ -118,7 +115,6 @@ class FormattedWorks(Struct, frozen=True):
     """The works of a course that its texts cite, in the order of the style."""
 
     entries: Mapping[str, Markup]
-    """The references by their keys."""
     mark: Any
     """Returns the text of a citation, given a key, and what is named within the work."""
     prefix: str
@@ -250,7 +246,6 @@ def _split_locator(text: str) -> tuple[str, str]:
 
 
 def _variables(work: Work, id: str, suffix: str) -> dict[str, Any]:
-    """A work as `citeproc` reads it."""
     values: dict[str, Any] = {"id": id, "type": _KINDS.get(work.kind, "article")}
     for name, fields in _FIELDS.items():
         if value := work.field(*fields):

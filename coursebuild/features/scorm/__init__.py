@@ -1,19 +1,18 @@
 """The site as a package of ADL SCORM 1.2, for learning platforms.
 
 A platform opens `sco/LESSON.html`, which shows the page of the lesson in a frame and speaks to the
-platform for it (`site/js/scorm.js`). So one visit lasts while the learner follows links from page
-to page, and the pages are those of the site, byte for byte. Each written lesson is a SCO, and the
-files that belong to no single lesson are one asset on which the SCOs depend (SCORM 1.2 Content
-Aggregation Model, section 2.3). A planned lesson has nothing to open, and is no SCO.
+platform for it (`site/js/scorm.js`). So one visit lasts while the learner follows links, and the
+pages are those of the site, byte for byte. Each written lesson is a SCO; the files that belong to
+no single lesson are one asset on which the SCOs depend (Content Aggregation Model, section 2.3).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from coursebuild.core.features import Exporter, Feature
-from coursebuild.core.model import Course, Lesson
+from coursebuild.core.model import Lesson
 from coursebuild.core.model.results import OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import page_script
@@ -52,24 +51,14 @@ def package_files(context: ExportContext) -> Iterator[SiteFile]:
             address=urls.Place(_start_path(lesson)).href(urls.lesson_path(lesson)),
         )
         yield OutputFile(_start_path(lesson), f"{html}\n".encode("utf-8", "replace"))
-    manifest = _manifest(context.course, sorted(file.path for file in files))
-    yield OutputFile("imsmanifest.xml", manifest)
-
-
-def _start_path(lesson: Lesson) -> str:
-    return f"sco/{lesson.id}-{lesson.slug}.html"
-
-
-def _manifest(course: Course, paths: Iterable[str]) -> bytes:
-    """Write the manifest: the lessons, and the files of each, within the lengths IMS allows."""
+    course, shared = context.course, list[str]()
     lesson_files = {
         f"lessons/{x.id}-{x.slug}": (x, [_start_path(x)]) for x in course.written_lessons
     }
-    shared: list[str] = []
-    for path in paths:
-        lesson = lesson_files.get(path.rpartition(".")[0])
-        (shared if lesson is None else lesson[1]).append(path)
-    return render_xml(
+    for path in sorted(file.path for file in files):
+        page = lesson_files.get(path.rpartition(".")[0])
+        (shared if page is None else page[1]).append(path)
+    manifest = render_xml(
         Path(__file__).with_name("manifest.jinja"),
         course=course,
         language=course.language or "en",
@@ -79,6 +68,11 @@ def _manifest(course: Course, paths: Iterable[str]) -> bytes:
         identifier=identifier,
         encode=urls.encode,
     )
+    yield OutputFile("imsmanifest.xml", manifest)
+
+
+def _start_path(lesson: Lesson) -> str:
+    return f"sco/{lesson.id}-{lesson.slug}.html"
 
 
 SCORM = Exporter(

@@ -1,12 +1,8 @@
 """What the search needs of a page: its text for the reader's browser, its terms for the index.
 
-Entry points: `note_page(inputs, document, body)`, both as bytes, and `text_and_terms`, which
-separates them; `script` and `as_json`, which write a file of the index.
-
-1. The blocks of a document, or its HTML where a page shows none, are walked in order, those in
-   containers too; a heading begins a section, which is what is searched.
-2. Formulas become lines of plain text (`tex`); the section is also found by their commands.
-3. Answers and explanations of quizzes are left out: a search must not give them away.
+The blocks of a document, or its HTML where a page shows none, are walked in order; a heading begins
+a section, which is what is searched. Formulas become lines of plain text, and are also found by
+their commands. Answers of quizzes are left out: a search must not give them away.
 """
 
 from __future__ import annotations
@@ -81,13 +77,7 @@ class SectionReader:
         block_values: Mapping[int, Struct] = {},
         reference: Reference = _unnamed,
     ) -> None:
-        """Begin a page.
-
-        Args:
-            labels: the labels of the kinds of callouts, by name.
-            block_values: the values of features' blocks, by the block's offset.
-            reference: the texts of links without one.
-        """
+        """`labels` are those of callouts by their kind; `block_values` go by the block's offset."""
         self._reference = reference
         self._labels = labels
         self._block_values = block_values
@@ -250,13 +240,7 @@ _FIELDS = {"text": _TEXT, "formula": _TEXT, "code": _CODE, "output": _CODE}
 
 
 def note_page(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
-    """Return the note of a page for the search; empty if it is not searched.
-
-    Args:
-        inputs: what is drawn.
-        page: the document on it, where it has one.
-        body: its HTML.
-    """
+    """Return the note of a page with this HTML for the search; empty if it is not searched."""
     if inputs.head.kind in _EXCLUDED_KINDS or not (
         inputs.head.indexed or inputs.head.kind in LEAD_ONLY
     ):
@@ -267,8 +251,19 @@ def note_page(inputs: PageInputs, page: PageContext | None, body: str) -> bytes:
         sections = page_sections(inputs, None, body)
     else:
         sections = page_sections(inputs, page.document, body, page.reference)
+    # Sections as the page's file has them; kinds of pieces by their first letter
+    rows = [
+        [
+            section.anchor,
+            section.heading,
+            section.level,
+            [[piece.kind[0], piece.text] for piece in section.pieces],
+            " ".join(section.names),
+        ]
+        for section in sections
+    ]
     terms = weigh_terms([name, inputs.head.title], sections)
-    return visible(as_json(pack_sections(sections))).encode() + b"\0" + terms
+    return visible(as_json(rows)).encode() + b"\0" + terms
 
 
 def text_and_terms(note: bytes) -> tuple[bytes, bytes]:
@@ -312,20 +307,6 @@ def script(kind: str, name: str, text: str) -> bytes:
     It is a script because browsers load no other data from a disk.
     """
     return visible(f'coursebuildSearch.take("{kind}","{name}",{text})\n').encode()
-
-
-def pack_sections(sections: Iterable[Section]) -> object:
-    """Return the sections of a page as its file has them; kinds by their first letter."""
-    return [
-        [
-            section.anchor,
-            section.heading,
-            section.level,
-            [[piece.kind[0], piece.text] for piece in section.pieces],
-            " ".join(section.names),
-        ]
-        for section in sections
-    ]
 
 
 def weigh_terms(titles: list[str], sections: Iterable[Section]) -> bytes:

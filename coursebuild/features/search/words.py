@@ -1,18 +1,14 @@
 """The terms that a text is found by; queries are split into terms by the same rules.
 
-Entry points: `count_terms(text)`; `terms_of(text)`, the terms of a text in order; `shelf_of(term)`,
-which decides what file of the index has a term.
-
 1. Characters are brought to their compatible form, without marks (NFKD, so that `Iₓₓ` is `Ixx` and
    `é` is `e`).
 2. The text is split into words, numbers, names in code (`data.qpos`, `mj_step`) and symbols.
 3. The terms of a name are the name and its parts, of a Greek letter or a symbol its name, of a text
    in a script without spaces its pairs of characters.
 
-A formula is found and shown as plain text, such as `τ = I_xx dω/dt`, by `plain_formula(tex)`. It
-never fails: unknown commands are left out, and unbalanced groups end where the TeX ends.
-
-`site/js/search/words.js` does the same; tests of both read `site/tests/search-words.json`.
+`plain_formula(tex)`, such as `τ = I_xx dω/dt`, never fails: unknown commands are left out, and
+unbalanced groups end where the TeX ends. `site/js/search/words.js` does the same; tests of both
+read `site/tests/search-words.json`.
 """
 
 from __future__ import annotations
@@ -117,7 +113,6 @@ def _without_marks(run: re.Match[str]) -> str:
 
 
 def _split_name(token: str) -> Iterator[str]:
-    """Yield a name and its parts."""
     yield token.lower()
     for name in filter(None, (name.strip("_") for name in token.split("."))):
         if len(name) > 1:
@@ -130,7 +125,6 @@ def _split_name(token: str) -> Iterator[str]:
 
 
 def _split_mixed(token: str) -> Iterator[str]:
-    """Yield the terms of a word with letters of other scripts."""
     runs = [(script, "".join(letters)) for script, letters in groupby(list(token), _script)]
     words: list[str] = []
     for script, run in runs:
@@ -193,9 +187,7 @@ _FUNCTIONS = (
     "sin cos tan cot sec csc arcsin arccos arctan sinh cosh tanh exp log ln lim max min sup inf det"
     " dim ker arg deg gcd Pr tr"
 ).split()
-"""Functions that are written with their names."""
 _TEXTS = _SIGNS | {name: name for name in _FUNCTIONS}
-"""The texts of commands without arguments."""
 _STYLE = frozenset(
     "left right big Big bigg Bigg bigl bigr Bigl Bigr middle displaystyle textstyle scriptstyle"
     " limits nolimits quad qquad text textrm textit textbf mathrm mathbf mathit mathsf mathcal"
@@ -232,8 +224,6 @@ def plain_formula(tex: str) -> tuple[str, tuple[str, ...]]:
 
 
 class _Reader:
-    """Reads pieces from left to right."""
-
     def __init__(self, tex: str) -> None:
         self._pieces = [match for match in _PIECE.finditer(tex) if match[0][0] != "%"]
         self._at = 0
@@ -249,18 +239,15 @@ class _Reader:
         return " ".join(parts)
 
     def _next(self) -> str:
-        """Return the next piece; empty at the end."""
         return self._pieces[self._at][0] if self._at < len(self._pieces) else ""
 
     def _group(self) -> str:
-        """Read up to the closing brace, which is left."""
         parts: list[str] = []
         while self._next() not in ("", "}"):
             parts.append(self._item())
         return "".join(parts)
 
     def _item(self) -> str:
-        """Read the next piece with its arguments."""
         match = self._pieces[self._at]
         self._at += 1
         piece = match[0]
@@ -304,6 +291,5 @@ class _Reader:
 
 
 def _add_brackets(text: str) -> str:
-    """Put a text in brackets, unless it is one word or sign."""
     text = text.strip()
     return f"({text})" if len(text) > 1 and not text.isalnum() else text

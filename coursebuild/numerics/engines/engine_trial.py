@@ -1,14 +1,12 @@
-"""What an engine is asked in a child process: one motion, and what a step of many worlds costs.
+"""What an engine is asked in a child process, and its answer beside a scene's reference.
 
-Entry points: `Engine`, the table that an engine's module fills in; `Variant`, `EngineTrial`;
-`begin(engine, …)`, then `run_motion(batch, trial)` and `run_costs(batch, trial, clock)`.
+It is asked for one motion, and for what a step of many worlds costs.
 
-1. The motion begins as the scenario does, in one world, and is looked at where the reference is.
-2. The worlds of a batch begin a little apart, so that they do not all take the same branches.
-3. Steps are timed beside MuJoCo's own, in the same process and in turn: what slows the machine for
+1. The worlds of a batch begin a little apart, so that they do not all take the same branches.
+2. Steps are timed beside MuJoCo's own, in the same process and in turn: what slows the machine for
    a while slows both, and their ratio holds. Time is that of the wall, since engines use threads or
    another device.
-4. The first step compiles; how much longer it takes than the second one is told apart.
+3. The first step compiles; how much longer it takes than the second one is told apart.
 """
 
 from __future__ import annotations
@@ -21,12 +19,28 @@ from typing import Any, Literal, Protocol, TypeAlias
 import mujoco
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import asdict, replace
 
 from coursebuild.numerics.costs import Clock, time_jobs
-from coursebuild.numerics.pilot import nudges
+from coursebuild.numerics.known_motion import KnownMotion, find_conserved, find_references
+from coursebuild.numerics.measure import energy_drift, errors
+from coursebuild.numerics.pilot import Pilot, nudges, own_setting, position_distances, run_pilot
 from coursebuild.numerics.problem import Array, Scenario
 from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.simulation import STATE, full_state, initial_data, silent
+from coursebuild.numerics.reports.engine_report import EngineRow, EngineScenario
+from coursebuild.numerics.scene import Scene
+from coursebuild.numerics.simulation import (
+    STATE,
+    EngineStates,
+    full_state,
+    initial_data,
+    integrator_of,
+    invariants,
+    motion_of,
+    silent,
+    simulate,
+    with_integrator,
+)
 
 
 class Variant(Struct, frozen=True):
@@ -167,11 +181,7 @@ def _finite(table: Array) -> list[list[float | None]]:
 
 
 def run_costs(batch: Batch, trial: EngineTrial, clock: Clock) -> EngineCost:
-    """What a step of one world costs among those of a batch.
-
-    Raises:
-        RefusalError: it takes too long to be timed.
-    """
+    """What a step of one world costs among a batch; a `RefusalError` where it takes too long."""
     model, worlds, count = batch.model, batch.worlds, batch.count
     until = trial.scenario.holds()[0][1]  # until the command changes
     most = round(until / float(model.opt.timestep))
@@ -215,3 +225,73 @@ def _time(work: Callable[[], None], clock: Clock) -> float:
     before = clock()
     work()
     return (clock() - before) * 1e-9
+
+
+class EngineBasis(Struct, frozen=True, eq=False):
+    """What is known of a scene before any engine is asked."""
+
+    model: Any
+    pilot: Pilot
+    reference: KnownMotion
+    energy: float | None
+    """The scale for changes of energy, J; `None` where energy is not conserved."""
+    baseline: EngineStates
+    """The motion in MuJoCo itself, at the model's own setting."""
+
+    @property
+    def report(self) -> EngineScenario:
+        """The report, without rows."""
+        scene, reference = self.pilot.scene, self.reference
+        return EngineScenario(
+            name=scene.name,
+            title=scene.title,
+            duration=scene.scenario.duration,
+            horizon=reference.horizon,
+            reference=reference.kind,
+            source=reference.source,
+            floor=reference.floor.place,
+            velocity_floor=reference.floor.velocity,
+            setting=own_setting(self.model, self.pilot),
+            rows=(),
+        )
+
+
+def engine_basis(model: Any, scene: Scene, *, quick: bool = False) -> EngineBasis:
+    """Find the reference of a scene, and how MuJoCo itself moves."""
+    pilot = run_pilot(model, scene)
+    setting = own_setting(model, pilot)
+    reference = find_references(model, pilot, quick=quick)[setting.cone].reference
+    energy, _ = find_conserved(model, pilot, reference)
+    own_model = with_integrator(model, integrator_of(model), scene.timestep)
+    return EngineBasis(model, pilot, reference, energy, simulate(pilot.setup, own_model).states)
+
+
+def judge_motion(basis: EngineBasis, row: EngineRow, motion: EngineMotion) -> EngineRow:
+    """Add to a row how far a motion is from the reference, and what it does to energy."""
+    model, scenario, reference = basis.model, basis.pilot.scene.scenario, basis.reference
+    row = replace(row, compile_seconds=motion.compile_seconds)
+    times = scenario.times[: len(motion.qpos)]
+    qpos, qvel = (np.array(part, dtype=np.float64) for part in (motion.qpos, motion.qvel))
+    states = EngineStates(times, qpos, qvel, np.zeros((len(times), int(model.na))))
+    if not (np.isfinite(qpos).all() and np.isfinite(qvel).all()):
+        lost = int(np.argmin(np.isfinite(np.hstack([qpos, qvel])).all(axis=1)))
+        message = f"the state is not finite at {times[lost]:.6g} s"
+        return replace(row, status="diverged", message=message)
+    beginning, scratch = initial_data(scenario, model), initial_data(scenario, model)
+    moments = [(beginning.qpos, beginning.qvel), *zip(qpos, qvel, strict=True)]
+    table = np.array([invariants(model, scratch, *moment) for moment in moments])
+    energies, setup = table[:, :2], basis.pilot.setup
+    bounds = (
+        ("position", np.abs(qpos).max(), setup.position_bound),
+        ("velocity", np.abs(qvel).max(), setup.velocity_bound),
+        ("energy", energies.sum(axis=1).max(), setup.energy_bound),
+    )
+    for name, size, bound in bounds:
+        if size > bound:
+            message = f"its {name} reaches {size:.3g}, over {bound:.3g}"
+            return replace(row, status="diverged", message=message)
+    exact, count = motion_of(model, reference.states), len(reference.states.times)
+    near = errors(motion_of(model, states.head(count)), exact, reference.floor)
+    apart = position_distances(model, states.qpos[:count], basis.baseline.qpos[:count])
+    drift = None if basis.energy is None else energy_drift(energies, basis.energy)
+    return replace(row, **asdict(near), apart=float(apart.max()), energy_drift=drift)

@@ -1,7 +1,4 @@
-"""MJX: MuJoCo in JAX, in 32 and in 64 bits, on the processor and on the first device of JAX.
-
-Its implementation in JAX, `impl="jax"`; that in Warp is an engine of its own.
-"""
+"""MJX: MuJoCo in JAX (`impl="jax"`), in 32 and 64 bits, on the processor and JAX's first device."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from coursebuild.numerics.engines.engine_trial import Engine, Variant
 from coursebuild.numerics.problem import Array
 
 
-class BatchedWorlds:
+class _BatchedWorlds:
     """A batch that one compiled function advances."""
 
     def __init__(self, model: Any, data: Any, velocities: Array, variant: Variant) -> None:
@@ -45,13 +42,11 @@ class BatchedWorlds:
             self._advance = jax.jit(advance)
 
     def advance(self, steps: int) -> None:
-        """Make so many steps in every world, and wait for them."""
         jax: Any = importlib.import_module("jax")
         with jax.default_device(self._device):
             self._batch = jax.block_until_ready(self._advance(self._model, self._batch, steps))
 
     def command(self, control: tuple[float, ...]) -> None:
-        """Give this command to all worlds."""
         import jax
 
         before = self._batch.ctrl
@@ -59,11 +54,9 @@ class BatchedWorlds:
         self._batch = self._batch.replace(ctrl=jax.device_put(table, self._device))
 
     def reset(self) -> None:
-        """Go back to the beginning."""
         self._batch = self._beginning
 
     def state(self) -> tuple[Array, Array]:
-        """The state of the first world."""
         return (
             np.asarray(self._batch.qpos[0], dtype=np.float64),
             np.asarray(self._batch.qvel[0], dtype=np.float64),
@@ -88,6 +81,6 @@ ENGINES = {
         module="mujoco.mjx",
         packages=("mujoco-mjx", "jax"),
         variants=variants,
-        start=BatchedWorlds,
+        start=_BatchedWorlds,
     )
 }

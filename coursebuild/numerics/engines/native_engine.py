@@ -15,7 +15,7 @@ from coursebuild.numerics.simulation import STATE, full_state
 _PHYSICS = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
 
 
-class OneWorld:
+class _OneWorld:
     """A world that `mj_step` simulates."""
 
     def __init__(self, model: Any, data: Any, velocities: Array, _: Variant) -> None:
@@ -24,23 +24,19 @@ class OneWorld:
         self._beginning = full_state(model, data)
 
     def advance(self, steps: int) -> None:
-        """Make so many steps."""
         mujoco.mj_step(self._model, self._data, steps)
 
     def command(self, control: tuple[float, ...]) -> None:
-        """Give a command."""
         self._data.ctrl[:] = control
 
     def reset(self) -> None:
-        """Go back to the beginning."""
         mujoco.mj_setState(self._model, self._data, self._beginning, STATE)
 
     def state(self) -> tuple[Array, Array]:
-        """The present state."""
         return self._data.qpos.copy(), self._data.qvel.copy()
 
 
-class ThreadedWorlds:
+class _ThreadedWorlds:
     """Worlds that `mujoco.rollout` simulates, each from where it was."""
 
     def __init__(self, model: Any, data: Any, velocities: Array, variant: Variant) -> None:
@@ -59,22 +55,18 @@ class ThreadedWorlds:
         self._scratch = mujoco.MjData(model)
 
     def advance(self, steps: int) -> None:
-        """Make so many steps in every world."""
         control = np.repeat(self._control[:, None], steps, axis=1) if self._model.nu else None
         states, _ = self._pool.rollout(self._model, self._datas, self._states, control, nstep=steps)
         self._states = states[:, -1].copy()
 
     def command(self, control: tuple[float, ...]) -> None:
-        """Give this command to all worlds."""
         self._control[:] = control
 
     def reset(self) -> None:
-        """Go back to the beginning."""
         self._states = self._beginning
         self._control[:] = self._first_control
 
     def state(self) -> tuple[Array, Array]:
-        """The state of the first world."""
         mujoco.mj_setState(self._model, self._scratch, self._states[0], _PHYSICS)
         return self._scratch.qpos.copy(), self._scratch.qvel.copy()
 
@@ -91,7 +83,7 @@ ENGINES = {
         module="mujoco",
         packages=("mujoco",),
         variants=lambda _: [Variant("cpu", "", 64, 1)],
-        start=OneWorld,
+        start=_OneWorld,
         batched=False,
     ),
     "threads": Engine(
@@ -99,6 +91,6 @@ ENGINES = {
         module="mujoco",
         packages=("mujoco",),
         variants=lambda processors: [Variant("cpu", "", 64, processors)],
-        start=ThreadedWorlds,
+        start=_ThreadedWorlds,
     ),
 }

@@ -18,7 +18,7 @@ _FIELDS = ("qpos", "qvel", "act", "ctrl", "time", "qacc_warmstart")
 """All that the next step depends on, in the models of a course."""
 
 
-class WarpWorlds:
+class _WarpWorlds:
     """A batch on a device of Warp."""
 
     def __init__(self, model: Any, data: Any, velocities: Array, variant: Variant) -> None:
@@ -34,7 +34,6 @@ class WarpWorlds:
         self._graph: Any = None
 
     def advance(self, steps: int) -> None:
-        """Make so many steps in every world, and wait for them."""
         import mujoco_warp
         import warp
 
@@ -53,19 +52,16 @@ class WarpWorlds:
             warp.synchronize_device(self._device)
 
     def command(self, control: tuple[float, ...]) -> None:
-        """Give this command to all worlds."""
         table = np.broadcast_to(np.asarray(control, np.float32), self._data.ctrl.shape)
         self._data.ctrl.assign(np.ascontiguousarray(table))
 
     def reset(self) -> None:
-        """Go back to the beginning."""
         import warp
 
         for name, array in self._beginning.items():
             warp.copy(getattr(self._data, name), array)
 
     def state(self) -> tuple[Array, Array]:
-        """The state of the first world."""
         return (
             self._data.qpos.numpy()[0].astype(np.float64),
             self._data.qvel.numpy()[0].astype(np.float64),
@@ -88,6 +84,6 @@ ENGINES = {
         module="mujoco_warp",
         packages=("mujoco-warp", "warp-lang"),
         variants=variants,
-        start=WarpWorlds,
+        start=_WarpWorlds,
     )
 }

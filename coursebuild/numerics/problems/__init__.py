@@ -1,7 +1,4 @@
-"""The hard cases, those of a kind in a module.
-
-Entry point: `all_problems()`.
-"""
+"""The hard cases, those of a kind in a module."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """Cases 7 and 9: a block and a ball on a slope, and a heavy body that rests on a light one.
 
-Entry point: `problems()`; `RestingStack` is the closed form of the latter.
-
 1. *Slope*: the cone of friction, rolling, creep of what should stick. Gravity is tilted instead of
    the floor, along an axis of the contact's frame or half-way between its two: a pyramidal cone
    gives only 1/√2 of the friction there.

@@ -1,7 +1,4 @@
-"""Case 13: things that are very small, very far, or given with few digits.
-
-Entry point: `problems()`.
-"""
+"""Case 13: things that are very small, very far, or given with few digits."""
 
 from __future__ import annotations
 

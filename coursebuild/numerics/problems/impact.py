@@ -1,7 +1,5 @@
 """Cases 4 and 8: a stone that is thrown, an elastic impact, and Newton's cradle.
 
-Entry point: `problems()`.
-
 The stone flies without air; the semi-implicit method is wrong by exactly g T h/2. The cradle has
 gaps, or two balls that touch.
 

@@ -1,8 +1,5 @@
 """Cases 10 and 11: a double pendulum, whose errors double until they mean nothing, and chains.
 
-Entry point: `problems()`; `Chain` has Newton's and Euler's equations, `DoublePendulum` integrates
-its own with 40 digits.
-
 1. *Double pendulum.* Sines and cosines are states of their own (c′ = −s ω, s′ = c ω), so that the
    equations are rational and `decimal` numbers can integrate them. Where the motion is chaotic, one
    run says little: what is known of it is said of an ensemble of beginnings that lie around the one

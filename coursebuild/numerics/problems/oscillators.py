@@ -1,8 +1,5 @@
 """Cases 2, 5, 6 and 12: pendulums with a closed form, and linear oscillators with a known limit.
 
-Entry point: `problems()`: a pendulum, a damped spring, a servo, and a soft equality constraint;
-`Swing` is the closed form of the first.
-
 1. *Pendulum*, let go at 90° and at 179°, as a hinge, as a ball joint and held by `connect`. The
    last one's error is that of the soft constraint: it does not go away with the timestep.
 2. *Damped spring.* Joint damping is implicit, unless `eulerdamp` is off.

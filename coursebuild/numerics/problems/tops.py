@@ -1,8 +1,5 @@
 """Case 3: a symmetric top, a thin rod and a coin that turn freely, and Lagrange's heavy top.
 
-Entry point: `problems()`; `FreeTop` is a closed form, `transverse_growth` what a step multiplies
-the transverse velocity by, `HeavyTop` that of the heavy one.
-
 1. A step of the explicit update ω + h ω̇ multiplies the transverse part by 1 + iz, z = hΩ; one of
    the linearly implicit update by 1/(1 − iz); the Runge–Kutta method by its stability polynomial.
 2. The heavy top, let go at a tilt with spin only: u = cos θ obeys

@@ -1,7 +1,5 @@
 """Case 1: a box that turns about its intermediate axis, and flips (Dzhanibekov's effect).
 
-Entry point: `problem()`; `Tumbling` is the closed form.
-
 Source: L. D. Landau, E. M. Lifshitz, Mechanics, § 37: angular velocities by Jacobi's elliptic
 functions, the precession about the angular momentum by a quadrature.
 """

@@ -1,8 +1,5 @@
 """What takes no part in what a scene shows, as far as runs can say: bodies, joints, couplings.
 
-Entry points: `far_bodies(text, names, scenarios, runs)`, `resting_joints(text, runs)`,
-`couplings(text)`.
-
 1. What touched a body that can move and is left, at any time and along any chain, is no candidate,
    however little that seems to have changed.
 2. What refers to a thing that goes, such as a sensor, goes with it.
@@ -19,7 +16,12 @@ from msgspec.structs import replace
 
 from coursebuild.numerics.pilot import scales
 from coursebuild.numerics.problem import Array, Scenario
-from coursebuild.numerics.pruning.candidates import Item, display_name, is_forceless_tendon
+from coursebuild.numerics.pruning.candidates import (
+    Item,
+    commanded_actuators,
+    display_name,
+    is_forceless_tendon,
+)
 from coursebuild.numerics.pruning.comparison import ALIKE, WatchedRun, watch
 from coursebuild.numerics.pruning.model_text import ModelText, section_of, thing_kind
 from coursebuild.numerics.pruning.xml_edits import Element, ModelEdit, set_attributes
@@ -38,10 +40,22 @@ def far_bodies(
 
     It is about trees of bodies that are driven or couple with others, are set in motion, or
     contain a name that code uses; where there are none, about mechanisms rather than single free
-    bodies; where there are none, about those with names. Where all are alike none is far.
+    bodies; where there are none, about those with names. Where all are alike none is far. Where
+    some actuators get commands, the others drive nothing: at most they hold it.
     """
     model, tree = text.model, text.model.body_treeid
-    used_names = {name for inner in text.elements for name in _references(inner, code_names)}
+    commanded = commanded_actuators(model, scenarios)
+    used_names = {
+        name
+        for inner in text.elements
+        if not (
+            commanded
+            and section_of(inner) == "actuator"
+            and inner.get("name") not in code_names
+            and commanded.isdisjoint(text.ids(inner))
+        )
+        for name in _references(inner, code_names)
+    }
     used_names |= set(code_names)
     used_names |= {
         name.rstrip("0123456789") for name in used_names
@@ -85,11 +99,17 @@ def far_bodies(
             break
         far = {element: numbers for element, numbers in far.items() if not numbers & near}
     return [
-        Item("far-body", display_name(element), element, (element, *_users(text, element)))
+        Item(
+            "far-body",
+            display_name(element),
+            element,
+            (element, *_users(text, element, _REFERRING)),
+        )
         for element in far
     ]
 
 
+_REFERRING = ("contact", "sensor", "actuator")
 _NOT_REFERENCES = frozenset(("name", "class", "childclass", "material", "mesh", "file", "type"))
 
 
@@ -109,7 +129,7 @@ def _references(element: Element, code_names: Collection[str]) -> Iterator[str]:
 def _users(
     text: ModelText,
     thing: Element,
-    sections: Collection[str] = ("contact", "sensor"),
+    sections: Collection[str],
     references: str = "",
 ) -> list[Element]:
     """The elements of some sections that refer to something, and go with it.

@@ -1,9 +1,5 @@
 """Candidates: what could be left out of a model, and why all motions would stay the same.
 
-Entry points: `unread_elements(text, scenarios)`, of which no motion is computed;
-`unreachable_contacts(text)`, where nothing can touch; `idle_contacts`, `contact_of_rest`,
-`inner_geoms`, `primitive_meshes`, `other_settings`, for which only runs speak.
-
 1. The proof of a kind holds only if MuJoCo compiles the model without the thing, so that no other
    element refers to it. The survey checks that nothing else in the compiled model changes.
 2. What has no proof is tried by running. The integrator and the timestep are not candidates: they
@@ -173,6 +169,7 @@ def unread_elements(text: ModelText, scenarios: Collection[Scenario]) -> list[It
     """Elements that no motion is computed from, in the order of their kinds."""
     keys = [e for e in text.elements if e.tag == "key" and section_of(e) == "keyframe"]
     start_keys = {keys[s.keyframe] for s in scenarios if 0 <= s.keyframe < len(keys)}
+    commanded = commanded_actuators(text.model, scenarios)
     items = [
         Item(f"{flag}-flag", flag, element, drops=((element, flag),))
         for element in text.elements
@@ -180,19 +177,19 @@ def unread_elements(text: ModelText, scenarios: Collection[Scenario]) -> list[It
         if element.tag == "flag" and element.get(flag) == "enable"
     ]
     for element in text.elements:
-        kind = _unread_kind(text, element, scenarios)
+        kind = _unread_kind(text, element, commanded)
         if kind and element not in start_keys:
             items.append(Item(kind, display_name(element), element, (element,)))
     kinds = list(KINDS)
     return sorted(items, key=lambda item: kinds.index(item.kind))
 
 
-def _unread_kind(text: ModelText, element: Element, scenarios: Collection[Scenario]) -> str:
+def _unread_kind(text: ModelText, element: Element, commanded: Collection[int]) -> str:
     """The kind of an element in a finding; empty for one that a motion may depend on."""
     ids, tag, section = text.ids(element), element.tag, section_of(element)
     if section == "sensor" and tag not in ("user", "plugin"):
         return "sensor-unread"
-    if section == "actuator" and ids and _is_forceless_actuator(text.model, ids, scenarios):
+    if section == "actuator" and ids and _is_forceless_actuator(text.model, ids, commanded):
         return "actuator-idle"
     if section == "tendon" and ids and is_forceless_tendon(text.model, ids):
         return "tendon-idle"
@@ -222,22 +219,26 @@ _RESISTANCE = ("damping", "dampingpoly", "armature")
 """Properties by which an actuator resists motion, whatever its command."""
 
 
-def _is_forceless_actuator(
-    model: Any, ids: Collection[int], scenarios: Collection[Scenario]
-) -> bool:
+def commanded_actuators(model: Any, scenarios: Collection[Scenario]) -> frozenset[int]:
+    """The actuators that a scenario or a keyframe gives a command other than 0, by number."""
+    rows = [*model.key_ctrl, *(row for scenario in scenarios for row in scenario.controls)]
+    is_used = np.any([np.zeros(model.nu), *rows], axis=0)
+    ends = model.actuator_ctrladr + model.actuator_ctrlnum
+    return frozenset(
+        i
+        for i, (start, end) in enumerate(zip(model.actuator_ctrladr, ends, strict=True))
+        if np.any(is_used[start:end])
+    )
+
+
+def _is_forceless_actuator(model: Any, ids: Collection[int], commanded: Collection[int]) -> bool:
     """Whether these actuators get no command, and give no force without one, in any state."""
-    commands = [
-        *model.key_ctrl,
-        *(np.array(row) for scenario in scenarios for row in scenario.controls),
-    ]
     linear = (int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE))
     for i in ids:
         ranges = [(model.actuator_ctrllimited[i], model.actuator_ctrlrange[i])]
         ranges += [(model.actuator_forcelimited[i], model.actuator_forcerange[i])]
-        first = int(model.actuator_ctrladr[i])
-        controls = slice(first, first + int(model.actuator_ctrlnum[i]))
         if (
-            any(np.any(row[controls]) for row in commands)
+            i in commanded
             or any(np.any(getattr(model, f"actuator_{name}")[i]) for name in _RESISTANCE)
             or model.actuator_biastype[i] != mujoco.mjtBias.mjBIAS_NONE
             or model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE

@@ -1,9 +1,5 @@
 """Two models in the same scenario: whether they do the same, bit for bit or nearly.
 
-Entry points: `pruning_scenes(model, declarations, quick=…)`, the scenarios by which a smaller model
-is judged; `watch(model, scene)`, the whole model in one; `nearby_scenes(model, run, count)`, from
-random starts nearby; `compare(base, variant, index, runs)`.
-
 1. Both begin in the same state and are stepped side by side to the end: neither is ever set to the
    state of the other, which would hide what a part does that is gone. Positions, velocities,
    activations and the sensors that are left must be the same bits after every step; so must
@@ -244,20 +240,30 @@ class MotionComparison(Struct, frozen=True):
 
 
 def compare(
-    base: Any, variant: Any, index: IndexMap, runs: Sequence[WatchedRun]
+    whole: Any,
+    variant: Any,
+    index: IndexMap,
+    runs: Sequence[WatchedRun],
+    remainder: tuple[Any, IndexMap] | None = None,
 ) -> MotionComparison:
-    """Run base and variant side by side as the base ran before, each from where it begins.
+    """Run whole model and variant side by side as the whole ran before, each from where it begins.
 
     A run ends where a difference can be seen, which is then the largest that is known.
+    `remainder`: a smaller model that is known to move alike, to run in place of the whole one.
 
     Raises:
-        ValueError: a state of the base cannot be transferred.
+        ValueError: a state of the whole model cannot be transferred.
     """
+    base, base_index = remainder or (whole, index_map(whole, {}))
     for model in (base, variant):
         without_reset(model)
     worst = MotionComparison(True, 0.0)
     for run in runs:
-        comparison = _follow(base, variant, index, run)
+        start = initial_data(run.scene.scenario, whole)
+        data, variant_data = mujoco.MjData(base), mujoco.MjData(variant)
+        transfer(whole, start, base_index, base, data)
+        transfer(whole, start, index, variant, variant_data)
+        comparison = _follow((base, data, base_index), (variant, variant_data, index), run)
         identical = worst.identical and comparison.identical
         worst = max(worst, comparison, key=lambda c: (c.difference, bool(c.shown)))
         worst = replace(worst, identical=identical)
@@ -266,17 +272,22 @@ def compare(
     return worst
 
 
-def _follow(base: Any, variant: Any, index: IndexMap, run: WatchedRun) -> MotionComparison:
+def _follow(
+    first: tuple[Any, Any, IndexMap], second: tuple[Any, Any, IndexMap], run: WatchedRun
+) -> MotionComparison:
+    """Compare two models, each with its state and its places in the whole, in a run."""
+    (base, data, base_index), (variant, variant_data, variant_index) = first, second
     scene, identical = run.scene, True
+    index = {
+        size: np.searchsorted(base_index[size], places) for size, places in variant_index.items()
+    }
     gauge = _Gauge(base, variant, index, scene)
-    geoms = {int(whole): i for i, whole in enumerate(index["ngeom"])}
+    geoms = {int(number): i for i, number in enumerate(index["ngeom"])}
     own_geoms = {i: i for i in range(variant.ngeom)}
-    data, variant_data = initial_data(scene.scenario, base), mujoco.MjData(variant)
-    transfer(base, data, index, variant, variant_data)
     for step, command in enumerate(scene.scenario.commands(scene.timestep)):
         if command:
-            data.ctrl[:] = command
-            variant_data.ctrl[:] = data.ctrl[index["nu"]]
+            data.ctrl[:] = np.take(command, base_index["nu"])
+            variant_data.ctrl[:] = np.take(command, variant_index["nu"])
         advance(base, data)
         advance(variant, variant_data)
         if identical:

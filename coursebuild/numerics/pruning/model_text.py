@@ -1,7 +1,5 @@
 """A model as its files and as what MuJoCo compiles from them.
 
-Entry point: `open_model`; then `ModelText.compile(edits)`, `ModelText.elements`, `ModelText.ids`.
-
 1. Files that the model includes are found where MuJoCo finds them, and read as markup.
 2. To compile a change, all files are joined to one text. That this gives the same model is checked
    byte by byte on the unchanged files.
@@ -25,10 +23,12 @@ from coursebuild.numerics.pruning.xml_edits import (
     Markup,
     ModelEdit,
     apply_edits,
+    merge_edits,
     parse_markup,
     set_attributes,
     splice,
 )
+from coursebuild.numerics.reports.diet_report import TextEdit
 
 _DEEPEST = 32
 
@@ -86,6 +86,17 @@ class ModelText:
             path: apply_edits(data[path], file_edits)
             for path, file_edits in _group_by_path(edits).items()
         }
+
+    def describe(self, edits: Iterable[ModelEdit]) -> tuple[TextEdit, ...]:
+        """These changes with their places and what stood there."""
+        documents, text_edits = {document.path: document for document in self.documents}, []
+        for edit in merge_edits(edits):
+            document = documents[edit.path]
+            line, column = document.position(edit.start)
+            old = document.data[edit.start : edit.end].decode("utf-8", "replace")
+            new = edit.new.decode("utf-8", "replace")
+            text_edits.append(TextEdit(edit.path, line, column, edit.start, edit.end, old, new))
+        return tuple(text_edits)
 
     def ids(self, element: Element) -> tuple[int, ...]:
         """The numbers of the things that an element becomes; empty where that is not known."""

@@ -1,8 +1,5 @@
 """Which geoms can never touch, whatever happens: a bound, not an observation; which enclose others.
 
-Entry points: `possible_pairs(model)`, `iterate_pairs(model)`, `find_separate(model, pairs)`;
-`PREMISES`, the fields that the bound rests on; `is_enclosed(model, geom)`, `depths`.
-
 1. MuJoCo looks for contact between geoms whose masks allow it, but not within a body, nor between
    bodies that are welded to each other or do not move, between parent and child, or where an
    `exclude` says so; and it does between those of a `pair`. This is repeated here.

@@ -1,9 +1,5 @@
 """What code may notice of a model: what cannot be ruled out counts as a use.
 
-Entry points: `read_code(path, text, course_modules)`, `ModelReader`; of two compiled models, or of
-their states, `difference(whole, variant)`, `unrelated_fields(fields, kinds)`, and `VIEWS`, the
-words by which code asks a model for one thing.
-
 1. Code is not interpreted, only searched for words. A thing counts as used where code has its name
    as a text, a field where its name stands anywhere, and every thing of a kind where code has the
    word that asks for one, unless a complete name follows: `model.sensor("tip")`.
@@ -20,6 +16,7 @@ from __future__ import annotations
 import functools
 import re
 import tokenize
+import unicodedata
 from collections.abc import Collection, Iterator
 from typing import Any
 
@@ -210,6 +207,8 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Mod
     rest = _THING.sub(lambda match: "named" if match[1] in VIEWS else match[0], rest)
     is_python = path.endswith(".py")
     code = _python_code(rest) if is_python else _PROSE.sub(lambda m: m[1] or '""', rest)
+    if is_python:  # to which letters of another width are the same
+        code = unicodedata.normalize("NFKC", code)
     words = frozenset(_WORD.findall(rest if filled else code))
     if not words.isdisjoint(("mj_stateSize", "mj_getState", "mj_setState")):
         words |= _STATE_WORDS

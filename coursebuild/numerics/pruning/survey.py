@@ -1,17 +1,11 @@
 """The scene diet of one model.
 
-Entry point: `Surveyor`, whose `survey` gives a `Survey`.
-
 1. The model runs in each scenario, and from random starts nearby. From one that is lost nothing is
    claimed.
-2. *Proved*: what no motion is computed of is taken out at once, as much as the compiler can do
-   without, as changes nothing else in the compiled model, and as no code can notice; every scenario
-   must give the same bits.
-3. *The same in what was run*: of the rest, as much of each kind is taken out as changes no motion
-   in the scenarios; only the time that it saves speaks for it.
-4. Scripts and labs of the course run with what is left: what changes their output is no finding.
+2. What is *proved* needless goes first, then far bodies. All else is tried in what is left: as much
+   of each kind is taken out as changes no motion, and only the time that it saves speaks for it.
+3. Scripts and labs of the course run with what is left: what changes their output is no finding.
    Other settings, with which they compute other digits, are tried in the scenarios alone.
-5. In the end all that `--fix` would change is taken out together; and so is everything found.
 """
 
 from __future__ import annotations
@@ -52,7 +46,7 @@ from coursebuild.numerics.pruning.model_text import ModelText
 from coursebuild.numerics.pruning.reachability import PREMISES
 from coursebuild.numerics.pruning.readers import ModelReader, difference, unrelated_fields
 from coursebuild.numerics.pruning.trials import PrunedModel, PruningTrials, largest_subset
-from coursebuild.numerics.pruning.xml_edits import ModelEdit, merge_edits, place_of
+from coursebuild.numerics.pruning.xml_edits import ModelEdit, place_of
 from coursebuild.numerics.reports.diet_report import (
     MEASURED_LABEL,
     PROVED_LABEL,
@@ -63,7 +57,6 @@ from coursebuild.numerics.reports.diet_report import (
     RejectedTrial,
     Saving,
     StaleKeep,
-    TextEdit,
 )
 from coursebuild.numerics.scene import Scene
 
@@ -164,13 +157,14 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     def _try_all(self, report: DietReport) -> Survey:
         """Try every candidate, then all findings together."""
         text, runs = self.text, self.trials.runs
-        groups = self._prove()
+        groups = self._settle(self._prove())
         proved = {item.element for group in groups for item in group.items}
         self.tell("what never moves")
         names = {name for reader in self.readers for name in reader.names}
         scenarios = [run.scene.scenario for run in self.good_runs]
+        far_items = far_bodies(text, names, scenarios, runs)
+        groups += self._settle(self._try_by_running([far_items]))
         candidates = [
-            far_bodies(text, names, scenarios, runs),
             resting_joints(text, self.good_runs),
             [item for item in couplings(text) if item.element not in proved],
         ]
@@ -196,12 +190,21 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             report,
             findings=tuple(group.finding for group in groups),
             tried=tuple(self.rejected),
-            fixed=None if fixed is None else self.trials.measure_saving(fixed.edits, fixed),
+            fixed=None
+            if fixed is None
+            else self.trials.measure_saving(fixed.edits, fixed, self.trials.whole),
             slim=slim,
             slim_difference=slim_difference,
             stale=tuple(StaleKeep(k, at.path, at.line, at.column) for k, at in stale.items()),
         )
         return Survey(report, self.text, () if fixed is None else fixed.edits)
+
+    def _settle(self, groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
+        """Confirm groups, and try the rest without them, but for what is kept."""
+        groups = self._confirm(groups) if groups else []
+        unkept = [group for group in groups if not group.finding.kept]
+        self.trials.absences += tuple(item for group in unkept for item in group.items)
+        return groups
 
     def _confirm(self, groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
         """The groups without which scripts and labs of the course print the same."""
@@ -260,25 +263,31 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         if trial is None:
             return False
         kinds = _views(items)
-        change = difference(self.text.model, trial.model)
         own_fields = {field for item in items for field in KINDS[item.kind].fields.split()}
-        if unrelated_fields(change, kinds) - own_fields:
+        if unrelated_fields(difference(self.text.model, trial.model), kinds) - own_fields:
             return False
+        change = self.trials.difference(trial, self.trials.whole)
         sleeps = int(self.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
         may_sleep = sleeps or any(reader.touches({"enableflags"}) for reader in self.readers)
         if may_sleep and "tree_sleep_policy" in change:
             return False
-        change |= self.trials.state_difference(trial)
         if self._find_noticing_reader((), kinds, change) is not None:
             return False
-        result = self.trials.compare(trial)
+        result = self.trials.compare(trial, self.trials.whole)
         return result is not None and result.identical
 
     def _try_by_running(self, candidates: Iterable[Sequence[Item]]) -> list[_PrunedGroup]:
         """Take out of each list of items as many of a kind as change no motion."""
         groups: list[_PrunedGroup] = []
+        absences = {element for item in self.trials.absences for element in item.removals}
         for items in candidates:
-            for reason, similar in self._group_items(items):
+            left = (
+                item
+                for item in items
+                if item.element is None
+                or absences.isdisjoint((item.element, *item.element.ancestors()))
+            )
+            for reason, similar in self._group_items(left):
                 self.tell(similar[0].kind)
                 group = self._try_items(similar, reason)
                 groups += [] if group is None else [group]
@@ -289,31 +298,34 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
 
         A shape that stands for a mesh is another scene: it may differ by less than can be seen.
         """
-        results: list[MotionComparison] = []
+        unlike: list[MotionComparison] = []
+        alike: list[MotionComparison] = []  # the last is of all that is removable
         tolerance = 1.0 if items[0].kind == "mesh-primitive" else ALIKE
+        trials, absences = self.trials, self.trials.absences
+        rest = trials.prune(absences) or trials.whole
 
         def moves_alike(items: Sequence[Item]) -> bool:
-            trial = self.trials.prune(items)
-            result = None if trial is None else self.trials.compare(trial)
-            if result is not None:
-                results.append(result)
-            return result is not None and result.difference < tolerance
+            trial = trials.prune([*absences, *items])
+            result = None if trial is None else trials.compare(trial, rest)
+            if result is None:
+                return False
+            is_alike = result.difference < tolerance
+            (alike if is_alike else unlike).append(result)
+            return is_alike
 
         removable = largest_subset(items, moves_alike)
         if not removable:
-            smallest = min(results, key=lambda result: result.difference, default=None)
+            least = min(unlike, key=lambda result: result.difference, default=None)
             reason_text = (
-                "it cannot be removed alone" if smallest is None else f"without it {smallest.shown}"
+                "it cannot be removed alone" if least is None else f"without it {least.shown}"
             )
-            self._reject(items, None if smallest is None else smallest.difference, reason_text)
+            self._reject(items, None if least is None else least.difference, reason_text)
             return None
-        if not moves_alike(removable):
-            return None
-        group = self._make_group(removable, reason, MEASURED_LABEL, results[-1])
+        group = self._make_group(removable, reason, MEASURED_LABEL, alike[-1])
         saving = group.finding.saving
         is_slow = saving.time is None or not (saving.certain and saving.time >= MIN_SPEEDUP)
         if self.clock is not None and is_slow and not reason:
-            self._reject(removable, results[-1].difference, "it saves no time")
+            self._reject(removable, alike[-1].difference, "it saves no time")
             return None
         return group
 
@@ -333,11 +345,11 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     def _make_group(
         self, items: Sequence[Item], reason: str, label: str, comparison: MotionComparison
     ) -> _PrunedGroup:
-        kind, trial, edits = items[0].kind, self.trials.prune(items), self.trials.edits(items)
-        change: frozenset[str] = frozenset()
-        if trial is not None:  # not where it goes only with what uses it
-            change = difference(self.text.model, trial.model)
-            change |= self.trials.state_difference(trial)
+        kind, trials, edits = items[0].kind, self.trials, self.trials.edits(items)
+        rest = trials.prune(trials.absences) or trials.whole
+        trial = trials.prune([*trials.absences, *items])
+        # One that is proved may go only with what uses it.
+        change = frozenset() if trial is None else trials.difference(trial, rest)
         timed = not kind.startswith("unused-") or kind == "unused-site"
         reader = self._find_noticing_reader((), _views(items), change)
         unfixed = self._reason_unfixed(kind, reason, label, edits)
@@ -349,8 +361,8 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             difference=comparison.difference,
             scenarios=tuple(run.scene.name for run in self.good_runs),
             proof=KINDS[kind].proof,
-            saving=self.trials.measure_saving(edits, trial, timed=timed),
-            edits=self._text_edits(edits),
+            saving=trials.measure_saving(edits, trial, rest, timed=timed),
+            edits=self.text.describe(edits),
             fixable=not unfixed,
             unfixed=unfixed,
             kept=reason,
@@ -379,17 +391,6 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         attempt = RejectedTrial(items[0].kind, message_of(items), names, finite, reason)
         self.rejected.append(attempt)
 
-    def _text_edits(self, edits: Sequence[ModelEdit]) -> tuple[TextEdit, ...]:
-        by_path = {document.path: document for document in self.text.documents}
-        text_edits = []
-        for edit in merge_edits(edits):
-            document = by_path[edit.path]
-            old = document.data[edit.start : edit.end].decode("utf-8", "replace")
-            line, column = document.position(edit.start)
-            new = edit.new.decode("utf-8", "replace")
-            text_edits.append(TextEdit(edit.path, line, column, edit.start, edit.end, old, new))
-        return tuple(text_edits)
-
     def _prune(self, groups: Sequence[_PrunedGroup]) -> PrunedModel | None:
         return self.trials.prune([item for group in groups for item in group.items])
 
@@ -405,30 +406,28 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
 
         def moves_alike(groups: Sequence[_PrunedGroup]) -> bool:
             trial = self._prune(groups)
-            result = None if trial is None else self.trials.compare(trial)
+            result = None if trial is None else self.trials.compare(trial, self.trials.whole)
             return result is not None and result.difference < ALIKE
 
         groups = [group for group in groups if group.finding.difference < ALIKE]
         by_time = sorted(groups, key=lambda group: -(group.finding.saving.time or 0.0))
-        is_setting = [group.finding.kind in SETTINGS for group in by_time]
-        things = [group for group, setting in zip(by_time, is_setting, strict=True) if not setting]
-        best = largest_subset(things, moves_alike)
-        saving = self._measure_groups(best)
+        best = largest_subset(
+            [group for group in by_time if group.finding.kind not in SETTINGS], moves_alike
+        )
+        trial = self._prune(best)
         # What is quicker in the whole model need not be so in what is left of it.
-        for group, setting in zip(by_time, is_setting, strict=True):
-            if setting and moves_alike([*best, group]):
-                other_saving = self._measure_groups([*best, group])
-                if other_saving and (other_saving.time or 0.0) > 1.03 * (
-                    (saving and saving.time) or 1.0
-                ):
-                    best, saving = [*best, group], other_saving
-        trial = self._prune(best) if best else None
-        result = None if trial is None else self.trials.compare(trial)
-        return (None, None) if result is None else (saving, result.difference)
-
-    def _measure_groups(self, groups: Sequence[_PrunedGroup]) -> Saving | None:
-        trial = self._prune(groups) if groups else None
-        return None if trial is None else self.trials.measure_saving(trial.edits, trial)
+        for group in by_time:
+            variant = self._prune([*best, group]) if group.finding.kind in SETTINGS else None
+            if variant is None or trial is None or not moves_alike([*best, group]):
+                continue
+            saving = self.trials.measure_saving(variant.edits, variant, trial)
+            if saving.certain and (saving.time or 0.0) > 1.0:
+                best, trial = [*best, group], variant
+        result = self.trials.compare(trial, self.trials.whole) if best and trial else None
+        if trial is None or result is None:
+            return None, None
+        saving = self.trials.measure_saving(trial.edits, trial, self.trials.whole)
+        return saving, result.difference
 
 
 def _views(items: Iterable[Item]) -> frozenset[str]:

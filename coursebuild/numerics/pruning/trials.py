@@ -1,7 +1,4 @@
-"""A model without some things: compiled, compared with the whole model, run and timed beside it.
-
-Entry points: `PruningTrials`, which makes a `PrunedModel`; `largest_subset(items, holds)`.
-"""
+"""A model without some things: compiled, compared with the whole model, run and timed beside it."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ import mujoco
 import numpy as np
 from msgspec import Struct
 
-from coursebuild.numerics.costs import Clock, Timing, scenario_job, time_jobs
+from coursebuild.numerics.costs import Clock, Job, Timing, scenario_job, time_jobs
 from coursebuild.numerics.pruning.candidates import Item
 from coursebuild.numerics.pruning.comparison import (
     KEY_SIZES,
@@ -88,6 +85,13 @@ class PruningTrials(Struct, eq=False, dict=True):
     """These scenarios."""
     clock: Clock | None
     quick: bool
+    absences: tuple[Item, ...] = ()
+    """What is gone for good, so that more is tried in what is left, which may be far less."""
+
+    @cached_property
+    def whole(self) -> PrunedModel:
+        """The model as it is."""
+        return PrunedModel((), self.text.model, index_map(self.text.model, {}))
 
     def prune(self, items: Iterable[Item]) -> PrunedModel | None:
         """The model without these items; `None` if it does not compile, or differs otherwise."""
@@ -109,25 +113,31 @@ class PruningTrials(Struct, eq=False, dict=True):
         files = self.text.files(edits)
         return sum(before[path] - len(data) for path, data in files.items())
 
-    def compare(self, trial: PrunedModel) -> MotionComparison | None:
-        """Compare it with the whole model in all runs; `None` where that is not possible."""
+    def compare(self, trial: PrunedModel, base: PrunedModel) -> MotionComparison | None:
+        """Compare two parts of the model in all runs; `None` where that is not possible."""
+        remainder = base.model, base.index
         try:
-            return compare(self.text.model, trial.model, trial.index, self.runs)
+            return compare(self.text.model, trial.model, trial.index, self.runs, remainder)
         except (ValueError, mujoco.FatalError):
             return None
 
-    def state_difference(self, trial: PrunedModel) -> frozenset[str]:
-        """The fields by which code could tell both apart in some states of the whole model."""
-        whole: Any = self.text.model
-        fields: frozenset[str] = frozenset()
+    def difference(self, trial: PrunedModel, base: PrunedModel) -> frozenset[str]:
+        """The fields by which code could tell both apart, in the models and in some states."""
+        fields = difference(base.model, trial.model)
         for state in self._states:
-            data, variant_data = mujoco.MjData(whole), mujoco.MjData(trial.model)
-            mujoco.mj_setState(whole, data, state, STATE)
-            transfer(whole, data, trial.index, trial.model, variant_data)
-            advance(whole, data)
-            advance(trial.model, variant_data)
-            fields |= difference(data, variant_data)
+            data = mujoco.MjData(self.text.model)
+            mujoco.mj_setState(self.text.model, data, state, STATE)
+            base_data, trial_data = self._part(data, base), self._part(data, trial)
+            advance(base.model, base_data)
+            advance(trial.model, trial_data)
+            fields |= difference(base_data, trial_data)
         return fields
+
+    def _part(self, data: Any, part: PrunedModel) -> Any:
+        """A state of the whole model in a part of it."""
+        part_data = mujoco.MjData(part.model)
+        transfer(self.text.model, data, part.index, part.model, part_data)
+        return part_data
 
     @cached_property
     def _states(self) -> list[Any]:
@@ -143,42 +153,44 @@ class PruningTrials(Struct, eq=False, dict=True):
         return states
 
     def measure_saving(
-        self, edits: Iterable[ModelEdit], trial: PrunedModel | None, *, timed: bool = True
+        self,
+        edits: Iterable[ModelEdit],
+        trial: PrunedModel | None,
+        base: PrunedModel,
+        *,
+        timed: bool = True,
     ) -> Saving:
         """Measure the saving of a change, in time and bytes; `None`: it does not go alone."""
         text = self._count_saved_bytes(edits)
         if trial is None:
             return Saving(None, None, False, 0, text)
-        memory = len(model_bytes(self.text.model)) - len(model_bytes(trial.model))
-        timing = self._measure_time(trial) if timed else None
+        memory = len(model_bytes(base.model)) - len(model_bytes(trial.model))
+        timing = self._measure_time(trial, base) if timed else None
         if timing is None:
             return Saving(None, None, False, memory, text)
         ratio = timing.ratio
         return Saving(ratio.value, ratio.half_width / 2, timing.certain, memory, text)
 
-    def _measure_time(self, trial: PrunedModel) -> Timing | None:
-        """Time of the whole model over that of this one, in whole scenarios."""
+    def _measure_time(self, trial: PrunedModel, base: PrunedModel) -> Timing | None:
+        """Time of one part of the model over that of another, in whole scenarios."""
         if self.clock is None:
             return None
-        whole, index, states = self.text.model, trial.index, []
-        scenarios, timestep = [scene.scenario for scene in self.scenes], self.scenes[0].timestep
         try:
-            for scenario in scenarios:
-                data, variant_data = initial_data(scenario, whole), mujoco.MjData(trial.model)
-                transfer(whole, data, index, trial.model, variant_data)
-                states.append(full_state(trial.model, variant_data))
+            jobs = [self._job(base), self._job(trial)]
         except ValueError:
             return None
-        actuators = index["nu"].tolist()
-        jobs = (
-            scenario_job(whole, scenarios, timestep),
-            scenario_job(trial.model, scenarios, timestep, states=states, actuators=actuators),
-        )
         with silent():
-            whole_time, pruned_time = time_jobs(jobs, 1, self.clock, quick=self.quick)
-        return (
-            whole_time if min(whole_time.nanoseconds.low, pruned_time.nanoseconds.low) > 0 else None
-        )
+            base_time, trial_time = time_jobs(jobs, 1, self.clock, quick=self.quick)
+        can_tell = min(base_time.nanoseconds.low, trial_time.nanoseconds.low) > 0
+        return base_time if can_tell else None
+
+    def _job(self, part: PrunedModel) -> Job:
+        """All scenarios in a part of the model."""
+        scenarios = [scene.scenario for scene in self.scenes]
+        starts = [initial_data(scenario, self.text.model) for scenario in scenarios]
+        states = [full_state(part.model, self._part(start, part)) for start in starts]
+        actuators, timestep = part.index["nu"].tolist(), self.scenes[0].timestep
+        return scenario_job(part.model, scenarios, timestep, states=states, actuators=actuators)
 
 
 def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], IndexMap]:

@@ -1,9 +1,5 @@
 """MJCF as text whose every element and attribute knows its place in bytes, and changes of it.
 
-Entry points: `Markup`, `Element`, `parse_markup(path, data)`, `splice`, `place_of`; `ModelEdit`:
-`remove_elements`, `set_attributes`, `drop_attribute`, `drop_numbers` and `set_option` make them;
-`apply_edits` makes the new bytes, `merge_edits` fewer edits of many.
-
 1. The standard library's parser gives the bytes at which an element begins and ends; attributes are
    then looked up in its tag. Whatever the file declares, it is read as UTF-8, as MuJoCo does.
 2. Nothing is normalised: an edit replaces bytes, and all others stay as their author wrote them.

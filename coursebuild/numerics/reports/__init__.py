@@ -1,10 +1,4 @@
-"""The results of measurements as values, to be recorded, printed, drawn, and shown on pages.
-
-`scene_report`: speed against error of a model, and its parameters at other values; `case_report`:
-the hard cases; `diet_report`: what a model can be without. `records`: reports as files, and how two
-differ; `shown_errors`: which errors are shown, and texts; `report_plots`: charts. Nothing here
-measures.
-"""
+"""The results of measurements as values, to be recorded, printed, drawn, and shown on pages."""
 
 from __future__ import annotations
 

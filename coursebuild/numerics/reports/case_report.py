@@ -1,9 +1,4 @@
-"""The report on a hard case, and its plots.
-
-Entry points: `CaseReport`; `case_quantities(report)`, the errors to draw, and `case_svgs(report,
-quantity, name)`; `course_cases(report)`, the hard cases of a course's own: scenarios of
-models whose exact motion stands in `exact_file`.
-"""
+"""The report on a hard case, or on a scenario of the course whose exact motion is known."""
 
 from __future__ import annotations
 
@@ -13,19 +8,8 @@ from itertools import pairwise
 from msgspec.structs import asdict
 
 from coursebuild.core.model.results import Machine
-from coursebuild.numerics.reports import Interval, Record
+from coursebuild.numerics.reports import Interval, Record, scene_report
 from coursebuild.numerics.reports.chart import PAIR_SIZE, Chart, Line, Point, chart_svg
-from coursebuild.numerics.reports.scene_report import (
-    FLOORS,
-    FigureLine,
-    MeasuredRun,
-    OrderRow,
-    ScenarioReport,
-    SceneReport,
-    StableRow,
-    WorkPrecisionRow,
-    step_evaluations,
-)
 from coursebuild.numerics.reports.shown_errors import (
     EVALUATION_LABEL,
     INTEGRATORS,
@@ -35,7 +19,7 @@ from coursebuild.numerics.reports.shown_errors import (
 )
 
 
-class BoundaryLine(StableRow, frozen=True):
+class BoundaryLine(scene_report.StableRow, frozen=True):
     """The largest stable timestep of an integrator, compared with theory."""
 
     difference: float | None = None
@@ -54,7 +38,7 @@ class StepCost(Record, frozen=True):
     """Processor time on the machine of the report."""
 
 
-class ErrorLine(MeasuredRun, frozen=True):
+class ErrorLine(scene_report.MeasuredRun, frozen=True):
     """An integrator at a timestep."""
 
     integrator: str
@@ -89,8 +73,8 @@ class CaseReport(Record, frozen=True):
     note: str
     reference: ReferenceLine
     boundaries: tuple[BoundaryLine, ...]
-    figures: tuple[FigureLine, ...]
-    orders: tuple[OrderRow, ...]
+    figures: tuple[scene_report.FigureLine, ...]
+    orders: tuple[scene_report.OrderRow, ...]
     errors: tuple[ErrorLine, ...]
     costs: tuple[StepCost, ...]
 
@@ -103,8 +87,7 @@ class CaseReport(Record, frozen=True):
     def cost_to(self, integrator: str, error: float) -> float | None:
         """The same for the timestep with a given error, m or rad; `None` where no run is as good.
 
-        Between two runs the cost follows a power of the error. Beyond the longest timestep nothing
-        is extrapolated.
+        Between two runs the cost follows a power of the error. Nothing is extrapolated.
         """
         runs = sorted(
             (cost.value, max(pair[0] for pair in places))
@@ -126,53 +109,54 @@ def exact_file(model: str) -> str:
     return f"models/{model}.exact.py"
 
 
-def course_cases(report: SceneReport) -> tuple[CaseReport, ...]:
+def course_cases(report: scene_report.SceneReport) -> tuple[CaseReport, ...]:
     """The scenarios of a model whose exact motion the course gives, or of which it knows theory."""
     file = exact_file(report.model)
-    exact_scenarios = (s for s in report.scenarios if s.source == file or s.figures)
-    return tuple(_course_case(report, scenario) for scenario in exact_scenarios)
-
-
-def _course_case(report: SceneReport, scenario: ScenarioReport) -> CaseReport:
-    baseline = scenario.own_setting
-    rows = [
-        row
-        for row in scenario.rows
-        if baseline and row.setting.solver_settings == baseline.solver_settings
-    ]
-    steps = {
-        row.setting.integrator: row.seconds.scale(row.setting.timestep)
-        for row in reversed(rows)
-        if row.seconds is not None
-    }
-    floors = scenario.floor, scenario.floor, scenario.velocity_floor
-    return CaseReport(
-        name=f"{report.model}/{scenario.name}",
-        title=f"{report.model}: {scenario.title or scenario.name}",
-        case=0,
-        machine=report.machine,
-        note="; ".join(scenario.notes),
-        reference=ReferenceLine(scenario.reference, scenario.source, scenario.second, *floors),
-        boundaries=tuple(BoundaryLine(**asdict(row)) for row in scenario.stable),
-        figures=scenario.figures,
-        orders=scenario.orders,
-        errors=tuple(_error_line(row) for row in rows),
-        costs=tuple(StepCost(name, seconds) for name, seconds in steps.items()),
-    )
-
-
-def _error_line(row: WorkPrecisionRow) -> ErrorLine:
-    fields = {name: getattr(row, name) for name in MeasuredRun.__struct_fields__}
-    return ErrorLine(integrator=row.setting.integrator, timestep=row.setting.timestep, **fields)
+    run_fields = scene_report.MeasuredRun.__struct_fields__
+    cases = []
+    for scenario in report.scenarios:
+        if scenario.source != file and not scenario.figures:
+            continue
+        usual = scenario.own_setting and scenario.own_setting.solver_settings
+        rows = [row for row in scenario.rows if row.setting.solver_settings == usual]
+        steps = {
+            row.setting.integrator: row.seconds.scale(row.setting.timestep)
+            for row in reversed(rows)
+            if row.seconds is not None
+        }
+        floors = scenario.floor, scenario.floor, scenario.velocity_floor
+        case = CaseReport(
+            name=f"{report.model}/{scenario.name}",
+            title=f"{report.model}: {scenario.title or scenario.name}",
+            case=0,
+            machine=report.machine,
+            note="; ".join(scenario.notes),
+            reference=ReferenceLine(scenario.reference, scenario.source, scenario.second, *floors),
+            boundaries=tuple(BoundaryLine(**asdict(row)) for row in scenario.stable),
+            figures=scenario.figures,
+            orders=scenario.orders,
+            errors=tuple(
+                ErrorLine(
+                    integrator=row.setting.integrator,
+                    timestep=row.setting.timestep,
+                    **{name: getattr(row, name) for name in run_fields},
+                )
+                for row in rows
+            ),
+            costs=tuple(StepCost(name, seconds) for name, seconds in steps.items()),
+        )
+        cases.append(case)
+    return tuple(cases)
 
 
 def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:
     """The first error that is resolved, and energy drift where energy is conserved."""
-    reference = report.reference
+    units = {"position": "m or rad", "attitude": "rad", "velocity": "m/s or rad/s"}
     errors = (
-        Quantity("position", "error of position (m or rad)", FLOORS * reference.position),
-        Quantity("attitude", "error of attitude (rad)", FLOORS * reference.attitude),
-        Quantity("velocity", "error of velocity (m/s or rad/s)", FLOORS * reference.velocity),
+        Quantity(
+            part, f"error of {part} ({unit})", scene_report.FLOORS * getattr(report.reference, part)
+        )
+        for part, unit in units.items()
     )
     drift = Quantity("energy_drift", "energy drift, relative")
     runs = [line for line in report.errors if line.status == "ok"]
@@ -183,19 +167,17 @@ def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:
 
 
 def case_svgs(report: CaseReport, quantity: Quantity, name: str) -> tuple[str, ...]:
-    """The plots of an error against processor time, where it was measured, and evaluations.
-
-    As `svg` elements; `name` is unique among the plots on the page.
-    """
+    """The plots of an error against processor time, where it was measured, and evaluations."""
+    charts = (_case_chart(report, quantity, is_time=is_time) for is_time in (True, False))
     svgs = (
-        _case_svg(report, quantity, work, f"{name}{suffix}")
-        for work, suffix in (("processor time", ""), (EVALUATION_LABEL, "-evaluations"))
+        chart_svg(chart, f"{name}{suffix}", PAIR_SIZE)
+        for chart, suffix in zip(charts, ("", "-evaluations"), strict=True)
     )
     return tuple(svg_text for svg_text in svgs if svg_text)
 
 
-def _case_svg(report: CaseReport, quantity: Quantity, work: str, name: str) -> str:
-    is_time = work == "processor time"
+def _case_chart(report: CaseReport, quantity: Quantity, *, is_time: bool) -> Chart:
+    work = "processor time" if is_time else EVALUATION_LABEL
 
     def amount(x: float, digits: int = 2) -> str:
         return seconds_text(x, digits) if is_time else f"{x:.{digits}g}"
@@ -204,7 +186,8 @@ def _case_svg(report: CaseReport, quantity: Quantity, work: str, name: str) -> s
     for number, integrator in enumerate(INTEGRATORS):
         points = []
         for run in report.errors:
-            x = report.cost(run) if is_time else _evaluations(run)
+            count = scene_report.step_evaluations(run.integrator) / run.timestep
+            x = report.cost(run) if is_time else Interval(count, count, count)
             if run.integrator != integrator or x is None:
                 continue
             setting = f"{integrator} at {seconds_text(run.timestep)}"
@@ -218,17 +201,10 @@ def _case_svg(report: CaseReport, quantity: Quantity, work: str, name: str) -> s
         if visible := line.visible_points:
             ends = (f"{p.y:.2g} at {amount(p.x.value)}" for p in (visible[0], visible[-1]))
             texts.append(f"{line.name}: {', '.join(ends)}.")
-    chart = Chart(
+    return Chart(
         title=f"{report.title}: {quantity.label} against {work}",
         text=" ".join(texts),
         axes=(f"{work} for a simulated second{' (s)' * is_time}", quantity.label),
         lines=tuple(lines),
         least=quantity.least,
     )
-    return chart_svg(chart, name, PAIR_SIZE)
-
-
-def _evaluations(run: ErrorLine) -> Interval:
-    """How often the forward dynamics are computed in a simulated second."""
-    count = step_evaluations(run.integrator) / run.timestep
-    return Interval(count, count, count)

@@ -1,12 +1,8 @@
 """A chart of lines between two logarithmic axes as SVG, and the primitives of all charts.
 
-Entry points: `chart_svg(chart, …)`; `path`, `label`, `symbol`, `bar`, `ring`; `colour`,
-`line_look`; `key`, `svg`.
-
 1. A line has a colour, a mark and a dash of its own; its name stands in the key, or at its end
-   where there is no key. Bars are intervals.
-2. Crosses at the upper edge are lost runs.
-3. A band at the bottom covers errors that the reference cannot resolve.
+   where there is no key. Bars are intervals, crosses at the upper edge lost runs.
+2. A band at the bottom covers errors that the reference cannot resolve.
 
 Colours are variables of the page's style sheet with a fallback, set as attributes, since pages
 allow no inline styles. The same chart gives the same bytes.
@@ -241,10 +237,7 @@ class Chart(Struct, frozen=True):
 def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
     """The chart as an `svg` element; empty where there is no point to be drawn.
 
-    Args:
-        chart: what to draw.
-        name: unique among the drawings on the page, as ids are made from it.
-        size: one of those above.
+    `name` is unique among the drawings on the page, as ids are made from it.
     """
     if not any(line.visible_points for line in chart.lines):
         return ""
@@ -259,7 +252,6 @@ def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
 
 
 def _scales(chart: Chart, size: tuple[float, float]) -> tuple[Scale, Scale]:
-    """The axes, wide enough for all that is between them."""
     points = [point for line in chart.lines for point in line.points]
     xs = [log(x) for point in points for x in (point.x.low, point.x.high)]
     ys = [log(point.y) for point in points if point.y]
@@ -279,7 +271,6 @@ def _scales(chart: Chart, size: tuple[float, float]) -> tuple[Scale, Scale]:
 
 
 def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
-    """All parts of the drawing, the lowest layer first."""
     lines, texts = _grid(x, y, chart.axes)
     yield from _levels(chart, x, y)
     yield path("".join(lines), 'stroke="currentColor" stroke-opacity="0.16"')
@@ -337,12 +328,10 @@ def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
 
 
 def _place(point: Point, x: Scale, y: Scale) -> tuple[float, float]:
-    """The place of a run; at the upper edge if it was lost."""
     return x(point.x.value), y.end - 6 if point.y is None else y(point.y)
 
 
 def _names(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
-    """The names at the right, in the order in which the lines end, without overlap."""
     lines = [line for line in chart.lines if line.visible_points]
     ends = [(_place(line.visible_points[-1], x, y), line) for line in lines]
     ends.sort(key=lambda end: end[0][1])
@@ -361,7 +350,13 @@ def _grid(x: Scale, y: Scale, titles: tuple[str, str]) -> tuple[list[str], list[
     for at, text in _ticks_y(y):
         texts.append(label(x.start - 7, at + 4, text, f'text-anchor="end" {FINE}'))
         lines.append(f"M{x.start:.1f} {at:.1f}h-4")
-    x_ticks = _ticks_x(x)
+    for most in (9, 7, 5, 4, 3, 2):  # as many as fit without their texts touching
+        x_ticks = x.ticks(most)
+        ends = [(at, text_width(text, TICK_SIZE) / 2) for at, text in x_ticks]
+        if all(b - a >= w + v + 8 for (a, w), (b, v) in pairwise(ends)):
+            break
+    else:
+        x_ticks = x_ticks[:1]
     for at in _decades(x) or [at for at, _ in x_ticks]:
         lines.append(f"M{at:.1f} {y.end:.1f}V{y.start:.1f}")
     for at, text in x_ticks:
@@ -385,13 +380,3 @@ def _decades(scale: Scale) -> list[float]:
 
 def _ticks_y(y: Scale) -> list[tuple[float, str]]:
     return y.ticks(max(2, int((y.start - y.end) / 30)))
-
-
-def _ticks_x(x: Scale) -> list[tuple[float, str]]:
-    """As many ticks as fit without their texts touching."""
-    for most in (9, 7, 5, 4, 3, 2):
-        ticks = x.ticks(most)
-        ticks_with_widths = [(at, text_width(text, TICK_SIZE)) for at, text in ticks]
-        if all(b - a >= (w + v) / 2 + 8 for (a, w), (b, v) in pairwise(ticks_with_widths)):
-            return ticks
-    return ticks[:1]

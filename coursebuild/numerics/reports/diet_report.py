@@ -1,7 +1,4 @@
-"""The report on what a model holds that its scenarios do not need.
-
-Entry point: `DietReport`.
-"""
+"""The report on what a model holds that its scenarios do not need."""
 
 from __future__ import annotations
 

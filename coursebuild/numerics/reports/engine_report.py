@@ -1,15 +1,10 @@
-"""The report on a model in other engines: error, drift, and cost of a step by the number of worlds.
-
-Entry points: `EngineReport`; `row_name(row)`; `engine_chart(report)`, the plot of costs.
-"""
+"""The report on a model in other engines: error, drift, and cost of a step by number of worlds."""
 
 from __future__ import annotations
 
 from coursebuild.core.model.results import Machine
 from coursebuild.numerics.reports import Interval, Record
-from coursebuild.numerics.reports.chart import Chart, Entry, Line, Point
 from coursebuild.numerics.reports.scene_report import Errors, MeasuredSetting
-from coursebuild.numerics.reports.shown_errors import seconds_text
 
 WORLDS = (1, 64, 4096)
 """How many worlds are simulated at once."""
@@ -102,33 +97,3 @@ def row_name(row: EngineRow) -> str:
     elif device not in ("", "cpu"):
         parts.append(device)
     return ", ".join(parts)
-
-
-def engine_chart(report: EngineScenario) -> Chart | None:
-    """The time of a step by the number of worlds; `None` where nothing was timed."""
-    lines = []
-    for number, row in enumerate(report.rows):
-        points = tuple(
-            Point(
-                Interval(cost.worlds, cost.worlds, cost.worlds),
-                cost.seconds.value * 1e6,
-                f"{row_name(row)}, {cost.worlds:,} worlds: {seconds_text(cost.seconds.value, 3)}",
-            )
-            for cost in row.costs
-            if cost.seconds is not None
-        )
-        if points:
-            lines.append(Line(row_name(row), number, points))
-    if not lines:
-        return None
-    text = " ".join(
-        f"{line.name}: {', '.join(point.title.rsplit(', ', 1)[1] for point in line.points)}."
-        for line in lines
-    )
-    return Chart(
-        title=f"{report.title or report.name}: time of a step by the number of worlds",
-        text=text,
-        axes=("worlds simulated at once", "time of a step over worlds (µs)"),
-        lines=tuple(lines),
-        marks=(Entry("front", "lowest of at least 8 rounds"),),
-    )

@@ -1,19 +1,13 @@
 """Reports as files of the course, `content/reports/…`, and how a new measurement differs from them.
 
-Entry points: `BENCH`, `ENGINES`, `DIET` and `STABILITY`, each a `ReportKind` that encodes and
-decodes its files; `RecordError`, for files that are no report; `scene_departures(record,
-measurement, bench)` and `case_departures`, the figures that left their band about the recorded
-ones.
-
-1. A file begins with its kind and the version of its format: `{"holds": …, "form": …, …}`.
-2. Keys are sorted, and every measured row is a line, so that a difference between two versions of a
+1. Keys are sorted, and every measured row is a line, so that a difference between two versions of a
    file says what changed. The same report gives the same bytes.
-3. Reading is strict: a file that lacks a field, has one more, or points at a row that is not there
+2. Reading is strict: a file that lacks a field, has one more, or points at a row that is not there
    was not written by this tool.
-4. Figures of accuracy are compared; times, and what follows from them, never are. An error has left
+3. Figures of accuracy are compared; times, and what follows from them, never are. An error has left
    its band when it differs from the recorded one by more than the band's share of it and ten floors
    of the reference: smaller differences come from the reference, or rounding.
-5. Drifts, depths and slips are those of the whole scenario. Where it is chaotic, they are not
+4. Drifts, depths and slips are those of the whole scenario. Where it is chaotic, they are not
    compared: rounding alone changes them. Words and flags must be as they were.
 """
 
@@ -30,19 +24,10 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model.scenarios import BenchTable
+from coursebuild.numerics.reports import scene_report
 from coursebuild.numerics.reports.case_report import CaseReport
 from coursebuild.numerics.reports.diet_report import DietReport
 from coursebuild.numerics.reports.engine_report import EngineReport
-from coursebuild.numerics.reports.scene_report import (
-    FLOORS,
-    FigureLine,
-    MeasuredRun,
-    OrderRow,
-    ScenarioReport,
-    SceneReport,
-    StableRow,
-    SweepReport,
-)
 from coursebuild.numerics.reports.shown_errors import seconds_text, setting_text, status_text
 
 FOLDER = "content/reports"
@@ -92,21 +77,29 @@ class ReportKind(Struct, Generic[_T], frozen=True):
         return (_text(msgspec.to_builtins(value, order="sorted"), 0, 0) + "\n").encode()
 
     def decode(self, data: bytes, model: str = "") -> _T:
-        """Read a file; the report must be about this model, if one is named.
-
-        Raises:
-            RecordError: it holds no such report.
-        """
+        """Read a file; a `RecordError` where it holds no such report, of this model if any."""
         fields = [("holds", str), ("form", int), (self.field, self.type)]
         file = msgspec.defstruct("File", fields, forbid_unknown_fields=True)
-        report: _T = getattr(_decode(data, f"coursebuild {self.name}", file), self.field)
+        try:
+            value = msgspec.json.decode(data)
+            head = value if isinstance(value, dict) else {}
+            if head.get("holds") != f"coursebuild {self.name}":
+                raise RecordError(f"holds no report of `coursebuild {self.name}`")
+            if (form := head.get("form")) != FORM:
+                raise RecordError(f"was written by another version of this tool (form {form})")
+            report: _T = getattr(msgspec.convert(value, file), self.field)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            text = str(error).replace("JSON is malformed", "no JSON")
+            raise RecordError(f"is damaged: {text[:1].lower()}{text[1:]}") from None
         flaw = self.flaw(report, model)
         if flaw:
             raise RecordError(flaw)
         return report
 
 
-def _model_flaw(kind: str, report: SceneReport | EngineReport | DietReport, model: str) -> str:
+def _model_flaw(
+    kind: str, report: scene_report.SceneReport | EngineReport | DietReport, model: str
+) -> str:
     """Why a report is not a complete one of this model; empty where it is, or none is named."""
     if model and report.model != model:
         return f"holds a report of the model `{report.model}`"
@@ -115,7 +108,7 @@ def _model_flaw(kind: str, report: SceneReport | EngineReport | DietReport, mode
     return ""
 
 
-def _scene_flaw(report: SceneReport, model: str) -> str:
+def _scene_flaw(report: scene_report.SceneReport, model: str) -> str:
     names = [scenario.name for scenario in report.scenarios]
     if len(set(names)) < len(names):
         return "holds two scenarios of one name"
@@ -131,7 +124,7 @@ def _case_flaw(cases: tuple[CaseReport, ...], _: str) -> str:
     return "holds two cases of one name" if has_duplicates else ""
 
 
-BENCH = ReportKind("bench", "scene", SceneReport, ".bench.json", _scene_flaw)
+BENCH = ReportKind("bench", "scene", scene_report.SceneReport, ".bench.json", _scene_flaw)
 ENGINES = ReportKind(
     "bench --engines",
     "engines",
@@ -145,25 +138,13 @@ STABILITY: ReportKind[tuple[CaseReport, ...]] = ReportKind(
 )
 
 
-def _decode(data: bytes, holds: str, kind: type[_T]) -> _T:
-    try:
-        value = msgspec.json.decode(data)
-        head = value if isinstance(value, dict) else {}
-        if head.get("holds") != holds:
-            raise RecordError(f"holds no report of `{holds}`")
-        if head.get("form") != FORM:
-            form = head.get("form")
-            raise RecordError(f"was written by another version of this tool (form {form})")
-        return msgspec.convert(value, kind)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        text = str(error).replace("JSON is malformed", "no JSON")
-        raise RecordError(f"is damaged: {text[:1].lower()}{text[1:]}") from None
-
-
 def _text(value: Any, indent: int, lists: int) -> str:
     """A value as JSON over several lines; small values and rows take one."""
-    inner = " " * (indent + 1)
-    if isinstance(value, dict) and value and not _is_row(value, lists):
+    inner, is_row = " " * (indent + 1), lists >= 2
+    if isinstance(value, dict) and not is_row:
+        is_flat = not any(isinstance(part, dict | list | tuple) and part for part in value.values())
+        is_row = is_flat and len(_flat(value)) <= 80
+    if isinstance(value, dict) and value and not is_row:
         items = [f"{_flat(key)}: {_text(value[key], indent + 1, lists)}" for key in sorted(value)]
     elif isinstance(value, list | tuple) and any(isinstance(part, dict) for part in value):
         items = [_text(part, indent + 1, lists + 1) for part in value]
@@ -171,15 +152,6 @@ def _text(value: Any, indent: int, lists: int) -> str:
         return _flat(value)
     left, right = "{}" if isinstance(value, dict) else "[]"
     return left + "".join(f"\n{inner}{item}," for item in items)[:-1] + f"\n{' ' * indent}{right}"
-
-
-def _is_row(value: dict[str, Any], lists: int) -> bool:
-    """Whether an object is a line of a table."""
-    if lists >= 2:
-        return True
-    return not any(isinstance(item, dict | list | tuple) and item for item in value.values()) and (
-        len(_flat(value)) <= 80
-    )
 
 
 def _flat(value: Any) -> str:
@@ -252,7 +224,7 @@ _Report: TypeAlias = dict[tuple[str, str, str], _Figures]
 
 
 def scene_departures(
-    record: SceneReport, measurement: SceneReport, bench: BenchTable
+    record: scene_report.SceneReport, measurement: scene_report.SceneReport, bench: BenchTable
 ) -> tuple[Departure, ...]:
     """Everything of a model that left its band, in the order of the recorded report.
 
@@ -266,9 +238,18 @@ def scene_departures(
         )
         measurement = replace(measurement, scenarios=scenarios)
 
-    def figures(report: SceneReport) -> _Report:
+    def figures(report: scene_report.SceneReport) -> _Report:
         tables = [(scenario.name, _scenario(scenario, bench)) for scenario in report.scenarios]
-        return _by_name([*tables, *((sweep.name, _sweep(sweep, bench)) for sweep in report.sweeps)])
+        for sweep in report.sweeps:
+            table: _Table = {("", "sweep"): {}}
+            for row in sweep.rows:
+                figures = {"status": _Figure(status_text(row.status))}
+                for name in ("change", "penetration", "slip", "restitution"):
+                    figures[name] = _Figure(getattr(row, name), bench.band, _INVISIBLE)
+                if row.parameter != "threads":
+                    table[f"{row.parameter} {row.value}", "value"] = figures
+            tables.append((sweep.name, table))
+        return _by_name(tables)
 
     return tuple(_departures(figures(record), figures(measurement)))
 
@@ -293,37 +274,35 @@ def _departures(record: _Report, measurement: _Report) -> Iterator[Departure]:
     for place, setting, kind in {**record, **measurement}:
         old, new = (report.get((place, setting, kind)) for report in (record, measurement))
         if old is not None and new is not None:
-            for name, texts in _compare_figures(old, new):
-                yield Departure(place, setting, name, *texts)
+            for name in (name for name in old if name in new):
+                if (texts := _compare(old[name], new[name])) is not None:
+                    yield Departure(place, setting, name, *texts)
+                    if name == "status":
+                        break  # what else differs does so for that reason
         elif place not in missing:
             before, now = ("nothing" if figures is None else "there" for figures in (old, new))
             yield Departure(place, setting, kind, before, now, "the same")
             missing |= set() if setting else {place}  # its settings go with it
 
 
-def _compare_figures(old: _Figures, new: _Figures) -> Iterator[tuple[str, tuple[str, str, str]]]:
-    """The figures of both that differ: recorded, measured, and the band, in words."""
-    for name in (name for name in old if name in new):
-        a, b = old[name], new[name]
-        wider = a if (a.share or 0, a.least) >= (b.share or 0, b.least) else b
-        band, differs = wider.band, a.value != b.value
-        if isinstance(a.value, float | int) and isinstance(b.value, float | int):
-            room = max(a.least, b.least) + (wider.share or 0.0) * abs(a.value)
-            differs = differs if wider.share is None else not abs(b.value - a.value) <= room
-        elif isinstance(a.value, str) or isinstance(b.value, str):
-            band = "the same"
-        if differs:
-            yield name, (*(_value_text(figure.value, band) for figure in (a, b)), band)  # type: ignore[misc]
-            if name == "status":
-                return  # what else differs does so for that reason
+def _compare(a: _Figure, b: _Figure) -> tuple[str, str, str] | None:
+    """What was recorded and measured, and the band, in words; `None` where they agree."""
+    wider = a if (a.share or 0, a.least) >= (b.share or 0, b.least) else b
+    band, differs = wider.band, a.value != b.value
+    if isinstance(a.value, float | int) and isinstance(b.value, float | int):
+        room = max(a.least, b.least) + (wider.share or 0.0) * abs(a.value)
+        differs = differs if wider.share is None else not abs(b.value - a.value) <= room
+    elif isinstance(a.value, str) or isinstance(b.value, str):
+        band = "the same"
 
+    def text(value: float | str | bool | None) -> str:
+        if isinstance(value, bool):
+            return "yes" if value else "no"
+        if isinstance(value, float | int):
+            return seconds_text(value) if band == "the same" else f"{value:.6g}"
+        return value or "nothing"
 
-def _value_text(value: float | str | bool | None, band: str) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float | int):
-        return seconds_text(value) if band == "the same" else f"{value:.6g}"
-    return value or "nothing"
+    return (text(a.value), text(b.value), band) if differs else None
 
 
 def _error(name: str, error: tuple[float, float] | None, share: float, least: float) -> _Figures:
@@ -337,12 +316,11 @@ def _error(name: str, error: tuple[float, float] | None, share: float, least: fl
 
 
 def _run(
-    run: MeasuredRun, share: float, place: float, speed: float, *, predictable: bool
+    run: scene_report.MeasuredRun, share: float, place: float, speed: float, *, predictable: bool
 ) -> _Figures:
-    """The figures of a run.
+    """The figures of a run, with the floors of errors of places and velocities.
 
-    `place`, `speed`: the floors of errors of places and velocities. `predictable`: whether the
-    reference reaches the end.
+    `predictable`: whether the reference reaches the end.
     """
     figures = {"status": _Figure(status_text(run.status)), "refsafe": _Figure(run.refsafe)}
     for part, least in zip(_PARTS, (place, place, speed), strict=True):
@@ -353,7 +331,7 @@ def _run(
     return figures
 
 
-def _orders(rows: Sequence[OrderRow], band: float) -> _Table:
+def _orders(rows: Sequence[scene_report.OrderRow], band: float) -> _Table:
     table: _Table = {}
     for row in rows:
         fits = {part: getattr(row, part) for part in _PARTS}
@@ -364,7 +342,7 @@ def _orders(rows: Sequence[OrderRow], band: float) -> _Table:
     return table
 
 
-def _largest(row: StableRow) -> _Figures:
+def _largest(row: scene_report.StableRow) -> _Figures:
     largest = "all" if row.largest is None else row.largest
     low, high = row.bracket or (1.0, 1.0)
     is_sharp = row.monotone and high <= low * (1 + _STABLE)
@@ -374,9 +352,9 @@ def _largest(row: StableRow) -> _Figures:
     }
 
 
-def _scenario(report: ScenarioReport, bench: BenchTable) -> _Table:
+def _scenario(report: scene_report.ScenarioReport, bench: BenchTable) -> _Table:
     share = bench.band
-    place, speed = FLOORS * report.floor, FLOORS * report.velocity_floor
+    place, speed = scene_report.FLOORS * report.floor, scene_report.FLOORS * report.velocity_floor
     predictable = report.horizon >= report.duration * (1 - _TIGHT_BAND)
     table: _Table = {
         ("", "scenario"): {
@@ -401,23 +379,12 @@ def _scenario(report: ScenarioReport, bench: BenchTable) -> _Table:
     return table | {(row.integrator, "stable timestep"): _largest(row) for row in report.stable}
 
 
-def _sweep(sweep: SweepReport, bench: BenchTable) -> _Table:
-    return {("", "sweep"): {}} | {
-        (f"{row.parameter} {row.value}", "value"): {
-            "status": _Figure(status_text(row.status)),
-            **{
-                name: _Figure(getattr(row, name), bench.band, _INVISIBLE)
-                for name in ("change", "penetration", "slip", "restitution")
-            },
-        }
-        for row in sweep.rows
-        if row.parameter != "threads"
-    }
-
-
 def _case(case: CaseReport) -> _Table:
     reference, share = case.reference, _BENCH.band
-    place, speed = FLOORS * max(reference.position, reference.attitude), FLOORS * reference.velocity
+    place, speed = (
+        scene_report.FLOORS * max(reference.position, reference.attitude),
+        scene_report.FLOORS * reference.velocity,
+    )
     table: _Table = {("", "case"): {}}
     for line in case.boundaries:
         figures = _largest(line) | {"beyond": _Figure(status_text(line.beyond))}
@@ -425,19 +392,17 @@ def _case(case: CaseReport) -> _Table:
             figures["growth"] = _Figure(line.growth, share)
         table[line.integrator, "stable timestep"] = figures
     for figure in case.figures:
-        table[figure.integrator, figure.name] = _figure(figure, share, place)
+        exact, value = figure.exact, figure.measured
+        figures = {f"exact {figure.name}": _Figure(exact, _TIGHT_BAND)}
+        if exact is None:
+            figures[figure.name] = _Figure(value, share, _ROUNDING)
+        else:  # what theory gives is compared by its error
+            error = None if value is None else value - exact
+            room = _ROUNDING * max(abs(exact), abs(value or 0.0)) + place
+            figures[f"{figure.name}, against theory"] = _Figure(error, share, room)
+        table[figure.integrator, figure.name] = figures
     table |= _orders(case.orders, _BENCH.order_band)
     for run in case.errors:
         name = f"{run.integrator} at {seconds_text(run.timestep)}"
         table[name, "run"] = _run(run, share, place, speed, predictable=True)
     return table
-
-
-def _figure(line: FigureLine, share: float, least: float) -> _Figures:
-    """A quantity that theory gives is compared by its error, another by its size."""
-    figures = {f"exact {line.name}": _Figure(line.exact, _TIGHT_BAND)}
-    if line.exact is None:
-        return figures | {line.name: _Figure(line.measured, share, _ROUNDING)}
-    error = None if line.measured is None else line.measured - line.exact
-    room = _ROUNDING * max(abs(line.exact), abs(line.measured or 0.0)) + least
-    return figures | {f"{line.name}, against theory": _Figure(error, share, room)}

@@ -1,18 +1,12 @@
-"""The plots of reports on models as SVG: error against work, of a scenario, and sweeps.
-
-Entry points: `plot_svgs(report, …)`, of a scenario, from `work_precision(report)`;
-`sweep_svg(sweep, …)`.
+"""The plots of reports on models as SVG: error against work, of a scenario, sweeps, and engines.
 
 1. A line for each integrator goes from long timesteps to short ones, over those rows that have the
-   scene's own solver, iterations and cone; the rows with others are small marks beside it.
-2. A mark is filled where the setting is on the Pareto front, and hollow where another one is
-   better. A ring is around the scene's own setting. Bars are the intervals of the costs.
-3. Beside the cost, which is time, work is counted as it is on every machine: in evaluations of the
-   forward dynamics, and in iterations of the solver. Each has a front of its own. The cost of a row
-   that was not timed is estimated from its evaluations.
-4. A sweep has a row for each value, and for each figure a scale beside it. A dot is a figure, a bar
-   its interval; a line joins the values of one parameter, and a ring marks the model's own value. A
-   scale is logarithmic where its figures differ by much.
+   scene's own solver, iterations and cone; the rows with others are small marks beside it. A mark
+   is filled where the setting is on the Pareto front; a ring is around the scene's own.
+2. Beside the cost, which is time, work is counted as it is on every machine: in evaluations of the
+   forward dynamics, and in iterations of the solver. Each has a front of its own.
+3. A sweep has a row for each value, and for each figure a scale beside it, which is logarithmic
+   where its figures differ by much. A line joins the values of one parameter.
 """
 
 from __future__ import annotations
@@ -50,6 +44,7 @@ from coursebuild.numerics.reports.chart import (
     symbol,
     symbols,
 )
+from coursebuild.numerics.reports.engine_report import EngineScenario, row_name
 from coursebuild.numerics.reports.scene_report import (
     FIGURES,
     ScenarioReport,
@@ -76,13 +71,7 @@ from coursebuild.numerics.reports.shown_errors import (
 
 
 def plot_svgs(report: ScenarioReport, *, name: str, narrow: bool = False) -> tuple[str, ...]:
-    """The plots of `work_precision` as `svg` elements.
-
-    Args:
-        report: of the scenario.
-        name: unique on the page, as ids are made from it.
-        narrow: for narrow screens: the text has the same size there.
-    """
+    """The plots of `work_precision` as `svg` elements, with a `name` that is unique on the page."""
     sizes = [WIDE_SIZE, PAIR_SIZE, PAIR_SIZE] if not narrow else [NARROW_SIZE] * 3
     return tuple(
         svg_text
@@ -137,6 +126,17 @@ def _chart(
         for name in INTEGRATORS
         if (points := tuple(_points(report, quantity, works, name)))
     )
+    visible = [point for line in lines for point in line.visible_points]
+    marks = [Entry("front", "on the Pareto front")] if any(p.full for p in visible) else []
+    if not all(point.full for point in visible):
+        marks.append(Entry("beaten", "another is better"))
+    if any(point.small for point in visible):
+        marks.append(Entry("other", "other solver, iterations or cone"))
+    own_names = (setting_text(row.setting, row.setting) for row in report.rows if row.own)
+    marks += [Entry("own", f"the scene’s own: {name}") for name in own_names]
+    losses = {"run lost": _lost(report), "past its horizon": _parted(report)}
+    if words := [text for text, names in losses.items() if names]:
+        marks.append(Entry("lost", ", or ".join(words)))
     return Chart(
         title=f"{report.title or report.name}: error of {quantity.label} against {label}",
         text=" ".join(_describe(report, quantity, lines, work)),
@@ -144,7 +144,7 @@ def _chart(
         lines=lines,
         least=quantity.least,
         unit_label="just visible" if quantity.name == "seen" else "",
-        marks=tuple(_marks(report, lines)),
+        marks=tuple(marks),
     )
 
 
@@ -183,34 +183,16 @@ def _find_works(report: ScenarioReport, work: str) -> list[Interval | None]:
     if work == "evaluations":
         return [Interval(n, n, n) for n in (float(row.work) for row in rows)]
     timed = [row for row in rows if row.cost is not None and row.cost.value > 0]
-    return [_cost(row, timed) for row in rows] if timed else []
-
-
-def _cost(row: WorkPrecisionRow, timed: Sequence[WorkPrecisionRow]) -> Interval:
-    """The cost of a row; estimated from its evaluations where it was not timed."""
-    if row in timed and row.cost is not None:
-        return row.cost
-    peers = [peer for peer in timed if peer.setting.integrator == row.setting.integrator] or timed
-    rates = [peer.cost.value / peer.work for peer in peers if peer.cost is not None]
-    value = row.work * statistics.median(rates)
-    return Interval(value, value, value)
-
-
-def _marks(report: ScenarioReport, lines: Sequence[Line]) -> Iterator[Entry]:
-    """The entries of the key, for the kinds of marks that occur."""
-    visible = [point for line in lines for point in line.visible_points]
-    if any(point.full for point in visible):
-        yield Entry("front", "on the Pareto front")
-    if not all(point.full for point in visible):
-        yield Entry("beaten", "another is better")
-    if any(point.small for point in visible):
-        yield Entry("other", "other solver, iterations or cone")
-    for row in report.rows:
-        if row.own:
-            yield Entry("own", f"the scene’s own: {setting_text(row.setting, row.setting)}")
-    kinds = {"run lost": _lost(report), "past its horizon": _parted(report)}
-    if words := [text for text, names in kinds.items() if names]:
-        yield Entry("lost", ", or ".join(words))
+    works: list[Interval | None] = []
+    for row in rows if timed else ():
+        x = row.cost
+        if x is None or not x.value:  # its evaluations say about how much it would be
+            alike = [peer for peer in timed if peer.setting.integrator == row.setting.integrator]
+            rates = [peer.cost.value / peer.work for peer in alike or timed if peer.cost]
+            value = row.work * statistics.median(rates)
+            x = Interval(value, value, value)
+        works.append(x)
+    return works
 
 
 def _lost(report: ScenarioReport) -> list[str]:
@@ -248,7 +230,6 @@ def _describe(
 
 
 def _range(values: Sequence[float], digits: int, words: str) -> str:
-    """The least and the largest of values."""
     least, largest = (f"{value:.{digits}g}" for value in (min(values), max(values)))
     return words.format(least, largest) if max(values) > min(values) else least
 
@@ -292,13 +273,7 @@ _GAP = 18.0
 
 
 def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
-    """The plot as an `svg` element; empty where nothing was measured.
-
-    Args:
-        sweep: what to draw.
-        name: unique among the plots on the page, as ids are made from it.
-        narrow: for narrow screens: the scales stand below each other.
-    """
+    """The plot as an `svg` element; empty where nothing was measured."""
     figures = shown_figures(sweep)[:_MAX_FIGURES]
     width, _ = NARROW_SIZE if narrow else WIDE_SIZE
     if not figures:
@@ -311,7 +286,16 @@ def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
     top = bottom = 0.0
     for n, figure in enumerate(figures):
         start = left + (n % column_count) * (scale_width + _GAP)
-        scale = _scale(sweep.rows, figure, start, start + scale_width)
+        intervals = [figure_interval(row, figure) for row in sweep.rows]
+        ends = [x for interval in intervals if interval for x in (interval.low, interval.high)]
+        low, high = min(ends, default=0.0), max(ends, default=1.0)
+        is_log = low > 0 and high > _SPREAD * low
+        if is_log:
+            low, high = log(low), log(high)
+        elif low < 0.5 * high:
+            low = min(low, 0.0)
+        pad = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
+        scale = Scale(start, start + scale_width, low - pad, high + pad, is_log)
         names = left if n % column_count == 0 else 0.0
         bottom = _panel(parts, sweep, figure, scale, top, names)
         top = bottom if narrow else top
@@ -319,22 +303,12 @@ def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
         key_svg, bottom = key([Entry("own", "as the model is")], 6.0, bottom + 20, width)
         parts.append(key_svg)
     title = f"{sweep.title}: {', '.join(FIGURES[figure] for figure in figures)}"
-    return svg("".join(parts), (width, bottom), name, (title, _describe_sweep(sweep, figures)))
-
-
-def _scale(rows: Sequence[SweepRow], figure: str, left: float, right: float) -> Scale:
-    intervals = [figure_interval(row, figure) for row in rows]
-    values = [
-        x for interval in intervals if interval is not None for x in (interval.low, interval.high)
+    cells = [
+        (row, [f"{FIGURES[figure]} {cell(row, figure) or row.status}" for figure in figures])
+        for row in sweep.rows
     ]
-    low, high = min(values, default=0.0), max(values, default=1.0)
-    powers = low > 0 and high > _SPREAD * low
-    if powers:
-        low, high = log(low), log(high)
-    elif low < 0.5 * high:
-        low = min(low, 0.0)
-    pad = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
-    return Scale(left, right, low - pad, high + pad, powers)
+    text = " ".join(f"{row.parameter} {row.value}: {', '.join(texts)}." for row, texts in cells)
+    return svg("".join(parts), (width, bottom), name, (title, text))
 
 
 def _panel(
@@ -382,10 +356,29 @@ def _group(
             yield ring(x, y, 7)
 
 
-def _describe_sweep(sweep: SweepReport, figures: Sequence[str]) -> str:
-    return " ".join(
-        f"{row.parameter} {row.value}: "
-        + ", ".join(f"{FIGURES[figure]} {cell(row, figure) or row.status}" for figure in figures)
-        + "."
-        for row in sweep.rows
+def engine_svg(report: EngineScenario, *, name: str, narrow: bool = False) -> str:
+    """The time of a step by the number of worlds; empty where nothing was timed."""
+    lines = []
+    for number, row in enumerate(report.rows):
+        points = tuple(
+            Point(
+                Interval(cost.worlds, cost.worlds, cost.worlds),
+                cost.seconds.value * 1e6,
+                f"{row_name(row)}, {cost.worlds:,} worlds: {seconds_text(cost.seconds.value, 3)}",
+            )
+            for cost in row.costs
+            if cost.seconds is not None
+        )
+        lines += [Line(row_name(row), number, points)] if points else []
+    text = " ".join(
+        f"{line.name}: {', '.join(point.title.rsplit(', ', 1)[1] for point in line.points)}."
+        for line in lines
     )
+    chart = Chart(
+        title=f"{report.title or report.name}: time of a step by the number of worlds",
+        text=text,
+        axes=("worlds simulated at once", "time of a step over worlds (µs)"),
+        lines=tuple(lines),
+        marks=(Entry("front", "lowest of at least 8 rounds"),),
+    )
+    return chart_svg(chart, name, NARROW_SIZE if narrow else WIDE_SIZE)

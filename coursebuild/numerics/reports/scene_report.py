@@ -1,8 +1,4 @@
-"""The report on a model: speed against error in each of its scenarios, and its sweeps.
-
-Entry points: `SceneReport`; of a sweep, where one parameter has other values, `SweepReport`,
-`shown_figures(sweep)`, `cell(row, figure)`, `figure_interval` and `FIGURES`.
-"""
+"""The report on a model: speed against error in each of its scenarios, and its sweeps."""
 
 from __future__ import annotations
 

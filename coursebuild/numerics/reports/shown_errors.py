@@ -1,9 +1,4 @@
-"""Which errors of reports are shown, which settings are worth their cost, and texts of both.
-
-Entry points: `quantities(report)`, `main_quantity`, `compared_quantity`; `front(rows)`;
-`setting_text`, `seconds_text`, `status_text`; `limit_text` and `map_text`, of largest stable
-timesteps.
-"""
+"""Which errors of reports are shown, which settings are worth their cost, and texts of both."""
 
 from __future__ import annotations
 
@@ -74,10 +69,7 @@ SEEN = Quantity("seen", "what is seen (1: just visible)")
 
 
 def compared_quantity(rows: Iterable[MeasuredRun], figure: Quantity, least_seen: float) -> Quantity:
-    """The error to compare settings by: the declared one, unless only what is seen is resolved.
-
-    `figure` has no label where none is declared.
-    """
+    """The error to compare by: the declared one, if it has a label, unless only `SEEN` is known."""
     rows, visible = tuple(rows), replace(SEEN, least=least_seen)
     is_compared = figure.is_resolved(rows) or not visible.is_resolved(rows)
     return figure if figure.label and is_compared else visible
@@ -126,7 +118,8 @@ def front_point(row: WorkPrecisionRow, quantity: Quantity) -> FrontPoint | None:
 def front(rows: Rows, quantity: Quantity = SEEN) -> tuple[WorkPrecisionRow, ...]:
     """Rows that say whether they are on the front, and otherwise which row dominates them.
 
-    A lucky row is on no front, and dominates none.
+    A row is dominated where another costs no more and errs no more, and is clearly better in one of
+    the two. A lucky row is on no front, and dominates none.
     """
     points = ((n, front_point(row, quantity)) for n, row in enumerate(rows))
     places = {n: point for n, point in points if point is not None}
@@ -148,10 +141,7 @@ def front(rows: Rows, quantity: Quantity = SEEN) -> tuple[WorkPrecisionRow, ...]
 
 
 def main_quantity(report: ScenarioReport) -> Quantity | None:
-    """The error to show where only one is shown: the first that is resolved, else the first.
-
-    `None` where no row has an error.
-    """
+    """The first error that is resolved, else the first; `None` where no row has an error."""
     present = quantities(report)
     return next(
         (quantity for quantity in present if quantity.is_resolved(report.rows)),
@@ -219,16 +209,13 @@ def interval_text(value: Interval) -> str:
 
 
 def setting_text(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> str:
-    """A setting in words; solver, iterations and cone only where they differ from those of `like`.
-
-    Without `like` all of them are given; options always.
-    """
+    """A setting in words; solver, iterations and cone only where they differ from `like`."""
     parts = [f"{setting.integrator} at {seconds_text(setting.timestep)}"]
     return ", ".join([*parts, *solving_parts(setting, like)])
 
 
 def solving_parts(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> list[str]:
-    """Solver, iterations and cone of a setting in words; see `setting_text`."""
+    """Solver, iterations and cone of a setting in words, where they differ from those of `like`."""
     parts = []
     if setting.solver and (like is None or setting.solver != like.solver):
         parts.append(setting.solver)

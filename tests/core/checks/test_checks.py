@@ -90,26 +90,6 @@ def test_scenarios_that_fit_their_model_are_good() -> None:
     assert scenario_messages(*GOOD_SCENARIOS) == []
 
 
-@pytest.mark.parametrize(
-    ("line", "expected"),
-    [
-        ('keyframe = "zzzzz"',
-         '"zzzzz"; the model has no keyframe `zzzzz` [known: `home`, `up`]'),
-        ('measure = "site:top"', '"site:top"; the model has no site `top` [did you mean `tip`?]'),
-        ('measure = "sensor:tip"',
-         '"sensor:tip"; the model has no sensor `tip` [known: `gyro`]'),
-        ("duration = 0.001",
-         "0.001; the model's timestep, 0.002 s, does not divide `duration` (0.001 s)"
-         " [a multiple near it is 0.002]"),
-        ("controls = [[1], [2]]\nhold = 0.003",
-         "0.003; the model's timestep, 0.002 s, does not divide `hold` (0.003 s)"
-         " [a multiple near it is 0.004]"),
-    ],
-)  # fmt: skip
-def test_a_mismatch_with_the_model_is_reported_at_its_value(line: str, expected: str) -> None:
-    assert scenario_messages(line) == [f"scenario-model: {expected}"]
-
-
 def test_all_mismatches_of_all_scenarios_are_reported() -> None:
     messages = scenario_messages("keyframe = 8\nduration = 0.003", "keyframe = 7\nqvel = [1]")
     assert [message.partition(";")[0] for message in messages] == [
@@ -120,56 +100,6 @@ def test_all_mismatches_of_all_scenarios_are_reported() -> None:
 SCRIPT = "```python file=examples/a_b.py\nx = 1\nprint(x)\n```\n\nOutput:\n\n```text\n1\n```\n"
 QUESTION = '{"id": "one", "kind": "open", "q": "Q", "reference": "R"}'
 QUIZ = f'```quiz\n{{"id": "q1", "questions": [{QUESTION}]}}\n```\n'
-
-
-def messages_of(first: str, second: str = f"## There {{#there}}\n\n{SCRIPT}") -> list[str]:
-    files = ["content/lessons/plot.svg", "content/data/a b.csv"]
-    return rules_and_texts(
-        check_course(make_course(first, second, models={"box": BOX}, files=files))
-    )
-
-
-GOOD_LINKS = (
-    *("model:box#facts", "model:box#file", "model:box#box.xml", "model:box#box.L3", "#"),
-    *("../lessons/plot.svg#x", "../data/a%20b.csv?x", "//example.org/x"),
-    *("lesson:1.2#a_b.py", "lesson:1.2#a_b.L2", "lesson:1.2#a_b.L1-L2", "lesson:1.2#a_b.out"),
-)
-BAD_LINKS = {
-    "link-lesson": ("lesson:4.3#x",),
-    "link-file": ("table.csv", "../plot.svg", "box.xml"),
-    "link-anchor": (
-        *("#nowhere", "#Here", "lesson:1.2#here", "lesson:1.3#x", "page:about#x"),
-        *("1.2-second.md#x", "lesson:1.2#a_b.L3", "lesson:1.2#a_b.L2-L1", "lesson:1.2#a_b.out-2"),
-        *("lesson:1.2#c.L1", "model:box#x", "model:box#box.L4", "model:box#bx.L1"),
-        "model:box#box.L2-L4",
-    ),
-}
-
-
-def test_links_that_lead_somewhere_are_good() -> None:
-    assert messages_of("## Here\n\n" + "\n".join(f"[a]({target})" for target in GOOD_LINKS)) == []
-
-
-@pytest.mark.parametrize("rule", BAD_LINKS)
-def test_links_that_lead_nowhere_are_reported_at_their_targets(rule: str) -> None:
-    messages = messages_of(
-        "## Here\n\n" + "\n".join(f"[a]({target})" for target in BAD_LINKS[rule])
-    )
-    assert messages == [f"{rule}: {target}" for target in BAD_LINKS[rule]]
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("See Lessons 1.1, 1.2 and 1.9.\n", ["link-lesson: 1.9"]),
-        ("> [!note] See Level 7\n> Text.\n", ["link-level: 7"]),
-        ("| a |\n| - |\n| Lesson 4.3 |\n", ["link-lesson: 4.3"]),
-        ("[a][r]\n\n[r]: lesson:4.3\n", ["link-lesson: lesson:4.3"]),
-        (QUIZ.replace('"Q"', '"See Lesson 4.3."'), ["link-lesson: 4.3"]),
-    ],
-)
-def test_mentions_are_links_wherever_they_stand(text: str, expected: list[str]) -> None:
-    assert messages_of(text) == expected
 
 
 def test_anchors_of_a_document() -> None:
@@ -191,24 +121,6 @@ def test_anchors_of_a_document() -> None:
     assert spans["eq:one"].start == text.index("$$")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("[a](lesson:1.3#x)", "lesson 1.3 is planned, so it has no anchor `#x` yet"
-         " [link to the lesson itself]"),
-        ("[a](page:about#x)", "page `about` has no anchor `#x`"),
-        ("[a](model:box#fact)", "the page of the model `box` has no anchor `#fact`"
-         " [did you mean `facts`?]"),
-        ("[a](x.md)", "no file `content/lessons/x.md`"
-         " [link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`]"),
-        ("[a](box.xml)", "no file `content/lessons/box.xml`"
-         " [link to a model by its name: `model:box`]"),
-    ],
-)  # fmt: skip
-def test_the_message_says_why_a_link_leads_nowhere(text: str, message: str) -> None:
-    assert messages(check_course(make_course(text, models={"box": BOX}))) == [message]
-
-
 GOOD = CompileResult("", None, facts())
 
 
@@ -226,50 +138,6 @@ def check(
 def block(keys: str, *lines: str) -> Course:
     body = "\n".join(lines or ("<mujoco>", "  <world/>", "</mujoco>"))
     return make_course(f"```mjcf{keys}\n{body}\n```\n")
-
-
-@pytest.mark.parametrize(
-    ("keys", "text", "before"),
-    [
-        ("", "<geom/>\n", 0),
-        (" fragment=mujoco", "<mujoco>\n<geom/>\n\n</mujoco>", 1),
-        (" fragment=worldbody", "<mujoco><worldbody>\n<geom/>\n\n</worldbody></mujoco>", 1),
-        (
-            ' fragment="worldbody/body"',
-            "<mujoco><worldbody><body>\n<geom/>\n\n</body></worldbody></mujoco>",
-            1,
-        ),
-    ],
-)
-def test_a_fragment_gets_the_elements_around_it(keys: str, text: str, before: int) -> None:
-    (wrapped,) = mjcf_texts(block(keys, "<geom/>"))
-    assert (wrapped.text, wrapped.lines_before) == (text, before)
-
-
-def test_texts_of_blocks_and_labs_are_compiled_in_their_order() -> None:
-    lab = '```lab\n{"xml": "<mujoco/>"}\n```\n'
-    by_name = '```lab\n{"model": "box"}\n```\n'
-    course = make_course(f"```mjcf\n<a/>\n```\n\n{lab}", f"{by_name}\n```mjcf\n<b/>\n```\n")
-    assert [text.text for text in mjcf_texts(course)] == ["<a/>\n", "<mujoco/>", "<b/>\n"]
-
-
-@pytest.mark.parametrize(
-    ("keys", "line", "expected"),
-    [
-        ("", 2, "<world/>"),
-        ("", 1, "<mujoco>"),
-        ("", 4, ""),
-        ("", 5, "```mjcf"),
-        ("", 0, "```mjcf"),
-        ("", None, "```mjcf"),
-        (" fragment=worldbody", 3, "<world/>"),
-        (" fragment=worldbody", 1, "```mjcf fragment=worldbody"),
-    ],
-)
-def test_an_error_is_reported_at_its_line_without_indent(
-    keys: str, line: int | None, expected: str
-) -> None:
-    assert rules_and_texts(check(block(keys), failure(line))) == [f"mjcf-error: {expected}"]
 
 
 PART = "<!-- a part -->\n<mujocoinclude/>\n"

@@ -15,7 +15,7 @@ import pytest
 
 from coursebuild.core.engine.page_pool import Workers, can_fork
 from coursebuild.core.files.errors import EffectError
-from support.run_code import run_code
+from support.run_code import program, run_code
 from support.runners import wait_until_ended
 
 pytestmark = pytest.mark.site
@@ -96,13 +96,7 @@ def test_what_is_raised_in_a_worker_is_raised_here() -> None:
 
 def test_where_standard_input_is_closed() -> None:
     """A worker's pipe may then have the number of standard input."""
-    code = (
-        "import os\n"
-        "from coursebuild.core.engine.page_pool import Workers\n"
-        "with Workers(lambda task: os.getpid(), 2) as workers:\n"
-        "    print(os.getpid() not in [p for p, _ in workers.map([(None, 1), (None, 2)])])\n"
-    )
-    shell = ["sh", "-c", 'exec "$0" -c "$1" <&-', sys.executable, code]
+    shell = ["sh", "-c", 'exec "$0" -c "$1" <&-', sys.executable, program("are_workers")]
     process = subprocess.run(shell, capture_output=True, text=True, check=True)
     assert process.stdout == "True\n", process.stderr
 
@@ -122,23 +116,10 @@ def test_after_a_failure_no_answer_is_taken_for_another() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_at_the_moment_of_a_fork_is_for_the_process_that_forks(
-    number: signal.Signals, tmp_path: Path
+    number: signal.Signals,
 ) -> None:
     """A terminal sends a signal to all of its processes; the worker gets it at once."""
-    code = (
-        "import os, signal, sys\n"
-        "from coursebuild.core.engine.page_pool import Workers\n"
-        "number = int(sys.argv[1])\n"
-        "def heard(*_): print('heard by', os.getpid() == here, flush=True)\n"
-        "here = os.getpid()\n"
-        "signal.signal(number, heard)\n"
-        "os.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), number),\n"
-        "                    after_in_parent=lambda: os.kill(os.getpid(), number))\n"
-        "with Workers(lambda task: (task, os.getpid() == here), 1) as workers:\n"
-        "    answers = [a for a, _ in workers.map([(None, 1)])]\n"
-        "    print(answers, signal.pthread_sigmask(signal.SIG_BLOCK, []))\n"
-    )
-    process = run_code(code, int(number))
+    process = run_code(program("signal_at_fork"), int(number))
     # SIGTERM ends the worker, as it would a moment later: its task is done here.
     answered_here = number == signal.SIGTERM
     assert process.stdout == f"heard by True\n[(1, {answered_here})] set()\n"
@@ -157,19 +138,10 @@ def test_a_process_with_threads_is_not_copied() -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
-def test_workers_end_with_the_process(number: signal.Signals, tmp_path: Path) -> None:
+def test_workers_end_with_the_process(number: signal.Signals) -> None:
     """Even if the process is killed, and they are in the middle of a task."""
-    script = tmp_path / "p.py"
-    script.write_text(
-        "import os\n"
-        "from coursebuild.core.engine.page_pool import Workers\n"
-        "def work(n):\n"
-        "    os.write(1, b'%d\\n' % os.getpid())\n"
-        "    while True: pass\n"
-        "with Workers(work, 2) as workers: list(workers.map([(None, n) for n in range(99)]))\n"
-    )
     with subprocess.Popen(
-        [sys.executable, str(script)],
+        [sys.executable, "-c", program("endless_work")],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         env={**os.environ, "PYTHONPATH": str(ROOT)},

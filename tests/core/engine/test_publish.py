@@ -22,6 +22,7 @@ from coursebuild.core.model.results import OutputFile
 from support.published_sites import Pages, entries, texts
 from support.published_sites import pages as pages
 from support.published_sites import root as root
+from support.run_code import program
 
 PATHS = ("index.html", "404.html", "lessons/4.2/index.html", "assets/fonts/a b é.woff2")
 
@@ -208,25 +209,11 @@ def test_a_mount_point_is_refused(root: Path, monkeypatch: pytest.MonkeyPatch) -
     assert refusal(root, root / "public") == "is a mount point, which cannot be swapped"
 
 
-BUILD = """
-import sys
-from pathlib import Path
-from coursebuild.core.engine import publish
-from coursebuild.core.model.results import OutputFile
-root, name, exchanges = Path(sys.argv[1]), sys.argv[2], sys.argv[3]
-if exchanges == "False":
-    publish.exchange = lambda a, b: False
-for i in range(40):
-    files = [OutputFile(f"{name}{k}/index.html", name.encode()) for k in range(20)]
-    publish.publish(root, root / "public", files)
-"""
-
-
 @pytest.mark.site
 def test_two_builds_at_once(root: Path, exchanges: bool) -> None:
     builds = [
         subprocess.Popen(
-            [sys.executable, "-c", BUILD, str(root), name, str(exchanges)],
+            [sys.executable, "-c", program("publish_often"), str(root), name, str(exchanges)],
             cwd=Path(publishing.__file__).parents[3],
             stderr=subprocess.PIPE,
             text=True,

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.engine.store import Store, prune
+from support.run_code import program
 
 ROOT = Path(__file__).parents[3]
 KEY = hashlib.sha256(b"a key").hexdigest()
@@ -83,23 +84,9 @@ def test_several_processes_write_read_and_prune_at_once(tmp_path: Path) -> None:
     assert names <= {key(number) for number in range(5)}
 
 
-KILLED_SCRIPT = """
-import os, sys
-from pathlib import Path
-from coursebuild.core.engine.store import Store
-def stop(source, target):
-    print("writing", flush=True)
-    sys.stdin.read()
-store = Store(Path(sys.argv[1]))
-store.put("other", sys.argv[2], b"")
-os.replace = stop
-store.put("kind", sys.argv[2], b"x" * 100_000)
-"""
-
-
 def test_a_writer_that_was_killed_leaves_nothing_that_is_served_or_stays(tmp_path: Path) -> None:
     process = subprocess.Popen(
-        [sys.executable, "-c", KILLED_SCRIPT, str(tmp_path), KEY],
+        [sys.executable, "-c", program("write_half"), str(tmp_path), KEY],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": str(ROOT)},

@@ -16,26 +16,15 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.files.locks import is_abandoned, project_lock, temporary_folder
-from support.run_code import run_code
+from support.run_code import program, run_code
 from support.runners import SOURCE_TREE
 from support.scratch_course import without_locks
 from support.waiting import wait_until
 
-HOLD = """
-import sys
-from pathlib import Path
-from coursebuild.core.files.locks import project_lock
-with project_lock(Path(sys.argv[1]), lambda said: print(said, flush=True)):
-    print("held", flush=True)
-    sys.stdin.read()
-print("done", flush=True)
-"""
-"""Holds the lock of a course until its input is closed."""
-
 
 def holder(root: Path, before: str = "") -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-c", before + HOLD, str(root)],
+        [sys.executable, "-c", before + program("hold"), str(root)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -151,14 +140,6 @@ def test_children_do_not_inherit_it(tmp_path: Path) -> None:
 
 
 MAKE = "from coursebuild.core.files.locks import temporary_folder\n"
-HOLD_FOLDER = (
-    f"{MAKE}import os, sys\n"
-    "with temporary_folder() as folder:\n"
-    "    os.mkdir(folder + '/inner', 0o700)\n"
-    "    os.chmod(folder + '/inner', 0)\n"
-    "    print(folder, flush=True)\n"
-    "    sys.stdin.read()\n"
-)
 NAME = "coursebuild.tmp.abcdefgh"
 
 
@@ -172,7 +153,7 @@ def place(tmp_path: Path) -> Path:
 def start(place: Path) -> tuple[subprocess.Popen[str], Path]:
     """A process with a temporary folder, which ends when its input closes."""
     process = subprocess.Popen(
-        [sys.executable, "-c", HOLD_FOLDER],
+        [sys.executable, "-c", program("hold_folder")],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

@@ -31,13 +31,10 @@ def fill(root: Path, files: Mapping[str, bytes | str]) -> None:
 def unreadable(root: Path) -> dict[str, str]:
     """The message for each path that cannot be read."""
     parsed_course = read_course(root)
-    assert all(d.rule == "file-unreadable" for d in parsed_course.diagnostics)
-    assert sorted(parsed_course.value.unreadable) == sorted(
-        d.span.path for d in parsed_course.diagnostics
-    )
-    return {
-        d.span.path: d.message.removeprefix(f"{d.span.path} ") for d in parsed_course.diagnostics
-    }
+    diagnostics = parsed_course.diagnostics
+    assert all(d.rule == "file-unreadable" for d in diagnostics)
+    assert sorted(parsed_course.value.unreadable) == sorted(d.span.path for d in diagnostics)
+    return {d.span.path: d.message.removeprefix(f"{d.span.path} ") for d in diagnostics}
 
 
 # --- what there is
@@ -54,18 +51,14 @@ def test_everything_in_its_place_and_sorted(root: Path, tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to("course")
     for folder in (root, tmp_path / "link"):
         parsed_course = read_course(folder)
-        assert parsed_course.diagnostics == () and parsed_course.value.map is not None
-        assert [s.path for s in parsed_course.value.lessons] == [
-            f"content/lessons/{n}" for n in lessons
-        ]
-        assert [s.path for s in parsed_course.value.pages] == [
-            f"content/pages/{name}" for name in pages
-        ]
-        assert [(m.name, m.source.path) for m in parsed_course.value.models] == [
-            (name, f"models/{name}.xml") for name in models
-        ]
-        assert "content/lessons/pictures/p.png" in parsed_course.value.files
-        assert list(parsed_course.value.files) == sorted(parsed_course.value.files)
+        course = parsed_course.value
+        assert parsed_course.diagnostics == () and course.map is not None
+        assert [s.path for s in course.lessons] == [f"content/lessons/{n}" for n in lessons]
+        assert [s.path for s in course.pages] == [f"content/pages/{name}" for name in pages]
+        model_paths = [(name, f"models/{name}.xml") for name in models]
+        assert [(m.name, m.source.path) for m in course.models] == model_paths
+        assert "content/lessons/pictures/p.png" in course.files
+        assert list(course.files) == sorted(course.files)
 
 
 def test_editors_droppings_are_no_files(root: Path) -> None:
@@ -108,11 +101,8 @@ def test_text_is_as_on_disk(root: Path) -> None:
     assert source.text.encode() == data
 
 
-LATIN, BINARY, UTF16 = (
-    "may be Latin-1 or Windows-1252",
-    "looks like a binary file",
-    "looks like UTF-16",
-)
+LATIN, UTF16 = "may be Latin-1 or Windows-1252", "looks like UTF-16"
+BINARY = "looks like a binary file"
 INVALID_BYTES = [
     (b"ab\xe9c", 1, 3, "byte 0xe9 is not UTF-8", LATIN),
     ("é\r\n\U0001d4b3x".encode() + b"\xffz", 2, 3, "byte 0xff is not UTF-8", LATIN),
@@ -141,15 +131,13 @@ def test_bytes_that_are_not_utf8_are_shown_and_what_is_no_text_is_read_no_furthe
         assert (diagnostic.span.line, diagnostic.span.column) == (line, column), data
         assert diagnostic.message == message, data
         assert diagnostic.help == f"save the file as UTF-8; it {guess}", data
+        files = parsed_course.value
         if guess != LATIN:
-            assert (parsed_course.value.lessons, parsed_course.value.unreadable) == (
-                (),
-                (LESSON,),
-            ), data
+            assert (files.lessons, files.unreadable) == ((), (LESSON,)), data
             continue
         # The rest of the file is there for other stages, and can never be written back as it is.
         assert diagnostic.span.text == "\ufffd"
-        (source,) = parsed_course.value.lessons
+        (source,) = files.lessons
         assert source.text.encode() != data
 
 
@@ -158,9 +146,8 @@ def test_bytes_that_are_not_utf8_are_shown_and_what_is_no_text_is_read_no_furthe
 
 def test_links_lead_nowhere_but_into_the_project(root: Path, tmp_path: Path) -> None:
     fill(tmp_path, {"secret.md": "secret", "elsewhere/x": ""})
-    fill(
-        root, {"shared/text.md": "shared", "shared/m/a.xml": "<mujoco/>", "content/pages/x.md": ""}
-    )
+    shared = {"shared/text.md": "shared", "shared/m/a.xml": "<mujoco/>"}
+    fill(root, {**shared, "content/pages/x.md": ""})
     links = {
         "content/lessons/1.2-b.md": "../../../secret.md",
         "content/lessons/1.3-c.md": str(tmp_path / "secret.md"),

@@ -18,7 +18,6 @@ def test_installed_before_source_tree_before_nothing(
 ) -> None:
     package = tmp_path / "tree/coursebuild"
     monkeypatch.setattr(resources, "_PACKAGE", package)
-    monkeypatch.setattr(resources, "_TREE", tmp_path / "tree")
     assert callable(ask)
     with pytest.raises(EffectError) as caught:
         ask()

@@ -136,13 +136,9 @@ def test_without_a_place_of_ones_own_outside_of_the_course_nothing_is_kept(
         monkeypatch.setattr(os, "geteuid", lambda: user)
     monkeypatch.setenv("XDG_STATE_HOME", str(root.parent / place))
     Store(root).put("kind", KEY, b"kept")
-    assert look_up(root) == (
-        None,
-        [
-            "warning: .coursebuild needs a key of its user's own, and there is nowhere to keep it: "
-            "set HOME, XDG_STATE_HOME or COURSEBUILD_STORE_KEY; it is set aside"
-        ],
-    )
+    warning = "warning: .coursebuild needs a key of its user's own, and there is nowhere to keep it"
+    advice = "set HOME, XDG_STATE_HOME or COURSEBUILD_STORE_KEY; it is set aside"
+    assert look_up(root) == (None, [f"{warning}: {advice}"])
     assert list(root.iterdir()) == []
 
 
@@ -240,10 +236,8 @@ def test_store_of_another_user_is_set_aside_with_a_warning(
     fill(root)
     user = os.geteuid() + 1
     monkeypatch.setattr(os, "geteuid", lambda: user)
-    assert look_up(root) == (
-        None,
-        ["warning: .coursebuild belongs to another user; it is set aside"],
-    )
+    warning = "warning: .coursebuild belongs to another user; it is set aside"
+    assert look_up(root) == (None, [warning])
 
 
 # --- Git
@@ -282,9 +276,8 @@ def test_linked_work_tree_and_letters_of_another_case(tmp_path: Path, state: Pat
     git(top, "worktree", "add", "--quiet", str(tmp_path / "tree"))
     shutil.rmtree(tmp_path / "tree/.Coursebuild")
     fill(tmp_path / "tree")
-    assert look_up(tmp_path / "tree")[1] == [
-        "warning: .coursebuild is tracked by Git; it is set aside"
-    ]
+    warning = "warning: .coursebuild is tracked by Git; it is set aside"
+    assert look_up(tmp_path / "tree")[1] == [warning]
 
 
 def test_git_folder_that_no_git_has_made_ends_nothing(root: Path) -> None:

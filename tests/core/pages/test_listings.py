@@ -16,7 +16,10 @@ from coursebuild.core.pages.listings import HEAD, LONG, Part, find_imports, fold
 from coursebuild.core.pages.references import check_links, has_anchor, merge_line_ids
 from coursebuild.core.text.characters import visible
 from coursebuild.features.lab.page import qr_svg
+from support.fixture_cases import fixture_tables
 from support.rendered_course import Make
+
+CASES = fixture_tables("listings")
 
 
 def test_anchors_are_named_after_the_file() -> None:
@@ -28,22 +31,9 @@ def test_anchors_are_named_after_the_file() -> None:
     assert listing_anchor("examples/a b.py") == "a␣b.py", "an id has no space"
 
 
-@pytest.mark.parametrize(
-    ("anchor", "lines"),
-    [
-        ("a.L1", ("a", 1, 1)),
-        ("sub/a.b.L3-L20", ("sub/a.b", 3, 20)),
-        ("a.L5-L4", None),
-        ("a.L0", None),
-        ("a.L01", None),
-        ("a.L1-2", None),
-        (".L1", None),
-        ("heading", None),
-        ("a.L9999999999", None),
-    ],
-)
-def test_the_lines_that_an_anchor_names(anchor: str, lines: tuple[str, int, int] | None) -> None:
-    assert linked_lines(anchor) == lines
+def test_the_lines_that_an_anchor_names() -> None:
+    lines_by_anchor = {anchor: tuple(lines) or None for anchor, lines in CASES["anchors"]}
+    assert {anchor: linked_lines(anchor) for anchor in lines_by_anchor} == lines_by_anchor
 
 
 SCRIPT = "```python file=examples/a.py\nprint(1)\nprint(2)\n```\n"
@@ -58,20 +48,10 @@ def test_lines_of_a_model_can_be_linked_to(make: Make) -> None:
 PAGE = '<p id="h"></p><span id="a.L1"></span><span id="a.L2"></span><a href="{}">x</a>'
 
 
-@pytest.mark.parametrize(
-    ("url", "fine"),
-    [
-        ("#a.L2", True),
-        ("#a.L1-L2", True),
-        ("#a.L3", False),
-        ("#a.L2-L3", False),
-        ("#b.L1", False),
-        ("#h", True),
-    ],
-)
-def test_links_to_lines_are_checked(url: str, fine: bool) -> None:
-    file = OutputFile("index.html", PAGE.format(url).encode())
-    assert (check_links([file]) == ()) is fine
+def test_links_to_lines_are_checked() -> None:
+    for url, fine in CASES["links"]:
+        file = OutputFile("index.html", PAGE.format(url).encode())
+        assert (check_links([file]) == ()) is fine, url
 
 
 # ------------------------------------------------------------------------------------ paper
@@ -217,31 +197,9 @@ def highlight(language: str, code: str) -> str:
 
 
 def test_python_gets_classes_for_what_a_reader_looks_for() -> None:
-    code = 'def spin(rate: float) -> str:\n    return f"{rate:.3f} rad/s"  # <slow>\n'
-    assert highlight("python", code) == (
-        '<span class="k">def</span> <span class="f">spin</span>(rate: float) -&gt; str:\n'
-        '    <span class="k">return</span> <span class="s">f"</span><span class="i">{</span>rate'
-        '<span class="i">:</span><span class="s">.3f</span><span class="i">}</span>'
-        ' <span class="s">rad/s"</span>  <span class="c"># &lt;slow&gt;</span>\n'
-    )
-
-
-def test_a_docstring_a_decorator_and_nested_fields_have_their_classes() -> None:
-    code = '"""Doc."""\n@cache\ndef f():\n    return f"{x!r:>{w}}"\n'
-    assert highlight("python", code) == (
-        '<span class="d">"""Doc."""</span>\n<span class="a">@cache</span>\n'
-        '<span class="k">def</span> <span class="f">f</span>():\n'
-        '    <span class="k">return</span> <span class="s">f"</span><span class="i">{</span>x'
-        '<span class="i">!r:</span><span class="s">&gt;</span><span class="i">{</span>w'
-        '<span class="i">}}</span><span class="s">"</span>\n'
-    )
-
-
-def test_python_that_does_not_parse_is_marked_as_far_as_it_can_be_read() -> None:
-    assert highlight("python", "def (:\n    x = 1  # ν\n") == (
-        '<span class="k">def</span> (:\n    x = <span class="n">1</span>'
-        '  <span class="c"># ν</span>\n'
-    )
+    """Also where it does not parse, as far as it can be read."""
+    for code, html in CASES["python"]:
+        assert highlight("python", code) == html
 
 
 def test_a_very_long_script_is_marked_too() -> None:

@@ -25,8 +25,11 @@ from coursebuild.core.pages.quantities import (
 from coursebuild.core.pages.strings import Strings, direction, parse_strings
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source, Span
+from support.fixture_cases import fixture_tables
 from support.plain_html import WORDS, PlainWriter
 from support.rendered_course import MAP, Make
+
+CASES = fixture_tables("markup")
 
 KINDS = frozenset({"note"})
 
@@ -70,82 +73,16 @@ def html(text: str) -> str:
     return str(Writer().render_blocks(parse(text).blocks))
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        (
-            '## A "b" & *c* {#x .wide}',
-            '<h2 id="x" class="wide">A &quot;b&quot; &amp; <em>c</em> '
-            '<a class="anchor" href="#x" aria-label="Link to this section">#</a></h2>\n',
-        ),
-        (
-            "## Übung",
-            '<h2 id="übung">Übung <a class="anchor" href="#%C3%BCbung" '
-            'aria-label="Link to this section">#</a></h2>\n',
-        ),
-        ("[a](lesson:1.1 't\"')", '<p><a href="/LessonTarget?a&amp;b" title="t&quot;">a</a></p>\n'),
-        ("Level 3", '<p><a href="/LevelTarget?a&amp;b">Level 3</a></p>\n'),
-        (
-            "![a \"b\"](c.png 'd')",
-            '<p><img src="/files/c.png" alt="a &quot;b&quot;" title="d"></p>\n',
-        ),
-        ("~~a~~", "<p><del>a</del></p>\n"),
-        (
-            "<img src=a.png srcset='b.png 2x, c.png'> <video poster=\"d&amp;e.png\"></video>",
-            "<p><img src=/files/a.png srcset='/files/b.png 2x, /files/c.png'> "
-            '<video poster="/files/d&amp;e.png"></video></p>\n',
-        ),
-        (
-            "<object data='a.svg'>\n<a href='a.svg'>\n",
-            "<object data='/files/a.svg'>\n<a href='a.svg'>\n",
-        ),
-        ("<b>&amp;</b>\n", "<p><b>&amp;</b></p>\n"),
-        ("- a\n  - b\n- c", "<ul>\n<li>a\n<ul>\n<li>b</li>\n</ul>\n</li>\n<li>c</li>\n</ul>\n"),
-    ],
-)
+@pytest.mark.parametrize(("text", "expected"), CASES["blocks"])
 def test_the_html_of_blocks_and_inlines(text: str, expected: str) -> None:
     assert html(text) == expected
 
 
-def test_a_table_is_framed_and_aligned() -> None:
-    assert html("| a | b | c |\n| - | -: | :-: |\n| *1* | 2 |\n") == (
-        '<div class="table" role="group" aria-label="Table" tabindex="0">\n'
-        '<table>\n<thead>\n<tr>\n<th scope="col">a</th>\n'
-        '<th scope="col" class="align-right">b</th>\n'
-        '<th scope="col" class="align-center">c</th>\n</tr>\n</thead>\n<tbody>\n<tr>\n'
-        '<td><em>1</em></td>\n<td class="align-right">2</td>\n<td class="align-center"></td>\n'
-        "</tr>\n</tbody>\n</table>\n</div>\n"
-    )
-
-
-def test_a_task_list_has_labelled_boxes() -> None:
-    assert html("- [ ] a\n- [x] b\n- c\n") == (
-        '<ul class="task-list">\n'
-        '<li><input type="checkbox" disabled aria-label="Not done"> a</li>\n'
-        '<li><input type="checkbox" disabled checked aria-label="Done"> b</li>\n'
-        "<li>c</li>\n</ul>\n"
-    )
-
-
 def test_footnotes_and_their_references_link_to_each_other() -> None:
-    document = parse("a[^x] b[^y] c[^x]\n\n[^x]: *One*.\n[^y]: - item\n")
-    assert str(Writer().render_blocks(document.blocks)) == (
-        '<p>a<sup class="footnote-ref"><a href="#fn:1" id="fnref:1" role="doc-noteref"'
-        ' aria-label="Footnote 1">1</a></sup> b<sup class="footnote-ref"><a href="#fn:2"'
-        ' id="fnref:2" role="doc-noteref" aria-label="Footnote 2">2</a></sup> c'
-        '<sup class="footnote-ref"><a href="#fn:1" id="fnref:1:2" role="doc-noteref"'
-        ' aria-label="Footnote 1">1</a></sup></p>\n'
-    )
-    assert str(Writer().render_footnotes(document.footnotes)) == (
-        '<section class="footnotes" role="doc-endnotes" aria-label="Footnotes">\n<ol>\n'
-        '<li id="fn:1">\n<p><em>One</em>. <a href="#fnref:1" class="footnote-back"'
-        ' role="doc-backlink" aria-label="Back to reference 1">↩</a> <a href="#fnref:1:2"'
-        ' class="footnote-back" role="doc-backlink"'
-        ' aria-label="Back to reference 1, place 2">↩<sup>2</sup></a></p>\n</li>\n'
-        '<li id="fn:2">\n<ul>\n<li>item</li>\n</ul>\n<p><a href="#fnref:2" class="footnote-back"'
-        ' role="doc-backlink" aria-label="Back to reference 2">↩</a></p>\n</li>\n'
-        "</ol>\n</section>\n"
-    )
+    text, html, notes = CASES["footnotes"]
+    document = parse(text)
+    assert str(Writer().render_blocks(document.blocks)) == html
+    assert str(Writer().render_footnotes(document.footnotes)) == notes
 
 
 def test_words_can_be_translated() -> None:
@@ -218,19 +155,7 @@ def test_an_output_in_the_next_list_item_stays_apart_from_the_script(make: Make)
     assert make(text).html().count("<figure") == 2
 
 
-@pytest.mark.parametrize(
-    ("keys", "status", "expected"),
-    [
-        (" atol=1e-12", "verified", "verified: Verified with MuJoCo 3.14.0, Python 3.11.7: "
-         "every number to within 1e-12."),
-        (' volatile="[0-9.]+ s"', "verified",
-         "verified: Verified with MuJoCo 3.14.0, Python 3.11.7: the same text, character by "
-         "character; what matches [0-9.]+ s varies from run to run and is not compared."),
-        ("", "unchecked", "unverified: Not verified: the script did not run to completion."),
-        ("", "drift", "unverified: Not verified: with MuJoCo 3.14.0, Python 3.11.7 the script "
-         "prints something else."),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("keys", "status", "expected"), CASES["receipts"])  # fmt: skip
 def test_the_receipt_of_an_output_says_how_it_was_compared(
     make: Make, keys: str, status: str, expected: str
 ) -> None:
@@ -268,75 +193,29 @@ def test_code_without_a_file_is_shown_with_its_language_escaped(make: Make) -> N
     assert "<script" not in hostile
 
 
-ROW = "<mrow><mi>alpha</mi><mrow><mi>beta</mi></mrow><mo>=</mo></mrow>"
-END = "<mrow><mi>gamma</mi><mo>+</mo><mn>123456</mn></mrow>"
+FORMULAS = {
+    "{X}": "<math><mi>x</mi></math>",
+    "{Y}": "<math><mi>y</mi></math>",
+    "{ROW}": "<mrow><mi>alpha</mi><mrow><mi>beta</mi></mrow><mo>=</mo></mrow>",
+    "{END}": "<mrow><mi>gamma</mi><mo>+</mo><mn>123456</mn></mrow>",
+}
 
 
-@pytest.mark.parametrize("space", ["", "<mspace/>"])
-def test_a_long_formula_is_cut_between_its_outermost_rows(space: str) -> None:
-    expected = f"<math>{ROW}</math><math>{space}{END}</math>"
-    assert split_formula(f"<math>{ROW}{space}{END}</math>") == expected
+def filled(text: str) -> str:
+    for name, formula in FORMULAS.items():
+        text = text.replace(name, formula)
+    return text
 
 
-@pytest.mark.parametrize(
-    "mathml",
-    [
-        f"<math>{ROW}</math>",
-        "<math><mrow><mi>a</mi><mo>=</mo></mrow><mrow><mi>b</mi></mrow></math>",
-        f'<math display="block">{ROW}{END}</math>',
-        f"<math>{ROW}{END}<mo>+</mo></math>",
-    ],
-)
-def test_short_displayed_and_open_formulas_stay_whole(mathml: str) -> None:
-    assert split_formula(mathml) == mathml
+def test_a_long_formula_is_cut_between_its_outermost_rows() -> None:
+    """Short, displayed and open ones stay whole."""
+    for mathml, expected in CASES["pieces"]:
+        assert split_formula(filled(mathml)) == filled(expected)
 
 
-X = "<math><mi>x</mi></math>"
-Y = "<math><mi>y</mi></math>"
-
-
-@pytest.mark.parametrize(
-    ("html", "expected"),
-    [
-        (f"axis {X}, {Y}.", f'axis <span class="held">{X},</span> <span class="held">{Y}.</span>'),
-        (f"({X})", f'<span class="held">({X})</span>'),
-        (f"{X}\u00a0m, to", f'<span class="held">{X}\u00a0m,</span> to'),
-        (f"{Y}\u00a0kg<sup>2</sup>", f'<span class="held">{Y}\u00a0kg</span><sup>2</sup>'),
-        (f"{X} m, {Y}\u00a0", f"{X} m, {Y}\u00a0"),
-        (f"“{X}”, so", f'<span class="held">“{X}”,</span> so'),
-        (f"{X} and {X}", f"{X} and {X}"),
-        (f"({X}{Y}{X})!", f'<span class="held">({X}</span>{Y}<span class="held">{X})!</span>'),
-        (f"{X}{Y},", f'{X}<span class="held">{Y},</span>'),
-        (f"<p>{X}</p>", f"<p>{X}</p>"),
-        (f'<math display="block">{X}</math>', f'<math display="block">{X}</math>'),
-        ("no formula, here", "no formula, here"),
-    ],
-)  # fmt: skip
-def test_punctuation_stays_on_the_line_of_its_formula(html: str, expected: str) -> None:
-    assert glue_formulas(html) == expected
-
-
-START, TWO = "of <math><mrow>", "<mn>2</mn>"
-NOTE = '<annotation encoding="application/x-tex">=2</annotation></semantics></math>'
-
-
-@pytest.mark.parametrize(
-    ("html", "expected"),
-    [
-        (f"{START}<mo>=</mo>{TWO}</mrow>", f'{START}<mo lspace="0em">=</mo>{TWO}</mrow>'),
-        (f"\n<math><semantics><mo>≈</mo>{TWO}", f'\n<math><semantics><mo lspace="0em">≈</mo>{TWO}'),
-        (f"{TWO}<mo>&lt;</mo></mrow>{NOTE} 3", f'{TWO}<mo rspace="0em">&lt;</mo></mrow>{NOTE} 3'),
-        ("a <math><mo>=</mo></math> b", 'a <math><mo lspace="0em" rspace="0em">=</mo></math> b'),
-        *((unchanged, unchanged) for unchanged in (
-            f"of {X}<math><mo>=</mo>{TWO}</math> m",
-            f"of <math>{TWO}<mo>=</mo></math><math>{TWO}</math> m",
-            f"of <math><mo>sin</mo>{TWO}</math> m",
-            f'of <math><mo lspace="0em">−</mo>{TWO}</math> m',
-        )),
-    ],
-)  # fmt: skip
-def test_an_operator_beside_a_space_of_the_text_has_none(html: str, expected: str) -> None:
-    assert glue_formulas(html) == expected
+def test_formulas_keep_their_punctuation_and_operators_their_space() -> None:
+    for html, expected in CASES["punctuation"] + CASES["operators"]:
+        assert glue_formulas(filled(html)) == filled(expected)
 
 
 LANGUAGES = {
@@ -352,35 +231,12 @@ def test_the_direction_of_a_language_is_that_of_its_script(side: str) -> None:
     assert [code for code in LANGUAGES[side].split() if direction(code) != side] == []
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("a mass of 5 kg falls", "a mass of 5\u00a0kg falls"),
-        ("9.81 m/s² and 3 N·m", "9.81\u00a0m/s² and 3\u00a0N·m"),
-        ("20 % of 3 ms", "20\u00a0% of 3\u00a0ms"),
-        ("3 minutes, 5 metres, 2 of them", "3 minutes, 5 metres, 2 of them"),
-        ("see 4.2 and 4.3", "see 4.2 and 4.3"),
-        ("30 °C, 2 kΩ, 4 µm, 4 μm", "30\u00a0°C, 2\u00a0kΩ, 4\u00a0µm, 4\u00a0μm"),
-        ("in 2 steps a 5 kg\nbox", "in 2 steps a 5\u00a0kg\nbox"),
-        ("3 kg m² of 4 N m s/rad", "3\u00a0kg\u00a0m² of 4\u00a0N\u00a0m\u00a0s/rad"),
-        ("5 kg mass, 2 m in 3 s more", "5\u00a0kg mass, 2\u00a0m in 3\u00a0s more"),
-    ],
-)
-def test_numbers_keep_their_units(text: str, expected: str) -> None:
-    assert join_units(text) == expected
+def test_numbers_keep_their_units() -> None:
+    for text, expected in CASES["units"]:
+        assert join_units(text) == expected
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("التسارع -9.81 m/s² هنا", ["-9.81 m/s²"]),
-        ("من −3 إلى +4.5", ["−3", "+4.5"]),
-        ("القيمة +3.2×10^-4 فقط", ["+3.2×10^-4"]),
-        ("الكتلة 2 kg، ثم 3", ["2 kg"]),
-        ("MuJoCo 3.14 و MuJoCo 3 kg", []),
-        ("2024-11-20", []),
-    ],
-)
+@pytest.mark.parametrize(("text", "expected"), CASES["quantities"])
 def test_quantities_in_text_from_the_right(text: str, expected: list[str]) -> None:
     pieces = list(split_quantities(text))
     assert [piece for piece, is_quantity in pieces if is_quantity] == expected

@@ -21,41 +21,11 @@ from coursebuild.core.model import local_file
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.references import check_links
 from coursebuild.core.pages.urls import Place, dark_path, file_path
+from support.fixture_cases import fixture_tables, fixture_text
 from support.rendered_course import MAP, Make
 
-LESSON = """## First part
-
-See lesson 1.1, level 1, lesson 1.2, [the page](page:about), [the box](model:box),
-[the script](examples/a.py), [a file](data.csv) and ![a sketch](../img/s.svg).[^n]
-
-$$x = 1$$
-
-```python file=examples/a.py
-from mjcourse import model_path
-import numpy as np
-print(model_path("box"))
-```
-
-Output:
-
-```text
-one
-```
-
-### Detail {#detail}
-
-Back to [the part](#first-part).
-
-## Second part
-
-```lab simlab
-{"model": "box", "dock": true, "title": "Docked"}
-```
-
-After.
-
-[^n]: A note.
-"""
+CASES = fixture_tables("addresses")
+LESSON = fixture_text("documents/site.md")
 
 FILES = {
     "content/lessons/data.csv": b"1,2\n",
@@ -276,17 +246,10 @@ def test_broken_links_are_reported_with_the_nearest_target() -> None:
         '<a href="b.html#x">3</a><script src=gone.js></script><a href="http://[">4</a>'
     )
     broken_links = [
-        (broken.url, broken.reason, broken.suggestion) for broken in check_links(linked_site(page))
+        [broken.url, broken.reason, broken.suggestion or ""]
+        for broken in check_links(linked_site(page))
     ]
-    assert broken_links == [
-        ("#conservatoin", "`lessons/a.html` has no anchor `#conservatoin`", "conservation"),
-        ("../../up.html", "no file `up.html` in the site", None),
-        ("../assets/sites.css", "no file `assets/sites.css` in the site", "assets/site.css"),
-        ("b.html#x", "no file `lessons/b.html` in the site", "lessons/a.html"),
-        ("gone.js", "no file `lessons/gone.js` in the site", None),
-        ("http://[", "the address cannot be read", None),
-        ("x.png", "no file `lessons/x.png` in the site", None),
-    ]
+    assert broken_links == CASES["broken"]
 
 
 def test_links_of_a_site_below_a_path_stay_below_it() -> None:
@@ -336,30 +299,14 @@ def test_a_browser_resolves_an_address_to_its_path() -> None:
 
 
 def test_addresses_are_as_short_as_they_can_be() -> None:
-    place = Place("lessons/1-a.html")
-    assert place.href("lessons/1-a.html", "b") == "#b"
-    assert place.href("lessons/1-a.html") == "1-a.html"
-    assert place.href("lessons/2-b.html") == "2-b.html"
-    assert place.href("index.html") == "../index.html"
+    """Those of the page for missing ones start at the root."""
+    for page, root, path, anchor, href in CASES["hrefs"]:
+        assert Place(page, root or None).href(path, anchor) == href
 
 
-def test_the_page_for_missing_addresses_starts_at_the_root() -> None:
-    place = Place("404.html", "/course/")
-    assert place.href("index.html") == "/course/"
-    assert place.href("assets/site.css") == "/course/assets/site.css"
-
-
-@pytest.mark.parametrize(
-    ("url", "path"),
-    [
-        ("sketch.svg", "content/lessons/sketch.svg"),
-        ("./a%20b.png", "content/lessons/a b.png"),
-        ("../pages/x.csv?raw#L3", "content/pages/x.csv"),
-        ("/content/x.png", "content/x.png"),
-    ],
-)
-def test_files_are_named_from_the_document(url: str, path: str) -> None:
-    assert local_file(url, "content/lessons/4.2-x.md") == path
+def test_files_are_named_from_the_document() -> None:
+    for url, path in CASES["files"]:
+        assert local_file(url, "content/lessons/4.2-x.md") == path
 
 
 @given(st.text(st.characters(exclude_categories=["Cs"], exclude_characters="/"), min_size=1))

@@ -14,20 +14,11 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.child import JsonChild
+from support.run_code import program
 from support.runners import SOURCE_TREE, is_alive, wait_until_ended
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
-
-SERVE = """\
-import json, os, signal, sys
-print("ready", flush=True)
-for line in sys.stdin:
-    request = json.loads(line)
-    if isinstance(request, dict) and "do" in request:
-        exec(request["do"])
-    print(json.dumps({"got": request, "pid": os.getpid(), "cwd": os.getcwd()}), flush=True)
-"""
 
 
 @pytest.fixture
@@ -41,7 +32,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def make(tmp_path: Path, seconds: float = 120.0) -> JsonChild:
     script = tmp_path / "worker.py"
-    script.write_text(SERVE)
+    script.write_text(program("answer"))
     return JsonChild(str(script), seconds)
 
 
@@ -89,17 +80,9 @@ def test_half_an_answer_has_the_same_time_limit(tmp_path: Path) -> None:
 def test_it_ends_with_its_parent(tmp_path: Path, request_code: str) -> None:
     """However the parent ends, and whatever the child does at that moment."""
     make(tmp_path)
-    code = (
-        "from coursebuild.core.run.child import JsonChild\n"
-        f"one = JsonChild({str(tmp_path / 'worker.py')!r}, 120.0)\n"
-        "print(one.ask(1)['pid'], flush=True)\n"
-        f"one.ask({request_code})\n"
-        "import signal; signal.pause()\n"
-    )
     env = {**os.environ, "TMPDIR": str(tmp_path)}
-    with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, cwd=SOURCE_TREE, env=env
-    ) as parent:
+    words = [sys.executable, "-c", program("ask"), tmp_path / "worker.py", request_code]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, cwd=SOURCE_TREE, env=env) as parent:
         assert parent.stdout is not None
         pid = int(parent.stdout.readline())
         assert is_alive(pid)

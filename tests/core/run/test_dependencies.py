@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
+import tomllib
 
-from coursebuild.core.engine.digests import ABSENT, FOLDER, SPECIAL
+from coursebuild.core.engine.digests import ABSENT, SPECIAL
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
 from coursebuild.core.run.dependencies import (
     Dependency,
@@ -17,7 +17,9 @@ from coursebuild.core.run.dependencies import (
     state_changes,
 )
 from coursebuild.core.run.run_record import from_bytes, record_of, to_bytes
+from support.fixture_cases import fixture_text
 
+FIXTURE = tomllib.loads(fixture_text("scripts/changes.toml"))
 ENVIRONMENT = (("Python", "CPython 3.11.7"), ("platform", "linux x86_64"))
 INPUTS = Inputs("examples/a.py", "0" * 64, ("--fast",), 10.0, ("scipy",), ENVIRONMENT)
 
@@ -54,36 +56,12 @@ def test_a_printed_folder_is_a_dependency_but_for_the_top_of_the_disk() -> None:
         assert [d.name for d in dependencies if d.kind is Kind.PLACE] == names, folder
 
 
-@pytest.mark.parametrize(
-    ("kind", "name", "then", "now", "words"),
-    [
-        (Kind.FILE, "models/a.xml", "1", "2", "models/a.xml changed"),
-        (Kind.FILE, "models/a.xml", "1", ABSENT, "models/a.xml is gone"),
-        (Kind.FILE, "models/a.xml", ABSENT, "1", "models/a.xml appeared"),
-        (Kind.FILE, "models/a.xml", "1", FOLDER, "models/a.xml is a folder now"),
-        (Kind.FILE, "models/a.xml", FOLDER, "1", "models/a.xml changed"),
-        (Kind.FILE, "models/a.xml", "1", "unreadable: permission denied",
-         "models/a.xml is unreadable: permission denied"),
-        (Kind.OUTSIDE, "/etc/hosts", "1", "2", "/etc/hosts changed"),
-        (Kind.OUTSIDE, "/dev/tty", SPECIAL, SPECIAL, "/dev/tty may have changed"),
-        (Kind.LISTING, "models", "1", "2", "the list of files in models changed"),
-        (Kind.LISTING, "models", "1", ABSENT, "the folder models is gone"),
-        (Kind.LISTING, "models", ABSENT, "1", "the folder models appeared"),
-        (Kind.SOUGHT, "examples/{ast,json}", "", "json",
-         "examples has now a file with the name of a module: json"),
-        (Kind.MODULE, "numpy", "numpy 2.3.1", "numpy 2.3.2", "numpy 2.3.1 → numpy 2.3.2"),
-        (Kind.MODULE, "numpy", "numpy 2.3.1", "",
-         "numpy is no longer installed (it was numpy 2.3.1)"),
-        (Kind.MODULE, "scipy", "", "scipy 1.17.1", "scipy is installed now: scipy 1.17.1"),
-        (Kind.MODULE, "mjcourse", "files 1", "files 2",
-         "the files of the module mjcourse changed"),
-        (Kind.PLACE, "course", "/a", "/b", "it printed a path of this machine: /a → /b"),
-    ],
-)  # fmt: skip
-def test_changes_of_states(kind: Kind, name: str, then: str, now: str, words: str) -> None:
-    dependency = Dependency(kind, name, then)
-    assert list(state_changes([dependency], lambda _: now)) == [words]
-    assert (list(state_changes([dependency], lambda _: then)) == []) == (then != SPECIAL)
+def test_changes_of_states() -> None:
+    for kind, name, then, now, words in FIXTURE["changes"]:
+        dependency = Dependency(Kind(kind), name, then)
+        assert list(state_changes([dependency], lambda _, now=now: now)) == [words]
+        changes = list(state_changes([dependency], lambda _, then=then: then))
+        assert (changes == []) == (then != SPECIAL)
 
 
 def test_dependencies_as_lines() -> None:
@@ -115,23 +93,13 @@ RECORD_INPUTS = Inputs("examples/a.py", "0" * 64, (), 10.0, (), (("Python", "3.1
 
 
 def test_a_traceback_is_moved_to_another_machine() -> None:
-    stderr = (
-        'File "/home/me/course/examples/a.py", line 2\n'
-        'File "/opt/venv/lib/python3.11/site-packages/numpy/x.py", line 3\n'
-        "/home/me/course/examples/a.py:3: UserWarning: ~ is /home/me and /home/mexico\n"
-        "a/home/me/course stays, /home/me/courses is in the home folder\n"
-    )
+    stderr, moved_stderr = FIXTURE["traceback"]["here"], FIXTURE["traceback"]["there"]
     run = ScriptRun("examples/a.py", Outcome.FAILED, 1, "out\n", stderr, 0.25)
     data = to_bytes(record_of(RECORD_INPUTS, (), 1_700_000_000, "", run), LOCAL_PLACES)
     assert b"/home/me/course/" not in data and b"/opt/venv" not in data
     record = from_bytes(data)
     assert record.restore(LOCAL_PLACES).stderr == stderr
-    assert record.restore(REMOTE_PLACES).stderr == (
-        'File "/ci/build/examples/a.py", line 2\n'
-        'File "/usr/lib/python3.11/site-packages/numpy/x.py", line 3\n'
-        "/ci/build/examples/a.py:3: UserWarning: ~ is /root and /home/mexico\n"
-        "a/home/me/course stays, /root/courses is in the home folder\n"
-    )
+    assert record.restore(REMOTE_PLACES).stderr == moved_stderr
 
 
 def test_a_course_at_the_top_of_the_disk_and_marks_that_a_script_printed() -> None:

@@ -205,17 +205,8 @@ def test_scripts_do_not_share_random_numbers(server: ScriptServer, root: Path) -
 
 
 def test_scripts_leave_nothing_to_each_other(server: ScriptServer, root: Path) -> None:
-    (root / "examples/soil.py").write_text(
-        "import numpy as np, os, sys, warnings, gc, signal\nnp.set_printoptions(precision=1)\n"
-        "np.seterr(all='raise')\nos.environ['X'] = '1'\nsys.path.append('x')\n"
-        "warnings.simplefilter('error')\ngc.disable()\nnp.pi = 3\nos.umask(0)\n"
-        "signal.signal(15, signal.SIG_IGN)\nsys.setrecursionlimit(50)\n"
-    )
-    (root / "examples/look.py").write_text(
-        "import numpy as np, os, sys, gc, signal\nprint(np.pi, np.geterr()['divide'], "
-        "os.environ.get('X'), 'x' in sys.path, gc.isenabled(), os.umask(0) != 0, "
-        "signal.getsignal(15) == signal.SIG_DFL, sys.getrecursionlimit(), np.array(2 / 3))",
-    )
+    for name, code in SCRIPTS["soil"].items():
+        (root / f"examples/{name}.py").write_text(code)
     jobs = [job("examples/soil.py"), job("examples/look.py")]
     expected = "3.141592653589793 warn None False True True True 1000 0.6666666666666666\n"
     assert [run.stdout for run in server.run(root, jobs * 2, parallel=1)] == ["", expected] * 2

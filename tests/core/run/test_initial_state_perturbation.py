@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -16,6 +17,7 @@ from support.runners import Run, both_ways
 pytestmark = pytest.mark.site
 
 HEAD = fixture_text("scripts/moved_states.txt")
+SCRIPTS = tomllib.loads(fixture_text("scripts/moved_states.toml"))
 SIZE = 1e-12
 FORWARD = "mujoco.mj_forward(model, data)\n"
 STEP = "mujoco.mj_step(model, data)\n"
@@ -83,25 +85,13 @@ def test_runs_of_a_pair_go_in_opposite_directions(read_values: ReadValues) -> No
 
 
 def test_after_a_reset_the_state_is_moved_again_and_alike(read_values: ReadValues) -> None:
-    text = "for name in 'ab':\n"
-    text += "    mujoco.mj_resetDataKeyframe(model, data, 0)\n    mujoco.mj_forward(model, data)\n"
-    text += "    tell(name, [*data.qpos, *data.qvel])\n    mujoco.mj_step(model, data, 10)\n"
-    values = read_values(text)
+    values = read_values(SCRIPTS["after a reset"])
     assert is_moved(values["a"][::3], 0.5, 2.0)
     assert values["a"] == values["b"]
 
 
 def test_velocities_and_activations(read_values: ReadValues) -> None:
-    values = read_values(f"""
-act = "<actuator><general joint='j' dyntype='filter' dynprm='1'/></actuator></mujoco>"
-model = mujoco.MjModel.from_xml_string(SPRING.partition("<keyframe>")[0] + act)
-data = mujoco.MjData(model)
-data.act[0] = 3.0
-data.qvel[1] = 7.0
-{FORWARD}
-tell("set", [data.act[0], data.qvel[1]])
-tell("v", data.qvel)
-""")
+    values = read_values(SCRIPTS["velocities and activations"])
     assert is_moved(values["set"], 3.0, 7.0)
     assert values["v"][0] == 0.0
 
@@ -113,55 +103,23 @@ def test_only_what_was_set_is_moved_again(read_values: ReadValues) -> None:
     assert is_moved(values["q"][1:], 3.0)
 
 
-COPIES = (
-    "import copy\nother = copy.copy(data)\n",
-    "other = mujoco.MjData(model)\nmujoco.mj_copyData(other, model, data)\n",
-    "spec = mujoco.mjtState.mjSTATE_INTEGRATION\n"
-    "state = np.empty(mujoco.mj_stateSize(model, spec))\n"
-    "mujoco.mj_getState(model, data, state, spec)\n"
-    "other = mujoco.MjData(model)\nmujoco.mj_setState(model, other, state, spec)\n",
-)
-
-
 def test_what_is_put_back_or_copied_is_not_moved(read_values: ReadValues) -> None:
-    text = PULL + STEP * 5 + "q, v, t = data.qpos.copy(), data.qvel.copy(), data.time\n" + STEP * 5
-    text += "other = data.qpos.copy()\ndata.qpos[:], data.qvel[:], data.time = q, v, t\n" + STEP * 5
-    assert read_values(text + "tell('apart', data.qpos - other)")["apart"] == [0.0, 0.0]
-    for copy_code in COPIES:
-        text = PULL + STEP * 5 + copy_code + STEP * 5 + "mujoco.mj_step(model, other, 5)\n"
-        assert read_values(text + "tell('apart', other.qpos - data.qpos)")["apart"] == [0.0, 0.0], (
-            copy_code
-        )
+    assert read_values(SCRIPTS["put back"])["apart"] == [0.0, 0.0]
+    for name in ("copy", "copied data", "copied state"):
+        text = PULL + STEP * 5 + SCRIPTS[name] + STEP * 5 + "mujoco.mj_step(model, other, 5)\n"
+        values = read_values(text + "tell('apart', other.qpos - data.qpos)")
+        assert values["apart"] == [0.0, 0.0], name
 
 
 def test_equal_states_are_moved_equally_so_that_differences_stay(read_values: ReadValues) -> None:
-    text = """
-def end(offset, timestep):
-    model.opt.timestep = timestep
-    data = mujoco.MjData(model)
-    data.qpos[:] = 0.5 + offset, 0.25
-    while data.time < 0.999:
-        mujoco.mj_step(model, data)
-    return data.qpos[0]
-
-tell("slope", (end(1e-6, 1e-3) - end(-1e-6, 1e-3)) / 2e-6)
-tell("error", end(0, 1e-3) - end(0, 1e-4))
-"""
+    text = SCRIPTS["slope and error"]
     plain, perturbed = read_values(text, 0), read_values(text, 1)
     assert perturbed["slope"] == pytest.approx(plain["slope"], rel=1e-9)
     assert perturbed["error"] == pytest.approx(plain["error"], rel=1e-10)
 
 
 def test_quaternions_keep_their_length(read_values: ReadValues) -> None:
-    text = """
-data.qpos[3:7] = 0.5, 0.5, -0.5, 0.5
-data.qpos[7:11] = np.array([1, 2, 3, 4]) / np.sqrt(30)
-before = data.qpos.copy()
-mujoco.mj_forward(model, data)
-tell("lengths", [np.linalg.norm(data.qpos[at:at + 4]) for at in (3, 7)])
-tell("apart", [np.abs(data.qpos - before)[at:at + 4].max() for at in (3, 7)])
-"""
-    values = read_values(NEW_BODY + text + STATE)
+    values = read_values(NEW_BODY + SCRIPTS["quaternions"] + STATE)
     assert values["lengths"] == pytest.approx([1.0, 1.0], abs=3e-16)
     assert all(1e-13 < apart < 1e-12 for apart in values["apart"])
     assert is_moved(values["q"][2:3], 1.0)
@@ -179,50 +137,23 @@ def test_zeros_stay_but_for_trees_that_have_nothing_else(read_values: ReadValues
 
 
 def test_the_correction_of_a_rounding_is_no_initial_state(read_values: ReadValues) -> None:
-    text = """
-data.qvel[3:6] = 1, 2, 3
-for _ in range(1000):
-    mujoco.mj_step(model, data)
-    data.qpos[3:7] /= np.linalg.norm(data.qpos[3:7]) * (1 + 1e-15)
-"""
+    text = SCRIPTS["corrections"]
     plain, perturbed = (read_values(NEW_BODY + text + STATE, number)["q"] for number in (0, 1))
     assert perturbed == pytest.approx(plain, rel=1e-10, abs=1e-10)
 
 
 def test_two_models_at_once(read_values: ReadValues) -> None:
-    values = read_values(f"""
-other = mujoco.MjModel.from_xml_string(BODY)
-second = mujoco.MjData(other)
-{PULL}
-mujoco.mj_step1(model, data)
-mujoco.mj_step1(other, second)
-tell("q", [*data.qpos, second.qpos[2]])
-mujoco.mj_step2(model, data)
-mujoco.mj_step2(other, second)
-""")
+    values = read_values(SCRIPTS["two models"])
     assert is_moved(values["q"], 0.5, 0.25, 1.0)
 
 
 def test_model_time_and_forces_stay(read_values: ReadValues) -> None:
-    text = PULL + "data.time = 3.0\ndata.qfrc_applied[0] = 5.0\ndata.xfrc_applied[1, 0] = 2.0\n"
-    text += FORWARD + "".join(
-        f"tell({name!r}, {name})\n"
-        for name in ("data.time", "data.qfrc_applied", "data.xfrc_applied", "model.geom_size")
-    )
-    text += "tell('m', [*model.body_mass, *model.qpos0, *model.key_qpos[0]])"
+    text = SCRIPTS["forces"]
     assert read_values(text, 1) == read_values(text, 0)
 
 
 def test_rollouts(read_values: ReadValues) -> None:
-    values = read_values(f"""
-from mujoco import rollout
-states = np.zeros((2, mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
-states[:, 1:3] = (0.5, 0.25), (1.0, 2.0)
-{DISABLE_SPRING}
-end, _ = rollout.rollout(model, data, states, nstep=3)
-tell("given", states[:, 1:3])
-tell("end", end[:, -1, 1:3])
-""")
+    values = read_values(SCRIPTS["rollouts"])
     assert values["given"] == [0.5, 0.25, 1.0, 2.0]
     assert is_moved(values["end"], *values["given"])
 
@@ -266,35 +197,7 @@ def test_states_are_compared_by_the_largest_since_the_simulation_began(run_pertu
 
 
 SPRING_HEAD = fixture_text("scripts/spring.txt")
-TEN = {
-    "one by one": "for _ in range(10):\n    mujoco.mj_step(model, data)\n",
-    "many at once": "mujoco.mj_step(model, data, nstep=10)\n",
-    "by keyword": "for _ in range(5):\n    mujoco.mj_step(m=model, d=data, nstep=2)\n",
-    "by the clock": "while data.time < 0.95:\n    mujoco.mj_step(model, data)\n",
-    "in parts": """\
-for _ in range(10):
-    mujoco.mj_step1(model, data)
-    mujoco.mj_step2(model, data)
-""",
-    "with its own forward": """\
-for _ in range(10):
-    mujoco.mj_forward(model, data)
-    mujoco.mj_Euler(model, data)
-""",
-    "of its own timestep": """\
-model.opt.timestep = 0.05
-while data.time < 0.975:
-    mujoco.mj_step(model, data)
-""",
-    "as a rollout": """\
-from mujoco import rollout
-begin = np.array([[0, 1, 0.0]])
-state, _ = rollout.rollout(model, data, begin, np.full((1, 10, 1), 2.0))
-assert state.shape == (1, 10, 3) and np.allclose(state[0, :, 0], np.arange(1, 11) / 10)
-data.qpos[0], data.qvel[0] = state[0, -1, 1:]
-data.time = state[0, -1, 0]
-""",
-}
+TEN = SCRIPTS["ten steps"]
 
 
 def spring(timestep: float, force: float = 2.0) -> tuple[float, float]:

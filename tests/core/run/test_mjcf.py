@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import resource
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,35 +18,17 @@ from coursebuild.core.model.results import CompileResult, Misspelling, ModelFact
 from coursebuild.core.run import compile_main, mjcf
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.mjcf import TEXT_PATH, compile_all, model_files, readable_error
+from support.fixture_cases import fixture_text
 from support.growth import processor_time_growth
 from support.model_files import TETRAHEDRON, png
+from support.run_code import program
+from support.runners import SOURCE_TREE
 
 pytestmark = pytest.mark.site
 
-ARM = """<mujoco model="arm">
-  <option timestep="0.001" integrator="implicitfast"/>
-  <worldbody>
-    <body name="ünder"><freejoint/><geom size="0.1" mass="2"/><site name="tip"/><site/>
-      <body><joint name="h" type="hinge" pos="1 0 0"/><geom size="0.1" mass="0.5"/></body>
-    </body>
-  </worldbody>
-  <actuator><motor name="m" joint="h"/></actuator>
-  <keyframe><key name="home"/><key/></keyframe>
-</mujoco>
-"""
-MAIN = """<mujoco>
-  <compiler meshdir="parts" texturedir="parts"/>
-  <include file="parts/asset.xml"/>
-  <asset><model name="child" file="child.xml"/></asset>
-  <worldbody><geom type="mesh" mesh="m"/><attach model="child" body="b" prefix="c_"/></worldbody>
-</mujoco>
-"""
-PARTS = (
-    "models/child.xml",
-    "models/parts/asset.xml",
-    "models/parts/mesh.obj",
-    "models/parts/skin.png",
-)
+MODELS = tomllib.loads(fixture_text("documents/models.toml"))
+PART_NAMES = "child.xml parts/asset.xml parts/mesh.obj parts/skin.png".split()
+PARTS = tuple(f"models/{name}" for name in PART_NAMES)
 
 
 @pytest.fixture
@@ -53,14 +36,9 @@ def root(tmp_path: Path) -> Path:
     root = tmp_path / "course"
     (root / "models/parts").mkdir(parents=True)
     (root / "models/parts/mesh.obj").write_text(TETRAHEDRON)
+    for name, text in MODELS["parts"].items():
+        (root / "models" / name).write_text(text)
     (root / "models/parts/skin.png").write_bytes(png())
-    (root / "models/parts/asset.xml").write_text(
-        '<mujoco><asset><mesh name="m" file="mesh.obj"/>'
-        '<texture name="t" type="2d" file="skin.png"/></asset></mujoco>'
-    )
-    (root / "models/child.xml").write_text(
-        '<mujoco><worldbody><body name="b"><geom size="1"/></body></worldbody></mujoco>'
-    )
     return root
 
 
@@ -81,7 +59,7 @@ def includes(root: Path, xmls: Sequence[str]) -> list[tuple[str, ...] | None]:
 
 def test_facts_of_the_text_that_was_read(root: Path) -> None:
     (root / "models/arm.xml").write_text("<broken")
-    assert compile_all(root, [("models/arm.xml", ARM)]) == (
+    assert compile_all(root, [("models/arm.xml", MODELS["arm"])]) == (
         CompileResult(
             "",
             None,
@@ -113,7 +91,7 @@ def test_integrators_by_their_names(root: Path) -> None:
 
 def test_everything_that_a_model_or_a_text_pulls_in(root: Path) -> None:
     for path in ("models/main.xml", TEXT_PATH):
-        (result,) = compile_all(root, [(path, MAIN)])
+        (result,) = compile_all(root, [(path, MODELS["main"])])
         assert result.facts is not None, result.error
         assert (result.facts.includes, result.facts.body_names) == (PARTS, ("c_b",))
     assert (names(root), names(root / "models")) == (["models"], ["child.xml", "parts"])
@@ -144,66 +122,15 @@ def test_what_is_looked_for_and_not_there(root: Path) -> None:
 
 # --- messages
 
-ATTACH = (
-    '<mujoco>\n<asset><model name="i" file="jointed.xml"/></asset>\n<worldbody>\n'
-    '<attach model="i" body="{}" prefix="p_"/></worldbody></mujoco>'
-)
+MISTAKES = tomllib.loads(fixture_text("documents/model_mistakes.toml"))
 INCLUDE = '<mujoco>\n<include file="{}.xml"/>\n</mujoco>'
-INNER = {
-    "jointed": '<mujoco>\n<worldbody><body name="b"><joint/></body></worldbody></mujoco>',
-    "zero": '<mujoco>\n<worldbody><geom size="0" name="q"/></worldbody></mujoco>',
-    "letter": '<mujoco>\n<worldbody><geom size="a" name="q"/></worldbody></mujoco>',
-    "broken": "<mujoco>\n\n\n<worldbody></mujoco>",
-    "itself": '<mujoco><include file="itself.xml"/></mujoco>',
-}
-MISTAKES = (
-    (
-        '<mujoco>\n<worldbody>\n<geom foo="1"/></worldbody></mujoco>',
-        "3: schema violation: unrecognized attribute: 'foo' in <geom>",
-    ),
-    (
-        '<mujoco>\n<worldbody>\n\n<geom size="a"/></worldbody></mujoco>',
-        "4: bad format in attribute 'size' in <geom>",
-    ),
-    (
-        '<mujoco>\n<worldbody><body name="q"><joint/></body></worldbody></mujoco>',
-        "2: mass and inertia of moving bodies must be larger than mjMINVAL (element `q`)",
-    ),
-    (
-        "<mujoco>\n<worldbody>\n</mujoco>",
-        "3: not well-formed XML (mismatched element <worldbody>)",
-    ),
-    ("", "None: empty file this text"),
-    ("hello", "1: not well-formed XML (text)"),
-    ("<a/>", "None: unrecognized XML model type: 'a'"),
-    (INCLUDE.format("none"), "2: error opening file 'none.xml' in <include>"),
-    (
-        '<mujoco><asset><mesh file="none.stl"/></asset></mujoco>',
-        "None: error opening file 'none.stl'",
-    ),
-    (
-        '<mujoco>\n<worldbody><body name="a"/>\n<body name="a"/></worldbody></mujoco>',
-        "3: repeated name 'a' in body in <body>",
-    ),
-    (
-        '<mujoco><keyframe><key qpos="1 2"/></keyframe></mujoco>',
-        "None: keyframe '': invalid qpos size, expected 0, got 2",
-    ),
-    # In files that are included or attached: the line of the element that does so.
-    (INCLUDE.format("zero"), "None: "),
-    (INCLUDE.format("letter"), "None: "),
-    (INCLUDE.format("broken"), "2: "),
-    (INCLUDE.format("itself"), "None: "),
-    (ATTACH.format("b"), "None: "),
-    (ATTACH.format("none"), "4: "),
-)
 
 
 def test_messages_have_one_line_and_the_line_of_the_text(root: Path) -> None:
-    for name, text in INNER.items():
+    for name, text in MISTAKES["files"].items():
         (root / f"models/{name}.xml").write_text(text)
-    results = texts(root, [xml for xml, _ in MISTAKES])
-    for (xml, line), result in zip(MISTAKES, results, strict=True):
+    messages = MISTAKES["messages"]
+    for (xml, line), result in zip(messages.items(), texts(root, [*messages]), strict=True):
         assert f"{result.line}: {readable_error(result.error)}".startswith(line), xml
         assert result.error and not result.facts and str(root) not in result.error
 
@@ -291,43 +218,14 @@ def test_files_that_include_each_other_in_many_ways_are_read_once(root: Path) ->
     assert {*model_files(root, "models/f0.xml", (root / "models/f0.xml").read_text())} == files
 
 
-@pytest.mark.parametrize(
-    ("text", "word", "candidates"),
-    [
-        ("<worldbody><geom siez='1'/></worldbody>", "siez", ("size",)),
-        ("<worldbody><gom tpye='box' size='1 1 1'/></worldbody>", "gom", ("geom",)),
-        ("<worldbody><lite pos='0 0 1' diffuse='1 1 1'/></worldbody>", "lite", ("light",)),
-        ("<worldbody><frame><gom size='1'/></frame></worldbody>", "gom", ("geom",)),
-        ("<worldbody>\n<body>\n<geom size='1'/>\n</bdoy></worldbody>", "bdoy", ("body",)),
-        ("<worldbody>\n<bdoy>\n<geom size='1'/>\n</body></worldbody>", "bdoy", ("body",)),
-        ("<include fil='child.xml'/>", "fil", ("file",)),
-        ("<option integrator='euler'/>", "euler", ("Euler",)),
-        ("<option><flag gravity='disabled'/></option>", "disabled", ("disable",)),
-        ("<default><default class='wheel'/></default><worldbody>"
-         "<geom class='weel' size='1'/></worldbody>", "weel", ("wheel",)),
-        ("<worldbody><camera mode='trakc'/></worldbody>", "trakc", ("track", "trackcom")),
-    ],
-)  # fmt: skip
-def test_likely_names_are_those_with_which_the_compiler_gets_further(
-    root: Path, text: str, word: str, candidates: tuple[str, ...]
-) -> None:
-    (result,) = texts(root, [f"<mujoco>{text}</mujoco>"])
-    assert result.misspelling is not None, result
-    assert (result.misspelling.word, result.misspelling.candidates) == (word, candidates)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "<worldbody><geom type='ball'/></worldbody>",  # a keyword of joints
-        "<worldbody><geom size='1' material='x'/></worldbody>",
-        "<worldbody><body name='wheel'/><site name='wheels'/><body name='wheel'/></worldbody>",
-        "<nonsense/>",
-    ],
-)
-def test_no_name_is_likely_that_the_compiler_does_not_take(root: Path, text: str) -> None:
-    (result,) = texts(root, [f"<mujoco>{text}</mujoco>"])
-    assert result.error and result.misspelling is None
+def test_likely_names_are_those_with_which_the_compiler_gets_further(root: Path) -> None:
+    likely = MISTAKES["likely"]
+    results = texts(root, [f"<mujoco>{text}</mujoco>" for text in likely])
+    for (text, (word, *candidates)), result in zip(likely.items(), results, strict=True):
+        assert result.misspelling is not None, text
+        assert (result.misspelling.word, [*result.misspelling.candidates]) == (word, candidates)
+    unlikely = [f"<mujoco>{text}</mujoco>" for text in MISTAKES["unlikely"]["models"]]
+    assert all(result.error and result.misspelling is None for result in texts(root, unlikely))
 
 
 def test_a_name_may_be_misspelt_in_a_file_that_is_included(root: Path) -> None:
@@ -344,27 +242,11 @@ def test_no_device_is_read_for_a_likely_name(root: Path) -> None:
     assert "unrecognized element" in result.error
 
 
-BAD_WORKER = f"""\
-import sys
-sys.path.insert(0, {str(Path(mjcf.__file__).parents[3])!r})
-import ctypes, os
-from coursebuild.core.run import compile_main
-really = compile_main._compile
-def compile(mujoco, path, texts):
-    if 'crash' in texts[path]: ctypes.string_at(0)
-    if 'exit' in texts[path]: os._exit(7)
-    if 'noise' in texts[path]: print('noise'); os.write(1, b'noise')
-    return really(mujoco, path, texts)
-compile_main._compile = compile
-compile_main.main()
-"""
-
-
 def test_a_compiler_that_crashes_or_cannot_be_loaded(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     worker = tmp_path / "worker.py"
-    worker.write_text(BAD_WORKER)
+    worker.write_text(program("bad_compiler").replace("SOURCE", str(SOURCE_TREE)))
     monkeypatch.setattr(compile_main, "__file__", str(worker))
     good = "<mujoco model='noise'/>"
     results = texts(root, [good, "<!-- crash -->", good, "<!-- exit -->", good])
@@ -381,10 +263,6 @@ def test_a_compiler_that_crashes_or_cannot_be_loaded(
     assert caught.value.message == "MuJoCo cannot be loaded: ImportError: no MuJoCo here"
 
 
-MODEL_TEXT = """<mujoco><compiler meshdir="assets"/><include file="part.xml"/>
-<asset><mesh name="m" file="m.obj"/></asset>
-<worldbody><geom type="mesh" mesh="m"/></worldbody></mujoco>"""
-PART = '<mujoco><worldbody><body><geom size="1"/></body></worldbody></mujoco>'
 TEXT = '<mujoco><include file="part.xml"/></mujoco>'
 BROKEN = "<mujoco><nonsense/></mujoco>"
 
@@ -414,12 +292,9 @@ class Course:
 def course(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Course:
     course = Course(tmp_path / "course")
     (course.root / "models/assets").mkdir(parents=True)
-    for path, text in {
-        "assets/m.obj": TETRAHEDRON,
-        "part.xml": PART,
-        "main.xml": MODEL_TEXT,
-    }.items():
-        (course.root / "models" / path).write_text(text)
+    (course.root / "models/assets/m.obj").write_text(TETRAHEDRON)
+    for name, text in MODELS["course"].items():
+        (course.root / "models" / name).write_text(text)
     real = mjcf.compile_all
 
     def compile(root: Path, texts: Sequence[tuple[str, str]], **limits: int) -> object:

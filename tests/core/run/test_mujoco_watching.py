@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,16 +18,8 @@ from support.runners import Run, both_ways
 
 pytestmark = pytest.mark.site
 
-HEAD = """\
-import mujoco
-XML = '''
-<mujoco model="spinner">
-  <worldbody><body><joint/><geom size="1" contype="0"/></body></worldbody>
-</mujoco>
-'''
-model = mujoco.MjModel.from_xml_string(XML)
-data = mujoco.MjData(model)
-"""
+SCRIPTS = tomllib.loads(fixture_text("scripts/watched.toml"))
+HEAD: str = SCRIPTS["head"]
 FAST = "data.qvel[0] = 1e20\n"
 STEP = "mujoco.mj_step(model, data)\n"
 LINE = len(HEAD.splitlines())
@@ -64,36 +57,13 @@ def test_a_warning_is_noticed_with_its_line_time_and_model(
     assert find_divergences(HEAD + "import numpy.random\n" + FAST + STEP) == warned(3)
 
 
-LAST_STATEMENTS = (
-    "mujoco.mj_resetData(model, data)\n",
-    "data.warning[mujoco.mjtWarning.mjWARN_BADQVEL].number = 0\n",
-    "data = mujoco.MjData(model)\n",
-    "del data\n",
-    "import os, sys; sys.stdout.flush(); os._exit(0)\n",
-)
-STEPS = (
-    "mujoco.mj_step(model, data, 10)",
-    "mujoco.mj_step(model, data, nstep=3)",
-    "mujoco.mj_step1(model, data); mujoco.mj_step2(model, data)",
-    "model.opt.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET; mujoco.mj_step(model, data)",
-    "from mujoco import mj_step as step; step(model, data)",
-    "import threading as t; t = t.Thread(target=mujoco.mj_step, args=(model, data)); "
-    "t.start(); t.join()",
-    "import os; child = os.fork(); child or (mujoco.mj_step(model, data), os._exit(0)); os.wait()",
-)
-IMPORTS = (
-    "import importlib\nmujoco = importlib.import_module('mu' + 'joco')\n",
-    "import importlib.util\nassert importlib.util.find_spec('mujoco')\nimport mujoco\n",
-    "__import__('mujoco')\nimport sys\nmujoco = sys.modules['mu' + 'joco']\n",
-)
-
-
 def test_a_warning_is_noticed_however_the_script_goes_about_it(
     find_divergences: FindDivergences,
 ) -> None:
-    scripts = [HEAD + FAST + STEP + after for after in LAST_STATEMENTS]
-    scripts += [f"{HEAD}{FAST}{step}\n" for step in STEPS]
-    scripts += [HEAD.replace("import mujoco\n", text, 1) + FAST + STEP for text in IMPORTS]
+    scripts = [HEAD + FAST + STEP + after for after in SCRIPTS["after"]]
+    scripts += [f"{HEAD}{FAST}{step}\n" for step in SCRIPTS["steps"]]
+    imports = SCRIPTS["imports"]
+    scripts += [HEAD.replace("import mujoco\n", text, 1) + FAST + STEP for text in imports]
     for script in scripts:
         assert signs(find_divergences(script)) == [Sign.VELOCITIES], script
 
@@ -101,20 +71,9 @@ def test_a_warning_is_noticed_however_the_script_goes_about_it(
 def test_a_warning_in_the_threads_of_a_rollout_has_the_line_that_began_it(
     find_divergences: FindDivergences,
 ) -> None:
-    rollout = """\
-import numpy, threading
-from mujoco import rollout
-states = numpy.zeros((8, 3))
-states[:, 2] = 1e20
-datas = [mujoco.MjData(model) for _ in range(3)]
-rollout.rollout(model, datas, states, nstep=20)
-"""
-    [divergence] = find_divergences(HEAD + rollout)
-    assert (divergence.sign, divergence.model, divergence.line) == (
-        Sign.VELOCITIES,
-        "spinner",
-        LINE + 6,
-    )
+    [divergence] = find_divergences(HEAD + SCRIPTS["rollout"])
+    assert (divergence.sign, divergence.model) == (Sign.VELOCITIES, "spinner")
+    assert divergence.line == LINE + 6
 
 
 def test_each_warning_and_each_lost_state_has_its_name(find_divergences: FindDivergences) -> None:
@@ -152,14 +111,7 @@ def test_a_loop_that_diverges_often_does_not_fill_the_notes(
 def test_with_another_handler_the_counter_is_noticed(
     find_divergences: FindDivergences,
 ) -> None:
-    silent = """\
-import ctypes
-library = ctypes.PyDLL(mujoco._functions.__file__)
-ignore = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(lambda message: None)
-pointer = ctypes.c_void_p.in_dll(library, "mju_user_warning")
-pointer.value = ctypes.cast(ignore, ctypes.c_void_p).value
-"""
-    [divergence] = find_divergences(HEAD + silent + FAST + STEP)
+    [divergence] = find_divergences(HEAD + SCRIPTS["silent"] + FAST + STEP)
     assert (divergence.sign, divergence.model, divergence.line) == (Sign.VELOCITIES, "spinner", 0)
 
 
@@ -192,24 +144,6 @@ def test_a_body_that_is_pressed_into_another_by_half_its_thickness(
 
 # --- what the script notices
 
-PLAIN = (
-    FAST + STEP + "print(data.qpos, data.time)\n",
-    "print(mujoco.get_mju_user_warning())\n",
-    "mujoco.set_mju_user_warning(lambda text: print('heard', text))\n"
-    "print(mujoco.get_mju_user_warning().__name__)\n"
-    f"{FAST}{STEP}"
-    "mujoco.set_mju_user_warning(None)\nprint(mujoco.get_mju_user_warning())\n"
-    f"mujoco.mj_resetData(model, data)\n{FAST}{STEP}",
-    "mujoco.set_mju_user_warning(3)\n",
-    "mujoco.MjData()\n",
-    "mujoco.mj_resetData(model)\n",
-    "print(mujoco.mj_resetData.__doc__, mujoco.MjData.__init__.__doc__)\n",
-    "import sys\nprint([m for m in sys.modules if 'course' in m], mujoco.mj_step)\n",
-    "import copy, pickle\nprint(pickle.loads(pickle.dumps(copy.deepcopy(data))).time)\n",
-    f"def bad(text):\n    raise KeyError(text)\nmujoco.set_mju_user_warning(bad)\n{FAST}{STEP}",
-    FALL.replace("{force}", "5000"),
-)
-
 
 def plain(text: str) -> str:
     """The text without addresses, and without the list of native modules after a crash."""
@@ -217,7 +151,7 @@ def plain(text: str) -> str:
 
 
 def test_watched_script_does_what_it_does_alone(run: Run, root: Path) -> None:
-    for code in PLAIN:
+    for code in (*SCRIPTS["plain"], FALL.replace("{force}", "5000")):
         watched = run(HEAD + code)
         alone = subprocess.run(
             [sys.executable, "examples/x.py"],

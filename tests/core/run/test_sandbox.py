@@ -10,6 +10,7 @@ import platform
 import socket
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -37,15 +38,8 @@ from support.sandboxes import require_sandbox
 pytestmark = pytest.mark.site
 
 Confine = Callable[..., list[ScriptRun]]
-TRY = """
-import os, sys
-def attempt(what):
-    try:
-        print(what())
-    except BaseException as error:
-        print(type(error).__name__, error)
-"""
-"""Prints the result of an attempt, or its error."""
+SCRIPTS = tomllib.loads(fixture_text("sandbox.toml"))["scripts"]
+"""Scripts, and the beginning of each, which prints the result of an attempt, or its error."""
 
 
 @pytest.fixture
@@ -64,7 +58,7 @@ def confine(root: Path, home: Path) -> Confine:
     def confine(*codes: str, **options: object) -> list[ScriptRun]:
         jobs = []
         for number, code in enumerate(codes):
-            (root / f"examples/x{number}.py").write_text(TRY + code)
+            (root / f"examples/x{number}.py").write_text(SCRIPTS["attempt"] + code)
             jobs.append(ScriptJob(f"examples/x{number}.py", (), 60.0, (), **options))
         with ScriptServer(sandbox=require_sandbox(root)) as server:
             return list(server.run(root, jobs, parallel=1))
@@ -121,22 +115,14 @@ def test_an_interpreter_of_the_course_that_never_reports(root: Path) -> None:
         job = ScriptJob("examples/x.py", (), 0.5, ())
         (run,) = server.run(root, [job], parallel=1, interpreter=interpreter)
     assert run.outcome is Outcome.TIMEOUT
-    assert (
-        run.stderr
-        == "its sandbox was stopped, because what ran in it did not end at its time limit\n"
-    )
+    fault = "what ran in it did not end at its time limit"
+    assert run.stderr == f"its sandbox was stopped, because {fault}\n"
 
 
 def test_the_network_by_address_and_by_name(confine: Confine) -> None:
     with socket.create_server(("127.0.0.1", 0)) as tcp:
         port = tcp.getsockname()[1]
-        (run,) = confine(
-            "import socket\n"
-            f"attempt(lambda: socket.create_connection(('127.0.0.1', {port}), 5))\n"
-            "attempt(lambda: socket.create_connection(('192.0.2.1', 80), 5))\n"
-            f"attempt(lambda: socket.create_connection(('localhost', {port}), 5))\n"
-            "attempt(lambda: socket.getaddrinfo('example.org', 80))\n"
-        )
+        (run,) = confine(SCRIPTS["network"].replace("PORT", str(port)))
         tcp.setblocking(False)
         with pytest.raises(BlockingIOError):
             tcp.accept()
@@ -156,15 +142,7 @@ def test_environments_and_files_of_other_processes(
     monkeypatch.setenv("GITHUB_TOKEN", "hush")
     with (home / "secret").open() as secret_file:
         os.set_inheritable(secret_file.fileno(), True)
-        (run,) = confine(
-            "import glob\n"
-            "attempt(lambda: sorted(os.environ))\n"
-            "for name in ('environ', 'cmdline'):\n"
-            "    for path in glob.glob(f'/proc/[0-9]*/{name}'):\n"
-            "        attempt(lambda: open(path).read())\n"
-            "for path in glob.glob('/proc/[0-9]*/fd/*'):\n"
-            "    attempt(lambda: os.readlink(path))\n"
-        )
+        (run,) = confine(SCRIPTS["other processes"])
     assert not any(word in run.stdout for word in ("hush", "GITHUB_TOKEN", "secret"))
     assert "/dev/null" in run.stdout
 
@@ -177,31 +155,17 @@ def test_script_that_kills_all_it_can_ends_alone(confine: Confine) -> None:
 
 
 def test_forging_the_report_of_another_script(confine: Confine) -> None:
-    forge = (
-        "import glob\n"
-        "parent = os.getppid()\n"
-        "for path in glob.glob(f'/proc/{parent}/fd/*'):\n"
-        "    try:\n"
-        "        with open(path, 'wb', buffering=0) as pipe: pipe.write(%r)\n"
-        "    except OSError: pass\n"
-    )
     texts = (b"\xff" * 64, b"\0\0\0\2{}", b'\0\0\0\x0c{"parts":[]}' + b"x" * 9)
-    *forged, last = confine(*(forge % text for text in texts), "print('mine')")
+    *forged, last = confine(
+        *(SCRIPTS["forge"].replace("TEXT", repr(text)) for text in texts), "print('mine')"
+    )
     assert all(run.outcome in (Outcome.KILLED, Outcome.OK) for run in forged)
     assert (last.outcome, last.stdout) == (Outcome.OK, "mine\n")
 
 
 def test_a_process_that_stays(confine: Confine) -> None:
     mark = f"600.{os.getpid()}"
-    (run,) = confine(
-        "if not os.fork():\n"
-        "    os.setsid()\n"
-        "    if os.fork(): os._exit(0)\n"
-        "    null = os.open('/dev/null', os.O_RDWR)\n"
-        "    for fd in 0, 1, 2: os.dup2(null, fd)\n"
-        f"    os.execv('/bin/sleep', ['sleep', '{mark}'])\n"
-        "os.wait()\n"
-    )
+    (run,) = confine(SCRIPTS["stay"].replace("MARK", mark))
     assert run.outcome is Outcome.OK, run.stderr
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:
@@ -212,14 +176,7 @@ def test_a_process_that_stays(confine: Confine) -> None:
 
 
 def test_filling_the_disk(confine: Confine, root: Path) -> None:
-    (run,) = confine(
-        "home = os.path.expanduser('~')\n"
-        "for folder in os.environ['TMPDIR'], home, '/dev/shm', 'runs', '/':\n"
-        "    os.makedirs(folder, exist_ok=True)\n"
-        "    with open(folder + '/large', 'wb') as file:\n"
-        "        attempt(lambda: os.posix_fallocate(file.fileno(), 0, 2 << 30))\n",
-        writes=("runs",),
-    )
+    (run,) = confine(SCRIPTS["fill"], writes=("runs",))
     assert run.stdout.splitlines() == ["OSError [Errno 28] No space left on device"] * 5
     assert not list(root.glob("runs/*"))
 
@@ -227,15 +184,8 @@ def test_filling_the_disk(confine: Confine, root: Path) -> None:
 def test_links_that_the_tool_would_follow(confine: Confine, root: Path, home: Path) -> None:
     secret = str(home / "secret")
     (root / "linked").symlink_to(home)
-    (run,) = confine(
-        "folder = os.environ['TMPDIR'] + '/figures-of-this-script'\n"
-        f"os.symlink({secret!r}, folder + '/a.csv')\n"
-        "os.mkfifo(folder + '/b.csv')\n"
-        f"os.symlink({secret!r}, 'runs/c.csv')\n"
-        "attempt(lambda: os.listdir('linked'))\n",
-        figures=("a.csv", "b.csv"),
-        writes=("runs", "linked"),
-    )
+    code = SCRIPTS["link"].replace("SECRET", secret)
+    (run,) = confine(code, figures=("a.csv", "b.csv"), writes=("runs", "linked"))
     assert run.outcome is Outcome.OK, run.stderr
     assert run.figures == ()
     assert run.stdout.startswith("FileNotFoundError")
@@ -245,17 +195,6 @@ def test_links_that_the_tool_would_follow(confine: Confine, root: Path, home: Pa
 
 class TestResults:
     """Well-behaved scripts do the same as outside."""
-
-    CODE = """
-import numpy, mujoco, helper
-from mjcourse import spatial
-from pathlib import Path
-with open("a.csv", "w") as file:
-    file.write("1,2\\n")
-model = mujoco.MjModel.from_xml_path("models/a.xml")
-old = Path("runs/old.csv").read_text()
-print(model.ngeom, helper.VALUE, old, os.getcwd(), os.path.expanduser("~"))
-"""
 
     @pytest.fixture(autouse=True)
     def course(self, root: Path) -> None:
@@ -268,7 +207,7 @@ print(model.ngeom, helper.VALUE, old, os.getcwd(), os.path.expanduser("~"))
             (root / path).write_text(text)
 
     def test_they_are_the_same(self, confine: Confine, root: Path) -> None:
-        (inside,) = confine(self.CODE, figures=("a.csv",))
+        (inside,) = confine(SCRIPTS["as outside"], figures=("a.csv",))
         job = ScriptJob("examples/x0.py", (), 60.0, (), figures=("a.csv",))
         with ScriptServer() as server:
             (outside,) = server.run(root, [job], parallel=1)
@@ -330,9 +269,8 @@ class TestRefusals:
         _write_bwrap(programs, "")
         monkeypatch.setattr(platform, "machine", lambda: "riscv64")
         none, parts = examine_sandbox(root)
-        assert none is None and [part.name for part in parts if part.problem] == [
-            "a filter of system calls"
-        ]
+        lacking = [part.name for part in parts if part.problem]
+        assert (none, lacking) == (None, ["a filter of system calls"])
         with pytest.raises(EffectError) as refused:
             find_sandbox(root)
         assert refused.value.message == (

@@ -20,35 +20,24 @@ from coursebuild.core.run.script_environment import (
 
 
 def test_conditions_do_not_depend_on_the_user() -> None:
-    user_environment = {
-        "PATH": "/bin",
-        "HOME": "/home/me",
-        "USER": "me",
-        "LANG": "de",
-        "SECRET": "x",
-    }
+    user_environment = {"PATH": "/bin", "HOME": "/home/me", "USER": "me"}
+    user_environment |= {"LANG": "de", "SECRET": "x"}
     empty_conditions = conditions({})
     assert conditions(user_environment) == empty_conditions
-    assert (
-        dict(empty_conditions)["Python"]
-        == f"{platform.python_implementation()} {platform.python_version()}"
-    )
+    python = f"{platform.python_implementation()} {platform.python_version()}"
+    assert dict(empty_conditions)["Python"] == python
     assert dict(empty_conditions)["platform"].startswith(f"{sys.platform} {platform.machine()}")
-    graphics_conditions = conditions(
-        {**user_environment, "MUJOCO_GL": "egl", "CUDA_VISIBLE_DEVICES": "1"}
-    )
-    additions = ("CUDA_VISIBLE_DEVICES", "1"), ("MUJOCO_GL", "egl")
-    assert graphics_conditions == tuple(
-        sorted((*empty_conditions, *((f"environment variable {n}", v) for n, v in additions)))
-    )
+    graphics = {"CUDA_VISIBLE_DEVICES": "1", "MUJOCO_GL": "egl"}
+    additions = [(f"environment variable {name}", value) for name, value in graphics.items()]
+    expected = tuple(sorted((*empty_conditions, *additions)))
+    assert conditions(user_environment | graphics) == expected
 
 
 def test_places_come_longest_first() -> None:
     """A folder inside another must be found before that one."""
     folders = places(Path("/home/me/course"), {"HOME": "/home/me"})
-    assert [len(folder) for _, folder in folders] == sorted(
-        (len(folder) for _, folder in folders), reverse=True
-    )
+    lengths = [len(folder) for _, folder in folders]
+    assert lengths == sorted(lengths, reverse=True)
     assert dict(folders)["course"] == "/home/me/course"
     assert dict(folders)["home"] == "/home/me"
     assert dict(folders)["prefix"] == sys.prefix

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import signal
 import subprocess
 import sys
@@ -51,10 +52,8 @@ def test_daemons_that_hold_the_pipe_end_with_their_script(run: Run, root: Path) 
 def test_all_that_a_hanging_script_has_started_ends(server: ScriptServer, root: Path) -> None:
     run_hanging(server, root, f"{DAEMON}\ntime.sleep(600)\n")
     assert not any(is_alive(pid) for pid in daemons(root))
-    code = (
-        "import os, time\nfor i in range(5): os.fork()\n"
-        "print(os.getpid(), flush=True)\ntime.sleep(600)\n"
-    )
+    code = "import os, time\nfor i in range(5): os.fork()\nprint(os.getpid(), flush=True)\n"
+    code += "time.sleep(600)\n"
     (result,) = run_hanging(server, root, code, is_done=lambda output: output.count("\n") == 32)
     assert len(result.stdout.split()) == 32
     assert not any(is_alive(int(pid)) for pid in result.stdout.split())
@@ -126,14 +125,8 @@ def test_error_in_a_callback_ends_the_run(server: ScriptServer, root: Path) -> N
 
 def test_results_are_in_order_and_callbacks_are_called(server: ScriptServer, root: Path) -> None:
     """The first script is the last to end: it waits for what the last one writes."""
-    for i, code in enumerate(
-        (
-            "import os, time\nwhile not os.path.exists('examples/met'): time.sleep(0.001)",
-            "",
-            "",
-            "open('examples/met', 'w').close()",
-        )
-    ):
+    wait = "import os, time\nwhile not os.path.exists('examples/met'): time.sleep(0.001)"
+    for i, code in enumerate((wait, "", "", "open('examples/met', 'w').close()")):
         (root / f"examples/{i}.py").write_text(f"print({i})\n{code}\n")
     started_paths: list[str] = []
     finished_runs: list[ScriptRun] = []
@@ -153,14 +146,13 @@ def test_no_more_scripts_at_a_time_than_allowed(server: ScriptServer, root: Path
         "def runs(): return len([n for n in os.listdir('examples') if n.startswith('run')])\n"
         "while runs() < int(sys.argv[1]): time.sleep(0.001)\n"
     )
-    running = [0]
-
-    def begins(_: str) -> None:
-        running.append(running[-1] + 1)
-
-    def ends(_: ScriptRun) -> None:
-        running.append(running[-1] - 1)
-
-    runs = server.run(root, [job(args=["3"])] * 6, parallel=3, on_start=begins, on_finish=ends)
+    events: list[int] = []
+    runs = server.run(
+        root,
+        [job(args=["3"])] * 6,
+        parallel=3,
+        on_start=lambda _: events.append(1),
+        on_finish=lambda _: events.append(-1),
+    )
     assert {run.outcome for run in runs} == {Outcome.OK}
-    assert max(running) == 3
+    assert max(itertools.accumulate(events)) == 3

@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import tempfile
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,8 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.run.script_environment import clean_environment
 from coursebuild.core.run.script_server import ScriptServer
-from support.run_code import run_code
+from support.fixture_cases import fixture_text
+from support.run_code import program, run_code
 from support.runners import SOURCE_TREE, TOOL, Run, both_ways, forked_or_not, job, run_hanging
 
 pytestmark = pytest.mark.site
@@ -136,30 +138,9 @@ def test_script_that_cannot_be_started_says_why(
         run("print(1)")
 
 
-PROBE = """
-import json, os, sys, time
-open_ = sorted(os.listdir("/proc/self/fd"))
-print(json.dumps([dict(os.environ), sys.argv, time.tzname[0], hash("a"), sys.warnoptions, open_]))
-try: open("/dev/tty")
-except OSError: print("no terminal")
-"""
+PROBE = program("environment")
 """`test_forked_scripts` compares the rest with what a bare Python finds."""
-OUTER = {
-    "PYTHONPATH": "/outer",
-    "PYTHONSTARTUP": "/outer",
-    "PYTHONWARNINGS": "error",
-    "PYTHONSAFEPATH": "1",
-    "PYTHONHASHSEED": "7",
-    "PYTHONOPTIMIZE": "2",
-    "LANG": "de_DE",
-    "LC_NUMERIC": "de_DE",
-    "TZ": "Asia/Tokyo",
-    "COLUMNS": "17",
-    "OMP_NUM_THREADS": "64",
-    "SECRET_TOKEN": "x",
-    "DISPLAY": ":0",
-    "MUJOCO_GL": "egl",
-}
+OUTER = tomllib.loads(fixture_text("scripts/outer_environment.toml"))
 
 
 @both_ways
@@ -179,13 +160,8 @@ def test_script_finds_the_course_and_nothing_of_the_user(
     first_line, terminal = result.stdout.splitlines()
     environment, *rest = json.loads(first_line)
     arguments = ["examples/x.py", "a b", "", "*", "é"]
-    assert rest == [
-        arguments,
-        "UTC",
-        second_hash,
-        [],
-        ["0", "1", "2", "3"],
-    ]  # 3 is the listing itself
+    # 3 is the listing itself.
+    assert rest == [arguments, "UTC", second_hash, [], ["0", "1", "2", "3"]]
     assert terminal == "no terminal"
     assert not {"SECRET_TOKEN", "DISPLAY", "COLUMNS", "LC_NUMERIC"} & environment.keys()
     assert environment["MUJOCO_GL"] == "egl"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import mmap
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,8 +23,6 @@ from support.runners import Run, both_ways, job, run_hanging
 pytestmark = pytest.mark.site
 
 RunTraced = Callable[[str], Trace]
-PROGRAMS, NETWORK = "it starts other programs", "it uses the network"
-WRITES = "it writes files of the project"
 
 
 @pytest.fixture
@@ -49,37 +48,14 @@ def traced(run: Run) -> RunTraced:
 
 # --- files
 
-READ: list[tuple[str, set[str]]] = [
-    ("", set()),
-    ("open('data/a.txt').read()", {"data/a.txt"}),
-    ("open(b'data/a.txt').read()", {"data/a.txt"}),
-    ("import os\nopen(os.path.abspath('data/a.txt'))", {"data/a.txt"}),
-    ("open('examples/.././data//a.txt')", {"data/a.txt"}),
-    ("open('data/none.txt')", {"data/none.txt"}),
-    ("import os\nos.chdir('data')\nopen('a.txt')\nopen('../x')", {"data/a.txt", "x"}),
-    (
-        "import os\nos.chdir('data')\nopen('a.txt')\nos.chdir('..')\nopen('a.txt')",
-        {"a.txt", "data/a.txt"},
-    ),
-    ("import os\nos.close(os.open('data/a.txt', os.O_RDONLY))", {"data/a.txt"}),
-    ("import io\nio.open_code(__file__.replace('x.py', 'y.py'))", {"examples/y.py"}),
-    ("import numpy as np\nnp.loadtxt('data/a.txt', dtype=str)", {"data/a.txt"}),
-    ("open(__file__)", set()),
-    ("open('data/ü\\udcff')", {"data/ü\udcff"}),
-    ("open('/dev/null'); open('/proc/self/stat')", set()),
-    ("import os\nf = os.environ['TMPDIR'] + '/f'\nopen(f, 'w').close()\nopen(f)", set()),
-    ("import tempfile\ntempfile.TemporaryFile().write(b'x')", set()),
-    *(
-        (f"import os\nopen('data/a.txt')\n{end}", {"data/a.txt"})
-        for end in ("os._exit(0)", "os.abort()", "os.kill(os.getpid(), 9)")
-    ),
-]
+SCRIPTS = tomllib.loads(fixture_text("scripts/traced.toml"))
 
 
 def test_files_that_are_read_however_the_script_ends(traced: RunTraced) -> None:
-    for code, files in READ:
+    scripts = {**SCRIPTS["files"], "open('data/ü\\udcff')": ["data/ü\udcff"]}
+    for code, files in scripts.items():
         trace = traced(code)
-        assert set(trace.files) == files, code
+        assert [*trace.files] == files, code
         assert (trace.folders, trace.outside, trace.opaque) == ((), (), ""), code
 
 
@@ -104,11 +80,7 @@ def test_files_outside_and_links_into_the_project(
 
 @both_ways
 def test_folders_that_are_listed(traced: RunTraced) -> None:
-    trace = traced(
-        "import os, glob, pathlib\nos.listdir('data')\nos.listdir()\nglob.glob('lib/*')\n"
-        "list(pathlib.Path('examples').iterdir())\nlist(os.scandir('data'))\n"
-        "try: os.listdir('none')\nexcept OSError: pass\n"
-    )
+    trace = traced(SCRIPTS["scripts"]["listing"])
     assert trace.folders == (".", "data", "examples", "lib", "none")
     assert trace.opaque == ""
 
@@ -134,10 +106,7 @@ def test_modules_of_the_project_are_files(traced: RunTraced, root: Path) -> None
     (root / "examples/pack").mkdir()
     for name in ("sibling", "random", "pack/__init__", "pack/inner"):
         (root / f"examples/{name}.py").write_text("value = 'mine'")
-    trace = traced(
-        "import sibling, random, sys\nfrom pack import inner\nassert random.value == 'mine'\n"
-        "sys.path.insert(0, 'lib')\nimport helper"
-    )
+    trace = traced(SCRIPTS["scripts"]["imports"])
     files = {f"examples/{name}.py" for name in ("sibling", "random", "pack/inner")}
     files |= {f"examples/{name}/__init__.py" for name in ("sibling", "random", "pack/inner")}
     files |= {f"lib/{name}{end}" for name in ("helper", "other") for end in (".py", "/__init__.py")}
@@ -148,17 +117,14 @@ def test_modules_of_the_project_are_files(traced: RunTraced, root: Path) -> None
 def test_a_cached_module_counts_as_its_source(traced: RunTraced, root: Path) -> None:
     (root / "examples/sibling.py").write_text("value = 1")
     code = "import py_compile\npy_compile.compile(__file__.replace('x.py', 'sibling.py'))"
-    assert WRITES in traced(code).opaque
+    assert traced(code).opaque == "it writes files of the project"
     assert list(root.glob("examples/__pycache__/*.pyc"))
     trace = traced("import sibling")
     assert trace.files == ("examples/sibling.py", "examples/sibling/__init__.py")
 
 
 def test_what_could_hide_a_module_and_what_is_not_installed(traced: RunTraced) -> None:
-    trace = traced(
-        "import json\nimport numpy.linalg\nimport sys\n"
-        "try: import no_such_module\nexcept ImportError: pass"
-    )
+    trace = traced(SCRIPTS["scripts"]["not installed"])
     (sought,) = trace.sought
     folder, _, names = sought.rstrip("}").partition("/{")
     assert (folder, trace.files) == ("examples", ())
@@ -200,10 +166,7 @@ def test_a_package_writes_as_it_is_imported_where_the_tool_lies_in_the_course(
 def test_forked_and_spawned_scripts_have_the_same_trace(
     root: Path, forking: ScriptServer, spawning: ScriptServer
 ) -> None:
-    (root / "examples/x.py").write_text(
-        "import json, numpy, mujoco\nimport numpy.testing, logging\nopen('data/a.txt')\n"
-        "numpy.random.rand()\n"
-    )
+    (root / "examples/x.py").write_text(SCRIPTS["scripts"]["both ways"])
     forked_trace, spawned_trace = (
         s.run(root, [job()], parallel=1)[0].trace for s in (forking, spawning)
     )
@@ -212,49 +175,9 @@ def test_forked_and_spawned_scripts_have_the_same_trace(
 
 # --- traces that may be incomplete, and effects
 
-OPAQUE: list[tuple[str, str]] = [
-    ("open('data/new', 'w')", WRITES),
-    ("open('data/a.txt', 'a')", WRITES),
-    ("open('data/a.txt', 'r+')", WRITES),
-    ("import os\nos.mkdir('data/new')", WRITES),
-    ("import os\nos.rename('data/a.txt', 'data/b')", WRITES),
-    ("import os\nos.remove('data/b')", WRITES),
-    ("from pathlib import Path\nPath('n').touch()", WRITES),
-    ("import os\nos.symlink('a', 'data/l')", WRITES),
-    ("import numpy as np\nnp.save('n.npy', [1])", WRITES),
-    ("import shutil\nshutil.copy('lib/other.py', 'n')", WRITES),
-    ("import subprocess\nsubprocess.run(['true'])", PROGRAMS),
-    ("import os\nos.system('true')", PROGRAMS),
-    ("import os\nos.execv('/bin/true', ['true'])", PROGRAMS),
-    ("import os\nif not os.fork(): os.execv('/bin/true', ['true'])\nos.wait()", PROGRAMS),
-    ("import os\nos.wait4(os.posix_spawn('/bin/true', ['true'], {}), 0)", PROGRAMS),
-    (
-        "import multiprocessing as m\nif __name__ == '__main__':\n"
-        "    m.get_context('spawn').Process(target=abs, args=(1,)).start()",
-        PROGRAMS,
-    ),
-    ("import socket\nsocket.create_connection(('127.0.0.1', 1))", NETWORK),
-    ("import socket\nsocket.socket().bind(('127.0.0.1', 0))", NETWORK),
-    ("import socket\nsocket.getaddrinfo('localhost', 1)", NETWORK),
-    ("import sqlite3\nsqlite3.connect('data/db')", "it opens a database"),
-    ("import ctypes\nctypes.CDLL('./data/lib.so')", "it loads native code of the project"),
-    ("import os\nos.listdir('/usr')", "it lists folders outside the project"),
-    ("import numpy, mujoco, logging, ctypes\nctypes.CDLL(None)", ""),
-    ("import asyncio\nasyncio.run(asyncio.sleep(0))", ""),
-    ("import sqlite3\nsqlite3.connect(':memory:')", ""),
-    ("import os\nif not os.fork(): os._exit(0)\nos.wait()", ""),
-    ("import tempfile\nwith tempfile.TemporaryDirectory() as d: open(d + '/x', 'w')", ""),
-    (
-        "import multiprocessing as m\nif __name__ == '__main__':\n"
-        "    with m.get_context('fork').Pool(2) as p: p.map(abs, [1])",
-        "",
-    ),
-    ("import concurrent.futures as c\nwith c.ThreadPoolExecutor() as p: p.submit(abs, 1)", ""),
-]
-
 
 def test_reasons_why_a_trace_is_opaque(traced: RunTraced) -> None:
-    for code, reason in OPAQUE:
+    for code, reason in SCRIPTS["opaque"].items():
         assert traced(code).opaque == reason, code
 
 
@@ -262,17 +185,11 @@ def test_effects_are_noted_once_for_each_line(
     traced: RunTraced, root: Path, tmp_path: Path
 ) -> None:
     (root / "examples/sibling.py").write_text("\ndef write(): open('data/c', 'w')\n")
-    trace = traced(
-        f"import os, sibling, socket\nopen({str(tmp_path / 'o')!r}, 'w')\n"
-        "for n in range(9): os.mkdir(f'data/{n}')\n"
-        "socket.getaddrinfo('localhost', 1)\n"
-        "if not os.fork(): sibling.write(); os._exit(0)\n"
-        "os.wait()\n"
-        "socket.socket().bind(('127.0.0.1', 0))\n"
-    )
+    outside = str(tmp_path / "o")
+    trace = traced(SCRIPTS["scripts"]["effects"].replace("OUTSIDE", outside))
     assert (trace.opaque, trace.outside) == ("it writes files outside its temporary folder", ())
     assert sorted((effect.target, effect.path, effect.line) for effect in trace.effects) == [
-        (str(tmp_path / "o"), "examples/x.py", 2),
+        (outside, "examples/x.py", 2),
         ("127.0.0.1:0", "examples/x.py", 7),
         ("data/0", "examples/x.py", 3),
         ("data/c", "examples/sibling.py", 2),

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+import tomllib
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -19,7 +20,7 @@ from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.run import v8
 from coursebuild.core.run.v8 import Isolate, LimitError, MathEngine, ScriptError, StoppedError
 from support.fixture_cases import fixture_text
-from support.run_code import run_code
+from support.run_code import program, run_code
 from support.runners import processor_time
 from support.waiting import wait_until
 
@@ -132,48 +133,14 @@ class TestMarkup:
             assert second_engine.typeset(formulas[::-1]) == first[::-1]
 
 
-MISTAKES = [
-    (r"a + \foo x", r"unknown command \foo", 4),
-    (r"𝒳𝒳 é \foo", r"unknown command \foo", 5),
-    ("x^2^3", "double superscript", 3),
-    ("{", "expected '}', got the end of the formula", 1),
-    ("a}", "unexpected '}'", 1),
-    (r"\frac{1}", "unexpected end of input in a macro argument, expected '}'", 8),
-    (r"\begin{foo}x\end{foo}", "no such environment: foo", 6),
-    (r"\text{a & b}", "unexpected '&'", 8),
-    (r"x $y$", "can't use function '$' in math mode", 2),
-    (r"\tag{1} x", r"\tag works only in display mode", None),
-    (r"\left( x", "expected '\\right', got the end of the formula", 8),
-    (r"\color{notacolour} x", "there is no colour `notacolour`", None),
-    (
-        r"\ref{a}",
-        "references to equations cannot be resolved; link to a heading instead",
-        None,
-    ),
-    (
-        r"a \eqref{a}",
-        "references to equations cannot be resolved; link to a heading instead",
-        None,
-    ),
-    ("", "the formula is empty", None),
-    (" % only a comment", "the formula is empty", None),
-    (r"\nonumber", "the formula is empty", None),
-    (r"\includegraphics{x.png}", 'function "\\includegraphics" is not trusted', 0),
-    ("ab\0", "the formula holds a control character", 2),
-    ("% \x1b", "the formula holds a control character", 2),
-    ("𝒳\ufffe", "the formula holds a control character", 1),
-    (r"\char\"D800 x", "the formula makes a character that a page must not hold", None),
-    (r"\char\"1", "the formula makes a character that a page must not hold", None),
-    (r"\hspace{" + "9" * 400 + "em}", "a length is not a number", None),
-    (r"\bra{\foo}", r"unknown command \foo", 5),
-]
+MISTAKES = tomllib.loads(fixture_text("documents/formula_mistakes.toml"))["mistakes"]
 
 
 class TestMistakes:
     def test_each_mistake_has_its_message_and_place(self, engine: MathEngine) -> None:
-        formulas = [Formula(tex.replace('\\"', '"'), False) for tex, *_ in MISTAKES]
-        errors = engine.typeset(formulas)
-        assert errors == [MathError(message, position) for _, message, position in MISTAKES]
+        errors = engine.typeset([Formula(tex, False) for tex in MISTAKES])
+        for error, (tex, (message, *position)) in zip(errors, MISTAKES.items(), strict=True):
+            assert error == MathError(message, *(position or [None])), tex
 
     def test_one_bad_formula_spoils_no_other(self, engine: MathEngine) -> None:
         formulas = [Formula(tex, False) for tex in ("a", r"\foo", "b", "{", "c")]
@@ -232,17 +199,7 @@ class TestHostile:
         assert len(bad.message) <= 160
 
 
-SCRIPT = """
-const same = x => x
-const spin = x => { for (;;) ; }
-const eat = () => { const a = []; for (;;) a.push(new Array(1e5).fill(1.5)) }
-const fail = x => { throw new Error(x) }
-const number = x => 1
-const busy = x => { for (let i = 0; i < +x; i++); return x }
-let place
-const reserve = (name, size) => place = new ArrayBuffer(size)
-const read = x => String(new Uint8Array(place))
-"""
+SCRIPT = fixture_text("scripts/isolate.js")
 
 
 @pytest.fixture
@@ -310,41 +267,16 @@ class TestIsolate:
             assert apart.submit(asyncio.run, work()).result() == "here"
 
     def test_a_copy_of_a_process_in_which_v8_was_started_has_its_own(self) -> None:
-        code = (
-            "from coursebuild.core.engine.page_pool import Workers, can_fork\n"
-            "from coursebuild.core.run.v8 import MathEngine, start\n"
-            "from coursebuild.core.model.results import Formula\n"
-            "def typeset(tex):\n"
-            "    with MathEngine() as engine: return engine.typeset([Formula(tex, False)])\n"
-            "before = typeset('x')\n"
-            "print(can_fork())\n"
-            "with Workers(typeset, 2) as workers:\n"
-            "    made, numbers = zip(*workers.map((None, 'x') for _ in range(8)))\n"
-            "print(all(one == before for one in made), None in numbers)\n"
-            "with MathEngine() as engine:\n"
-            "    engine.typeset([Formula('x', False)])\n"
-            "    print(can_fork())\n"
-        )
         can = sys.platform != "darwin"
-        process = run_code(code)
-        assert (process.stdout.splitlines(), process.stderr) == (
-            [str(can), f"True {not can}", "False"],
-            "",
-        )
+        process = run_code(program("typeset_in_copies"))
+        assert process.stderr == ""
+        assert process.stdout.splitlines() == [str(can), f"True {not can}", "False"]
 
 
 class TestLife:
     def test_an_interrupt_is_heard_and_ends_cleanly(self) -> None:
-        code = (
-            "from coursebuild.core.run.v8 import Isolate\n"
-            "isolate = Isolate('function spin(x) { for (;;) {} }')\n"
-            "try:\n"
-            "    print('ready', flush=True)\n"
-            "    isolate.call('spin', '', 600.0)\n"
-            "except KeyboardInterrupt: print('interrupted')\n"
-        )
         process = subprocess.Popen(
-            [sys.executable, "-W", "always", "-c", code],
+            [sys.executable, "-W", "always", "-c", program("spin")],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -360,10 +292,5 @@ class TestLife:
         assert (output, errors, process.returncode) == ("interrupted\n", "", 0)
 
     def test_a_process_that_forgets_to_close_ends(self) -> None:
-        code = (
-            "from coursebuild.core.run.v8 import MathEngine\n"
-            "from coursebuild.core.model.results import Formula\n"
-            "engine = MathEngine()\nprint(len(engine.typeset([Formula('x', False)])))\n"
-        )
-        process = run_code(code)
+        process = run_code(program("typeset_and_end"))
         assert (process.stdout, process.stderr, process.returncode) == ("1\n", "", 0)

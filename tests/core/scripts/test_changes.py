@@ -7,13 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison
-from coursebuild.core.model.results import DriftKind, ScriptRun
+from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.scripts.bindings import BindingEvidence, PrintedOutputs, check_bindings
 from coursebuild.core.scripts.compare import compare, verify
 from coursebuild.core.scripts.diff import diff_rows
 from coursebuild.core.scripts.findings import drift_diagnostic
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.report.text import Style, diagnostic_text
+from support.fixture_cases import fixture_tables
 from support.sample_lessons import (
     DIGITS_ELLIPSIS,
     ELLIPSIS,
@@ -27,6 +28,8 @@ from support.sample_lessons import (
     table,
     verdict,
 )
+
+CASES = fixture_tables("changes")
 
 ENERGY = """\
 conservation over 20 s:
@@ -44,28 +47,10 @@ def test_places_in_nested_fences(prefix: str, eol: str) -> None:
     assert (change.span.line, change.span.column) == (9, 44 + len(prefix))
 
 
-@pytest.mark.parametrize(
-    ("recorded", "printed", "kind"),
-    [
-        ("6.641", "6.642", DriftKind.ROUNDING),
-        ("6.641", "6.640", DriftKind.ROUNDING),
-        ("6.641", "6.643", DriftKind.NUMERIC),
-        ("6.641", "6.6421", DriftKind.NUMERIC),
-        ("6.641", "6.6414", DriftKind.ROUNDING),
-        ("6.999", "7.000", DriftKind.ROUNDING),
-        ("-0.000", "0.001", DriftKind.ROUNDING),
-        ("1.5e-3", "1.6e-3", DriftKind.ROUNDING),
-        ("1.5e-3", "1.6e-2", DriftKind.NUMERIC),
-        ("4", "5", DriftKind.NUMERIC),
-        ("0.5", "0.50", DriftKind.TEXT),
-        ("-0.000", "0.000", DriftKind.TEXT),
-        ("nan", "0.5", DriftKind.NUMERIC),
-        ("inf", "-inf", DriftKind.NUMERIC),
-    ],
-)
-def test_classes_of_numbers(recorded: str, printed: str, kind: DriftKind) -> None:
-    result = verdict(f"E {recorded} J", f"E {printed} J")
-    assert [(c.kind, c.recorded, c.printed) for c in result.changes] == [(kind, recorded, printed)]
+def test_classes_of_numbers() -> None:
+    for recorded, printed, kind in CASES["classes"]:
+        result = verdict(f"E {recorded} J", f"E {printed} J")
+        assert [change_values(c) for c in result.changes] == [(kind, recorded, printed)]
 
 
 def test_enormous_errors_stay_finite() -> None:
@@ -73,78 +58,27 @@ def test_enormous_errors_stay_finite() -> None:
     assert change.relative_error is None and change.digits == 0
 
 
-def test_white_space_is_named_only_where_nothing_else_differs() -> None:
-    result = verdict("a   9.9 b", "a  10.9 b")
-    assert [change_values(c) for c in result.changes] == [("numeric", "9.9", "10.9")]
-    result = verdict("a   b", "a  b")
-    assert [change_values(c) for c in result.changes] == [("text", "   ", "  ")]
+def test_changes() -> None:
+    comparisons = {"exact": EXACT, "ellipsis": ELLIPSIS}
+    for recorded, printed, mode, changes in CASES["changes"]:
+        result = verdict(recorded, printed, comparisons[mode])
+        assert [list(change_values(change)) for change in result.changes] == changes
 
 
-def test_text_changes_are_small() -> None:
-    result = verdict("the red box at 1.5 m", "the dark blue box at 1.5 m")
-    assert [change_values(c) for c in result.changes] == [("text", "red", "dark blue")]
-    result = verdict("E: 6.641 %", "E total: 6.702 %")
-    assert [change_values(c) for c in result.changes] == [
-        ("text", "", " total"),
-        ("numeric", "6.641", "6.702"),
-    ]
-
-
-def test_missing_and_extra_lines() -> None:
-    result = verdict("a one\nb two\nc three\nd four", "a one\nd four")
-    assert [change_values(c) for c in result.changes] == [("missing lines", "b two\nc three", "")]
-    assert result.changes[0].span.text == "b two\nc three"
-    result = verdict("a one\nd four", "a one\nb two\nc three\nd four")
-    assert [change_values(c) for c in result.changes] == [("extra lines", "", "b two\nc three")]
-    assert (
-        result.changes[0].span.line == 8
-        and result.changes[0].span.start == result.changes[0].span.end
-    )
-
-
-def test_a_line_that_moved_is_missing_here_and_extra_there() -> None:
-    result = verdict("x alpha\ny beta\nz gamma", "y beta\nz gamma\nx alpha")
-    assert [c.kind.value for c in result.changes] == ["missing lines", "extra lines"]
-
-
-def test_changes_beside_an_ellipsis() -> None:
-    result = verdict("start\n...\nE 1.50\nend", "start\nfoo\nbar\nE 1.70\nend", ELLIPSIS)
-    assert [change_values(c) for c in result.changes] == [("numeric", "1.50", "1.70")]
-    result = verdict("t=... s, E 1.5 J", "t=0.1 s, E 2.5 J", ELLIPSIS)
-    assert [change_values(c) for c in result.changes] == [("numeric", "1.5", "2.5")]
-    result = verdict("t=... s, E", "u=0.1 s, F", ELLIPSIS)
-    assert [change_values(c) for c in result.changes] == [("text", "t=... s, E", "u=0.1 s, F")]
+def test_missing_and_extra_lines_have_places() -> None:
+    (missing,) = verdict("a one\nb two\nc three\nd four", "a one\nd four").changes
+    assert missing.span.text == "b two\nc three"
+    (extra,) = verdict("a one\nd four", "a one\nb two\nc three\nd four").changes
+    assert (extra.span.line, extra.span.text) == (8, "")
 
 
 def drift(recorded: str, printed: str, comparison: Comparison = EXACT) -> Diagnostic:
     return drift_diagnostic(compare(recording(recorded), comparison, printed), "4.2")
 
 
-@pytest.mark.parametrize(
-    ("recorded", "printed", "label"),
-    [
-        ("E 6.641", "E 6.702", "this run printed 6.702 (relative error 9.2e-03, 2 digits agree)"),
-        ("E 1.0", "E 1.5", "this run printed 1.5 (relative error 5.0e-01, no digit agrees)"),
-        ("E 1.00", "E 1.05", "this run printed 1.05 (relative error 5.0e-02, 1 digit agrees)"),
-        ("E 1.00", "E 1.01", "this run printed 1.01 (relative error 1.0e-02, 2 digits agree)"),
-        ("E 0.0", "E 1.5", "this run printed 1.5"),
-        ("E 1.0", "E nan", "this run printed nan"),
-        ("E 1e-9", "E 1e500", "this run printed 1e500"),
-        ("E 1.0", "E 1.00", "this run printed 1.00 (the same value, written in another way)"),
-        ("a red b", "a blue b", "this run printed `blue`"),
-        ("a red b", "a b", "this run printed nothing here"),
-        ("a b", "a red b", "this run printed `red`"),
-        ("a   b", "a b", "this run printed white space of another width here"),
-        ("a\nb c d", "a", "this run did not print this line"),
-        ("a\nb\nc", "a", "this run did not print these 2 lines"),
-        ("a", "a\nb", "this run printed `b` here"),
-        ("a", "a\nb\nc", "this run printed `b` and 1 more line here"),
-        ("a", "a\nb\nc\nd", "this run printed `b` and 2 more lines here"),
-        ("a", "b" * 99, f"this run printed `{'b' * 59}…`"),
-    ],
-)
-def test_labels(recorded: str, printed: str, label: str) -> None:
-    assert drift(recorded, printed).label == label
+def test_labels() -> None:
+    for recorded, printed, label in CASES["labels"]:
+        assert drift(recorded, printed).label == label
 
 
 def test_a_drift_is_reported_in_ten_lines() -> None:
@@ -170,27 +104,9 @@ def rows(recorded: str, printed: str) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize(
-    ("recorded", "printed", "expected"),
-    [
-        ("pi 3.14\nn 2", "pi 3.14159\nn 3", [" pi 3.14", "-n [2]", "+n [3]"]),
-        ("a\n...\nz 1", "a\nb\nc\nz 2", [" a", " ...", "-z [1]", "+z [2]"]),
-        ("a 1\nb 2\nc 3", "a 1\nb 4\nc 3", [" a 1", "-b [2]", "+b [4]", " c 3"]),
-        ("a 1\nb 2", "a 3\nb 4", ["-a [1]", "-b [2]", "+a [3]", "+b [4]"]),
-        ("one\ntwo", "one", [" one", "-[two]"]),
-        ("one", "one\ntwo", [" one", "+[two]"]),
-        # half of their words make two lines one; what is between such is one after the other
-        (
-            "first\nmass one",
-            "mass two\nlast",
-            ["-[first]", "-mass [one]", "+mass [two]", "+[last]"],
-        ),
-        ("the mass is 3", "the mass was 3", ["-the mass [is] 3", "+the mass [was] 3"]),
-        ("a\n\nb 1", "a\n\nb 2", [" a", " ", "-b [1]", "+b [2]"]),
-    ],
-)
-def test_rows(recorded: str, printed: str, expected: list[str]) -> None:
-    assert rows(recorded, printed) == expected
+def test_rows() -> None:
+    for recorded, printed, expected in CASES["rows"]:
+        assert rows(recorded, printed) == expected
 
 
 def test_rows_of_a_table_are_the_cells_that_changed() -> None:
@@ -272,44 +188,7 @@ binding-mismatch at 12:2 `2.006`
     )
 
 
-@pytest.mark.parametrize(
-    ("binding", "before", "now", "label", "help_text"),
-    [
-        # swapped, as lines and as values: the one beside the same words counts
-        ("1.5", "a 1.5\nb 2.5", "b 1.6\na 2.6", "2.6 is printed where 1.5 was", "2.6"),
-        ("1.5", "a 1.5\nb 2.5", "a 2.4\nb 1.4", "2.4 is printed where 1.5 was", "2.4"),
-        # a line more and one fewer
-        ("2.5", "x 1\na 2.5", "a 3.5\nb 2.4", "3.5 is printed where 2.5 was", "3.5"),
-        # inside a line
-        ("2.0", "a 1.0 b 2.0 c 3.0", "a 2.1 b 7.0 c 2.2", "7.0 is printed where 2.0 was", "7.0"),
-        ("1, 2.0", "[1.0 2.0 3.0]", "[3.1  4.0 1.1]", "3.1, 4.0 are printed where 1.0, 2.0 were",
-            "3, 4.0"),
-        # columns get wider, numbers get signs, minus signs are real ones, exponents move
-        ("6.6 %", "E  6.641 %  p 6.2", "E -12.700 %  p 6.5", "-12.700 is printed where 6.641 was",
-            "-12.7 %"),
-        ("\u22120.5", "a \u22120.5\nb 0.6", "a \u22120.9\nb \u22120.6",
-            "\u22120.9 is printed where \u22120.5 was", "\u22120.9"),
-        ("3.9e-11", "a 3.9e-11\nb 1e-3", "a 1.23E-07\nb 3.8e-11",
-            "1.23E-07 is printed where 3.9e-11 was", "1.2e-07"),
-        ("+6.6", "a +6.641", "a +7.25", "+7.25 is printed where +6.641 was", "+7.2"),
-        ("4 flips", "a 4 flips\nb 9 flips", "a 12 flips\nb 5 flips", "12 is printed where 4 was",
-            "12 flips"),
-        # rounded as the author rounds; where digits would be lost there is nothing to write
-        ("3.9 × 10⁻¹¹", "a 3.9e-11 b 5", "a 4.9e-11 b 5", "4.9e-11 is printed where 3.9e-11", ""),
-        ("2.5", "a 2.5\nb 3", "a nan\nb 3", "nan is printed where 2.5 was", ""),
-        ("2.01", "a 2.00613", "a 0.00314", "0.00314 is printed where 2.00613 was", ""),
-        ("12", "a 12", "a 0", "0 is printed where 12 was", "0"),
-        # with its unit it would be another one
-        ("2.5 J", "a 2.5\nb 3", "a 3.5\nb 4 J", "3.5 is printed where 2.5 was", ""),
-        # two places that are one number
-        ("2.5", "a 2.5 2.50", "a 3.5 3.50", "3.5 is printed where 2.5 was", "3.5"),
-        # the unit chooses the place
-        ("2.5 J", "a 2.5 m 2.5 J", "a 3.5 m 4.5 J", "4.5 is printed where 2.5 was", "4.5 J"),
-        # nothing is printed any more
-        ("2.5", "a 2.5", "nothing here", "no number was printed", ""),
-        ("2.5, 3.5", "a 2.5 3.5", "a 2.5\nb 3.6", "no printed line has 2 numbers one after", ""),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("binding", "before", "now", "label", "help_text"), CASES["proposals"])
 def test_the_number_in_the_same_place_is_proposed(
     binding: str, before: str, now: str, label: str, help_text: str
 ) -> None:
@@ -318,33 +197,10 @@ def test_the_number_in_the_same_place_is_proposed(
     assert diagnostic.help == (help_text and f"write `{help_text}`")
 
 
-@pytest.mark.parametrize(
-    ("before", "now", "successor"),
-    [
-        # headings tell lines that are alike apart, wherever they stand
-        ("Euler:\nerr 2.5\nRK4:\nerr 1", "RK4:\nerr 2.4\nEuler:\nerr 7.5", "7.5"),
-        ("Euler:\nerr 2.5\nRK4:\nerr 1", "Euler:\nerr 7.5\nMid:\nerr 2.4\nRK4:\nerr 1", "7.5"),
-        ("Euler:\nerr 2.5\nRK4:\nerr 1", "Euler:\nerr 7.5", "7.5"),
-        # one that is gone may have been what the number was about
-        ("Euler:\nerr 2.5\nRK4:\nerr 1", "Midpoint:\nerr 7.5\nRK4:\nerr 1", None),
-        ("Euler:\nerr 2.5", "Euler:\nsteps\nerr 7.5", None),
-        ("Euler:\nerr 2.5\nRK4:\nE 1", "Euler:\nE 1\nRK4:\nerr 7.5", None),
-        # rows are known by the number that they begin with
-        ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.05 2\n0.1 7.5\n0.2 9", "7.5"),
-        ("dt err\n0.1 2.5\n0.2 9", "dt err\n0.05 2\n0.1 7.5", "7.5"),
-        ("n err\n0 10 3.5\n0 20 2.5", "n err\n0 10 8\n0 20 7.5", None),
-        ("n err\n10 3.5\n20 2.5\n40 4.5", "n err\n10 3.1\n30 2.1\n40 4.1", None),
-        ("1 0 2.5\n2 1 9", "2 0 8\n1 1 7.5", "7.5"),
-        ("dt 0.1\nerr 2.5\ndt 0.2\nerr 9", "dt 0.05\nerr 2.4\ndt 0.1\nerr 7.5", None),
-        ("err 2.5", "err 2.6\nerr 2.7", None),
-        # another wording is another quantity
-        ("period 2.5 s", "frequency 2.6 s", None),
-        ("period 2.5 s", "period 2.6 ms", None),
-    ],
-)  # fmt: skip
-def test_which_line_is_the_same(before: str, now: str, successor: str | None) -> None:
+@pytest.mark.parametrize(("before", "now", "successor"), CASES["successors"])
+def test_which_line_is_the_same(before: str, now: str, successor: str) -> None:
     diagnostic = mismatch_after("2.5", before + "\n", now + "\n")
-    if successor is None:
+    if not successor:
         assert diagnostic.label.startswith(
             "it is not certain what is printed in place of 2.5 now; the "
         )
@@ -371,25 +227,7 @@ def test_with_another_number_of_outputs_the_evidence_does_not_count() -> None:
     assert diagnostic.label == "the nearest printed value is 1.975"
 
 
-@pytest.mark.parametrize(
-    ("binding", "printed", "nearest", "better"),
-    [
-        # proposed where no other number can be meant
-        ("2.5", "a 2.6 2.60", "2.6", "2.6"),
-        ("2.5", "a 2.6 9.1", "2.6", ""),
-        ("b 2.5", "a 2.4 b 9.1", "9.1", "b 9.1"),
-        ("2.5 J", "a 2.4 J b 9.1", "2.4", "2.4 J"),
-        ("2.5 s", "energy 2.4 J", "2.4", ""),
-        ("−1.5e-3", "1.6e-03", "1.6e-03", "1.6e-3"),
-        ("1.50, 2.0", "-1.50 -2.00", "-1.50, -2.00", "-1.50, -2.0"),
-        # the nearest by its size, then by its sign
-        ("829.030", "work -829.030 J, 263.1 W", "-829.030", ""),
-        ("829.030", "-829.031 829.031", "829.031", ""),
-        ("1.50, -2.0", "1.50 2.00\n1.50 -2.1", "1.50, 2.00", ""),
-        ("0.1", "0.0001 0.5", "0.5", ""),
-        ("5.1", "nan inf 9.0", "9.0", ""),
-    ],
-)
+@pytest.mark.parametrize(("binding", "printed", "nearest", "better"), CASES["nearest"])
 def test_without_evidence_the_nearest_number_is_named(
     binding: str, printed: str, nearest: str, better: str
 ) -> None:

@@ -14,6 +14,7 @@ from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
+from support.fixture_cases import fixture_tables
 from support.sample_lessons import (
     DIGITS,
     DIGITS_ELLIPSIS,
@@ -27,23 +28,16 @@ from support.sample_lessons import (
     update,
 )
 
+CASES = fixture_tables("updates")
+
 SECONDS = Comparison(volatile="[0-9.]+ s")
 
 # ------------------------------------------------------------------------------------ new text
 
 
-def test_the_output_is_written() -> None:
-    assert body("a 1.5\nb", "a 2.5\nb\nc  \n\n\n") == "a 2.5\nb\nc\n"
-    assert body("", "a\n") == "a\n"
-    assert body("a\nb\nc", "\n\na") == "\n\na\n"
-
-
-def test_line_ends_and_prefixes_are_the_lesson_s() -> None:
-    assert body("a", "b\n\nc", eol="\r\n") == "b\r\n\r\nc\r\n"
-    assert body("a", "b\n\nc", eol="\r") == "b\r\rc\r"
-    assert body("a", "b\r\n\r\nc", prefix="> ") == "> b\n>\n> c\n"
-    assert body("a", " b\n\nc", prefix="   ", eol="\r\n") == "    b\r\n\r\n   c\r\n"
-    assert body("", "b\n\nc", prefix=">   ") == ">   b\n>\n>   c\n"
+def test_the_output_is_written_as_the_lesson_is() -> None:
+    for recorded, printed, style, expected in CASES["plain"]:
+        assert body(recorded, printed, **style) == expected
 
 
 def test_what_matches_is_left_alone() -> None:
@@ -70,11 +64,7 @@ def test_what_varies_is_written_with_the_rest_of_its_line_only() -> None:
     assert new.body_span.text == "a 7 s, E 3\nb 1 s\n"
 
 
-def test_a_tilde_fence_holds_backticks() -> None:
-    assert body("a", "```\nb", fence="~~~") == "```\nb\n"
-    assert body("a", "```\n~~~~\nb", fence="~~~~~") == "```\n~~~~\nb\n"
-    assert body("a", "    ```\n``\nb") == "    ```\n``\nb\n"
-    assert body("a", "```x", fence="~~~") == "```x\n"
+def test_an_output_that_would_close_its_fence_is_refused() -> None:
     assert "would close this fence, or begin another" in refusal_text("a", " ```x\nb")
 
 
@@ -94,21 +84,7 @@ def test_what_cannot_be_recorded_is_refused() -> None:
 # -------------------------------------------------------------------------------------- ellipsis
 
 
-@pytest.mark.parametrize(
-    ("recorded", "printed", "expected"),
-    [
-        ("a 1\n...\nb 2", "a 3\nx\ny\nb 4", "a 3\n...\nb 4\n"),
-        ("a 1\n...\nb 2", "a 3\nb 2", "a 3\n...\nb 2\n"),
-        ("t=... s\na 1", "t=0.3 s\na 2", "t=... s\na 2\n"),
-        ("t=... s, E=1.5 J", "t=0.3 s, E=2.5 J", "t=... s, E=2.5 J\n"),
-        ("E 1.5 at t=...", "E 2.5 at t=0.3", "E 2.5 at t=...\n"),
-        ("a\n...\n...\nb 1", "a\nb 2", "a\n...\n...\nb 2\n"),
-        ("...\nb 1\nc", "x\nb 2\nc", "...\nb 2\nc\n"),
-        ("a 1\n...", "a 2", "a 2\n...\n"),
-        ("a\nb\nc\n...\nd", "a\nc\nx\nd", "a\nc\n...\nd\n"),
-        ("a x\nb\n...\nz 1", "a x\nnew\nb\nw\nz 1", "a x\nnew\nb\n...\nz 1\n"),
-    ],
-)
+@pytest.mark.parametrize(("recorded", "printed", "expected"), CASES["ellipses"])
 @pytest.mark.parametrize("comparison", [ELLIPSIS, DIGITS_ELLIPSIS], ids=["exact", "digits"])
 def test_ellipses_are_kept(
     recorded: str, printed: str, expected: str, comparison: Comparison

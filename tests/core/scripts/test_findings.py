@@ -9,7 +9,7 @@ from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.scripts.failures import failure_diagnostic
 from coursebuild.core.scripts.findings import script_findings
-from support.fixture_cases import fixture_text
+from support.fixture_cases import FIXTURES, Case, check_cases, fixture_text
 from support.sample_lessons import course, describe, document, make_run
 
 
@@ -145,50 +145,13 @@ def describe_failure(stderr: str = "", outcome: Outcome = Outcome.FAILED, status
     return f"{diagnostic.span.path}\n{describe(diagnostic)}"
 
 
-def test_an_exception_group_ends_with_its_last_exception() -> None:
-    stderr = (
-        "  + Exception Group Traceback (most recent call last):\n"
-        '  |   File "/x/examples/a.py", line 5, in <module>\n  |     go()\n'
-        "  | ExceptionGroup: two (1 sub-exception)\n  +-+---------------- 1 ----------------\n"
-        '    | Traceback (most recent call last):\n    |   File "/x/examples/a.py", line 4, in go\n'
-        "    |     helper.fall()\n    | ValueError: bad\n    +------------------------\n"
-    )
-    assert describe_failure(stderr).split("\n")[1:4] == [
-        "script-failed at 7:5 `helper.fall()`",
-        "  `examples/a.py` exited with status 1",
-        "  ^ ValueError: bad",
-    ]
+def test_failures_are_told_with_their_places(rewriting: bool) -> None:
+    def render(case: Case) -> str:
+        outcome, status = case.input.split("\n")[0].split()
+        stderr = case.input.partition("\n")[2]
+        return describe_failure(stderr, Outcome(outcome), int(status)) + "\n"
 
-
-def test_an_exit_without_output_shows_its_status_alone() -> None:
-    assert describe_failure("").split("\n")[1:] == [
-        "script-failed at 3:1 ````python file=examples/a.py timeout=2.5`",
-        "  `examples/a.py` exited with status 1",
-    ]
-
-
-def test_a_syntax_error_and_warnings() -> None:
-    stderr = (
-        "/x/examples/a.py:4: RuntimeWarning: divide by zero\n  helper.fall()\n"
-        "  File \"/x/examples/a.py\", line 5\n    go(\n      ^\nSyntaxError: '(' was never closed\n"
-    )
-    assert describe_failure(stderr).split("\n")[1:6] == [
-        "script-failed at 8:1 `go()`",
-        "  `examples/a.py` exited with status 1",
-        "  ^ SyntaxError: '(' was never closed",
-        "  note: its standard error:",
-        "    content/lessons/4.2-mass.md:7: RuntimeWarning: divide by zero",
-    ]
-
-
-def test_a_crash_is_shown_at_the_line_that_its_dump_names_first() -> None:
-    stderr = (
-        "Fatal Python error: Segmentation fault\n\n"
-        "Current thread 0x00007f1200000000 (most recent call first):\n"
-        '  File "/x/examples/a.py", line 4 in go\n  File "/x/examples/a.py", line 5 in <module>\n'
-    )
-    place = describe_failure(stderr, Outcome.KILLED, 11).split("\n")[1]
-    assert place == "script-killed at 7:5 `helper.fall()`"
+    check_cases(FIXTURES / "scripts/failures.md", render, rewriting=rewriting)
 
 
 def test_only_extracted_files_are_replaced() -> None:

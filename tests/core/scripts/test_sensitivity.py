@@ -17,7 +17,10 @@ from coursebuild.core.scripts.sensitivity import (
     noise_warnings,
     sensitivity,
 )
+from support.fixture_cases import fixture_tables
 from support.sample_lessons import DIGITS, EXACT, course, describe, document, recording, tolerance
+
+CASES = fixture_tables("sensitivity")
 
 TRACE = Trace((), (), (), ("mujoco",), "")
 
@@ -72,31 +75,13 @@ def warnings(result: Sensitivity) -> list[str]:
 # --- numbers
 
 
-@pytest.mark.parametrize(
-    ("recorded", "moved_output", "expected"),
-    [
-        ("1.23456", ["1.23461", "1.23451"], ("1.23456", 6, 5, "1.2346")),
-        ("1.23456", ["1.23462"], ("1.23456", 6, 4, "1.235")),
-        ("1.23456", ["1.3"], ("1.23456", 6, 1, "1")),
-        ("1.23456", ["4.2"], ("1.23456", 6, 0, "")),
-        ("+6.641", ["+6.645"], ("+6.641", 4, 3, "+6.64")),
-        ("\u22126.641", ["\u22126.645"], ("\u22126.641", 4, 3, "\u22126.64")),
-        ("1.2345e-03", ["1.2349e-03"], ("1.2345e-03", 5, 4, "1.234e-03")),
-        ("1.2345E+7", ["1.2445E+7"], ("1.2345E+7", 5, 2, "1.2E+7")),
-        ("6e-17", ["-2e-17"], ("6e-17", 1, 0, "")),
-        ("12345.6", ["12395.6"], ("12345.6", 6, 3, "1.23e+04")),
-        ("9.9996", ["9.9999"], ("9.9996", 5, 4, "10.000")),
-        ("0.000", ["0.001"], ("0.000", 4, 0, "")),
-        ("26", ["27"], ("26", 2, 1, "")),
-        ("1.5", ["nan"], ("1.5", 2, 0, "")),
-    ],
-)
+@pytest.mark.parametrize(("recorded", "moved_output", "expected"), CASES["digits"])
 def test_digits_that_hold(
-    recorded: str, moved_output: list[str], expected: tuple[str, int, int, str]
+    recorded: str, moved_output: list[str], expected: list[str | int]
 ) -> None:
     text = "value {} m"
     result = measure(text.format(recorded), *(text.format(value) for value in moved_output))
-    assert digits(result) == [expected]
+    assert digits(result) == [tuple(expected)]
 
 
 def test_what_a_filter_takes_out_does_not_count() -> None:
@@ -116,33 +101,15 @@ def test_values_within_a_tolerance_are_compared_with_those_of_the_run() -> None:
     assert digits(result) == [("1.2347", 5, 4, "1.235")]
 
 
-@pytest.mark.parametrize(
-    ("recorded", "moved_output", "finer", "expected"),
-    [
-        # A pendulum at -3.0662266: its digits repeat, and the last two are not right.
-        ("-3.0662252", "-3.0662252", "-3.0662265 -3.0662266", (8, 6, "-3.06623", 8)),
-        ("1.2345", "1.2346", "1.2345 1.2345", (4, 5, "1.234", 5)),
-        ("1.2345", "1.2346", "1.25 1.258", (4, 2, "1.2", 5)),
-        ("1.2345", "1.2345", "1.2345 1.2345", None),
-        ("1.2345", "1.2345", "7 7", (5, 0, "", 5)),
-        ("1.2345", "1.2345", "nan 1.2345", (5, 0, "", 5)),
-        ("26", "26", "27 27", (2, 1, "", 2)),
-        # The first two lie near each other by luck: the truth is 0.69.
-        ("0.89", "0.89", "0.89 0.75", (2, 0, "", 2)),
-        ("0.8874", "0.8874", "0.8886 0.7503", (4, 0, "", 4)),
-        # Changes that do not become smaller show no limit, and those of first order do.
-        ("0.88740", "0.88740", "0.88860 0.88990", (5, 1, "0.9", 5)),
-        ("0.88740", "0.88740", "0.88860 0.88920", (5, 2, "0.89", 5)),
-    ],
-)
+@pytest.mark.parametrize(("recorded", "moved_output", "finer", "expected"), CASES["converged"])
 def test_digits_that_repeat_and_digits_that_are_converged(
-    recorded: str, moved_output: str, finer: str, expected: tuple[int, int, str, int] | None
+    recorded: str, moved_output: str, finer: str, expected: list[int | str]
 ) -> None:
     text = "value {} m"
     half, quarter = map(text.format, finer.split())
     result = measure(text.format(recorded), text.format(moved_output), finer=(half, quarter))
     values = [(d.repeat, d.converged, d.instead, d.digits) for d in result.doubts]
-    assert values == ([] if expected is None else [expected])
+    assert values == ([tuple(expected)] if expected else [])
     assert result.unhalved == ""
     assert warnings(result) == warnings(measure(text.format(recorded), text.format(moved_output)))
 

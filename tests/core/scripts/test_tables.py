@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -17,7 +16,10 @@ from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
+from support.fixture_cases import fixture_tables
 from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, tolerance, update
+
+CASES = fixture_tables("tables")
 
 OUTPUT = """\
 integrators
@@ -44,35 +46,13 @@ def verdict(
     return compare(table(HEAD + rows), comparison, printed)
 
 
-def test_rows_stand_in_lines() -> None:
+MODES = {"exact": EXACT, "digits": DIGITS, "tolerance": tolerance("0.1"), "volatile": VOLATILE}
+
+
+def test_rows_stand_in_lines_with_whole_words_and_numbers() -> None:
     assert verdict(ROWS).status == "verified"
-    assert verdict(ROWS.split("\n")[2]).status == "verified"
-    assert verdict("| Euler | | 6.9e-04 |").status == "verified"
-    assert verdict("| | | |").status == "verified"
-
-
-@pytest.mark.parametrize(
-    "row",
-    [
-        "| implicit | 3.9e-11 | |",
-        "| RK4 | 0.000 % | |",
-        "| Euler | 6.641 % | |",
-        "| Euler | +6.64 % | |",
-        "| Eul | +6.641 % | |",
-        "| Euler | +6.641 | 6.9 |",
-        "| K4 | | |",
-    ],
-)
-def test_words_and_numbers_stand_whole(row: str) -> None:
-    assert verdict(row).status == "drift"
-
-
-def test_numbers_match_by_the_mode() -> None:
-    assert verdict("| Euler | 6.64 % | 6.9e-04 |", comparison=DIGITS).status == "verified"
-    assert verdict("| Euler | 6.6 % | 7e-04 |", comparison=DIGITS).status == "verified"
-    assert verdict("| Euler | 6.63 % | 7e-04 |", comparison=DIGITS).status == "drift"
-    assert verdict("| Euler | 6.7 % | 7e-04 |", comparison=tolerance("0.1")).status == "verified"
-    assert verdict("| Euler | 9.9 % | 7e-04 |", comparison=VOLATILE).status == "volatile"
+    for row, mode, status in CASES["rows"]:
+        assert verdict(row, comparison=MODES[mode]).status == status, row
 
 
 def test_the_number_that_drifted_is_named() -> None:
@@ -210,22 +190,10 @@ def test_what_changes_from_run_to_run_is_not_recorded() -> None:
     assert b"20" not in today.replace(b"2000/svg", b"") and b"made" not in today
 
 
-DIFFERENT = {
-    '<path d="M0 0L10.05 1"/>': "",
-    '<path d="M0 0L12.5 1"/>': "1 of its parts moved, by up to 2.5% of its size",
-    '<path d="M0 0L10 1" fill="red"/>': "it has 7 parts where 6 are recorded",
-    '<path d="M0 0H10 1"/>': "other words or colours in 1 of its parts",
-    '<path d="M0 0L1e999 1"/>': "1 of its parts moved, by up to inf% of its size",
-    '<path d="M0 0L10 1"/><text>a</text>': "it has 8 parts where 6 are recorded",
-}
-
-
 def test_svg_differs_by_parts_words_and_places() -> None:
     base = recorded('<path d="M0 0L10 1"/>')
-    wordings = {
-        inside: describe_difference("x.svg", base, recorded(inside)) for inside in DIFFERENT
-    }
-    assert wordings == DIFFERENT
+    for inside, wording in CASES["svg"]:
+        assert describe_difference("x.svg", base, recorded(inside)) == wording, inside
 
 
 def test_png_differs_by_pixels() -> None:

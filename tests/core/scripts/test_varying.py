@@ -11,6 +11,7 @@ from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.scripts.findings import find_instability
 from coursebuild.core.text.diagnostics import Diagnostic
+from support.fixture_cases import fixture_tables
 from support.sample_lessons import (
     DIGITS,
     ELLIPSIS,
@@ -20,6 +21,8 @@ from support.sample_lessons import (
     recording,
     recordings,
 )
+
+CASES = fixture_tables("times")
 
 SECONDS = Comparison(volatile="[0-9.]+ s")
 
@@ -58,25 +61,7 @@ def test_runs_that_differ_where_nothing_is_compared_are_stable() -> None:
     assert instability("a", "a", recorded="c") is None, "a drift that repeats"
 
 
-TIMES = [
-    ("took 0.52 s", "took 0.58 s", "[0-9.]+ s"),
-    ("t = 0.50 s\ntook 0.31 s", "t = 0.50 s\ntook 0.35 s", "took [0-9.]+ s"),
-    ("sim 5 s in 0.31 s", "sim 5 s in 0.35 s", "in [0-9.]+ s"),
-    ("a 1 s\nb 2 s\nc 3 s", "a 1 s\nb 3 s\nc 4 s", "b [0-9]+ s|c [0-9]+ s"),
-    ("elapsed: 0.5", "elapsed: 0.61", "elapsed: [0-9.]+"),
-    ("Elapsed time (s): 1.23", "Elapsed time (s): 1.3", r"\(s\): [0-9.]+"),
-    ("took 950 ms", "took 1.02 s", "[0-9.]+(?: ms| s)"),
-    ("ran 1.2e-05 s", "ran 9.9e-06 s", "[0-9.e-]+ s"),
-    ("took      9.5 s", "took     10.5 s", "[0-9.]+ s"),
-    ("83,667 steps/s", "79,102 steps/s", "[0-9,]+ steps/s"),
-    ("12.1x real time", "12.5x real time", "[0-9.]+x real"),
-    (
-        "2026-11-24 03:14:02 start",
-        "2026-11-24 03:14:05 start",
-        "[0-9]+-[0-9]+-[0-9]+ [0-9]+:[0-9]+:[0-9]+",
-    ),
-    ("done 0:00:01.234", "done 0:00:01.331", r"[0-9]+:[0-9]+:[0-9]+\.[0-9]+"),
-]
+TIMES = CASES["patterns"]
 
 
 @pytest.mark.parametrize(("first", "second", "pattern"), TIMES)
@@ -101,19 +86,7 @@ def test_a_second_time_is_added_to_what_varies_already() -> None:
     assert "load [0-9.]+ s|[0-9.]+ h" in diagnostic.help
 
 
-@pytest.mark.parametrize(
-    ("first", "second"),
-    [
-        ("mean 0.48", "mean 0.51"),
-        ("mean 0.48 took 1.2 s", "mean 0.51 took 1.1 s"),
-        ("run number 1", "run number 2"),
-        ("for the time number 1", "for the time number 2"),
-        ("n   time (s)\n10   0.12\n20   0.25", "n   time (s)\n10   0.13\n20   0.24"),
-        ("took 1 s", "took 1 s\nretried"),
-        ("object at 0x7f01", "object at 0x7f02"),
-        ('"5 s" in "1 s"', '"5 s" in "2 s"'),
-    ],
-)
+@pytest.mark.parametrize(("first", "second"), CASES["unlike"])
 def test_nothing_is_proposed_where_more_than_times_would_vary(first: str, second: str) -> None:
     diagnostic = instability(first, second)
     assert diagnostic is not None

@@ -1,7 +1,7 @@
 """JSON and TOML with places: the values are those of the standard library.
 
-The diagnostics of wrong texts are `tests/fixtures/texts/`; `pytest tests/core/syntax
---rewrite-fixtures` writes their expected parts anew.
+What courses, models and quizzes become stands in `tests/fixtures/values/`, the diagnostics of wrong
+texts in `tests/fixtures/texts/`; `pytest tests/core/syntax --rewrite-fixtures` writes both anew.
 """
 
 from __future__ import annotations
@@ -9,20 +9,37 @@ from __future__ import annotations
 import datetime
 import json
 import tomllib
+from collections.abc import Callable
+from decimal import Decimal
+from typing import Any
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from msgspec import NODEFAULT, Struct
+from msgspec.structs import fields
 
+from coursebuild.core.model import Comparison, Mode
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.syntax.json_text import parse_json
-from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode, StringNode
+from coursebuild.core.syntax.nodes import (
+    ArrayNode,
+    BoolNode,
+    DateNode,
+    Node,
+    NumberNode,
+    ObjectNode,
+    StringNode,
+)
 from coursebuild.core.syntax.toml_text import parse_toml
-from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.core.text.source import Excerpt, Source
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed
+from coursebuild.core.text.source import Excerpt, Source, Span
+from support.fixture_cases import Case, check_cases, read_cases
 from support.text_cases import FOLDER, Reader, check_texts, parse_lab, parse_quiz, plain
 from support.text_cases import parse_text as parse
+
+VALUE_FOLDER = FOLDER.parent / "values"
 
 
 def walk(node: Node) -> list[Node]:
@@ -139,13 +156,6 @@ def test_invalid_json_is_always_reported(text: str) -> None:
 DATES = (datetime.date, datetime.time)
 
 
-def root_of(text: str) -> ObjectNode:
-    parsed_toml = parse_toml(Source("content/course.toml", text))
-    assert parsed_toml.diagnostics == ()
-    assert parsed_toml.value is not None
-    return parsed_toml.value
-
-
 def replace_dates(value: object) -> object:
     """A value of tomllib with dates as `plain` gives them."""
     if isinstance(value, dict):
@@ -155,84 +165,10 @@ def replace_dates(value: object) -> object:
     return "a date" if isinstance(value, DATES) else value
 
 
-ALL = r'''# a comment
-top = 1
-a.b."c d".'e' = 0x1F   # dotted
-
-[course]
-title = "Mass and \"inertia\""
-path = 'C:\temp'
-long = """
-first \
-   joined
- second""""
-raw = """""\u00e9"""
-literal = LLL'quoted'LLL
-when = 1979-05-27 07:32:00Z
-day = 1979-05-27
-hour = 07:32:00.999
-numbers = [ 1, 2.5e3, +inf, -nan, 1_000, # comment ] here
-  0o17, 0b1,
-]
-inline = { x = 1, y.z = [ "a", { b = true } ], "q" = 'r' }
-
-[[level]]
-id = 0
-[[level.lesson]]
-id = "0.1"
-[level.lesson.more]
-k = []
-[[level.lesson]]
-id = "0.2"
-[[level]]
-id = 1
-[other.deep]
-[other]
-x = false
-'''.replace("LLL", "'''")
-
-
-@pytest.mark.parametrize("newline", ["\n", "\r\n"])
-def test_every_kind_of_statement_and_its_place(newline: str) -> None:
-    text = ALL.replace("\n", newline)
-    root = root_of(text)
-    assert repr(plain(root)) == repr(replace_dates(tomllib.loads(text)))
-
-    def at(*path: str | int) -> str:
-        node: Node | None = root
-        for part in path:
-            if isinstance(part, int):
-                assert isinstance(node, ArrayNode)
-                node = node.items[part]
-            else:
-                assert isinstance(node, ObjectNode)
-                node = node.get(part)
-        assert node is not None
-        return f"{node.span.line}:{node.span.column} {node.mark.text}"
-
-    assert at("top") == "2:7 1"
-    assert at("a") == "3:1 a"
-    assert at("a", "b", "c d", "e") == "3:17 0x1F"
-    assert at("course") == "5:1 [course]"
-    assert at("course", "title") == r'6:9 "Mass and \"inertia\""'
-    assert at("course", "when") == "14:8 1979-05-27 07:32:00Z"
-    assert at("course", "numbers") == "17:11 ["
-    assert at("course", "numbers", 4) == "17:35 1_000"
-    assert at("course", "numbers", 6) == "18:9 0b1"
-    assert at("course", "inline") == "20:10 {"
-    assert at("course", "inline", "y", "z", 1, "b") == "20:38 true"
-    assert at("level") == "22:1 [[level]]"
-    assert at("level", 0, "lesson") == "24:1 [[level.lesson]]"
-    assert at("level", 0, "lesson", 0, "more", "k") == "27:5 ["
-    assert at("level", 0, "lesson", 1, "id") == '29:6 "0.2"'
-    assert at("level", 1) == "30:1 [[level]]"
-    assert at("other") == "32:2 [other]"  # its first part stands above its header
-    assert at("other", "x") == "34:5 false"
-
-
 def test_each_character_of_toml_knows_its_place() -> None:
     text = "a = \"\"\"\r\nx\\ty\\\r\n   \\u00e9z\r\n\"\"\"\r\nb = '''\r\np\r\nq'''\r\n"
-    root = root_of(text)
+    root = parse_toml(Source("content/course.toml", text)).value
+    assert root is not None
     a, b = root.get("a"), root.get("b")
     assert isinstance(a, StringNode) and isinstance(b, StringNode)
     assert a.value == "x\ty\u00e9z\n"
@@ -255,14 +191,15 @@ TOML_PIECES = st.sampled_from(
 
 
 @st.composite
-def edited_toml(draw: st.DrawFn, text: str) -> str:
+def edited_toml(draw: st.DrawFn) -> str:
     """A text with a piece in the place of some characters."""
+    text = read_cases(VALUE_FOLDER / "toml.md")[0].input
     at = draw(st.integers(0, len(text)))
     return text[:at] + draw(TOML_PIECES) + text[at + draw(st.integers(0, 3)) :]
 
 
 @settings(max_examples=200)
-@given(st.lists(TOML_PIECES, max_size=14).map("".join) | st.text(max_size=20) | edited_toml(ALL))
+@given(st.lists(TOML_PIECES, max_size=14).map("".join) | st.text(max_size=20) | edited_toml())
 @example("a=[]\na.b=1\n")
 @example("[a.b.c]\n[a]\nb.x=1\n")
 @example("[x]\na.b=1\n[x.a.c]\n")
@@ -348,6 +285,7 @@ def test_diagnostics_of_wrong_texts(name: str, rewriting: bool) -> None:
 
 def test_every_file_of_texts_is_read() -> None:
     assert {path.stem for path in FOLDER.iterdir()} == {*READERS, "fields"}
+    assert {path.stem for path in VALUE_FOLDER.iterdir()} == {*VALUES_READ}
 
 
 def test_notes_point_at_the_first_key_and_at_the_bracket() -> None:
@@ -386,3 +324,85 @@ def test_nesting_up_to_the_limit_is_read() -> None:
     assert parse("[" * 64 + "]" * 64).diagnostics == ()
     assert read_toml("a = " + "[" * 64 + "]" * 64)[1] == ()
     assert read_toml(".".join("a" * 64) + " = 1")[1] == ()
+
+
+VALUES_READ: dict[str, Callable[[str], Parsed[Any]]] = {
+    "map": lambda text: parse_course_map(Source("content/course.toml", text)),
+    "model": lambda text: parse_declarations(Source("models/arms/arm.toml", text)),
+    "quiz": parse_quiz,
+    "toml": lambda text: parse_toml(Source("x.toml", text)),
+}
+
+
+def describe(value: object, depth: int = 0) -> str:
+    """A value in lines: its fields but for empty ones, and places as what stands there."""
+    match value:
+        case Source():
+            return f" {value.path}\n"
+        case Span() | Excerpt():
+            span = value if isinstance(value, Span) else value.span()
+            return f" {span.line}:{span.column} {span.first_line().text}\n"
+        case ObjectNode():
+            pairs = [(f"{key}:", member.value, None) for key, member in value.members.items()]
+            head = describe(value.mark)
+        case ArrayNode():
+            pairs, head = [("-", item, None) for item in value.items], describe(value.mark)
+        case StringNode() | NumberNode() | BoolNode() | DateNode():
+            return describe(value.mark)
+        case Struct():
+            pairs = [(f"{f.name}:", getattr(value, f.name), f.default) for f in fields(value)]
+            head = f" {type(value).__name__}\n"
+        case tuple() if any(isinstance(item, Struct | tuple) for item in value):
+            pairs, head = [("-", item, NODEFAULT) for item in value], "\n"
+        case _:
+            return f" {value!r}\n"
+    indent = "  " * depth
+    return head + "".join(
+        f"{indent}{name}{describe(part, depth + 1)}"
+        for name, part, default in pairs
+        if part != default and (default is not NODEFAULT or part not in ((), "", None, {}))
+    )
+
+
+@pytest.mark.parametrize("name", VALUES_READ)
+def test_values_of_right_texts(name: str, rewriting: bool) -> None:
+    def render(case: Case) -> str:
+        text = case.input
+        results = [VALUES_READ[name](text), VALUES_READ[name](text.replace("\n", "\r\n"))]
+        assert [result.diagnostics for result in results] == [(), ()]
+        first, second = (describe(result.value) for result in results)
+        assert first == second
+        return first
+
+    check_cases(VALUE_FOLDER / f"{name}.md", render, rewriting=rewriting)
+
+
+@pytest.mark.parametrize(
+    ("verify", "expected"),
+    [
+        ("", Comparison()),
+        ('compare = "exact"', Comparison()),
+        ('compare = "digits"', Comparison(Mode.DIGITS)),
+        ('compare = "rtol"\nrtol = 0.001', Comparison(Mode.TOLERANCE, Decimal("0.001"))),
+        ("rtol = 1e-3", Comparison(Mode.TOLERANCE, Decimal("0.001"))),
+        ("atol = 1_000.5", Comparison(Mode.TOLERANCE, Decimal(0), Decimal("1000.5"))),
+        ("atol = 0x10", Comparison(Mode.TOLERANCE, Decimal(0), Decimal(16))),
+        ("ellipsis = true", Comparison(ellipsis=True)),
+    ],
+)
+def test_how_outputs_are_compared(verify: str, expected: Comparison) -> None:
+    text = f'[course]\ntitle = "T"\n[verify]\n{verify}\n'
+    course = parse_course_map(Source("content/course.toml", text)).value
+    assert course is not None and course.comparison == expected
+
+
+@settings(max_examples=150)
+@given(st.sampled_from([*VALUES_READ]), st.data())
+def test_any_edit_of_a_right_text_is_parsed_or_reported(name: str, data: st.DataObject) -> None:
+    text = read_cases(VALUE_FOLDER / f"{name}.md")[0].input
+    at = data.draw(st.integers(0, len(text)))
+    piece = data.draw(JSON_PIECES | TOML_PIECES | st.text(max_size=3))
+    result = VALUES_READ[name](text[:at] + piece + text[at + data.draw(st.integers(0, 20)) :])
+    assert result.value is not None or result.diagnostics
+    orders = [diagnostic.order for diagnostic in result.diagnostics]
+    assert orders == sorted(orders)

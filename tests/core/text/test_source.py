@@ -39,14 +39,6 @@ def test_span_of_several_lines() -> None:
     assert not Span(Source("y.md", "one"), 0, 3).contains(span)
 
 
-def test_excerpt_of_a_crlf_text_points_into_it() -> None:
-    source = Source("x.md", "ab\r\ncd\r\n")
-    excerpt = source.excerpt()
-    assert excerpt.text == "ab\ncd\n"
-    assert [excerpt.offset(i) for i in range(6)] == [0, 1, 2, 4, 5, 6]
-    assert excerpt.lines()[1].span().text == "cd"
-
-
 def test_excerpt_of_prefixed_lines() -> None:
     source = Source("x.md", "> {\n>  1}\n")
     excerpt = Excerpt.join([Excerpt.of_span(source.span(*at)) for at in ((2, 3), (6, 9))], "\n")

@@ -15,6 +15,7 @@ from coursebuild.cli import main
 from support.measured_course import TOML, bench_course, write
 from support.scratch_course import ROOT
 
+Capture = pytest.CaptureFixture[str]
 pytestmark = pytest.mark.site
 
 
@@ -28,7 +29,7 @@ def run(course: Path, *arguments: str) -> int:
 
 
 @pytest.mark.slow
-def test_bench_prints_a_table_and_json(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench_prints_a_table_and_json(course: Path, capsys: Capture) -> None:
     write(course / "models" / "box.toml", TOML)
     assert run(course, "--quick") == 0
     out, err = capsys.readouterr()
@@ -45,9 +46,7 @@ def test_bench_prints_a_table_and_json(course: Path, capsys: pytest.CaptureFixtu
     assert all(row["position"][0] < 1e-3 for name, row in by_integrator if name == "RK4")
 
 
-def test_bench_with_wrong_arguments_gives_2(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bench_with_wrong_arguments_gives_2(course: Path, capsys: Capture) -> None:
     assert run(course, "bix") == 2
     assert "no model is called `bix`; did you mean `box`?" in capsys.readouterr().err
     with pytest.raises(SystemExit) as caught:
@@ -55,7 +54,7 @@ def test_bench_with_wrong_arguments_gives_2(
     assert caught.value.code == 2
 
 
-def test_bench_without_models_says_so(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bench_without_models_says_so(course: Path, capsys: Capture) -> None:
     (course / "models" / "box.xml").unlink()
     assert run(course, "-q") == 0
     assert capsys.readouterr().out == "there is no model to measure\n"

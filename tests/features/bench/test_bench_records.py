@@ -33,10 +33,8 @@ def test_what_is_recorded_is_checked(course: Path) -> None:
     write(course / "models" / "arms" / "left arm.xml", BOX)
     measurement = record(course)
     assert measurement.ok
-    assert measurement.remarks == (
-        "wrote content/reports/arms/left arm.bench.json",
-        f"wrote {PATH}",
-    )
+    paths = ("content/reports/arms/left arm.bench.json", PATH)
+    assert measurement.remarks == tuple(f"wrote {path}" for path in paths)
     report = BENCH.decode((course / PATH).read_bytes())
     assert report.model == "box" and report.scenarios == (swing(),)
     assert report.digest == find_scenes(course, ("box",)).value[0].digest
@@ -64,17 +62,14 @@ def test_a_figure_that_left_its_band_fails(course: Path) -> None:
     assert not measurement.ok
     (comparison,) = measurement.checked
     assert (comparison.name, comparison.path) == ("box", PATH)
-    assert {d.figure for d in comparison.departures} == {
-        "error of velocity",
-        "error of velocity at the end",
-    }
+    figures = {departure.figure for departure in comparison.departures}
+    assert figures == {"error of velocity", "error of velocity at the end"}
     write(course / "models" / "box.toml", f"[bench]\nband = 1.0\n{TOML}")
     rows[2] = replace(rows[2], velocity=tuple(1.9 * x for x in swing().rows[2].velocity or ()))  # type: ignore[arg-type]
     wide = check(options(course), measuring=Fake(replace(swing(), rows=tuple(rows))))
     assert wide.ok
-    assert wide.checked[0].remarks == (
-        "the model or its scenarios have changed since it was recorded",
-    )
+    remark = "the model or its scenarios have changed since it was recorded"
+    assert wide.checked[0].remarks == (remark,)
 
 
 def test_a_report_that_is_not_there_or_none_or_of_something_else(course: Path) -> None:
@@ -82,15 +77,10 @@ def test_a_report_that_is_not_there_or_none_or_of_something_else(course: Path) -
     fake = Fake()
     measurement = check(options(course), measuring=fake)
     assert not measurement.ok and fake.calls == []
+    arm_path = "content/reports/left arm.bench.json"
     assert [(failure.message, failure.help) for failure in measurement.failures] == [
-        (
-            f"{PATH} is not there",
-            "make it with `coursebuild bench box --record`, and commit it",
-        ),
-        (
-            "content/reports/left arm.bench.json is not there",
-            "make it with `coursebuild bench 'left arm' --record`, and commit it",
-        ),
+        (f"{path} is not there", f"make it with `coursebuild bench {name} --record`, and commit it")
+        for path, name in ((PATH, "box"), (arm_path, "'left arm'"))
     ]
     record(course)
     report = BENCH.decode((course / PATH).read_bytes())

@@ -20,7 +20,7 @@ from coursebuild.features.bench.commands.measurement import (
 )
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.records import Departure, RecordCheck
-from coursebuild.numerics.reports.scene_report import RowVerdict
+from coursebuild.numerics.reports.scene_report import FigureLine, RowVerdict
 from coursebuild.report import Style
 from coursebuild.report.text import Column, cells, table
 from support.bench_reports import awkward, row, scenario, scene
@@ -41,7 +41,17 @@ RECORD_CHECK = RecordCheck(
 
 def test_text_is_as_wide_as_the_terminal(rewriting: bool) -> None:
     still = replace(scene(), model="still", scenarios=())
-    scenes = [scene(), scene(awkward(), quick=True), scene(scenario([])), still]
+    figures = (
+        FigureLine("slip", "m", "Euler", 0.00335, 0.0, "as declared"),
+        FigureLine("slip", "m", "RK4", 0.0031, 0.0, "as declared"),
+        FigureLine("slip", "m", "discrete", 0.00335, 0.0, "as declared"),
+    )
+    scenes = [
+        scene(replace(scene().scenarios[0], figures=figures)),
+        scene(awkward(), quick=True),
+        scene(scenario([])),
+        still,
+    ]
     for width in (80, 160):
         text = bench_text(scenes, Style(width=width))
         check_text(HERE / f"bench-{width}.txt", text, rewriting=rewriting)

@@ -13,6 +13,7 @@ from coursebuild.cli import main
 from coursebuild.numerics.reports.records import DIET
 from support.scratch_course import ROOT, course_map
 
+Capture = pytest.CaptureFixture[str]
 pytestmark = pytest.mark.site
 
 MODEL = """<mujoco>
@@ -49,7 +50,7 @@ def run(course: Path, *arguments: str) -> int:
     return main(["-C", str(course), "diet", "--quick", *arguments])
 
 
-def values(course: Path, capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, Any]:
+def values(course: Path, capsys: Capture, *arguments: str) -> tuple[int, Any]:
     capsys.readouterr()
     status = run(course, *arguments, "--format", "json", "-q")
     out, err = capsys.readouterr()
@@ -57,9 +58,7 @@ def values(course: Path, capsys: pytest.CaptureFixture[str], *arguments: str) ->
     return status, json.loads(out)
 
 
-def test_diet_shows_a_finding_as_text_and_as_json(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_diet_shows_a_finding_as_text_and_as_json(course: Path, capsys: Capture) -> None:
     assert run(course) == run(course) == 1
     out, err = capsys.readouterr()
     assert err.count("swing: looked at after") == 1, "the model did not change"
@@ -74,22 +73,14 @@ def test_diet_shows_a_finding_as_text_and_as_json(
     assert [scenario["status"] for scenario in model["scenarios"]] == ["ok"]
     (finding,) = model["findings"]
     assert finding["label"] == "proved" and finding["fixable"]
-    assert finding["places"] == [
-        {
-            "name": "time",
-            "element": 'mujoco/sensor/clock[@name="time"]',
-            "path": "models/swing.xml",
-            "line": 6,
-            "column": 5,
-        }
-    ]
+    element = 'mujoco/sensor/clock[@name="time"]'
+    place = {"name": "time", "element": element, "path": "models/swing.xml", "line": 6, "column": 5}
+    assert finding["places"] == [place]
     (edit,) = finding["edits"]
     assert MODEL[edit["start"] : edit["end"]] == edit["old"] and edit["new"] == ""
 
 
-def test_fix_changes_only_what_is_in_vain_and_then_nothing(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_fix_changes_only_what_is_in_vain_and_then_nothing(course: Path, capsys: Capture) -> None:
     """Line ends, a byte order mark and letters beyond ASCII stay."""
     file = course / "models" / "swing.xml"
     text = "\ufeff" + MODEL.replace("bob", "Kügelchen")
@@ -106,7 +97,7 @@ def test_fix_changes_only_what_is_in_vain_and_then_nothing(
 
 
 def test_fix_takes_what_goes_together_and_leaves_what_only_runs_speak_for(
-    course: Path, capsys: pytest.CaptureFixture[str]
+    course: Path, capsys: Capture
 ) -> None:
     file = course / "models" / "swing.xml"
     spare = """  <asset>
@@ -126,7 +117,7 @@ def test_fix_takes_what_goes_together_and_leaves_what_only_runs_speak_for(
     )
 
 
-def test_a_finding_is_kept_with_a_reason(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_finding_is_kept_with_a_reason(course: Path, capsys: Capture) -> None:
     declarations = course / "models" / "swing.toml"
     declarations.write_text('[[keep]]\nfinding = "sensor-unread time"\nreason = "shown in class"\n')
     assert run(course) == 0
@@ -141,9 +132,7 @@ def test_a_finding_is_kept_with_a_reason(course: Path, capsys: pytest.CaptureFix
     ]
 
 
-def test_sensor_that_a_lesson_reads_is_no_finding(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_sensor_that_a_lesson_reads_is_no_finding(course: Path, capsys: Capture) -> None:
     lessons = course / "content" / "lessons"
     lessons.mkdir()
     lesson = lessons / "1.1-one.md"
@@ -164,7 +153,7 @@ def test_sensor_that_a_lesson_reads_is_no_finding(
 
 
 def test_a_part_without_which_a_script_prints_something_else_is_no_finding(
-    course: Path, capsys: pytest.CaptureFixture[str]
+    course: Path, capsys: Capture
 ) -> None:
     """No scenario shows that the far body is gone, but the number of positions does."""
     far = '<body pos="900 0 1"><freejoint/><geom size=".1"/></body>\n  </worldbody>'
@@ -180,7 +169,7 @@ def test_a_part_without_which_a_script_prints_something_else_is_no_finding(
 
 
 def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
-    course: Path, capsys: pytest.CaptureFixture[str]
+    course: Path, capsys: Capture
 ) -> None:
     keys = '  <keyframe><key name="go" qpos="1"/><key name="rest"/></keyframe>\n</mujoco>'
     (course / "models" / "swing.xml").write_text(MODEL.replace("</mujoco>", keys))
@@ -202,9 +191,7 @@ SHARED_PART = (
 )
 
 
-def test_a_file_of_two_models_is_not_changed(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_of_two_models_is_not_changed(course: Path, capsys: Capture) -> None:
     models = course / "models"
     (models / "part.xml").write_text(SHARED_PART)
     text = CLEAN.replace("<mujoco>", '<mujoco>\n  <include file="part.xml"/>')
@@ -220,9 +207,7 @@ def test_a_file_of_two_models_is_not_changed(
     assert (models / "part.xml").read_text() == SHARED_PART
 
 
-def test_where_a_file_cannot_be_written_none_is(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_where_a_file_cannot_be_written_none_is(course: Path, capsys: Capture) -> None:
     models = course / "models"
     (models / "part.xml").write_text(SHARED_PART)
     text = MODEL.replace("<mujoco>", '<mujoco>\n  <include file="part.xml"/>')
@@ -237,34 +222,29 @@ def test_where_a_file_cannot_be_written_none_is(
     assert (models / "part.xml").read_text() != SHARED_PART
 
 
-def test_a_report_is_recorded(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_report_is_recorded(course: Path, capsys: Capture) -> None:
     path = course / "content" / "reports" / "swing.diet.json"
     assert main(["-C", str(course), "diet", "--record"]) == 1
     assert "wrote content/reports/swing.diet.json" in capsys.readouterr().out
     report = DIET.decode(path.read_bytes())
-    assert report.model == "swing" and [finding.kind for finding in report.findings] == [
-        "sensor-unread"
-    ]
+    assert report.model == "swing"
+    assert [finding.kind for finding in report.findings] == ["sensor-unread"]
 
 
-def test_diet_with_wrong_arguments_gives_2(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_is_recorded_is_whole_and_nothing_else_is_done(course: Path, capsys: Capture) -> None:
     assert run(course, "--record") == 2
     assert "--record cannot be combined with --quick" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         run(course, "--record", "--fix")
 
 
-def test_diet_without_models_says_so(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diet_without_models_says_so(course: Path, capsys: Capture) -> None:
     shutil.rmtree(course / "models")
     assert run(course) == 0
     assert capsys.readouterr().out == "there is no model to look at\n"
 
 
-def test_a_broken_model_keeps_no_other_from_being_looked_at(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_broken_model_keeps_no_other_from_being_looked_at(course: Path, capsys: Capture) -> None:
     models = course / "models"
     (models / "broken.xml").write_text("<mujoco><worldbody><gem/></worldbody></mujoco>")
     # MuJoCo's own parser takes a bare ampersand.
@@ -280,15 +260,11 @@ def test_a_broken_model_keeps_no_other_from_being_looked_at(
     assert messages["models/loose.xml"] == (
         "models/loose.xml:1:19 is not XML: not well-formed (invalid token)"
     )
-    assert (
-        messages["models/swing.toml"]
-        == "`qpos` has 2 numbers, and the model has 1 positions (`nq`)"
-    )
+    expected = "`qpos` has 2 numbers, and the model has 1 positions (`nq`)"
+    assert messages["models/swing.toml"] == expected
 
 
-def test_a_scenario_that_diverges_is_reported(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_scenario_that_diverges_is_reported(course: Path, capsys: Capture) -> None:
     text = MODEL.replace("<mujoco>", '<mujoco>\n  <option timestep="0.1"/>')
     text = text.replace("<joint", '<joint stiffness="1e7"')
     key = '  <keyframe><key name="go" qpos="1"/></keyframe>\n</mujoco>'
@@ -302,9 +278,7 @@ def test_a_scenario_that_diverges_is_reported(
 
 
 @pytest.mark.slow
-def test_the_models_of_this_course_pass_their_own_diet(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_models_of_this_course_pass_their_own_diet(tmp_path: Path, capsys: Capture) -> None:
     for name in ("content", "models"):
         shutil.copytree(ROOT / name, tmp_path / name)
     status = run(tmp_path)

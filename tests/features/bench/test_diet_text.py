@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from coursebuild.features.bench.commands.diet import diet_text
 from coursebuild.numerics.reports.diet_report import (
+    MEASURED_LABEL,
     DietScenario,
     ModelPlace,
     RejectedTrial,
@@ -32,6 +33,18 @@ REPORT = replace(diet(FINDING), model="arm", fixed=CERTAIN_SAVING, slim=CERTAIN_
 
 KEPT_FINDING = replace(FINDING, kept="shown in class", fixable=False, unfixed="it is kept")
 LONG_FINDING = replace(FINDING, edits=(EDIT,) * 9, unfixed="models/b.xml uses models/arm.xml too")
+FAR_FINDING = replace(
+    FINDING,
+    kind="far-body",
+    message="what the scene is about moves in the same way without the body rock",
+    label=MEASURED_LABEL,
+    proof="",
+    shown="the body puck is off by 1.7e-06 rad at 0.59 s",
+    starts=3,
+    edits=(),
+    fixable=False,
+    unfixed="only what is proved is changed",
+)
 REPORTS = [
     REPORT,
     replace(
@@ -44,6 +57,7 @@ REPORTS = [
         stale=(StaleKeep("unused-site", "models/arm.toml", 3, 11),),
     ),
     replace(REPORT, model="kept", findings=(KEPT_FINDING,)),
+    replace(REPORT, model="rubble", findings=(FAR_FINDING,), fixed=None),
     replace(
         REPORT,
         model="tried",
@@ -60,7 +74,7 @@ REPORTS = [
 def test_findings_are_shown_with_their_saving_reason_and_change(rewriting: bool) -> None:
     text = diet_text(REPORTS, Style(width=90))
     check_text(Path(__file__).with_name("diet.txt"), text, rewriting=rewriting)
-    assert [report.ok for report in REPORTS] == [False, False, True, False]
+    assert [report.ok for report in REPORTS] == [False, False, True, True, False]
 
 
 def test_control_characters_are_shown_and_lines_are_not_too_long() -> None:

@@ -70,9 +70,8 @@ def test_each_engine_has_a_row_whatever_it_does(course: Path) -> None:
         "crash": ("failed", "its process ended with status 7"),
         "driverless": ("failed", "ImportError: no driver"),
     }
-    assert (
-        long[0] == "failed" and long[1].startswith("ValueError: what what") and len(long[1]) == 300
-    )
+    assert long[0] == "failed" and long[1].startswith("ValueError: what what")
+    assert len(long[1]) == 300
     single, alone = found_rows["single"], found_rows["alone"]
     assert single.bits == 32 and single.versions[0][0] == "mujoco"
     assert single.position is not None and 0 < single.position[0] < 0.01
@@ -125,15 +124,9 @@ def test_engines_are_chosen_by_name() -> None:
 
 @pytest.mark.site
 def test_what_cannot_be_asked_for(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    cases = {
-        (
-            "--check",
-        ): "--check takes no --engines: 32 bits do not repeat from one device to the next",
-        ("--record", "--quick"): "--record cannot be combined with --quick",
-    }
-    for arguments, message in cases.items():
-        assert main(["-C", str(course), "bench", "box", "--engines", "mujoco", *arguments]) == 2
-        assert message in capsys.readouterr().err
+    assert main(["-C", str(course), "bench", "box", "--engines", "mujoco", "--check"]) == 2
+    message = "--check takes no --engines: 32 bits do not repeat from one device to the next"
+    assert message in capsys.readouterr().err
 
 
 def interval(value: float) -> Interval:
@@ -162,18 +155,9 @@ def report() -> EngineReport:
     double = replace(base, bits=64, device="cpu", status="failed", message="TypeError: <int64>")
     refusal = replace(base, engine="x", title="X", status="unsupported", message="no cones")
     setting = swing().rows[0].setting
-    scenario = EngineScenario(
-        "swing",
-        "A swing",
-        1.0,
-        0.5,
-        "ode",
-        "a source",
-        1e-12,
-        1e-12,
-        setting,
-        (single, double, refusal),
-    )
+    rows = (single, double, refusal)
+    reference = ("ode", "a source", 1e-12, 1e-12)
+    scenario = EngineScenario("swing", "A swing", 1.0, 0.5, *reference, setting, rows)
     return EngineReport("box", "0", False, MACHINE, 3.25, (scenario,))
 
 

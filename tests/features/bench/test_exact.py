@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.measurement import CannotMeasureError
 from coursebuild.features.bench.commands.measuring import compile_scene, run_scenario
 from coursebuild.numerics.reports.scene_report import ScenarioReport
@@ -49,6 +50,12 @@ def report(course: Path, exact: str, toml: str = TOML) -> ScenarioReport:
     return run_scenario(compiled_scene, 0, quick=True, timed=False, tell=lambda _: None)
 
 
+def mistake(course: Path, exact: str, toml: str = TOML) -> Diagnostic:
+    with pytest.raises(CannotMeasureError) as caught:
+        report(course, exact, toml)
+    return caught.value.diagnostic
+
+
 def test_errors_are_taken_from_the_exact_motion(course: Path) -> None:
     for velocity in (", qvel - 9.81 * time", ""):
         scenario = report(course, EXACT.format(velocity=velocity))
@@ -71,9 +78,7 @@ def acceleration(time, qpos, qvel):
 def test_equations_of_motion_are_integrated(course: Path) -> None:
     scenario = report(course, EQUATIONS.format(""))
     assert scenario.reference == "closed" and scenario.floor < 1e-11
-    with pytest.raises(CannotMeasureError) as caught:
-        report(course, EQUATIONS.format(" * (1 + 1e-5)"))
-    help = caught.value.diagnostic.help
+    help = mistake(course, EQUATIONS.format(" * (1 + 1e-5)")).help
     assert help.startswith("it errs by 7.8e-06 in position: two integrations of the model agree")
     loose = report(course, EQUATIONS.format(" * (1 + 1e-5)"), TOML + "precision = 1e-4\n")
     assert 1e-6 < loose.floor < 1e-4, "and no error is given that is not known"
@@ -83,12 +88,8 @@ def test_two_motions_of_the_course_are_told_apart(course: Path) -> None:
     """A formula and equations: the one that errs is named, and the engine decides."""
     exact = EXACT.format(velocity=", qvel - 9.81 * time") + "\n\n" + EQUATIONS
     assert report(course, exact.format("")).floor < 1e-11
-    with pytest.raises(CannotMeasureError) as caught:
-        report(course, exact.format(" * (1 + 1e-5)"))
-    diagnostic = caught.value.diagnostic
-    assert diagnostic.message == (
-        "`models/ball.exact.py`, `acceleration`, is not this scene's motion"
-    )
+    message = mistake(course, exact.format(" * (1 + 1e-5)")).message
+    assert message == "`models/ball.exact.py`, `acceleration`, is not this scene's motion"
 
 
 PENDULUM = """\
@@ -124,10 +125,8 @@ def test_quantities_of_theory_are_measured_by_their_formula(course: Path) -> Non
     assert euler is not None and 1e-5 < abs(euler - crossing.exact) < 1e-2
     assert figures["RK4", "largest"].measured == pytest.approx(1.5707, abs=1e-3)
     assert {row.energy for row in scenario.stable} == {9.9}
-    with pytest.raises(CannotMeasureError) as caught:
-        report(course, QUARTER.replace("largest", "loudest"), toml)
-    message = "`models/ball.exact.py` expects `loudest`, which is not measured"
-    assert caught.value.diagnostic.message == message
+    message = mistake(course, QUARTER.replace("largest", "loudest"), toml).message
+    assert message == "`models/ball.exact.py` expects `loudest`, which is not measured"
 
 
 BOUNCE = """\
@@ -157,11 +156,10 @@ def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(course: P
     depths = {line.integrator: (line.measured, line.exact) for line in scenario.figures}
     assert depths["Euler"] == (pytest.approx(2.1e-4, rel=0.2), 1e-4)
     assert scenario.stable[0].theory == 0.01
-    for mistake in ({"friction": 0.6, "height": 0}, {"friction": 0.5, "height": "time"}):
-        with pytest.raises(CannotMeasureError) as caught:
-            report(course, SLIDE.format(**mistake), toml)
-        assert "is not this scene's motion" in caught.value.diagnostic.message, mistake
-        assert "contacts as they are" in caught.value.diagnostic.help, mistake
+    for values in ({"friction": 0.6, "height": 0}, {"friction": 0.5, "height": "time"}):
+        diagnostic = mistake(course, SLIDE.format(**values), toml)
+        assert "is not this scene's motion" in diagnostic.message, values
+        assert "contacts as they are" in diagnostic.help, values
 
 
 def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:
@@ -172,9 +170,7 @@ def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:
         "import sys\n\nsys.exit()\n": "gives no motion: ",
     }
     for text, message in cases.items():
-        with pytest.raises(CannotMeasureError) as caught:
-            report(course, text)
-        diagnostic = caught.value.diagnostic
+        diagnostic = mistake(course, text)
         assert message in diagnostic.message, text
         assert diagnostic.span.path == "models/ball.exact.py", text
 

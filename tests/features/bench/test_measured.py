@@ -124,12 +124,9 @@ def test_where_the_duration_ended_the_search_for_stable_timesteps(make: Make) ->
 
 def test_an_error_that_the_reference_does_not_resolve_has_no_column(make: Make) -> None:
     flat = [row(velocity=(1e-11, 1e-11), position=(2e-3, 1e-3), own=True)]
-    site_reports = Reports(
-        {"box": scene(scenario(flat, floor=1e-12, velocity_floor=1e-12), model="box")}
-    )
-    heads = re.findall(
-        r"<th scope=\"col\"[^>]*>(.*?)</th>", pages(make, site_reports)["models/box.html"]
-    )
+    flat_scenario = scenario(flat, floor=1e-12, velocity_floor=1e-12)
+    page = pages(make, Reports({"box": scene(flat_scenario, model="box")}))["models/box.html"]
+    heads = re.findall(r"<th scope=\"col\"[^>]*>(.*?)</th>", page)
     assert "Position (m or rad)" in heads
     assert "Velocity (m/s or rad/s)" not in heads
 
@@ -237,9 +234,8 @@ def test_errors_and_energy_are_drawn_against_time_and_evaluations(make: Make) ->
 
 
 def test_a_hard_case_of_an_unknown_number_goes_by_its_own_title(make: Make) -> None:
-    site_reports = Reports(
-        cases=(case("a", 4), case("b", 99), case("c", 99, boundaries=(), figures=()))
-    )
+    last_case = case("c", 99, boundaries=(), figures=())
+    site_reports = Reports(cases=(case("a", 4), case("b", 99), last_case))
     words = text(pages(make, site_reports)["numerics/index.html"])
     assert "4 A &lt;a&gt; No timestep" in words
     assert "99 A &lt;b&gt; A &lt;b&gt; No timestep" in words

@@ -8,22 +8,11 @@ from pathlib import Path
 import pypdf
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder
 
 pytestmark = [pytest.mark.site, pytest.mark.browser]
-LESSON = """## Words
-
-Text. See [](#tab:x).
-
-Table: *Some*. {#tab:x}
-
-| a |
-| - |
-| b |
-
-> [!derivation]- A fold
-> What is folded.
-"""
+LESSON = fixture_text("documents/printed.md")
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from urllib.parse import unquote
 import pytest
 
 from coursebuild.core.pages.html_tree import HtmlElement, parse_html
+from support.fixture_cases import fixture_text
 from support.scratch_course import GOOD, Folder, Make
 
 pytestmark = pytest.mark.site
@@ -19,14 +20,12 @@ MAP = "content/course.toml"
 
 
 def slides(folder: Folder, lesson: str = "1.1") -> str:
-    """The slides of a lesson."""
     result = folder.main("export", "slides", lesson, "--quiet")
     assert result.status == 0, result.out + result.err
     return folder.text(f"{lesson}-slides.html")
 
 
 def texts(page: str) -> list[tuple[str, str, str]]:
-    """The section, the heading and the text of each slide."""
     body = HtmlElement("body", {}, parse_html(page))
     parts = []
     for slide in body.nearest("section"):
@@ -36,29 +35,7 @@ def texts(page: str) -> list[tuple[str, str, str]]:
     return parts
 
 
-LESSON = """Before any heading.
-
-## First *part*
-
-One.
-
-### Detail
-
-Two.[^n]
-
-#### Not a slide
-
-Three.
-
-## Second
-
-### At once
-
-> [!derivation]- Folded
-> Inside.
-
-[^n]: The note.
-"""
+LESSON = fixture_text("documents/slides.md")
 
 
 def test_a_slide_begins_at_each_heading_of_the_second_and_third_level(make_course: Make) -> None:
@@ -88,15 +65,7 @@ def test_code_and_what_authors_fold_is_folded_and_outputs_are_not(make_course: M
     assert code < script.index("print(") < script.index("</details>") < output
 
 
-HOSTILE = """## A <b>b</b>
-
-<section id="_slide-1" class="slide" data-lab="x" data-config="../../etc/passwd" data-script="x.js">
-<p class="lab-title" onclick="alert(1)">t</p></section>
-<div data-config="../assets/site.css" data-lab="y"></div>
-<script>alert(1)</script><iframe srcdoc="x"></iframe><button onclick="alert(1)">b</button>
-
-[self](#a-b) [other](1.2-two.md) [far](https://example.org/x)
-"""
+HOSTILE = fixture_text("documents/hostile_slides.md")
 
 
 def test_one_file_is_enough_and_wild_html_does_nothing_in_it(make_course: Make) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, cast
 
 import pytest
 
@@ -13,86 +13,26 @@ from coursebuild.core.features import Trial
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.features.lab.compile import LabCode, compile_lab
-from coursebuild.features.lab.engines.native import engine_digest
+from coursebuild.features.lab.engines.native import TRIAL, WASM, asset_digest
 from coursebuild.features.lab.inputs import trial_inputs
+from support.fixture_cases import check_lines
 from support.lab_values import Bench, lab_of, make_lab
 
 Form: TypeAlias = Literal["statements", "setter", "expression", "target"]
 
 
 def check_code(bench: Bench, pieces: list[tuple[Form, str]]) -> list[str | None]:
-    """Say of each piece of code why it cannot be part of a lab; `None` if it can."""
     return bench.browser.check_code([LabCode(("x",), form, code) for form, code in pieces])
 
 
-BREAKING_OUT: list[tuple[Form, str]] = [
-    ("expression", "1); evil("),
-    ("expression", "1]) + ([2"),
-    ("expression", "0), globalThis.x = ({}"),
-    ("expression", "1\n), (model) => (2"),
-    ("expression", ""),
-    ("expression", "// nothing"),
-    ("expression", "...model"),
-    ("expression", "1 /*"),
-    ("expression", "`"),
-    ("expression", "x ? `${"),
-    ("expression", "return 1"),
-    ("expression", "import.meta.url"),
-    ("expression", "arguments[0]"),
-    ("expression", "await model"),
-    ("expression", "1 <!--2"),
-    ("statements", "}}; evil(); {{"),
-    ("statements", "}, (model) => {"),
-    ("statements", "//\u2028 }"),
-    ("statements", "/* open"),
-    ("statements", "x = `"),
-    ("statements", "'use strict'; ctx.x = 1"),
-    ("statements", "with (model) {}"),
-    ("statements", "ctx.x = 010"),
-    ("statements", "break"),
-    ("statements", "ctx.x = 1\n--> ctx.y"),
-    ("target", "data.qpos[0] = 1; x"),
-    ("setter", "let value = 1"),
-    ("target", "f()"),
-    ("target", "model?.opt"),
-    ("target", "a = b"),
-    ("target", "data"),
-    ("target", "a) = 1; (b"),
-]
-FINE: list[tuple[Form, str]] = [
-    ("expression", "1 // a comment at the end"),
-    ("expression", "/* ) */ 1"),
-    ("expression", "data.qpos[0], data.qpos[1]"),
-    ("expression", "`a ${`b ${1}`} </script> <!- `"),
-    ("expression", "'\u2028'"),
-    ("expression", "'await the landing'"),
-    ("expression", "/* await */ data.time"),
-    ("expression", "'<!--'"),
-    ("expression", "/[)\\]'\"]/.test('x') ? 1 : 0"),
-    ("expression", '"\\"); evil(\\""'),
-    ("expression", "(function () { return arguments.length })(1)"),
-    ("expression", "data\u2028.time"),
-    ("statements", "outer: for (const x of [1]) { continue outer }"),
-    ("statements", "let n = 3; while (n --> 0) ctx.n = n // counts"),
-    ("statements", "let value = 1; ctx.x = value"),
-    ("statements", "ctx.text = 'a\\u2028b' + \"it's\""),
-    ("target", "model.opt.timestep"),
-    ("target", "data.qpos[3] // angle"),
-    ("target", "model.opt.gravity[ctx.axis ?? 2]"),
-    ("target", "ctx['a b']"),
-]
-
-
 @pytest.mark.engine
-def test_only_what_is_a_piece_by_itself_is_taken(bench: Bench) -> None:
-    messages = check_code(bench, BREAKING_OUT)
-    assert [
-        piece for piece, message in zip(BREAKING_OUT, messages, strict=True) if message is None
-    ] == []
-    messages = check_code(bench, FINE)
-    assert [
-        piece for piece, message in zip(FINE, messages, strict=True) if message is not None
-    ] == []
+def test_only_what_is_a_piece_by_itself_is_taken(bench: Bench, rewriting: bool) -> None:
+    def convert(piece: str) -> list[str]:
+        form, code = piece.split(": ", 1)
+        (message,) = check_code(bench, [(cast(Form, form), code)])
+        return [message or "is taken"]
+
+    check_lines(Path(__file__).with_name("pieces.md"), convert, rewriting=rewriting)
 
 
 @pytest.mark.engine
@@ -224,7 +164,6 @@ EDITS = [
 
 
 def inputs_of(text: str) -> Inputs:
-    """Return what the trial of a lesson's lab depends on besides files."""
     inputs = trial_inputs(Trial("1.2-lab-1", "1.2", lab_of(text)))
     assert inputs is not None
     return inputs
@@ -238,4 +177,5 @@ def test_an_edit_counts_exactly_where_a_trial_depends_on_it() -> None:
     assert effective_edits == EDITS
     conditions = dict(before.conditions)
     assert conditions["MuJoCo"] == engine_version()
-    assert engine_digest().startswith(conditions["the browser's engine and its trial"])
+    digest = asset_digest(WASM, TRIAL)
+    assert digest.startswith(conditions["the browser's engine and its trial"])

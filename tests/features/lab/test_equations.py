@@ -42,7 +42,6 @@ def engine() -> Iterator[EquationEngine]:
 
 
 def config_of(text: str, kind: str = "ode") -> dict[str, Any]:
-    """The data of a lab without mistakes."""
     parsed_lab = parse_lab(text, kind)
     assert parsed_lab.diagnostics == ()
     assert parsed_lab.value is not None
@@ -58,7 +57,6 @@ def run_of(engine: EquationEngine, config: dict[str, Any], *values: float) -> Cu
 def page_values(
     engine: EquationEngine, programs: list[Program], x: float, y: float
 ) -> list[float | None]:
-    """What the page's code makes of programs over `x` and `y`."""
     axis = {"min": x, "max": x + 1, "at": x}
     config = {"axis": axis, "where": [], "states": [], "events": [], "plots": [], "readouts": []}
     attempt = {"values": [y], "claims": [(program, x) for program in programs]}

@@ -42,7 +42,7 @@ from coursebuild.features.lab.javascript import UntranslatableError
 from coursebuild.features.lab.trial import Engines
 from coursebuild.pipeline.options import Options
 from support.built_sites import BuiltCourses
-from support.fixture_cases import Case, check_cases
+from support.fixture_cases import Case, check_cases, fixture_text
 from support.lab_values import make_lab, try_labs
 from support.made_courses import make_course
 
@@ -50,16 +50,7 @@ ROOT = Path(__file__).parents[3]
 
 METADATA = ExportMetadata("lab_1_1_1.py", "a lab of lesson 1.1, “First”", "A course", "3.14.0", 1.0)
 
-PENDULUM = """<mujoco><option timestep="0.005"/><worldbody>
-  <body name="arm" pos="0 0 1"><joint name="hinge" axis="0 1 0"/>
-    <geom name="rod" type="capsule" size=".02" fromto="0 0 0 .5 0 0" mass="1"/>
-    <site name="end" pos=".5 0 0"/></body>
-  <body name="goal" mocap="true" pos="1 0 1"><geom size=".02" contype="0" conaffinity="0"/></body>
-  <body name="ball" pos="2 0 .3"><freejoint name="float"/>
-    <geom name="ball" size=".1" rgba="1 .5 .25 1"/></body>
-  <geom name="floor" type="plane" size="5 5 .1"/></worldbody>
-  <actuator><motor name="motor" joint="hinge"/></actuator>
-  <keyframe><key name="up" qpos="0.4  2 0 .5 1 0 0 0"/></keyframe></mujoco>"""
+PENDULUM = fixture_text("documents/pendulum.xml")
 
 RICH: dict[str, Any] = {
     "title": 'A "lab" with \\ everything',
@@ -179,7 +170,6 @@ def test_script_is_offered_where_it_does_what_the_lab_does_and_a_reason_where_no
 
 
 def run(path: Path, *values: object) -> str:
-    """Run a script with these values in place of the marks, and return what it prints."""
     text = path.read_text()
     for i, value in enumerate(values):
         text = text.replace(f"{{{{control:{i}}}}}", repr(value))

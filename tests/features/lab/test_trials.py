@@ -186,7 +186,6 @@ def test_error_in_a_trial_ends_the_command_and_hangs_nothing(
 
 
 def native_processes() -> list[int]:
-    """Return the ids of the processes of native MuJoCo that this process started."""
     ids = []
     for file in Path(f"/proc/{os.getpid()}/task").glob("*/children"):
         for child in file.read_text().split():

@@ -27,7 +27,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.markdown.copies import markdown_href
 from coursebuild.features.markdown.writer import DocumentWriter
-from support.fixture_cases import check_text, fixture_text
+from support.fixture_cases import check_lines, check_text, fixture_text
 from support.plain_html import PlainWriter, plain_html
 from support.rendered_course import Make
 
@@ -114,29 +114,9 @@ def plainly(markdown: str) -> str:
     return re.sub(r"[\s\\]+|<br />", " ", html).strip()
 
 
-def test_markdown_of_constructs() -> None:
-    cases = [
-        ("# A `b` #\n", "# A `b`\n"),
-        ("C #\n===\n", "# C \\#\n"),
-        ("- a\n- b\n\n* c\n", "- a\n- b\n\n* c\n"),
-        ("3. a\n\n   b\n4. c\n", "3. a\n\n   b\n\n4. c\n"),
-        ("- [x] done\n- [ ] not\n", "- [x] done\n- [ ] not\n"),
-        ("    code\n", "```\ncode\n```\n"),
-        ("````\n```\n````\n", "````\n```\n````\n"),
-        ("a\n***\nb\n", "a\n\n___\n\nb\n"),
-        ("costs \\$5 and `$x`\n", "costs \\$5 and `$x`\n"),
-        ("$$\na\n\\\\ b\n$$\n", "$$\na\n\\\\ b\n$$\n"),
-        ("so $a\n= b$ it\n", "so $a = b$ it\n"),
-        (
-            "| a \\| b | $\\lVert x \\| y$ |\n|:--|--:|\n| `c` | |\n",
-            "| a \\| b | $\\lVert x \\vert{} y$ |\n| :--- | ---: |\n| `c` |  |\n",
-        ),
-        ("a[^x]\n\n[^x]: One.\n\n    Two.\n", "a[^1]\n\n[^1]: One.\n\n    Two.\n"),
-        ("<https://a.example/b>\n", "<https://a.example/b>\n"),
-        ("1986\\. A year\n", "1986\\. A year\n"),
-        ("&lt;b&gt; &amp;amp; \\*\n", "\\<b> \\&amp; \\*\n"),
-    ]
-    assert [rewrite(markdown) for markdown, _ in cases] == [expected for _, expected in cases]
+def test_markdown_of_constructs(rewriting: bool) -> None:
+    path = Path(__file__).with_name("constructs.md")
+    check_lines(path, lambda markdown: [rewrite(markdown)], rewriting=rewriting)
 
 
 def test_lines_that_would_begin_another_block_are_escaped() -> None:
@@ -174,18 +154,7 @@ def test_files_that_raw_html_shows_have_the_address_of_the_copy() -> None:
 
 
 LESSON = fixture_text("documents/copied.md")
-NEXT_LESSON = """## More {#more}
-
-Back to [it](lesson:0.1#part).
-
-```lab simlab
-{"model": "box"}
-```
-
-```lab mjcf
-<mujoco/>
-```
-"""
+NEXT_LESSON = fixture_text("documents/copied_next.md")
 
 
 def site(make: Make, text: str = LESSON, **texts: str) -> dict[str, bytes]:
@@ -312,18 +281,6 @@ def test_numbers_are_written(make: Make) -> None:
     assert "[(1)](#eq:one)" in copy
 
 
-def test_addresses_lead_to_the_markdown_of_their_page() -> None:
-    place = Place("lessons/1.1-a.html")
-    cases = [
-        ("1.2-b.html", "1.2-b.md"),
-        ("../levels/0.html#a%20b", "../levels/0.md#a%20b"),
-        ("%C3%A9.html?q=1", "%C3%A9.md?q=1"),
-        ("../files/a.html", "../files/a.html"),
-        ("../../out.html", "../../out.html"),
-        ("../search/index.html", "../search/index.html"),
-        ("a.htm", "a.htm"),
-        ("#a", "#a"),
-        ("https://e.org/a.html", "https://e.org/a.html"),
-        ("//[.html", "//[.html"),
-    ]
-    assert [markdown_href(place, href) for href, _ in cases] == [copy for _, copy in cases]
+def test_addresses_lead_to_the_markdown_of_their_page(rewriting: bool) -> None:
+    path, place = Path(__file__).with_name("addresses.md"), Place("lessons/1.1-a.html")
+    check_lines(path, lambda href: [markdown_href(place, href)], rewriting=rewriting)

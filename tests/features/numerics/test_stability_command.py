@@ -9,9 +9,14 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.cli import main
+from coursebuild.features.numerics.commands import stability_text
 from coursebuild.numerics.problems import all_problems, impact
 from coursebuild.numerics.reports.records import STABILITY
+from coursebuild.report import Style
+from support.fixture_cases import check_text
+from support.model_reports import case
 
+Capture = pytest.CaptureFixture[str]
 pytestmark = pytest.mark.site
 
 
@@ -31,7 +36,7 @@ def names(course: Path) -> list[str]:
 
 
 def test_stability_prints_text_and_then_json_without_measuring_again(
-    course: Path, capsys: pytest.CaptureFixture[str]
+    course: Path, capsys: Capture
 ) -> None:
     assert main(["-C", str(course), "stability", "projectile"]) == 0
     out, err = capsys.readouterr()
@@ -53,9 +58,7 @@ def test_stability_prints_text_and_then_json_without_measuring_again(
     assert "projectile: measured after" in capsys.readouterr().err
 
 
-def test_stability_of_a_family_and_of_an_unknown_case(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_stability_of_a_family_and_of_an_unknown_case(course: Path, capsys: Capture) -> None:
     assert main(["-C", str(course), "stability", "tumbling-bocks"]) == 2
     message = capsys.readouterr().err
     assert "no hard case is called `tumbling-bocks`; did you mean `tumbling-box`?" in message
@@ -71,7 +74,7 @@ def test_stability_of_a_family_and_of_an_unknown_case(
 
 
 def test_model_of_the_course_is_a_case_if_something_is_known_of_it(
-    course: Path, capsys: pytest.CaptureFixture[str]
+    course: Path, capsys: Capture
 ) -> None:
     (course / "models").mkdir()
     joint, geom = '<joint type="slide"/>', '<geom size=".1" contype="0" conaffinity="0"/>'
@@ -91,7 +94,7 @@ def test_model_of_the_course_is_a_case_if_something_is_known_of_it(
     assert "drop.bench.json" in capsys.readouterr().out, "there is none yet to compare with"
 
 
-def test_recorded_then_checked(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_recorded_then_checked(course: Path, capsys: Capture) -> None:
     assert run(course, "projectile", "--record") == 0
     out = capsys.readouterr().out
     assert out.startswith("projectile  case 4: Projectile\n")
@@ -101,7 +104,7 @@ def test_recorded_then_checked(course: Path, capsys: pytest.CaptureFixture[str])
 
 
 def test_references_that_differ_are_an_error_and_nothing_is_recorded(
-    course: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    course: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As of a constant that somebody mistyped: here the stone is thrown 1e-6 too fast."""
     thrown = replace(impact.PARABOLA, launch=(3.000003, 0.0, 4.0))
@@ -129,7 +132,7 @@ def test_recording_some_cases_leaves_the_others(course: Path) -> None:
     assert names(course) == ["projectile"]
 
 
-def test_a_figure_that_left_its_band(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_figure_that_left_its_band(course: Path, capsys: Capture) -> None:
     run(course, "projectile", "--record")
     path = course / STABILITY.path()
     (case,) = STABILITY.decode(path.read_bytes())
@@ -155,15 +158,10 @@ def test_a_figure_that_left_its_band(course: Path, capsys: pytest.CaptureFixture
     assert departure["recorded"] == "-0.01095"
 
 
-def test_where_there_is_no_report_or_a_damaged_one(
-    course: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run(course, "--check") == 1
-    assert capsys.readouterr().out == (
-        f"error: {STABILITY.path()} is not there\n"
-        "  help: make it with `coursebuild stability --record`, and commit it\n"
-    )
+def test_where_there_is_no_report_or_a_damaged_one(course: Path, capsys: Capture) -> None:
     path = course / STABILITY.path()
+    assert run(course, "--check") == 1
+    assert capsys.readouterr().out.startswith(f"error: {STABILITY.path()} is not there\n  help: ")
     path.parent.mkdir()
     path.write_bytes(b"{}")
     assert run(course, "--check") == 1
@@ -174,3 +172,10 @@ def test_where_there_is_no_report_or_a_damaged_one(
     assert run(course, "projectile", "--record") == 1
     assert "holds no report of" in capsys.readouterr().out
     assert path.read_bytes() == b"{}"
+
+
+def test_text_puts_integrators_with_equal_figures_together(rewriting: bool) -> None:
+    first, *remaining = case().boundaries
+    none = replace(first, integrator="none", largest=0.0, theory=0.0, difference=None)
+    text = stability_text([case(boundaries=(first, *remaining, none))], Style())
+    check_text(Path(__file__).with_name("spring.txt"), text, rewriting=rewriting)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model.results import FileFacts
 from coursebuild.features.offline import PAPER, listing, short_name
-from support.fixture_cases import fixture_text
+from support.fixture_cases import check_lines, fixture_text
 from support.rendered_course import Make
 
 ROOT = Path(__file__).parents[3]
@@ -141,24 +141,9 @@ def test_the_colours_of_the_manifest_are_those_of_the_style_sheet() -> None:
     assert re.findall(r'name="theme-color" content="(#\w+)"', base) == [light, dark]
 
 
-@pytest.mark.parametrize(
-    ("title", "short"),
-    [
-        ("Simulation with MuJoCo", "Simulation"),
-        ("Physics", "Physics"),
-        ("Rigid bodies", "Rigid bodies"),
-        ("Rigid bodies1", "Rigid"),
-        ("A first course", "A first"),
-        ("Bodies, falling", "Bodies,"[:-1]),
-        ("Thermodynamik für Anfänger", "Thermodynamik"),
-        ("物理学入門", "物理学入門"),
-        ("— — —", "— — —"),
-    ],
-)
-def test_a_name_below_an_icon_has_whole_words_and_at_most_12_characters(
-    title: str, short: str
-) -> None:
-    assert short_name(title) == short
+def test_a_name_below_an_icon_has_whole_words(rewriting: bool) -> None:
+    path = Path(__file__).with_name("names.md")
+    check_lines(path, lambda title: [short_name(title)], rewriting=rewriting)
 
 
 def test_hostile_titles_stay_text(make: Make) -> None:

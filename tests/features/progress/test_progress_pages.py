@@ -32,7 +32,6 @@ NAMES = f"0.1-one:{WHY_KEY},how 0.1-two:{WHAT_KEY}"
 
 @pytest.fixture(scope="module")
 def pages(make: Make) -> dict[str, str]:
-    """The pages of a course with questions in a lesson and in another page."""
     site = make(TWO_QUIZZES, about=quiz("about", open_question("Which?", id="which"))).site()
     return {path: data.decode() for path, data in site.items() if path.endswith(".html")}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
@@ -20,6 +21,7 @@ from support.archives import (
     packaging_schema,
     referenced_files,
 )
+from support.fixture_cases import check_lines
 from support.hostile_html import HOSTILE, REFUSED_TEXTS
 from support.qti_rules import MATHML, QTI
 from support.qti_rules import mistakes as item_mistakes
@@ -37,7 +39,6 @@ def export(folder: Folder, *arguments: str) -> CommandResult:
 
 
 def package(folder: Folder) -> dict[str, bytes]:
-    """The package, in which everything is as it must be."""
     export(folder)
     files = entries(folder.root / ZIP)
     check(files)
@@ -61,7 +62,6 @@ def check(files: dict[str, bytes]) -> None:
 
 
 def items(files: dict[str, bytes], test: str = "") -> list[etree._Element]:
-    """The items of a test, or of all, in their order."""
     paths = [path for path in files if path.startswith(f"tests/{test}")]
     tests = [etree.fromstring(files[path]) for path in paths]
     names = [ref.get("href") for test in tests for ref in test.iter(f"{{{QTI}}}assessmentItemRef")]
@@ -70,12 +70,10 @@ def items(files: dict[str, bytes], test: str = "") -> list[etree._Element]:
 
 @pytest.fixture(scope="session")
 def zoo_items(qti: Package) -> dict[str, etree._Element]:
-    """The items by the names of their questions."""
     return dict(zip(ANY, items(qti.files), strict=True))
 
 
 def shape(node: etree._Element, path: str) -> list[str]:
-    """Return the texts or attributes at a path."""
     nodes = node.xpath(path, namespaces=SPACES)
     return [part if isinstance(part, str) else "".join(part.itertext()) for part in nodes]
 
@@ -386,57 +384,11 @@ def bare(node: Element) -> bytes:
     return re.sub(rb"(<[a-z:0-9]+)", declaration, data, count=1)
 
 
-def test_html_becomes_the_nearest_that_qti_allows() -> None:
-    cases = [
-        ("plain", "<p>plain</p>"),
-        ("  ", ""),
-        ("a<p>b</p>c", "<p>a</p><p>b</p><p>c</p>"),
-        ("<p>one<p>two", "<p>one</p><p>two</p>"),
-        ("<ul><li>a<ul><li>b</ul><li>c</ul>",
-         "<ul><li><p>a</p><ul><li>b</li></ul></li><li>c</li></ul>"),
-        ("<pre><code>a <span class='k'>if</span>\n  b\n\n</code></pre>",
-         "<pre><code>a if\n  b</code></pre>"),
-        ("<table><tr><td>1<td>2<tr><th scope=row>3</table>",
-         '<table><tbody><tr><td>1</td><td>2</td></tr><tr><th scope="row">3</th></tr></tbody>'
-         "</table>"),
-        ("<table><thead><tr><th>h</table>", "<table><tbody><tr><th>h</th></tr></tbody></table>"),
-        ("<abbr title='centre of mass'>CoM</abbr>", "<p><abbr>CoM</abbr> (centre of mass)</p>"),
-        ("<a href='https://a.org/?x=1&amp;y'>out</a>",
-         '<p><a href="https://a.org/?x=1&amp;y">out</a></p>'),
-        ("<mark>m</mark><u>u</u>", "<p><em>m</em><em>u</em></p>"),
-        ("<table>loose<tr>more<td>1</td></tr><p>p</p></table>",
-         "<p>loosemore</p><p>p</p><table><tbody><tr><td>1</td></tr></tbody></table>"),
-        ("<table><caption>a</caption><caption>b</caption><td>1</table>",
-         "<p>a</p><p>b</p><table><tbody><tr><td>1</td></tr></tbody></table>"),
-        ("<table><tfoot><tr><td>f</tfoot><thead><tr><td>h</thead><tr><td>b</table>",
-         "<table><thead><tr><td>h</td></tr></thead><tbody><tr><td>b</td></tr><tr><td>f</td></tr>"
-         "</tbody></table>"),
-        ("<h2>a<div>b</div></h2><ul>c<li>d</ul>", "<h2>ab</h2><ul><li>c</li><li>d</li></ul>"),
-        ("<dl><dt>t<dd>d</dl>", "<dl><dt>t</dt><dd>d</dd></dl>"),
-        ("<b>bold</i> on</b>", "<p><b>bold on</b></p>"),
-        ("<math><mrow><mi>x</mi></mrow></math><span><math><mo>=</mo></math></span>",
-         "<p><m:math><m:mrow><m:mi>x</m:mi></m:mrow><m:mo>=</m:mo></m:math></p>"),
-        ("<math><semantics><mrow><mi>x</mi></mrow><annotation>x</annotation></semantics></math>",
-         "<p><m:math><m:mrow><m:mi>x</m:mi></m:mrow></m:math></p>"),
-    ]  # fmt: skip
-    assert [blocks(html) for html, _ in cases] == [expected for _, expected in cases]
+def test_html_becomes_the_nearest_that_qti_allows_and_losses_are_listed(rewriting: bool) -> None:
+    def convert(html: str) -> list[str]:
+        return [blocks(html), *(f"loss: {loss}" for loss in check_flow(html).losses)]
 
-
-def test_html_that_qti_cannot_hold_is_listed_as_loss() -> None:
-    cases: list[tuple[str, list[str]]] = [
-        ("<video src='a'>words</video>", ["`<video>` has no place in QTI and is left out"]),
-        ("<canvas></canvas><canvas></canvas>", ["`<canvas>` has no place in QTI and is left out"]),
-        ("<ol start=2><li>x</ol>", ["a numbered list counts from 1"]),
-        ("<ol start=1><li>x</ol>", []),
-        ("<a href='b.html'>x</a>",
-         ["the link to `b.html` is text, as the course has no `base_url`"]),
-        ("<a href='javascript:alert(1)'>x</a>", ["the link to `javascript:alert(1)` is text"]),
-        ("<img src='b.svg' alt='words'>", ["the picture `b.svg` is replaced by its words"]),
-        ("<details><summary>a</summary>b</details>", ["`<details>` is open"]),
-        ("<p style='color:red' onclick='x()' id=y>a</p>", []),
-        ("<script>alert(1)</script><style>p{}</style><!-- no -->", []),
-    ]  # fmt: skip
-    assert [check_flow(html).losses for html, _ in cases] == [losses for _, losses in cases]
+    check_lines(Path(__file__).with_name("html.md"), convert, rewriting=rewriting)
 
 
 @given(st.lists(PIECES, max_size=14).map("".join))

@@ -10,34 +10,12 @@ import pytest
 from coursebuild.core.text.source import Source
 from coursebuild.features.references.bibtex import read_works
 from coursebuild.features.references.csl import StyleFailure, format_works
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder
 
-LIST = r"""
-@article{euler1758,
-  author = {Euler, Leonhard}, title = {Du mouvement <script>alert(1)</script>},
-  journal = {M{\'e}moires}, volume = 14, pages = {154--193}, year = 1765, doi = {10.1000/1\_2},
-}
-@book{goldstein, author = {Goldstein, Herbert and Poole, Charles P. and Safko, John},
-  title = {Classical Mechanics}, year = 2002, edition = {3rd}, isbn = {978-0-201-65702-9}}
-@article{one, author = {van der Berg, Jan}, title = {First}, year = 2001, doi = {10.1000/3}}
-@article{two, author = {van der Berg, Jan}, title = {Second}, year = 2001, doi = {10.1000/4}}
-@online{team, author = {{The MuJoCo Team}}, title = {MuJoCo}, url = {https://mujoco.org/}}
-"""
-NUMERIC = """<style xmlns="http://purl.org/net/xbiblio/csl" class="in-text" version="1.0">
-<info><title>n</title><id>n</id><updated>2026-01-01T00:00:00+00:00</updated></info>
-<citation><layout prefix="[" suffix="]" delimiter=", "><text variable="citation-number"/></layout>
-</citation><bibliography><layout><text variable="title"/></layout></bibliography></style>
-"""
-FIRST = """## One
-
-So it is [@euler1758, p. 12], and [as one may
-see in @goldstein, ch. 3; @one]. Again [@euler1758], me@example.org,
-[a link @ home](https://example.org/).
-
-| a |
-| - |
-| [@two] |
-"""
+LIST = fixture_text("documents/references.bib")
+NUMERIC = fixture_text("documents/numeric.csl")
+FIRST = fixture_text("documents/cited.md")
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,6 @@ KIND = "{http://www.adlnet.org/xsd/adlcp_rootv1p2}scormtype"
 
 
 def package(folder: Folder) -> dict[str, bytes]:
-    """The package, in which everything is as it must be."""
     command = folder.main("export", "scorm")
     assert command.status == 0, command.out + command.err
     files = entries(folder.root / ZIP)

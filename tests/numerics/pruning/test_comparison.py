@@ -127,11 +127,8 @@ def test_a_state_is_brought_over() -> None:
     data.qpos[:], data.qvel[:] = range(12), range(10)
     data.time, data.act[:], data.ctrl[:], data.mocap_pos[0] = 3.0, [1], [4, 5], 7
     transfer(model, data, left, variant, variant_data)
-    assert (variant_data.time, variant_data.qpos.tolist(), variant_data.qvel.tolist()) == (
-        3.0,
-        [11.0],
-        [9.0],
-    )
+    state = variant_data.time, variant_data.qpos.tolist(), variant_data.qvel.tolist()
+    assert state == (3.0, [11.0], [9.0])
     assert (variant_data.act.tolist(), variant_data.ctrl.tolist()) == ([1], [4, 5])
     assert variant_data.mocap_pos[0].tolist() == [7] * 3
 

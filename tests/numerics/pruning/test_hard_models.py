@@ -77,9 +77,8 @@ def test_includes_are_changed_where_they_stand() -> None:
     }
     survey = run_survey(files)
     assert set(findings_by_kind(survey)) >= {"sensor-unread", "unused-site", "unused-default"}
-    assert [place.path for place in findings_by_kind(survey)["sensor-unread"].places] == [
-        "models/parts/sensors.xml"
-    ]
+    (place,) = findings_by_kind(survey)["sensor-unread"].places
+    assert place.path == "models/parts/sensors.xml"
     assert fixed_text(survey, "models/parts/sensors.xml") == files["models/parts/sensors.xml"]
     assert '<include file="parts/sensors.xml"/>' not in fixed_text(survey, "models/parts/arm.xml")
     main = fixed_text(survey)
@@ -183,9 +182,7 @@ def test_composites_and_flexes_stay_as_they_are(
 </mujoco>
 """
     survey, left = whole(text)
-    assert "far-body" not in findings_by_kind(survey) and "contact-off" not in findings_by_kind(
-        survey
-    )
+    assert {"far-body", "contact-off"}.isdisjoint(findings_by_kind(survey))
     assert '<composite prefix="r"' in left and "<flexcomp" in left and "<clock" not in left
 
 

@@ -93,9 +93,8 @@ def test_only_bounded_joints_keep_a_body_away() -> None:
 def test_margins_count() -> None:
     body = '<geom size=".1" pos="2 0 0" margin="{}"/><body><joint/><geom size=".1"/></body>'
     near_model, far_model = (compile_model(body.format(margin)) for margin in ("0", "1.9"))
-    assert find_separate(near_model, possible_pairs(near_model)) and not find_separate(
-        far_model, possible_pairs(far_model)
-    )
+    assert find_separate(near_model, possible_pairs(near_model))
+    assert not find_separate(far_model, possible_pairs(far_model))
     for gap in ('gap="1.9" adhesion="1"', 'margin="1" gap="0.9"'):  # it pulls across its gap
         gap_model = compile_model(body.replace('margin="{}"', gap))
         assert not find_separate(gap_model, possible_pairs(gap_model)), gap

@@ -38,6 +38,7 @@ HOSTILE = {
     "raw f-string": ("sensor", 's = "r"\nprint(fr"{data.sensordata}")'),
     "f-string before a text": ("sensor", 'print(f"{model}", data.sensordata, "x")'),
     "triple f-string": ("sensor", "print(f'''it's {data.sensordata}''', \"x\")"),
+    "letters of another width": ("sensor", "print(data.\uff53ensordata)"),
     "size of a state": ("actuator", "print(mujoco.mj_stateSize(model, 8191))"),
     "whole state": ("actuator", "mujoco.mj_getState(model, data, np.empty(9), 31)"),
     "file mapped": ("sensor", "print(np.memmap(model_path('leg')))"),
@@ -87,11 +88,8 @@ def test_no_hostile_script_loses_a_part() -> None:
         kind, _, name = part.partition(" ")
         assert any(kind in finding for finding in whole), kind
         survey = run_survey(MODEL, lesson=HEAD + script, declarations=GO)
-        faults = [
-            finding
-            for finding in survey.report.findings
-            if finding.is_fault and kind in finding.kind
-        ]
+        findings = survey.report.findings
+        faults = [finding for finding in findings if finding.is_fault and kind in finding.kind]
         lost += [(title, finding.kind) for finding in faults if not name or name in names(finding)]
     assert lost == []
 

@@ -1,7 +1,4 @@
-"""The commands that begin and change a course, each in a module of its name.
-
-Entry point: `apply_changes`, for the commands that change one.
-"""
+"""The commands that begin and change a course, each in a module of its name."""
 
 from __future__ import annotations
 

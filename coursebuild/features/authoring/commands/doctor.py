@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not folder.is_dir():
         raise UsageError(f"there is no folder {arguments.root}")
     style, status = style_of(sys.stdout), CLEAN
-    required = (_python, _mujoco, _lab_engine, _fonts, _folder)
+    required = (_engines, _lab_engine, _fonts, _folder)
     for make_probes in (*required, _store, _locks, _disk, _rendering, _sandbox):
         for probe in make_probes(folder):
             word, colour = ("broken", RED) if probe.is_required else ("-", YELLOW)
@@ -83,11 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
     return status
 
 
-def _python(_: Path) -> Iterator[Probe]:
+def _engines(_: Path) -> Iterator[Probe]:
     yield Probe(f"Python {python_version()} at {sys.executable}", True)
-
-
-def _mujoco(_: Path) -> Iterator[Probe]:
     try:
         error_line = _try_code(_STEP)
         text = f"MuJoCo {engine_version()}" + (f": {error_line}" if error_line else "")
@@ -200,7 +197,6 @@ def _sandbox(folder: Path) -> Iterator[Probe]:
 
 
 def _try_code(code: str, **environment: str) -> str:
-    """Run code in a process of its own; return the last line of its error, empty if it succeeds."""
     try:
         process = subprocess.run(
             [sys.executable, "-c", code],

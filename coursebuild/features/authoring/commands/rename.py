@@ -70,7 +70,6 @@ def run(arguments: argparse.Namespace) -> int:
 def _list_changes(
     root: Path, course: Course, lesson: Lesson, new: str, edits: Sequence[Edit]
 ) -> list[FileChange]:
-    """Return the changes of the map, of the lesson's file, and of the files that refer to it."""
     by_source: dict[Source, list[Edit]] = {}
     for edit in edits:
         by_source.setdefault(edit.span.source, []).append(edit)

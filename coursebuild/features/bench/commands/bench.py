@@ -1,19 +1,15 @@
 """`coursebuild bench`: speed against error of the course's models.
 
-Entry points: `bench(options, names, …)`, `check(…)`; `bench_text(scenes, style)`, the tables of the
-models' pages, on a terminal.
-
-1. Names mean models. One that does not compile is reported, and the others are measured.
-2. Each scenario's report is stored by all that it depends on, so that a run that was stopped goes
+1. Each scenario's report is stored by all that it depends on, so that a run that was stopped goes
    on where it was. Times are true of this machine only, so reports are not shared.
-3. Recording writes the reports into `content/reports/`; checking measures again, whatever is
+2. Recording writes the reports into `content/reports/`; checking measures again, whatever is
    stored, and compares figures of accuracy with what is recorded there.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -50,7 +46,6 @@ from coursebuild.numerics.reports.scene_report import (
     ScenarioReport,
     SceneReport,
     SweepReport,
-    WorkPrecisionRow,
 )
 from coursebuild.numerics.reports.shown_errors import is_idle
 from coursebuild.numerics.sweep import THREADS
@@ -128,13 +123,9 @@ def bench(
     record: bool = False,
     measuring: Any = measuring,
 ) -> Measurement[SceneReport]:
-    """Measure the models that the names mean; without names, all.
+    """Measure the models that the names mean, without names all; with `record` into the course.
 
-    `record`: each model's report is also written into the course. `measuring`: the module that
-    measures.
-
-    Raises:
-        UsageError: no model is called so, or only a part is to be recorded.
+    `measuring` is the module that measures.
     """
     if record:
         forbid_quick("--record", quick=quick)
@@ -157,9 +148,6 @@ def check(
     """Measure again, and compare with the recorded reports.
 
     A model without a recorded report, or with one that cannot be read, is not measured.
-
-    Raises:
-        UsageError: no model is called so, or only a part is to be measured.
     """
     forbid_quick("--check", quick=quick)
     scenes = find_scenes(options.root, names)
@@ -322,7 +310,6 @@ class SceneRun(MeasuringRun):
     def _load_or_measure_part(
         self, kind: str, parts: tuple[object, ...], report_type: type[_T], measure: Callable[[], _T]
     ) -> _T:
-        """Load the report on a scenario or a sweep, or measure it now."""
         report = self.load(kind, parts, report_type)
         if report is None:
             report = measure()
@@ -351,11 +338,7 @@ def measure_part(root: Path, data: bytes) -> bytes:
 
 @lru_cache(maxsize=1)
 def _compile(root: Path, name: str, digest: str, *, quick: bool) -> measuring.CompiledScene:
-    """Compile a scene once for all its parts.
-
-    Raises:
-        LookupError: no scene has the digest, as its files have been edited meanwhile.
-    """
+    """Compile a scene once for all its parts; a `LookupError` where its files were edited."""
     by_digest = {scene.digest: scene for scene in find_scenes(root, (name,)).value}
     return measuring.compile_scene(root, by_digest[digest], quick=quick)
 
@@ -365,25 +348,24 @@ _OWN_MARK, _FRONT_MARK = ">", "*"
 
 def bench_text(scenes: Sequence[SceneReport], style: Style) -> str:
     """Write every model with its scenarios, and a blank line between models."""
-    return "\n".join(_scene(scene, style) for scene in scenes)
-
-
-def _scene(scene: SceneReport, style: Style) -> str:
-    head = style.paint(visible(scene.model), BOLD)
-    if scene.quick:
-        head += "  " + style.paint("quick: fewer settings, rough times", YELLOW)
-    lines = [head, *style.wrap(machine_text(english(), scene.machine), _INDENT)]
-    if not scene.scenarios:
-        lines.append(f"{_INDENT}nothing in it can move, so nothing was measured")
-    for scenario in scene.scenarios:
-        lines += ["", *_scenario(scenario, style)]
-    for sweep in scene.sweeps:
-        view = scenario_view(english(), sweep)
-        marks = (((_OWN_MARK, BOLD) if row.own else (" ", "")) for row in sweep.rows)
-        lines += ["", _title(sweep.name, sweep.title, style)]
-        lines += _table(view.settings, marks, f"{_OWN_MARK} as the model is", style)
-        lines += _notes(view.notes, style)
-    return "\n".join(lines) + "\n"
+    texts = []
+    for scene in scenes:
+        head = style.paint(visible(scene.model), BOLD)
+        if scene.quick:
+            head += "  " + style.paint("quick: fewer settings, rough times", YELLOW)
+        lines = [head, *style.wrap(machine_text(english(), scene.machine), _INDENT)]
+        if not scene.scenarios:
+            lines.append(f"{_INDENT}nothing in it can move, so nothing was measured")
+        for scenario in scene.scenarios:
+            lines += ["", *_scenario(scenario, style)]
+        for sweep in scene.sweeps:
+            view = scenario_view(english(), sweep)
+            marks = [((_OWN_MARK, BOLD) if row.own else (" ", "")) for row in sweep.rows]
+            lines += ["", _title(sweep.name, sweep.title, style)]
+            lines += _table(view.settings, marks, f"{_OWN_MARK} as the model is", style)
+            lines += _notes(view.notes, style)
+        texts.append("\n".join(lines) + "\n")
+    return "\n".join(texts)
 
 
 def _scenario(report: ScenarioReport, style: Style) -> list[str]:
@@ -394,11 +376,17 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
         texts.append(f"It measures {report.figure}.")
     if report.velocity_floor > report.floor:
         texts.append(f"Velocities are known to {plain_text(power(report.velocity_floor, 1))}.")
-    for text in (*texts, *report.notes):
+    for text in (*texts, *report.notes, *_theory(report)):
         lines += style.wrap(text, 2 * _INDENT)
     legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
-    shown_rows = (row for row in report.rows if not is_idle(row))
-    lines += _table(view.settings, map(_mark, shown_rows), legend, style)
+    marks = []
+    for row in report.rows:
+        if not is_idle(row):
+            code = BOLD if row.own else RED if row.status in ("diverged", "reset") else ""
+            code = code or (YELLOW if row.status != "ok" else GREEN if row.front else "")
+            mark = (_OWN_MARK if row.own else " ") + (_FRONT_MARK if row.front else " ")
+            marks.append((mark, code))
+    lines += _table(view.settings, marks, legend, style)
     colour = GREEN if report.verdict.on_front and not report.verdict.noticeable else YELLOW
     if report.verdict.text:
         lines += ["", *style.wrap(report.verdict.text, 2 * _INDENT, colour)]
@@ -408,26 +396,36 @@ def _scenario(report: ScenarioReport, style: Style) -> list[str]:
     return [*lines, *_notes(view.notes, style)]
 
 
+def _theory(report: ScenarioReport) -> Iterator[str]:
+    """What theory says of quantities, and what each integrator makes of them."""
+
+    def amount(value: float | None, unit: str) -> str:
+        return "none" if value is None else f"{value:.4g} {unit}".strip()
+
+    for name in dict.fromkeys(line.name for line in report.figures):
+        lines = [line for line in report.figures if line.name == name]
+        integrators: dict[str, list[str]] = {}
+        for line in lines:
+            integrators.setdefault(amount(line.measured, line.unit), []).append(line.integrator)
+        values = (f"{value} under {', '.join(names)}" for value, names in integrators.items())
+        exact = amount(lines[0].exact, lines[0].unit)
+        yield f"theory ({lines[0].source}): the {name} is {exact}; measured: {'; '.join(values)}"
+
+
 def _title(name: str, title: str, style: Style) -> str:
     return _INDENT + style.paint(visible(name), BOLD) + (f"  {visible(title)}" if title else "")
 
 
 def _table(
-    grid: Grid, marks: Iterable[tuple[str, str]], legend: str, style: Style
+    grid: Grid, marks: Sequence[tuple[str, str]], legend: str, style: Style
 ) -> Iterator[str]:
     yield ""
     if not grid.rows:
         yield f"{2 * _INDENT}no setting was measured"
         return
-    _, *lines = grid_lines(grid, style, tuple(marks))
+    _, *lines = grid_lines(grid, style, marks)
     for line in (*lines, style.paint(legend, FAINT)):
         yield f"{2 * _INDENT}{line}".rstrip()
-
-
-def _mark(row: WorkPrecisionRow) -> tuple[str, str]:
-    code = BOLD if row.own else RED if row.status in ("diverged", "reset") else ""
-    code = code or (YELLOW if row.status != "ok" else GREEN if row.front else "")
-    return (_OWN_MARK if row.own else " ") + (_FRONT_MARK if row.front else " "), code
 
 
 def _notes(notes: Sequence[str], style: Style) -> list[str]:

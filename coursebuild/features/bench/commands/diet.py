@@ -1,8 +1,5 @@
 """`coursebuild diet`: what models of the course hold that their scenarios do not need.
 
-Entry points: `diet(options, names, …)`; `diet_text(reports, style)`; `diet_values(reports)`, for
-JSON.
-
 1. Names mean models. One that does not compile is reported, and the others are looked at.
 2. A part that code of the course may notice is not proved superfluous, and a part without which
    scripts or labs have another output is no finding. A part that is to stay stands in
@@ -340,8 +337,11 @@ def _summary(report: DietReport, style: Style) -> list[str]:
             text += f", {len(fixable)} of them for `coursebuild diet {report.model} --fix`"
         lines += style.wrap(text, "  ", RED)
         lines += style.wrap(_how_to_keep(report, findings), "  ", FAINT)
-    else:
+    elif all(finding.kept for finding in report.findings):
         lines.append("  " + style.paint("nothing in it is useless", GREEN))
+    else:
+        text = "nothing in it is proved useless; what is named above was not needed in what was run"
+        lines += style.wrap(text, "  ", GREEN)
     if report.slim is not None and len(findings) > 1:
         lines += style.wrap(f"without all of them: {_saving(report.slim)}", "  ")
     if report.fixed is not None and len(fixable) > 1 and len(fixable) < len(findings):
@@ -380,6 +380,8 @@ def _finding(finding: Finding, style: Style) -> list[str]:
     lines += style.wrap(f"{label}; {_saving(finding.saving)}", "    ")
     if finding.proof:
         lines += style.wrap(f"because {finding.proof}", "    ")
+    if finding.kind == "far-body" and not finding.kept:
+        lines += style.wrap("what only runs speak for, below, was tried without it", "    ")
     if finding.kept:
         return [*lines, *style.wrap(f"kept: {finding.kept}", "    ")]
     for edit in finding.edits[:_EDITS]:

@@ -1,8 +1,5 @@
 """A model of the course as the diet sees it: its files, who reads it, and what is to be kept.
 
-Entry points: `DietModel`; `readers_of(course, root, files, scene)`; `Reruns`, which runs scripts
-and labs.
-
 1. Every script of the course that may use the model is a reader; so is every file of code, as
    scripts and labs may use it. A lab draws its model, so it may use all of it, except what code
    asks for by name or number. Observables that are declared for a model read it too.

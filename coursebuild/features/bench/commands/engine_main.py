@@ -1,10 +1,7 @@
 """The child process in which an engine runs: a crash or a hang takes nothing else along.
 
-Entry point: run as a file by `engines`, in a temporary folder, where engines leave what they
-compile.
-
-The protocol: JSON lines. First this process says that it is ready. A request is a module of engines
-with the name of one, and what to do; the reply has the result, or says why there is none.
+It is run as a file in a temporary folder, where engines leave what they compile. The protocol is
+JSON lines: first this process says that it is ready, then it replies to each request.
 """
 
 from __future__ import annotations
@@ -19,16 +16,7 @@ from typing import Literal
 import msgspec
 from msgspec import Struct
 
-from coursebuild.numerics.engines.engine_trial import (
-    Engine,
-    EngineCost,
-    EngineMotion,
-    EngineTrial,
-    Variant,
-    begin,
-    run_costs,
-    run_motion,
-)
+from coursebuild.numerics.engines import engine_trial
 
 
 class Request(Struct, frozen=True):
@@ -41,17 +29,17 @@ class Request(Struct, frozen=True):
     processors: int
     action: Literal["list", "motion", "costs"]
     """A motion comes with the costs of one world, so that it is compiled only once."""
-    variant: Variant | None = None
-    trial: EngineTrial | None = None
+    variant: engine_trial.Variant | None = None
+    trial: engine_trial.EngineTrial | None = None
     worlds: int = 1
 
 
 class Reply(Struct, frozen=True):
     """What it says: what was asked for, or why there is none."""
 
-    variants: tuple[Variant, ...] = ()
-    motion: EngineMotion | None = None
-    cost: EngineCost | None = None
+    variants: tuple[engine_trial.Variant, ...] = ()
+    motion: engine_trial.EngineMotion | None = None
+    cost: engine_trial.EngineCost | None = None
     refusal: str = ""
     """In the engine's own words."""
     unsupported: bool = False
@@ -86,14 +74,14 @@ def main() -> None:
 
 def _answer(request: Request) -> Reply:
     sys.path[:] = request.path
-    engine: Engine = importlib.import_module(request.module).ENGINES[request.name]
+    engine: engine_trial.Engine = importlib.import_module(request.module).ENGINES[request.name]
     if request.action == "list":
         return Reply(tuple(engine.variants(request.processors)))
     assert request.variant is not None and request.trial is not None
     trial, clock = request.trial, time.perf_counter_ns
-    batch = begin(engine, request.variant, trial, request.worlds, clock)
-    motion = run_motion(batch, trial) if request.action == "motion" else None
-    return Reply(motion=motion, cost=run_costs(batch, trial, clock))
+    batch = engine_trial.begin(engine, request.variant, trial, request.worlds, clock)
+    motion = engine_trial.run_motion(batch, trial) if request.action == "motion" else None
+    return Reply(motion=motion, cost=engine_trial.run_costs(batch, trial, clock))
 
 
 def _words(error: Exception) -> str:

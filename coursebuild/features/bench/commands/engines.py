@@ -1,14 +1,8 @@
 """`coursebuild bench --engines`: the course's models in other engines.
 
-Entry points: `run_engines(arguments)`; `chosen_engines(text)`, of the option;
-`bench_engines(options, names, engines, …)`; `engines_text(reports, style)`.
-
-1. Without names, all engines whose packages are installed are measured, and what is missing is
-   said.
-2. An engine runs in a process of its own for each of its variants. If that dies or takes too long,
-   its row says so, and the others go on.
-3. An engine that refuses a model has a row with its own words.
-4. Four thousand worlds are not tried where 64 say that they would take too long.
+An engine runs in a process of its own for each of its variants: if that dies, takes too long or
+refuses the model, its row says so, and the others go on. Four thousand worlds are not tried where
+64 say that they would take too long.
 """
 
 from __future__ import annotations
@@ -45,11 +39,16 @@ from coursebuild.features.bench.commands.measurement import (
     run_measurement,
     write_records,
 )
-from coursebuild.features.bench.engine_view import engine_view
 from coursebuild.features.bench.grids import machine_text
+from coursebuild.features.bench.scenario_view import engine_view
 from coursebuild.numerics.engines import MODULES
-from coursebuild.numerics.engines.engine_trial import Engine, EngineTrial, Variant
-from coursebuild.numerics.engines.engine_verdict import EngineBasis, engine_basis, judge_motion
+from coursebuild.numerics.engines.engine_trial import (
+    Engine,
+    EngineBasis,
+    EngineTrial,
+    engine_basis,
+    judge_motion,
+)
 from coursebuild.numerics.reports.engine_report import (
     WORLDS,
     BatchCost,
@@ -116,11 +115,8 @@ def chosen_engines(
 ) -> tuple[tuple[ChosenEngine, ...], tuple[str, ...]]:
     """The engines that an option names; if it is empty, all that are installed.
 
-    The second is a remark about each that is not installed, where none was named.
-
-    Raises:
-        UsageError: there is no such engine.
-        EffectError: its package is not installed.
+    The second is a remark about each that is not installed, where none was named. An `EffectError`
+    where the package of one that was named is missing.
     """
     engines = {
         name: ChosenEngine(name, module, engine)
@@ -135,19 +131,18 @@ def chosen_engines(
         require(engines[name].engine.module, "engines", f"the engine `{name}`")
     if names:
         return tuple(engines[name] for name in names), ()
-    missing = [e for e in engines.values() if not _is_installed(e.engine)]
-    remarks = tuple(
-        f"{e.engine.title} is not installed: `pip install 'coursebuild[engines]'` brings it"
-        for e in missing
-    )
-    return tuple(e for e in engines.values() if e not in missing), remarks
-
-
-def _is_installed(engine: Engine) -> bool:
-    try:
-        return find_spec(engine.module) is not None
-    except ModuleNotFoundError:  # not even its package
-        return False
+    installed, remarks = [], []
+    for choice in engines.values():
+        try:
+            is_installed = find_spec(choice.engine.module) is not None
+        except ModuleNotFoundError:  # not even its package
+            is_installed = False
+        if is_installed:
+            installed.append(choice)
+        else:
+            command = "`pip install 'coursebuild[engines]'`"
+            remarks.append(f"{choice.engine.title} is not installed: {command} brings it")
+    return tuple(installed), tuple(remarks)
 
 
 def bench_engines(
@@ -160,13 +155,7 @@ def bench_engines(
     record: bool = False,
     seconds: float = SECONDS,
 ) -> Measurement[EngineReport]:
-    """Measure the models that the names mean in other engines; without names, all.
-
-    `record`: each model's report is also written into the course.
-
-    Raises:
-        UsageError: no model is called so, or only a part is to be recorded.
-    """
+    """Measure the models that the names mean in other engines; with `record` into the course."""
     if record:
         forbid_quick("--record", quick=quick)
     scenes = find_scenes(options.root, names)
@@ -234,7 +223,7 @@ class _EngineRun(MeasuringRun):
             velocity=None,
         )
         with _EngineChild(choice, self.seconds) as child:
-            reply = child.ask(action="list")
+            reply = child.reply(action="list")
         if reply.refusal:
             yield _refuse(row, reply)
             return
@@ -242,15 +231,21 @@ class _EngineRun(MeasuringRun):
             named_row = replace(row, **msgspec.structs.asdict(variant))
             self.progress.describe(basis.pilot.scene.name, row_name(named_row))
             with _EngineChild(choice, self.seconds) as child:
-                reply = child.ask(action="motion", variant=variant, trial=trial)
+                reply = child.reply(action="motion", variant=variant, trial=trial)
                 if reply.motion is None:
                     yield _refuse(named_row, reply)
                     continue
                 named_row = judge_motion(basis, named_row, reply.motion)
-                counts = WORLDS[:2] if self.quick else WORLDS
-                costs = [_batch_cost(1, reply)]
-                if choice.engine.batched:
-                    costs += _costs(child, variant, trial, counts[1:], self.seconds)
+                costs, expected = [_batch_cost(1, reply)], 0.0
+                counts = WORLDS[1:2] if self.quick else WORLDS[1:]
+                for worlds in counts if choice.engine.batched else ():
+                    if expected * worlds * _ROUNDS > self.seconds:
+                        remark = f"not tried: a step would take about {expected * worlds:.2g} s"
+                        costs.append(BatchCost(worlds, remark=remark))
+                        continue
+                    reply = child.reply(action="costs", variant=variant, trial=trial, worlds=worlds)
+                    expected = 0.0 if reply.cost is None else reply.cost.seconds.value
+                    costs.append(_batch_cost(worlds, reply))
                 yield replace(named_row, costs=tuple(costs))
 
 
@@ -259,73 +254,51 @@ def _refuse(row: EngineRow, reply: Reply) -> EngineRow:
     return replace(row, status=status, message=reply.refusal)
 
 
-def _costs(
-    child: _EngineChild, variant: Variant, trial: EngineTrial, counts: Iterable[int], limit: float
-) -> Iterator[BatchCost]:
-    """What a step costs among more and more worlds."""
-    expected = 0.0
-    for worlds in counts:
-        if expected * worlds * _ROUNDS > limit:
-            remark = f"not tried: a step would take about {expected * worlds:.2g} s"
-            yield BatchCost(worlds, remark=remark)
-            continue
-        reply = child.ask(action="costs", variant=variant, trial=trial, worlds=worlds)
-        expected = 0.0 if reply.cost is None else reply.cost.seconds.value
-        yield _batch_cost(worlds, reply)
-
-
 def _batch_cost(worlds: int, reply: Reply) -> BatchCost:
     if (cost := reply.cost) is None:
         return BatchCost(worlds, remark=reply.refusal)
     return BatchCost(worlds, cost.seconds, cost.ratio, cost.compile_seconds)
 
 
-class _EngineChild:
+class _EngineChild(JsonChild):
     """The process of an engine; it is started again after it died."""
 
     def __init__(self, choice: ChosenEngine, seconds: float) -> None:
-        self._choice, self._seconds = choice, seconds
         # It is killed after ten times as long as it may compute, which is not limited here.
-        self._child = JsonChild(engine_main.__file__, seconds / 10, memory=_MEMORY)
+        super().__init__(engine_main.__file__, seconds / 10, memory=_MEMORY)
+        self._choice, self._wall = choice, seconds
 
-    def __enter__(self) -> _EngineChild:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._child.__exit__()
-
-    def ask(self, **request: object) -> Reply:
+    def reply(self, **request: object) -> Reply:
         """What the engine says; a refusal where its process crashed or took too long."""
         choice, processors = self._choice, machine().processors
         question = Request(tuple(sys.path), choice.module, choice.name, processors, **request)  # type: ignore[arg-type]
         try:
-            answer = self._child.ask(msgspec.to_builtins(question))
+            answer = self.ask(msgspec.to_builtins(question))
         except EffectError as error:
             return Reply(refusal=error.message)
         if answer is not None:
             return msgspec.convert(answer, Reply)
-        death = self._child.death()
-        if self._child.timed_out:
-            death = f"took longer than {self._seconds:g} s"
+        death = self.death()
+        if self.timed_out:
+            death = f"took longer than {self._wall:g} s"
         return Reply(refusal=f"its process {death}")
 
 
 def engines_text(reports: Sequence[EngineReport], style: Style) -> str:
     """Write every model with its scenarios in other engines."""
-    return "\n".join(_report_text(report, style) for report in reports)
-
-
-def _report_text(report: EngineReport, style: Style) -> str:
-    head = style.paint(visible(report.model), BOLD)
-    if report.quick:
-        head += "  " + style.paint("quick: at most 64 worlds", YELLOW)
-    lines = [head, *style.wrap(machine_text(english(), report.machine), _INDENT)]
-    for scenario in report.scenarios:
-        view = engine_view(english(), scenario, report)
-        lines += ["", _INDENT + style.paint(visible(view.title), BOLD)]
-        for text in view.description:
-            lines += style.wrap(plain_text(text), 2 * _INDENT)
-        lines += ["", *(f"{2 * _INDENT}{line}" for line in grid_lines(view.table, style)[1:])]
-        for note in view.notes:
-            lines += style.wrap(note, 2 * _INDENT, YELLOW)
-    return "\n".join(lines) + "\n"
+    texts = []
+    for report in reports:
+        head = style.paint(visible(report.model), BOLD)
+        if report.quick:
+            head += "  " + style.paint("quick: at most 64 worlds", YELLOW)
+        lines = [head, *style.wrap(machine_text(english(), report.machine), _INDENT)]
+        for scenario in report.scenarios:
+            view = engine_view(english(), scenario, report)
+            lines += ["", _INDENT + style.paint(visible(view.title), BOLD)]
+            for text in view.description:
+                lines += style.wrap(plain_text(text), 2 * _INDENT)
+            lines += ["", *(f"{2 * _INDENT}{line}" for line in grid_lines(view.table, style)[1:])]
+            for note in view.notes:
+                lines += style.wrap(note, 2 * _INDENT, YELLOW)
+        texts.append("\n".join(lines) + "\n")
+    return "\n".join(texts)

@@ -1,10 +1,4 @@
-"""How `bench`, `stability` and `diet` measure, and what they print and record.
-
-Entry points: `add_report_options`, `run_measurement`, of their arguments; `MeasuringRun`, which
-makes a `Measurement`, `CannotMeasureError`, `write_records`; `measurement_text`,
-`measurement_json`, `failure_text`, `format_checks`; for what pages show of reports `english`,
-`plain_text`, `grid_lines`.
-"""
+"""How `bench`, `stability` and `diet` measure, and what they print and record."""
 
 from __future__ import annotations
 
@@ -75,55 +69,38 @@ class Measurement(Struct, Generic[_T], frozen=True):
         return not (has_errors or self.failures or has_departures or has_tasks)
 
 
-def measurement_text(reports: str, measurement: Measurement[_T], style: Style) -> str:
-    """Write diagnostics, failures, the text of the reports, checks and remarks."""
-    parts = list(diagnostic_paragraphs(measurement.diagnostics, style))
-    parts += ["".join(failure_text(failure, style) for failure in measurement.failures), reports]
-    parts += [format_checks(measurement.checked, style)]
-    parts += ["".join(f"{visible(remark)}\n" for remark in measurement.remarks)]
-    return "\n".join(part for part in parts if part)
-
-
 def measurement_json(reports: Mapping[str, object], measurement: Measurement[_T]) -> str:
     """Write the same as one JSON object."""
     rest = {name: getattr(measurement, name) for name in Measurement.__struct_fields__[1:]}
     return json_text({**reports, **rest})
 
 
-def failure_text(failure: ReportFailure, style: Style) -> str:
-    """Say what is wrong with a recorded report, and how to mend it."""
-    text = f"{style.paint('error', RED)}{style.paint(f': {visible(failure.message)}', BOLD)}\n"
-    return text + (f"  help: {visible(failure.help)}\n" if failure.help else "")
-
-
 def format_checks(checks: Sequence[RecordCheck], style: Style) -> str:
     """Say of each recorded report that it holds, or which figures left their bands."""
-    return "\n".join(_format_check(check, style) for check in checks)
-
-
-def _format_check(check: RecordCheck, style: Style) -> str:
-    if check.departures:
-        figures = plural(len(check.departures), "figure")
-        verdict = style.paint(f"{figures} not as recorded in {visible(check.path)}", RED)
-    else:
+    texts = []
+    names = ("setting", "figure", "recorded", "measured", "band")
+    for check in checks:
         verdict = style.paint(f"as recorded in {visible(check.path)}", GREEN)
-    lines = [f"{style.paint(visible(check.name), BOLD)}  {verdict}"]
-    lines += ["  " + style.paint(visible(remark), YELLOW) for remark in check.remarks]
-    for place in dict.fromkeys(departure.where for departure in check.departures):
-        departures = [d for d in check.departures if d.where == place]
-        head, *rows = table(
-            [
+        if check.departures:
+            figures = plural(len(check.departures), "figure")
+            verdict = style.paint(f"{figures} not as recorded in {visible(check.path)}", RED)
+        lines = [f"{style.paint(visible(check.name), BOLD)}  {verdict}"]
+        lines += ["  " + style.paint(visible(remark), YELLOW) for remark in check.remarks]
+        for place in dict.fromkeys(departure.where for departure in check.departures):
+            departures = [d for d in check.departures if d.where == place]
+            columns = [
                 Column(
                     name,
                     tuple(getattr(departure, name) for departure in departures),
                     left=name not in ("recorded", "measured"),
                 )
-                for name in ("setting", "figure", "recorded", "measured", "band")
+                for name in names
             ]
-        )
-        lines += ["", "  " + style.paint(visible(place), BOLD), "    " + style.paint(head, FAINT)]
-        lines += [f"    {row}" for row in rows]
-    return "\n".join(lines) + "\n"
+            head, *rows = table(columns)
+            lines += ["", "  " + style.paint(visible(place), BOLD)]
+            lines += ["    " + style.paint(head, FAINT), *(f"    {row}" for row in rows)]
+        texts.append("\n".join(lines) + "\n")
+    return "\n".join(texts)
 
 
 def add_report_options(parser: argparse.ArgumentParser) -> None:
@@ -160,8 +137,19 @@ def run_measurement(
     if arguments.format == "json":
         return write(json(measurement), status)
     style = style_of(sys.stdout)
-    reports = text(measurement.reports, style)
-    return write(measurement_text(reports, measurement, style) or empty, status)
+    failures = ""
+    for failure in measurement.failures:
+        message = style.paint(f": {visible(failure.message)}", BOLD)
+        failures += f"{style.paint('error', RED)}{message}\n"
+        failures += f"  help: {visible(failure.help)}\n" if failure.help else ""
+    parts = [
+        *diagnostic_paragraphs(measurement.diagnostics, style),
+        failures,
+        text(measurement.reports, style),
+        format_checks(measurement.checked, style),
+        "".join(f"{visible(remark)}\n" for remark in measurement.remarks),
+    ]
+    return write("\n".join(part for part in parts if part) or empty, status)
 
 
 class CannotMeasureError(Exception):
@@ -273,7 +261,7 @@ class MeasuringRun:
 
 
 def read_task(data: bytes, *, timed: bool = True) -> tuple[tuple[Any, ...], Machine] | None:
-    """The task that another process has sent, and its machine, of which times have to be true.
+    """The task that another process has sent, and its machine.
 
     `None` if it is to be timed, and this is another machine than that.
     """
@@ -287,11 +275,7 @@ def read_task(data: bytes, *, timed: bool = True) -> tuple[tuple[Any, ...], Mach
 
 
 def forbid_quick(option: str, *, quick: bool) -> None:
-    """Forbid `--quick` with an option for full measurements.
-
-    Raises:
-        UsageError: `quick` is set.
-    """
+    """Forbid `--quick` with an option for full measurements, by a `UsageError`."""
     if quick:
         raise UsageError(
             f"{option} cannot be combined with --quick: recorded measurements are complete"
@@ -302,27 +286,19 @@ def write_records(
     root: Path, measurement: Measurement[_T], records: Iterable[tuple[str, bytes]]
 ) -> Measurement[_T]:
     """Write reports, given as (path, bytes), and add what was done to the measurement."""
-    outcomes = [_write_record(root, path, data) for path, data in records]
-    return replace(
-        measurement,
-        failures=tuple(outcome for outcome in outcomes if isinstance(outcome, ReportFailure)),
-        remarks=tuple(outcome for outcome in outcomes if isinstance(outcome, str)),
-    )
-
-
-def _write_record(root: Path, path: str, data: bytes) -> str | ReportFailure:
-    """Write a report, and say what was done, or why it cannot be done."""
-    try:
-        target = resolve_inside(root, path)
-        before = target.read_bytes() if target.exists() else None
-        if before == data:
-            return f"{path} is unchanged"
-        write_atomic(root, path, data, expected=before)
-    except EffectError as error:
-        return ReportFailure(error.message, error.help)
-    except OSError as error:
-        return ReportFailure(f"{path} cannot be written: {reason(error)}")
-    return f"wrote {path}"
+    failures, remarks = [], []
+    for path, data in records:
+        try:
+            target = resolve_inside(root, path)
+            before = target.read_bytes() if target.exists() else None
+            if before != data:
+                write_atomic(root, path, data, expected=before)
+            remarks.append(f"{path} is unchanged" if before == data else f"wrote {path}")
+        except EffectError as error:
+            failures.append(ReportFailure(error.message, error.help))
+        except OSError as error:
+            failures.append(ReportFailure(f"{path} cannot be written: {reason(error)}"))
+    return replace(measurement, failures=tuple(failures), remarks=tuple(remarks))
 
 
 _SUPERSCRIPTS = str.maketrans("-\u22120123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

@@ -1,11 +1,6 @@
 """Measures the scenarios of a scene, with its compiled model and a clock.
 
-Entry points: `compile_scene(root, scene)`, `run_scenario(compiled, …)`, `run_sweep`;
-`add_card(root, scene, report)`, what a model is made of and how fast the browser's engine runs it.
-
-1. The clock is the processor time of this thread: it stands still while others run.
-2. MuJoCo's warnings are not printed: it would also write them into the working directory, which is
-   the author's.
+The clock is the processor time of this thread: it stands still while others run.
 """
 
 from __future__ import annotations
@@ -70,11 +65,7 @@ class CompiledScene(Struct, frozen=True):
 
 
 def compile_scene(root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
-    """Compile a scene, and work out its scenarios.
-
-    Raises:
-        CannotMeasureError: this is not possible.
-    """
+    """Compile a scene and find its scenarios; a `CannotMeasureError` where it cannot be done."""
     with report_errors(scene):
         model = _compile_model(root, scene)
         exact = _exact_motion(root, scene)
@@ -92,11 +83,7 @@ def run_scenario(
     timed: bool,
     tell: Callable[[str], None],
 ) -> ScenarioReport:
-    """Measure a scenario, given by its number.
-
-    Raises:
-        CannotMeasureError: this is not possible.
-    """
+    """Measure a scenario, given by its number; a `CannotMeasureError` where it cannot be done."""
     clock = time.thread_time_ns if timed else None
     with report_errors(compiled_scene.scene), one_processor():
         scenario = compiled_scene.scenarios[number]
@@ -112,11 +99,7 @@ def run_sweep(
     tell: Callable[[str], None],
     piece: slice | None = None,
 ) -> SweepReport:
-    """Measure a sweep that the course declares, or some of its settings, but no threads.
-
-    Raises:
-        CannotMeasureError: this is not possible.
-    """
+    """Measure a sweep, or a piece without threads; a `CannotMeasureError` if it cannot be done."""
     tell(sweep.name)
     clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
     scenario = next(s for s in compiled_scene.scenarios if sweep.scenario in (None, s.name))
@@ -139,13 +122,10 @@ def run_sweep(
 def report_errors(
     scene: CourseScene, failure: str = "the model `{}` cannot be measured", *errors: type[Exception]
 ) -> Iterator[None]:
-    """Turn errors into diagnostics at their places, and silence MuJoCo's warnings.
+    """Turn errors into a `CannotMeasureError` with their places, and silence MuJoCo's warnings.
 
     `failure` says what is not possible because of one of `errors`, or of what MuJoCo refuses to
     run, such as a model that asks for less memory than it needs.
-
-    Raises:
-        CannotMeasureError: there was one.
     """
     try:
         with silent():
@@ -206,11 +186,7 @@ class _Answer(Struct, frozen=True):
 def add_card(
     root: Path, scene: CourseScene, report: SceneReport, seconds: float = _SECONDS
 ) -> SceneReport:
-    """Add the model's card to its report; a run in the browser's engine may take `seconds`.
-
-    Raises:
-        EffectError: an engine cannot be loaded.
-    """
+    """Add the model's card to its report; a run in the browser's engine may take `seconds`."""
     from coursebuild.core.run.mjcf import existing_files
     from coursebuild.features.lab.engines.browser import real_time_factor
 

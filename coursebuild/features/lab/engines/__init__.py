@@ -1,6 +1,1 @@
-"""The two engines of trials: the browser's, in V8, and native MuJoCo.
-
-- `browser` (with `pieces.js`): `LabEngine`, and how fast it runs a model
-- `native` (with its child `native_worker`): `NativeEngine`, and the files of both on which results
-  depend
-"""
+"""The engines of trials: the browser's MuJoCo in V8, and the native one in a child process."""

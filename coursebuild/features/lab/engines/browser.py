@@ -1,10 +1,7 @@
 """The browser's MuJoCo in this process: V8 runs the same WebAssembly file and the same lab code.
 
-Entry points: `LabEngine.trial`, `LabEngine.check_code`. `site/js/lab/trial/trial.js` describes
-requests and replies.
-
-The engine starts when it is first needed, and again after a trial that ran too long or took too
-much memory, so that such a trial fails alone.
+`site/js/lab/trial/trial.js` describes requests and replies. The engine starts when it is first
+needed, and again after a trial that had to be ended, so that such a trial fails alone.
 """
 
 from __future__ import annotations
@@ -21,10 +18,11 @@ from coursebuild.core.run.v8 import Heartbeat, Isolate, LimitError, ScriptError,
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.compile import LabCode, compile_lab
 from coursebuild.features.lab.engines.native import (
+    TRIAL,
+    WASM,
     NativeEngine,
     NativeError,
-    script_path,
-    wasm_path,
+    asset_path,
 )
 from coursebuild.features.lab.model import SIMLAB, Lab
 from coursebuild.features.lab.schema import SimLab
@@ -35,25 +33,14 @@ _PATIENCE = 5.0
 _PIECES = Path(__file__).with_name("pieces.js")
 
 
-class LabEngine:
-    """Runs trials, one after the other; a context manager for use in one thread."""
+class V8Engine:
+    """Code of the page in V8, started when it is first needed."""
 
-    def __init__(self, memory: int = LIMITS.memory, patience: float = _PATIENCE) -> None:
-        """`memory`: MiB of JavaScript objects; WebAssembly's memory comes on top.
-
-        `patience`: seconds of processor time that a trial may take without progress.
-        """
+    def __init__(self, memory: int) -> None:
+        """`memory`: MiB of JavaScript objects; WebAssembly's memory comes on top."""
         self._memory = memory << 20
-        self._patience = patience
         self._isolate: Isolate | None = None
         self._stopped = False
-        self.version = ""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Free V8's memory; the engine can be used again."""
@@ -66,6 +53,22 @@ class LabEngine:
         self._stopped = True
         if (isolate := self._isolate) is not None:
             isolate.stop()
+
+
+class LabEngine(V8Engine):
+    """Runs trials, one after the other; a context manager for use in one thread."""
+
+    def __init__(self, memory: int = LIMITS.memory, patience: float = _PATIENCE) -> None:
+        """`patience`: seconds of processor time that a trial may take without progress."""
+        super().__init__(memory)
+        self._patience = patience
+        self.version = ""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def check_code(self, pieces: Sequence[LabCode]) -> list[str | None]:
         """Say of each piece of code why it cannot be part of a lab; `None` if it can."""
@@ -110,7 +113,6 @@ class LabEngine:
         return reply
 
     def _end(self, isolate: Isolate, kind: str, message: str) -> dict[str, Any]:
-        """End the engine, and make the reply of the trial that it ran."""
         entry: list[str | int] = []
         with contextlib.suppress(LimitError, ScriptError):
             progress = json.loads(isolate.call("trying", "", _START_SECONDS))
@@ -130,10 +132,10 @@ class LabEngine:
         return isolate
 
     def _start(self) -> Isolate:
-        scripts = (path.read_text(encoding="utf-8") for path in (script_path(), _PIECES))
+        scripts = (path.read_text(encoding="utf-8") for path in (asset_path(TRIAL), _PIECES))
         self._isolate = isolate = Isolate(*scripts, memory=self._memory)
         try:
-            isolate.fill("wasm", wasm_path().read_bytes())
+            isolate.fill("wasm", asset_path(WASM).read_bytes())
             isolate.call("boot", "", _START_SECONDS)
             self.version = isolate.call("booted", "", _START_SECONDS)
         except (LimitError, ScriptError) as error:

@@ -1,9 +1,5 @@
 """Native MuJoCo for labs: saves models as MJB files, and repeats runs of the browser's engine.
 
-Entry points: `NativeEngine`, a context manager around a child process; `LAB_ENGINE`, the version of
-MuJoCo in the browser; `wasm_path`, `script_path`, `engine_digest`, `lab_digest`: files that a trial
-runs, whose digests can be had without V8.
-
 Only the version that wrote an MJB file can read it. Where another MuJoCo is installed than that of
 the browser, the child runs in an environment with that one, in the user's state folder.
 """
@@ -26,33 +22,19 @@ LAB_ENGINE = "3.14.0"
 """The version of MuJoCo in the browser, as `site/package.json` names it."""
 
 
-def wasm_path() -> Path:
-    """The path of MuJoCo for browsers."""
-    return assets_dir() / "mujoco" / "mujoco.wasm"
+WASM, TRIAL, EQUATION_TRIAL = "mujoco/mujoco.wasm", "js/lab-trial.js", "js/equation-trial.js"
+"""MuJoCo for browsers, and the scripts that run trials in V8, with and without it."""
 
 
-def script_path() -> Path:
-    """The path of the script that runs trials in V8."""
-    return assets_dir() / "js" / "lab-trial.js"
-
-
-@functools.cache
-def engine_digest() -> str:
-    """Return a hash of both files."""
-    digest = hashlib.sha256(wasm_path().read_bytes())
-    digest.update(script_path().read_bytes())
-    return digest.hexdigest()
-
-
-def equation_script_path() -> Path:
-    """The path of the script that tries labs without an engine in V8."""
-    return assets_dir() / "js" / "equation-trial.js"
+def asset_path(name: str) -> Path:
+    """The path of a file that a trial runs."""
+    return assets_dir() / name
 
 
 @functools.cache
-def equation_script_digest() -> str:
-    """Return a hash of that script."""
-    return hashlib.sha256(equation_script_path().read_bytes()).hexdigest()
+def asset_digest(*names: str) -> str:
+    """Return a hash of files that a trial runs."""
+    return hashlib.sha256(b"".join(asset_path(name).read_bytes() for name in names)).hexdigest()
 
 
 @functools.cache
@@ -69,14 +51,10 @@ class NativeError(Exception):
 
 
 class NativeEngine(JsonChild):
-    """The child that runs MuJoCo.
+    """The child that runs MuJoCo; requests raise a `NativeError` if it dies.
 
-    Args:
-        root: the course's folder.
-        seconds: processor time that one request may take.
-        memory: MiB that the child may take.
-        compiling: processor time that a model may take to compile.
-        say: tells of an environment that has to be made.
+    `seconds` and `compiling` are the processor time that a request and a model may take; `memory`
+    is in MiB; `say` tells of an environment that has to be made.
     """
 
     def __init__(
@@ -95,11 +73,8 @@ class NativeEngine(JsonChild):
     def save(self, path: str, text: str) -> bytes:
         """Compile a text as if it stood at a path of the course, and return the MJB file.
 
-        The same text and files give the same bytes wherever the course lies.
-
-        Raises:
-            NativeError: it does not compile (which is reported before), or the child died.
-            EffectError: MuJoCo cannot be loaded.
+        The same text and files give the same bytes wherever the course lies. A text that does not
+        compile raises a `NativeError`; it is reported before.
         """
         request = {"task": "save", "path": str(self._root / path), "text": text}
         return base64.b64decode(self._request(request, self._compiling)["mjb"])
@@ -109,10 +84,6 @@ class NativeEngine(JsonChild):
 
         `run` is the `parity` part of a trial's reply; the size of a difference counts up to the
         step `horizon`.
-
-        Raises:
-            NativeError: the model cannot be loaded, or the child died.
-            EffectError: MuJoCo cannot be loaded.
         """
         model = run["mjb"]["data"] if run["mjb"] else base64.b64encode(mjb).decode()
         return self._request({"task": "parity", "mjb": model, "run": run, "horizon": horizon})
@@ -123,10 +94,6 @@ class NativeEngine(JsonChild):
         `request` has the script's `path` in the course (nothing need be there), its `text`, its
         `buttons`, `variants` (the text with other values), and `near`, the step whose state is
         returned.
-
-        Raises:
-            NativeError: the child died.
-            EffectError: MuJoCo cannot be loaded.
         """
         library = str(Path(__file__).resolve().parents[4])
         return self._request({"task": "script", "library": library, **request})

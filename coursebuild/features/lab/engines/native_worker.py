@@ -1,14 +1,8 @@
 """The child process that runs native MuJoCo for labs: it saves models and repeats runs.
 
-Entry point: run as a file by `native`, in a temporary folder, where MuJoCo may leave its log.
-
-The protocol: JSON lines, with binary data in base64. The first line says that this process is
-ready; then it answers each request with one line. A request that takes more processor time than its
-limit ends this process by SIGPROF.
-
-- `save`: compile a text (as if it stood at a path) and return the model as an MJB file.
-- `script`: run an exported script as its user would, and observe it.
-- `parity`: load an MJB file, set the state, step, and compare with the states that were recorded.
+`native` runs this file in a temporary folder, where MuJoCo may leave its log. The protocol is JSON
+lines: this process says that it is ready, then answers each request with one line. A request that
+takes more processor time than its limit ends this process by SIGPROF.
 """
 
 from __future__ import annotations
@@ -141,7 +135,6 @@ def _relative_difference(native: Any, browser: Any) -> float:
 
 
 def _script(request: Any) -> dict[str, Any]:
-    """Run a script's `main`, then its buttons, then its variants with other values of controls."""
     if importlib.util.find_spec("mjcourse") is None:
         sys.path.append(request["library"])
     try:
@@ -173,7 +166,6 @@ def _load(path: str, text: str) -> Any:
 
 
 def _observe(module: Any, recorded_step: int) -> dict[str, Any]:
-    """Run a script's `main`; return its steps, state after `recorded_step` and readouts."""
     observations: dict[str, Any] = {"steps": 0, "state": []}
     step, simulate = module.step, module.simulate
 

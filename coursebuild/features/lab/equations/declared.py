@@ -1,8 +1,4 @@
-"""The fields of labs without an engine: `lab plot` and `lab ode`.
-
-Entry points: `PlotLab`, `OdeLab`. The decoder checks a fence against them; `compile` checks how
-they fit together, and makes the lab of them.
-"""
+"""The fields of labs without an engine: `lab plot` and `lab ode`."""
 
 # No `from __future__ import annotations` here: msgspec would evaluate each annotation, a text then,
 # again in every struct that inherits it.

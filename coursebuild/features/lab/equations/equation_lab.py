@@ -1,12 +1,8 @@
 """Labs without an engine: `lab plot` and `lab ode`, from their TOML or JSON to a `Lab`.
 
-Entry point: `parse_equations`.
-
-1. The text is read into nodes, and these into the declared fields; JSON begins with a brace.
-2. Each expression becomes a program over an environment: the variable of the axis, then the states,
-   the controls and the definitions, each in its slot.
-3. What the page and the trial run is data, in `Lab.config`; `Lab.fields` has what labs of all kinds
-   show of themselves.
+Each expression becomes a program over an environment: the variable of the axis, then the states,
+the controls and the definitions, each in its slot. What the page and the trial run is in
+`Lab.config`; `Lab.fields` has what labs of all kinds show of themselves.
 """
 
 from __future__ import annotations
@@ -41,15 +37,9 @@ from coursebuild.core.text.diagnostics import (
 )
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
+from coursebuild.features.lab import relations, schema
 from coursebuild.features.lab.compile import control_data
-from coursebuild.features.lab.equations.declared import (
-    Axis,
-    EquationLab,
-    EquationPlot,
-    OdeLab,
-    PlotLab,
-    Tolerance,
-)
+from coursebuild.features.lab.equations import declared
 from coursebuild.features.lab.equations.formula import (
     ARITIES,
     CONSTANTS,
@@ -59,21 +49,6 @@ from coursebuild.features.lab.equations.formula import (
     normalise_name,
 )
 from coursebuild.features.lab.model import PLOT, Lab, values_in
-from coursebuild.features.lab.relations import (
-    check_axes,
-    check_controls,
-    check_steps,
-    known_controls,
-)
-from coursebuild.features.lab.schema import (
-    Goal,
-    Plot,
-    PlotFields,
-    Select,
-    SimLab,
-    Slider,
-    TraceFields,
-)
 
 _MOST_STATES = 20
 _MOST = {
@@ -95,7 +70,7 @@ def parse_equations(
     )
     if text.value is None:
         return Parsed(None, sort_diagnostics(text.diagnostics))
-    fields_type: type[EquationLab] = PlotLab if kind == PLOT else OdeLab
+    fields_type: type[declared.EquationLab] = declared.PlotLab if kind == PLOT else declared.OdeLab
     decoding = decode(text.value, fields_type, "the lab", JSON if is_json else TOML)
     prose = Prose.read(decoding.texts, texts)
     diagnostics = [*text.diagnostics, *decoding.diagnostics, *prose.diagnostics]
@@ -120,10 +95,10 @@ def parse_equations(
     return Parsed(None if diagnostics else lab, sort_diagnostics(diagnostics))
 
 
-def _common_fields(fields: EquationLab, config: Mapping[str, Any]) -> SimLab:
+def _common_fields(fields: declared.EquationLab, config: Mapping[str, Any]) -> schema.SimLab:
     """What the static form, copies and the search know of a lab of any kind."""
     goal = fields.goal
-    return SimLab(
+    return schema.SimLab(
         title=fields.title,
         height=fields.height,
         dock=fields.dock,
@@ -131,25 +106,24 @@ def _common_fields(fields: EquationLab, config: Mapping[str, Any]) -> SimLab:
         readouts=fields.readouts,
         plots=tuple(
             convert(
-                {name: plot[name] for name in PlotFields.__struct_fields__}
+                {name: plot[name] for name in schema.PlotFields.__struct_fields__}
                 | {
                     "traces": [
                         {"label": t["label"], "dash": t["dash"], "expr": "0"}
                         for t in plot["traces"]
                     ]
                 },
-                Plot,
+                schema.Plot,
             )
             for plot in config["plots"]
         ),
-        goal=None if goal is None else Goal(goal.text, goal.expr, (), goal.hold),
+        goal=None if goal is None else schema.Goal(goal.text, goal.expr, (), goal.hold),
     )
 
 
 def _check(node: ObjectNode, structs: Mapping[ObjectNode, Struct]) -> Iterator[Diagnostic]:
-    """Check how fields fit together, of each part whose own fields are right."""
-    yield from check_controls(node, structs, ("param",))
-    yield from check_axes(node, structs)
+    yield from relations.check_controls(node, structs, ("param",))
+    yield from relations.check_axes(node, structs)
     for owner in (node, *node.objects("controls"), *node.objects("plots")):
         for name, most in _MOST.items():
             if (count := len(owner.items(name))) > most:
@@ -161,7 +135,7 @@ def _check(node: ObjectNode, structs: Mapping[ObjectNode, Struct]) -> Iterator[D
             yield diagnose("field-value", plot.place("points"), message, help=help)
     for control in node.objects("controls"):
         match structs.get(control):
-            case Slider() | Select():
+            case schema.Slider() | schema.Select():
                 for name in _FOREIGN:
                     if name in control.members:
                         message = f"`{name}` acts on a simulation, and this lab has none"
@@ -178,12 +152,12 @@ def _check(node: ObjectNode, structs: Mapping[ObjectNode, Struct]) -> Iterator[D
                 message = "the value of an option is a number here"
                 yield diagnose("field-type", option.items[-1].mark, message)
         yield from _check_units(control)
-    controls = known_controls(node, structs)
+    controls = relations.known_controls(node, structs)
     goal = node.object("goal")
     for owner in (*node.objects("expect"), goal):
         after = owner.get("after")
         if isinstance(after, ObjectNode) and (after.members or owner is goal):
-            yield from check_steps(after, "after", controls)
+            yield from relations.check_steps(after, "after", controls)
 
 
 def _check_units(node: ObjectNode) -> Iterator[Diagnostic]:
@@ -195,7 +169,7 @@ def _check_units(node: ObjectNode) -> Iterator[Diagnostic]:
 class _Compiler:
     """Makes the data of a lab from fields that are right, and collects what is wrong with it."""
 
-    def __init__(self, kind: str, node: ObjectNode, fields: EquationLab) -> None:
+    def __init__(self, kind: str, node: ObjectNode, fields: declared.EquationLab) -> None:
         self.kind, self.node, self.fields = kind, node, fields
         self.diagnostics: list[Diagnostic] = []
         self.slots: dict[str, int] = {}
@@ -203,12 +177,12 @@ class _Compiler:
         """Slots whose values differ along the axis."""
 
     def compile(self) -> dict[str, Any]:
-        """Return all data of the lab."""
         node, fields = self.node, self.fields
-        axis_name = "x" if isinstance(fields, PlotLab) else "t"
-        axis = fields.x if isinstance(fields, PlotLab) else fields.t  # type: ignore[attr-defined]
+        axis_name = "x" if isinstance(fields, declared.PlotLab) else "t"
+        axis = fields.x if isinstance(fields, declared.PlotLab) else fields.t  # type: ignore[attr-defined]
         axis_data = self.axis(node.object(axis_name), axis, axis_name)
-        axis_label = _axis_label(axis, axis_name)
+        axis_label = axis.label or axis.name or axis_name
+        axis_label += f" ({axis.unit})" if axis.unit else ""
         state_nodes = node.object("states").members
         for member in state_nodes.values():
             self.declare(member.key.value, member.key.span)
@@ -254,7 +228,7 @@ class _Compiler:
             ],
             "goal": self.goal(controls),
             "expect": [self.claim(n, controls) for n in node.objects("expect")],
-            "verify": to_builtins(fields.verify or Tolerance()),
+            "verify": to_builtins(fields.verify or declared.Tolerance()),
         }
 
     def report(self, rule: str, span: Span, message: str, help: str = "") -> None:
@@ -263,7 +237,6 @@ class _Compiler:
     # --- names
 
     def declare(self, name: str, span: Span) -> int:
-        """Give a name the next slot."""
         key = normalise_name(name)
         if not key.isidentifier() or iskeyword(key):
             help = "a name has letters, digits and `_`, and no digit first"
@@ -276,8 +249,7 @@ class _Compiler:
             key = f"{key} {len(self.slots)}"  # so that what follows keeps its slot
         return self.slots.setdefault(key, len(self.slots))
 
-    def axis(self, node: ObjectNode, axis: Axis, name: str) -> dict[str, Any]:
-        """Return the data of the axis."""
+    def axis(self, node: ObjectNode, axis: declared.Axis, name: str) -> dict[str, Any]:
         self.diagnostics += _check_units(node)
         name_node = node.get("name")
         self.declare(axis.name or name, node.mark if name_node is None else name_node.span)
@@ -292,7 +264,6 @@ class _Compiler:
         return data | {"name": axis.name or name, "at": at}
 
     def definition(self, key: StringNode, value: Node) -> Program:
-        """Compile a definition, which later ones may use."""
         program = self.formula(value)
         slot = self.declare(key.value, key.span)
         if not self.varying.isdisjoint(_slots(program)):
@@ -302,7 +273,6 @@ class _Compiler:
     # --- formulas
 
     def formula(self, node: Node | None) -> Program:
-        """Compile a number or an expression; where it is wrong, this is reported."""
         if isinstance(node, NumberNode):
             return [float(node.value)]
         if not isinstance(node, StringNode):
@@ -312,7 +282,6 @@ class _Compiler:
         return compilation.value or [0.0]
 
     def start(self, node: Node | None) -> Program:
-        """Compile the value of a state at the start."""
         program = self.formula(node)
         if node is not None and not self.varying.isdisjoint(_slots(program)):
             message = "what a state starts from cannot depend on the time or on states"
@@ -321,7 +290,6 @@ class _Compiler:
         return program
 
     def event(self, node: ObjectNode, states: set[str]) -> dict[str, Any]:
-        """Compile an event."""
         condition, stop, direction = node.get("when"), node.get("stop"), 0
         program: Program = [0.0]
         if isinstance(condition, StringNode):
@@ -345,8 +313,9 @@ class _Compiler:
 
     # --- what is shown, and what is claimed
 
-    def plot(self, node: ObjectNode, plot: EquationPlot, axis_label: str) -> dict[str, Any]:
-        """Compile a plot."""
+    def plot(
+        self, node: ObjectNode, plot: declared.EquationPlot, axis_label: str
+    ) -> dict[str, Any]:
         traces: list[dict[str, Any]] = [
             {"label": trace.label, "dash": trace.dash, "value": self.formula(n.get("expr"))}
             for n, trace in zip(node.objects("traces"), plot.traces, strict=True)
@@ -368,9 +337,10 @@ class _Compiler:
         return data | {"xlabel": label, "x": horizontal, "traces": traces, "field": field}
 
     def plot_of_states(self, names: list[str], axis_label: str) -> dict[str, Any]:
-        """Make the plot of a lab that declares none."""
-        traces = tuple(TraceFields(name, name) for name in names) or (TraceFields("", "0"),)
-        data: dict[str, Any] = to_builtins(EquationPlot(traces))
+        traces = tuple(schema.TraceFields(name, name) for name in names) or (
+            schema.TraceFields("", "0"),
+        )
+        data: dict[str, Any] = to_builtins(declared.EquationPlot(traces))
         lines = [
             {"label": name, "dash": False, "value": [[self.slots.get(normalise_name(name), 0)]]}
             for name in names
@@ -378,7 +348,6 @@ class _Compiler:
         return data | {"xlabel": axis_label, "traces": lines, "field": None}
 
     def goal(self, controls: list[dict[str, Any]]) -> dict[str, Any] | None:
-        """Compile the goal."""
         goal, node = self.fields.goal, self.node.get("goal")
         if goal is None or not isinstance(node, ObjectNode):
             return None
@@ -386,7 +355,6 @@ class _Compiler:
         return {"hold": goal.hold, "value": value, "values": values}
 
     def claim(self, node: ObjectNode, controls: list[dict[str, Any]]) -> dict[str, Any]:
-        """Compile a claim."""
         claim = self.fields.expect[self.node.objects("expect").index(node)]
         for name, is_due in (("expr", not claim.diverges), ("diverges", claim.expr is None)):
             if (name in node.members) != is_due:
@@ -407,11 +375,5 @@ def _slots(program: Program) -> set[int]:
     return {item[0] for item in program if isinstance(item, list)}
 
 
-def _axis_label(axis: Axis, name: str) -> str:
-    label = axis.label or axis.name or name
-    return f"{label} ({axis.unit})" if axis.unit else label
-
-
 def _values(controls: list[dict[str, Any]], after: Mapping[str, Any]) -> list[Any]:
-    """The values of all controls, some of which are set."""
     return [after.get(control["label"], control["value"]) for control in controls]

@@ -1,13 +1,7 @@
 """Trials of labs without an engine: the page's own code in V8, held against NumPy and SciPy.
 
-Entry points: `EquationEngine`; `run_trial(engine, config, seconds)` → `EquationReply`;
-`add_points`, of recorded outputs.
-
-1. The page's code computes what follows from the controls as they start, from each at its ends, and
-   from what claims and the goal set.
-2. Curves must be finite, claims hold, the goal be reached by what its author says and by nothing
-   less.
-3. NumPy evaluates each curve again, and SciPy solves the equations.
+Tried are the controls as they start, each at its ends, and what claims and the goal set. Curves
+must be finite, claims hold, the goal be reached by what its author says and by nothing less.
 """
 
 from __future__ import annotations
@@ -27,13 +21,9 @@ from coursebuild.core.files.errors import require
 from coursebuild.core.model import Course, Recording, find_blocks
 from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedError
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.features.lab.engines.native import equation_script_path
-from coursebuild.features.lab.equations.reference import (
-    CurveComparison,
-    CurveRun,
-    compare_states,
-    compare_values,
-)
+from coursebuild.features.lab.engines.browser import V8Engine
+from coursebuild.features.lab.engines.native import EQUATION_TRIAL, asset_path
+from coursebuild.features.lab.equations import reference
 from coursebuild.features.lab.model import PLOT, Entry, Lab
 
 _MOST_POINTS = 500
@@ -82,8 +72,7 @@ class EquationReply(Struct, frozen=True):
     tried: int = 0
     difference: float = 0.0
     """The largest, relative, from NumPy and SciPy."""
-    start: CurveRun | None = None
-    """What follows from the controls as they start."""
+    start: reference.CurveRun | None = None
     seconds: float = 0.0
     timestamp: int = 0
     lasting: bool = True
@@ -94,49 +83,25 @@ class EquationReply(Struct, frozen=True):
         return f"{library} agrees to {self.difference:.0e}" if self.start is not None else ""
 
 
-class EquationEngine:
-    """The page's code in V8, started when it is first needed."""
+class EquationEngine(V8Engine):
+    """The page's code for labs without an engine."""
 
-    def __init__(self, memory: int) -> None:
-        """`memory`: MiB of JavaScript objects."""
-        self._memory = memory << 20
-        self._isolate: Isolate | None = None
-        self._stopped = False
-
-    def close(self) -> None:
-        """Free V8's memory; the engine can be used again."""
-        if self._isolate is not None:
-            self._isolate.close()
-            self._isolate = None
-
-    def stop(self) -> None:
-        """End what runs, and what comes after, by a `StoppedError`; called from another thread."""
-        self._stopped = True
-        if (isolate := self._isolate) is not None:
-            isolate.stop()
-
-    def run(self, request: dict[str, Any], seconds: float) -> list[CurveRun]:
-        """Run the attempts of a lab.
-
-        Raises:
-            LimitError, ScriptError: they do not come to their end.
-        """
+    def run(self, request: dict[str, Any], seconds: float) -> list[reference.CurveRun]:
+        """Run the attempts of a lab; those that do not end raise `LimitError` or `ScriptError`."""
         if self._stopped:
             raise StoppedError
         if self._isolate is None:
-            script = equation_script_path().read_text(encoding="utf-8")
+            script = asset_path(EQUATION_TRIAL).read_text(encoding="utf-8")
             self._isolate = Isolate(script, memory=self._memory)
         try:
             text = self._isolate.call("tryCurves", json.dumps(request), seconds)
         except (LimitError, ScriptError):
             self.close()
             raise
-        return msgspec.convert(json.loads(text), list[CurveRun])
+        return msgspec.convert(json.loads(text), list[reference.CurveRun])
 
 
 class _Attempt(Struct, frozen=True):
-    """Values of the controls, and what they are for."""
-
     values: tuple[float, ...]
     description: str = ""
     entry: Entry = ()
@@ -277,9 +242,8 @@ def _check_points(
 
 
 def _check_run(
-    config: Mapping[str, Any], attempt: _Attempt, run: CurveRun
+    config: Mapping[str, Any], attempt: _Attempt, run: reference.CurveRun
 ) -> Iterator[CurveFinding]:
-    """Check what a run shows, claims and reaches."""
     if run.failure is not None and not _is_claimed(config, attempt, run):
         yield _failure(config, run)
         return
@@ -294,7 +258,21 @@ def _check_run(
         if value is None and "nan" not in readout["value"]:
             message = f"the readout `{readout['label']}` is no finite number"
             yield CurveFinding("lab-value", ("readouts", i, "expr"), message, help=_NAN_HELP)
-    yield from _check_claims(config, attempt, run)
+    for i, value in zip(attempt.claims, run.claims, strict=False):
+        claim = config["expect"][i]
+        at = _place(config, claim["at"])
+        message = ""
+        if claim["value"] is None:
+            if run.failure is None or run.end > claim["at"]:
+                message = f"the solution goes on after {at}"
+        elif value is None:
+            message = f"the claim has no finite value at {at}"
+        elif claim["min"] is not None and value < claim["min"]:
+            message = f"the claim does not hold: {value:.6g} at {at}, not at least {claim['min']:g}"
+        elif claim["max"] is not None and value > claim["max"]:
+            message = f"the claim does not hold: {value:.6g} at {at}, not at most {claim['max']:g}"
+        if message:
+            yield CurveFinding("lab-expect", ("expect", i), message)
     goal = config["goal"]
     if goal is None:
         return
@@ -311,28 +289,7 @@ def _check_run(
 _NAN_HELP = "say where there is no value: `1/x if x != 0 else nan`"
 
 
-def _check_claims(
-    config: Mapping[str, Any], attempt: _Attempt, run: CurveRun
-) -> Iterator[CurveFinding]:
-    for i, value in zip(attempt.claims, run.claims, strict=False):
-        claim = config["expect"][i]
-        at = _place(config, claim["at"])
-        entry: Entry = ("expect", i)
-        if claim["value"] is None:
-            if run.failure is None or run.end > claim["at"]:
-                yield CurveFinding("lab-expect", entry, f"the solution goes on after {at}")
-        elif value is None:
-            yield CurveFinding("lab-expect", entry, f"the claim has no finite value at {at}")
-        elif claim["min"] is not None and value < claim["min"]:
-            message = f"the claim does not hold: {value:.6g} at {at}, not at least {claim['min']:g}"
-            yield CurveFinding("lab-expect", entry, message)
-        elif claim["max"] is not None and value > claim["max"]:
-            message = f"the claim does not hold: {value:.6g} at {at}, not at most {claim['max']:g}"
-            yield CurveFinding("lab-expect", entry, message)
-
-
-def _is_claimed(config: Mapping[str, Any], attempt: _Attempt, run: CurveRun) -> bool:
-    """Whether the solution ends, and the lab claims that it does with one of these controls."""
+def _is_claimed(config: Mapping[str, Any], attempt: _Attempt, run: reference.CurveRun) -> bool:
     claims = [claim for claim in config["expect"] if claim["diverges"]]
     assert run.failure is not None
     start = [control["value"] for control in config["controls"]]
@@ -349,8 +306,7 @@ def _is_claimed(config: Mapping[str, Any], attempt: _Attempt, run: CurveRun) -> 
     )
 
 
-def _failure(config: Mapping[str, Any], run: CurveRun) -> CurveFinding:
-    """Report a solution that ends too soon."""
+def _failure(config: Mapping[str, Any], run: reference.CurveRun) -> CurveFinding:
     assert run.failure is not None
     kind, index, t = run.failure["kind"], run.failure["index"], run.failure["t"]
     rule, text, help = _FAILURES[kind]
@@ -366,20 +322,20 @@ def _failure(config: Mapping[str, Any], run: CurveRun) -> CurveFinding:
 
 
 def _compare(
-    config: dict[str, Any], attempt: _Attempt, run: CurveRun, patience: float
-) -> tuple[CurveComparison, Entry]:
+    config: dict[str, Any], attempt: _Attempt, run: reference.CurveRun, patience: float
+) -> tuple[reference.CurveComparison, Entry]:
     """Compare a run with NumPy and SciPy; return the larger difference, and the entry it is at."""
     tolerance = config["verify"]
-    comparison = compare_values(config, attempt.values, run)
+    comparison = reference.compare_values(config, attempt.values, run)
     if comparison.difference > tolerance["rtol"] or not config["states"] or run.failure is not None:
         return comparison, ("plots",)
     until = config["axis"]["max"] if tolerance["until"] is None else tolerance["until"]
-    states = compare_states(config, attempt.values, run, until, patience)
+    states = reference.compare_states(config, attempt.values, run, until, patience)
     return max(comparison, states, key=lambda c: c.difference), ("states",)
 
 
 def _check_comparison(
-    config: Mapping[str, Any], comparison: CurveComparison, entry: Entry
+    config: Mapping[str, Any], comparison: reference.CurveComparison, entry: Entry
 ) -> Iterator[CurveFinding]:
     rtol = config["verify"]["rtol"]
     if comparison.difference <= rtol:
@@ -398,6 +354,5 @@ def _check_comparison(
 
 
 def _place(config: Mapping[str, Any], t: float) -> str:
-    """A place on the axis, in words."""
     axis = config["axis"]
     return f"{axis['name']} = {t:.6g}" + (f" {axis['unit']}" if axis["unit"] else "")

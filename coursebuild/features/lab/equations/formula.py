@@ -1,7 +1,5 @@
 """Expressions of labs without an engine: text → a program that Python and the page both run.
 
-Entry points: `compile_formula(text, names)`; `compile_condition`, for an event.
-
 An expression is written as in Python, so that it can go from a script into a lab and back. Python's
 own parser reads it; what it may hold is decided here, and nothing is ever evaluated as code. A
 program is in postfix order, as JSON has it: a number is pushed; `[slot]` pushes a value of the
@@ -14,13 +12,14 @@ import ast
 import math
 import unicodedata
 import warnings
-from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias, TypeVar
 
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt
 
 Program: TypeAlias = list[float | str | list[int]]
+T = TypeVar("T")
 
 LONGEST = 1000
 """Characters of an expression."""
@@ -36,6 +35,14 @@ _OPERATORS: dict[type[ast.AST], str] = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
 _DIRECTIONS = {"<": -1, "<=": -1, ">": 1, ">=": 1, "==": 0}
+_FOREIGN_SIGNS = {
+    "?": "write `a if test else b`",
+    "&&": "write `a and b`",
+    "||": "write `a or b`",
+    "\\": "an expression is written as in Python: `sqrt(x)`, not as in TeX",
+    "=": "an expression has a value, and assigns none",
+}
+"""Signs of other languages, with what to write; the first that there is counts."""
 _HELP: dict[type[ast.AST], str] = {
     ast.BitXor: Fix("a power is `a**b`", "**", "^", safe=True),
     ast.FloorDiv: "write `floor(a/b)`",
@@ -44,8 +51,6 @@ _HELP: dict[type[ast.AST], str] = {
 
 
 class _MistakeError(Exception):
-    """What is wrong with a part of an expression."""
-
     def __init__(self, node: ast.expr, message: str, help: str = "", rule: str = "lab-code"):
         super().__init__(message)
         self.node, self.message, self.help, self.rule = node, message, help, rule
@@ -53,27 +58,21 @@ class _MistakeError(Exception):
 
 def compile_formula(text: Excerpt, names: Mapping[str, int]) -> Parsed[Program | None]:
     """Compile an expression over names, each with its slot in the environment. Never raises."""
-    tree = _parse(text)
-    if isinstance(tree, Diagnostic):
-        return Parsed(None, (tree,))
-    try:
+
+    def compile_tree(tree: ast.expr) -> Program:
         program: Program = []
         _emit(tree, names, program)
-        return Parsed(program)
-    except _MistakeError as mistake:
-        return Parsed(None, (_diagnose(text, mistake),))
-    except RecursionError:
-        return Parsed(None, (diagnose("lab-code", text.span(), "the expression nests too deep"),))
+        return program
+
+    return _compile(text, compile_tree)
 
 
 def compile_condition(
     text: Excerpt, names: Mapping[str, int]
 ) -> Parsed[tuple[Program, int] | None]:
     """Compile a comparison: the difference of its sides, and the direction in which it passes 0."""
-    tree = _parse(text)
-    if isinstance(tree, Diagnostic):
-        return Parsed(None, (tree,))
-    try:
+
+    def compile_tree(tree: ast.expr) -> tuple[Program, int]:
         match tree:
             case ast.Compare(left=left, ops=[op], comparators=[right]):
                 sign = _OPERATORS.get(type(op), "")
@@ -81,10 +80,20 @@ def compile_condition(
                     program: Program = []
                     for side in (left, right):
                         _emit(side, names, program)
-                    return Parsed(([*program, "-"], _DIRECTIONS[sign]))
+                    return [*program, "-"], _DIRECTIONS[sign]
             case _:
                 pass
         raise _MistakeError(tree, "an event is one comparison", "write it as in `height < 0`")
+
+    return _compile(text, compile_tree)
+
+
+def _compile(text: Excerpt, compile_tree: Callable[[ast.expr], T]) -> Parsed[T | None]:
+    tree = _parse(text)
+    if isinstance(tree, Diagnostic):
+        return Parsed(None, (tree,))
+    try:
+        return Parsed(compile_tree(tree))
     except _MistakeError as mistake:
         return Parsed(None, (_diagnose(text, mistake),))
     except RecursionError:
@@ -92,7 +101,6 @@ def compile_condition(
 
 
 def _parse(text: Excerpt) -> ast.expr | Diagnostic:
-    """Parse an expression, which may take several lines."""
     if len(text.text) > LONGEST:
         message = f"the expression has {len(text.text)} characters, {LONGEST} at most can be read"
         return diagnose("lab-code", text.span(), message, help="name parts of it in `where`")
@@ -107,22 +115,13 @@ def _parse(text: Excerpt) -> ast.expr | Diagnostic:
         reason = (error.msg or "").partition(". ")[0].removeprefix("invalid syntax")
         reason = reason[:1].lower() + reason[1:]
         message = f"the expression cannot be read{': ' if reason else ' here'}{reason}"
-        return diagnose("lab-code", text.span(at, at + 1), message, help=_syntax_help(line))
+        help = next(
+            (help for sign, help in _FOREIGN_SIGNS.items() if sign in line),
+            "an expression is written as in Python: `2*sin(x)**2`",
+        )
+        return diagnose("lab-code", text.span(at, at + 1), message, help=help)
     except (ValueError, RecursionError, MemoryError):
         return diagnose("lab-code", text.span(), "the expression cannot be read")
-
-
-def _syntax_help(line: str) -> str:
-    for foreign, help in (
-        ("?", "write `a if test else b`"),
-        ("&&", "write `a and b`"),
-        ("||", "write `a or b`"),
-        ("\\", "an expression is written as in Python: `sqrt(x)`, not as in TeX"),
-        ("=", "an expression has a value, and assigns none"),
-    ):
-        if foreign in line:
-            return help
-    return "an expression is written as in Python: `2*sin(x)**2`"
 
 
 def _diagnose(text: Excerpt, mistake: _MistakeError) -> Diagnostic:

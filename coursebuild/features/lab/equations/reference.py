@@ -1,8 +1,4 @@
-"""The same curves by other means: NumPy evaluates the formulas, SciPy solves the equations.
-
-Entry points: `evaluate(program, env)`; `compare_values` and `compare_states`, which hold a run of
-the page's own code against them.
-"""
+"""The same curves by other means: NumPy evaluates the formulas, SciPy solves the equations."""
 
 from __future__ import annotations
 
@@ -128,8 +124,6 @@ class _TooLongError(Exception):
 
 
 class _Equations:
-    """The equations of a lab for SciPy."""
-
     def __init__(self, config: dict[str, Any], values: Sequence[float], end: float) -> None:
         """`end`: the processor time of this thread at which patience ends, s."""
         self.config, self.values, self.count, self.end = config, values, 0, end
@@ -191,7 +185,6 @@ class _Equations:
         return quantity
 
     def assign(self, index: int, t: float, y: list[float]) -> list[float]:
-        """The states after an event."""
         self.before = index, self.quantity(index, t, y)
         env = environment(self.config, self.values, t, y)
         after = list(y)

@@ -1,7 +1,4 @@
-"""Translates expressions of lab code from JavaScript to Python.
-
-Entry points: `Expressions`, `engine_field`; see `translate`.
-"""
+"""Expressions of lab code, from JavaScript to Python; see `translate`."""
 
 from __future__ import annotations
 
@@ -14,18 +11,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from tree_sitter import Node
 
-from coursebuild.features.lab.javascript import (
-    UntranslatableError,
-    arguments,
-    array_items,
-    children,
-    dotted_name,
-    field,
-    refusal,
-    string_value,
-    template_parts,
-    text_of,
-)
+from coursebuild.features.lab import javascript as js
 
 ROOTS = frozenset("model data mj sim ctx lib Math".split())
 RESERVED = ROOTS.union(
@@ -92,7 +78,7 @@ class Expressions:
 
     def part(self, node: Node, name: str) -> str:
         """Translate an expression that is part of a node."""
-        return self.expression(field(node, name))
+        return self.expression(js.field(node, name))
 
     def all(self, nodes: Iterable[Node]) -> str:
         """Translate expressions, and put commas between them."""
@@ -102,32 +88,34 @@ class Expressions:
         """Translate an expression that is used for its value."""
         match node.type:
             case "number":
-                text = text_of(node)
+                text = js.text_of(node)
                 if text.endswith("n"):
-                    raise UntranslatableError(f"the number `{text}`")
+                    raise js.UntranslatableError(f"the number `{text}`")
                 return text
             case "string":
-                return repr(string_value(node))
+                return repr(js.string_value(node))
             case "template_string":
-                parts = template_parts(node)
+                parts = js.template_parts(node)
                 texts = (repr(p) if isinstance(p, str) else self.text(p) for p in parts)
                 return f"({' + '.join(texts) or repr('')})"
             case "true" | "false":
                 return node.type.capitalize()
             case "identifier":
-                return self.name(text_of(node))
+                return self.name(js.text_of(node))
             case "member_expression":
                 return self.member(node)
             case "subscript_expression":
                 text = self.element(node)
-                is_single = engine_field(dotted_name(field(node, "object"))) == "single"
+                is_single = (
+                    engine_fields().get(js.dotted_name(js.field(node, "object"))) == "single"
+                )
                 return f"float({text})" if is_single else text
             case "call_expression":
                 return self.call(node)
             case "spread_element":
-                return f"*{self.expression(children(node)[0])}"
+                return f"*{self.expression(js.children(node)[0])}"
             case "array":
-                return f"np.array([{self.all(array_items(node))}], dtype=float)"
+                return f"np.array([{self.all(js.array_items(node))}], dtype=float)"
             case "unary_expression" if operator_of(node) in _UNARY:
                 return f"({_UNARY[operator_of(node)]}{self.part(node, 'argument')})"
             case "binary_expression":
@@ -140,15 +128,15 @@ class Expressions:
                 )
                 return f"({first} if {self.part(node, 'condition')} else {second})"
             case _:
-                raise refusal(node)
+                raise js.refusal(node)
 
     def binary(self, node: Node) -> str:
         """Translate an operator with two operands."""
-        operator, sides = operator_of(node), (field(node, "left"), field(node, "right"))
+        operator, sides = operator_of(node), (js.field(node, "left"), js.field(node, "right"))
         if operator == "%":
             return f"np.fmod({self.all(sides)})"
         if operator not in _BINARY:
-            raise UntranslatableError(f"`{operator}`")
+            raise js.UntranslatableError(f"`{operator}`")
         translate = self.text if _is_text(node) else self.expression
         return f"({translate(sides[0])} {_BINARY[operator]} {translate(sides[1])})"
 
@@ -169,12 +157,12 @@ class Expressions:
         if name in ("model", "data"):
             return name
         if name not in _UNBOUNDED:
-            raise UntranslatableError(f"`{name}`")
+            raise js.UntranslatableError(f"`{name}`")
         return _UNBOUNDED[name]
 
     def member(self, node: Node) -> str:
         """Translate a name with dots."""
-        path, name = dotted_name(node), text_of(field(node, "property"))
+        path, name = js.dotted_name(node), js.text_of(js.field(node, "property"))
         match path:
             case ("sim", "time"):
                 return "data.time"
@@ -186,21 +174,21 @@ class Expressions:
                 return f"mujoco.{enumeration}.{member}.value"
             case _:
                 pass
-        kind = engine_field(path)
+        kind = engine_fields().get(path)
         if kind is not None:
             return ".".join(path) + (_FLAT if kind in ("rows", "single") else "")
         if name == "length":
             return f"{self.part(node, 'object')}.size"
         if name in ("kinetic", "potential", "total") and not path:
             return f"{self.part(node, 'object')}.{name}"
-        raise refusal(node)
+        raise js.refusal(node)
 
     def element(self, node: Node) -> str:
         """Translate an element of an array; one with rows is flat, as in JavaScript."""
         array = self.part(node, "object")
         if array.endswith(_FLAT):
             array = f"{array.removesuffix(_FLAT)}.flat"
-        return f"{array}[{self.index(field(node, 'index'))}]"
+        return f"{array}[{self.index(js.field(node, 'index'))}]"
 
     def index(self, node: Node) -> str:
         """Translate an index, which in Python must be an `int`."""
@@ -211,16 +199,19 @@ class Expressions:
         """Whether an expression is surely a whole number."""
         match node.type:
             case "number":
-                return text_of(node).isdecimal()
+                return js.text_of(node).isdecimal()
             case "identifier":
-                return text_of(node) in self.counters
+                return js.text_of(node) in self.counters
             case "binary_expression":
-                sides = (field(node, "left"), field(node, "right"))
+                sides = (js.field(node, "left"), js.field(node, "right"))
                 return operator_of(node) in "+-*" and all(map(self.is_whole, sides))
             case "call_expression":
-                return dotted_name(field(node, "function"))[-1:] in (("bodyId",), ("jointId",))
+                return js.dotted_name(js.field(node, "function"))[-1:] in (
+                    ("bodyId",),
+                    ("jointId",),
+                )
             case "member_expression":
-                return text_of(field(node, "property")) == "length"
+                return js.text_of(js.field(node, "property")) == "length"
             case _:
                 return False
 
@@ -231,13 +222,13 @@ class Expressions:
 
     def call(self, node: Node) -> str:
         """Translate a call that is used for its value."""
-        function, values = field(node, "function"), arguments(node)
-        path = dotted_name(function)
+        function, values = js.field(node, "function"), js.arguments(node)
+        path = js.dotted_name(function)
         if ".".join(path) in _FUNCTIONS:
             return _FUNCTIONS[".".join(path)].replace("...", self.all(values))
         if path[:1] == ("mj",) and hasattr(_mujoco(), path[-1]):
             return f"mujoco.{path[-1]}({self.all(values)})"
-        match text_of(field(function, "property")) if "member" in function.type else "":
+        match js.text_of(js.field(function, "property")) if "member" in function.type else "":
             case "slice" | "subarray" as method if len(values) < 3:
                 part = f"{self.part(function, 'object')}[{self.bounds(values) or ':'}]"
                 return part + ".copy()" * (method == "slice")
@@ -245,11 +236,12 @@ class Expressions:
                 digits = self.all(values) or "0"
                 return f"format({self.part(function, 'object')}, '.{digits}f')"
             case _:
-                raise refusal(function, "a call of ")
+                raise js.refusal(function, "a call of ")
 
 
 @functools.cache
-def _engine_fields() -> Mapping[tuple[str, ...], EngineField]:
+def engine_fields() -> Mapping[tuple[str, ...], EngineField]:
+    """Map paths such as `("model", "opt", "gravity")` to what numbers stand there."""
     mujoco = _mujoco()
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
     owners: dict[tuple[str, ...], Any] = {
@@ -258,24 +250,16 @@ def _engine_fields() -> Mapping[tuple[str, ...], EngineField]:
         ("model", "opt"): model.opt,
         ("model", "stat"): model.stat,
     }
-    return {
-        (*owner, name): kind
-        for owner, values in owners.items()
-        for name in dir(values)
-        if not name.startswith("_") and (kind := _kind(getattr(values, name))) is not None
-    }
-
-
-def engine_field(path: tuple[str, ...]) -> EngineField | None:
-    """Say what `("model", "opt", "gravity")` is; `None` if it holds no numbers."""
-    return _engine_fields().get(path)
-
-
-def _kind(value: object) -> EngineField | None:
-    if isinstance(value, np.ndarray):
-        is_single = value.dtype == np.float32
-        return "single" if is_single else "rows" if value.ndim > 1 else "array"
-    return "number" if isinstance(value, int | float) else None
+    fields: dict[tuple[str, ...], EngineField] = {}
+    for owner, values in owners.items():
+        for name in dir(values):
+            value = None if name.startswith("_") else getattr(values, name)
+            if isinstance(value, np.ndarray):
+                kind: EngineField = "rows" if value.ndim > 1 else "array"
+                fields[*owner, name] = "single" if value.dtype == np.float32 else kind
+            elif isinstance(value, int | float):
+                fields[*owner, name] = "number"
+    return fields
 
 
 def _mujoco() -> Any:
@@ -292,11 +276,11 @@ def python_name(name: str) -> str:
 
 def operator_of(node: Node) -> str:
     """Return the operator of an expression."""
-    return text_of(field(node, "operator"))
+    return js.text_of(js.field(node, "operator"))
 
 
 def _branches(node: Node) -> tuple[Node, Node]:
-    return field(node, "consequence"), field(node, "alternative")
+    return js.field(node, "consequence"), js.field(node, "alternative")
 
 
 def _is_text(node: Node) -> bool:
@@ -305,11 +289,14 @@ def _is_text(node: Node) -> bool:
         case "string" | "template_string":
             return True
         case "binary_expression" if operator_of(node) == "+":
-            return _is_text(field(node, "left")) or _is_text(field(node, "right"))
+            return _is_text(js.field(node, "left")) or _is_text(js.field(node, "right"))
         case "ternary_expression":
             return any(map(_is_text, _branches(node)))
         case "call_expression":
-            function = field(node, "function")
-            return "member" in function.type and text_of(field(function, "property")) == "toFixed"
+            function = js.field(node, "function")
+            return (
+                "member" in function.type
+                and js.text_of(js.field(function, "property")) == "toFixed"
+            )
         case _:
             return False

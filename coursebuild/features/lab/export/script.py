@@ -1,18 +1,13 @@
 """A lab as a Python script that does natively what the lab does in the page, and its trial.
 
-Entry points: `export_script(lab, metadata)`; `fill_in_values`, for the values of its controls;
-`export_lab(…)`, which runs the script and compares it with the lab's trial; `record_for_export`,
-which records of a trial what is compared.
-
-The template `script.jinja` puts the translated pieces of the lab's code together in the order in
-which the lab runs them (docs/explanation/how-labs-run.md). In the text `{{control:N}}` stands for
-the value of control N, which the page fills in. A script is not offered if its result differs from
-the lab's, or if it fails for any value that the page may fill in.
+`script.jinja` puts the translated pieces together in the order in which the lab runs them
+(docs/explanation/how-labs-run.md). `{{control:N}}` in the text stands for the value of control N,
+which the page fills in. A script is not offered if its result differs from the lab's, or if it
+fails for any value that the page may fill in.
 """
 
 from __future__ import annotations
 
-import functools
 import json
 import keyword
 import math
@@ -22,11 +17,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined, Template
+from jinja2 import Environment, StrictUndefined
 from msgspec import Struct
 
 from coursebuild.core.features import Trial, TrialContext
-from coursebuild.core.model import Course
+from coursebuild.core.model import Lesson
 from coursebuild.core.text.source import unique_name
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.engines.native import (
@@ -48,7 +43,10 @@ from coursebuild.features.lab.schema import Button, Control, Select, Slider
 
 _HALF_CHARACTER = re.compile("[\ud800-\udfff]")
 _PLACE = re.compile(r"\{\{control:(\d+)\}\}")
-_TEMPLATE = Path(__file__).with_name("script.jinja")
+_ENVIRONMENT = Environment(
+    trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=StrictUndefined
+)
+_TEMPLATE = _ENVIRONMENT.from_string(Path(__file__).with_name("script.jinja").read_text("utf-8"))
 _WIDTH = 88
 
 
@@ -61,9 +59,7 @@ class ExportMetadata(Struct, frozen=True):
     """As in `a lab of lesson 4.2, “Mass and inertia”`."""
     course: str
     engine: str
-    """Version of MuJoCo."""
     seconds: float
-    """Simulated time."""
 
 
 class Export(Struct, frozen=True):
@@ -73,7 +69,6 @@ class Export(Struct, frozen=True):
     text: str
     """With `{{control:N}}` for the value of control N."""
     buttons: tuple[str, ...]
-    """Names of the functions of the lab's buttons."""
 
 
 def file_name(lab: str) -> str:
@@ -142,7 +137,7 @@ def _export(lab: Lab, metadata: ExportMetadata) -> Export:
         (json.dumps(readout.label, ensure_ascii=False), readout.expr, readout.digits)
         for readout in code.readouts
     )
-    text = _template().render(
+    text = _TEMPLATE.render(
         introduction=_introduction(lab, metadata),
         seconds=_literal(metadata.seconds),
         constants=constants,
@@ -162,16 +157,7 @@ def _export(lab: Lab, metadata: ExportMetadata) -> Export:
     return Export(metadata.name, text, tuple(names[i] for i in buttons))
 
 
-@functools.cache
-def _template() -> Template:
-    environment = Environment(
-        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=StrictUndefined
-    )
-    return environment.from_string(_TEMPLATE.read_text(encoding="utf-8"))
-
-
 def _names(controls: Sequence[Control]) -> list[str]:
-    """Name the controls in the script: constants, in capitals, and functions for buttons."""
     names: list[str] = []
     for control in controls:
         is_button = isinstance(control, Button)
@@ -185,14 +171,12 @@ def _names(controls: Sequence[Control]) -> list[str]:
 
 
 def _setter(control: Slider | Select) -> str:
-    """Return the code that a control runs with its `value`."""
     if control.set is not None:
         return f"({control.set}\n) = value"
     return control.apply or f"ctx.{control.param} = value"
 
 
 def _keyframe(key: int | str | None) -> str:
-    """Write the line that resets the data to the lab's keyframe."""
     if key is None:
         return "mujoco.mj_resetData(model, data)"
     number = str(key) if isinstance(key, int) else f"model.key({json.dumps(key)}).id"
@@ -219,25 +203,20 @@ def _comment(control: Slider | Select) -> list[str]:
     unit = f" ({_one_line(control.unit)})" if control.unit else ""
     text = f"The control “{_one_line(control.label)}”{unit}"
     if isinstance(control, Select):
-        text += ", one of " + ", ".join(_option(*option) for option in control.options)
+        pairs = ((_one_line(label), _literal(value)) for label, value in control.options)
+        texts = (value if label == value else f"{value} ({label})" for label, value in pairs)
+        text += f", one of {', '.join(texts)}"
     else:
         text += f", from {control.min:g} to {control.max:g}"
     return [f"# {line}" for line in textwrap.wrap(text, _WIDTH)]
 
 
-def _option(label: str, value: float | str) -> str:
-    literal = _literal(value)
-    return literal if _one_line(label) == literal else f"{literal} ({_one_line(label)})"
-
-
 def _one_line(text: str) -> str:
-    """Put a text of the author on one line, for a comment."""
     printable = "".join(c if c.isprintable() else " " for c in text)
     return " ".join(printable.replace("\\", "/").replace('"', "'").split())
 
 
 def _long_text(text: str) -> str:
-    """Write a text of several lines as a literal of Python."""
     is_unprintable = any(not c.isprintable() and c != "\n" for c in text)
     if "\\" in text or '"""' in text or is_unprintable or text.endswith('"'):
         return repr(text)
@@ -271,9 +250,13 @@ def export_lab(
     `main` is the main run of the lab's trial.
     """
     start, end = (main["pictures"][i]["time"] for i in (0, -1))
+    owner = next((o for o in context.course.owners if o.id == trial.owner), None)
+    origin = f"a lab of the page “{trial.owner if owner is None else owner.title}”"
+    if isinstance(owner, Lesson):
+        origin = f"a lab of lesson {owner.id}, “{owner.title}”"
     metadata = ExportMetadata(
         file_name(trial.name),
-        _origin(context.course, trial.owner),
+        origin,
         context.course.title,
         LAB_ENGINE,
         round(end - start, 9),
@@ -324,14 +307,6 @@ def _try_export(
     return LabExport(None, reason) if reason else LabExport((export.name, export.text))
 
 
-def _origin(course: Course, owner: str) -> str:
-    for lesson in course.lessons:
-        if lesson.id == owner:
-            return f"a lab of lesson {owner}, “{lesson.title}”"
-    title = next((page.title for page in course.pages if page.id == owner), owner)
-    return f"a lab of the page “{title}”"
-
-
 def _control_variants(lab: Lab) -> list[dict[int, float | str]]:
     """List values of all controls, with a single one at another value than at the start."""
     start = initial_values(lab)
@@ -378,7 +353,11 @@ def _difference(main: MainRun, run: dict[str, Any], rtol: float) -> str | None:
     assert record is not None, "without a record no script is tried"
     if run["steps"] != record["steps"]:
         return f"it makes {run['steps']} steps, and the lab {record['steps']}"
-    difference = _relative_difference(run["state"], record["state"])
+    state, lab_state, difference = run["state"], record["state"], math.inf
+    if len(state) == len(lab_state):
+        largest = max([1.0, *map(abs, lab_state)])
+        pairs = zip(state, lab_state, strict=True)
+        difference = max([0.0, *(abs(a - b) / largest for a, b in pairs)])
     if not difference <= rtol:
         return f"its state after {record['near']} steps is apart from the lab's by {difference:.1e}"
     first, last = main["pictures"][0], main["pictures"][-1]
@@ -386,13 +365,6 @@ def _difference(main: MainRun, run: dict[str, Any], rtol: float) -> str | None:
     if reason is None and run["last"] == record["last"]:
         reason = _compare_readouts(last["readouts"], run["end"], "end")
     return reason
-
-
-def _relative_difference(state: Sequence[float], lab_state: Sequence[float]) -> float:
-    if len(state) != len(lab_state):
-        return math.inf
-    largest = max([1.0, *(abs(x) for x in lab_state)])
-    return max([0.0, *(abs(a - b) / largest for a, b in zip(state, lab_state, strict=True))])
 
 
 def _compare_readouts(lab_values: Any, readouts: list[list[Any]], moment: str) -> str | None:

@@ -1,10 +1,7 @@
 """Draws a picture of a scene without a graphics processor.
 
-Entry point: `draw(solids, camera, size, light)` → pixels.
-
-1. Every solid's triangles are brought into the camera's frame (MuJoCo's free camera) and projected
-   (`raster.py`). Each sample keeps the nearest surface, with its place, normal and texture
-   coordinates there. A pixel has 2 × 2 samples.
+1. Every solid's triangles are projected (`raster.py`); each of the 2 × 2 samples of a pixel keeps
+   the nearest surface, with its place, normal and texture coordinates there.
 2. The samples are coloured by texture and light, and the first shiny plane or box
    shows what the camera's mirror image sees.
 3. Transparent solids are mixed in, the farthest first, and the sky is put behind all.
@@ -21,19 +18,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from coursebuild.features.lab.picture.raster import (
-    NORMAL,
-    POSITION,
-    UV,
-    Eye,
-    Floor,
-    GBuffer,
-    Texture,
-    TextureMapping,
-    draw_edges,
-    rotate,
-    sky,
-)
+from coursebuild.features.lab.picture import raster
 from coursebuild.features.lab.picture.shapes import Array, Light, Material, Surface, shade, studio
 
 _SAMPLES = 2
@@ -44,7 +29,6 @@ _FROM_BELOW = 0.5
 """Factor of the opacity of a plane seen from below, as in MuJoCo."""
 _TOP = 0.5
 _AT_ONCE = 1 << 16
-"""How many samples are coloured together."""
 _STEPS = 127
 """Shades from black to white: nobody can see more, and the file is a quarter smaller."""
 _PLAIN = Material()
@@ -65,7 +49,7 @@ class Solid(Struct, frozen=True):
     """(3, 3); columns are the solid's axes in the world."""
     rgba: tuple[float, float, float, float]
     material: Material = _PLAIN
-    texture: TextureMapping | None = None
+    texture: raster.TextureMapping | None = None
     plane: bool = False
     """Whether it is a plane, which is lit by its upper side."""
     mirror: float | None = None
@@ -79,7 +63,7 @@ class Solid(Struct, frozen=True):
 
     def world_surface(self) -> Surface:
         """Return its surface in world coordinates."""
-        vertices = rotate(self.surface.vertices, self.rotation) + self.position
+        vertices = raster.rotate(self.surface.vertices, self.rotation) + self.position
         return replace(self.surface, vertices=vertices, uv=None)
 
     @property
@@ -108,7 +92,7 @@ class FreeCamera(Struct, frozen=True):
         a, e = np.radians(self.azimuth), np.radians(self.elevation)
         return np.array((np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)))
 
-    def eye(self, width: int, height: int) -> Eye:
+    def eye(self, width: int, height: int) -> raster.Eye:
         """Return the eye of this camera with a screen of so many samples."""
         azimuth = np.radians(self.azimuth)
         right = np.array((np.sin(azimuth), -np.cos(azimuth), 0.0))
@@ -116,7 +100,7 @@ class FreeCamera(Struct, frozen=True):
         focal = height / 2 / np.tan(np.radians(self.fovy) / 2)
         near = max(_NEAR_SHARE * self.distance, 1e-6)
         position = np.array(self.target) - self.distance * self.forward
-        return Eye((width, height), focal, near, position, axes)
+        return raster.Eye((width, height), focal, near, position, axes)
 
 
 def draw(
@@ -124,8 +108,8 @@ def draw(
     camera: FreeCamera,
     size: tuple[int, int],
     light: Light | None = None,
-    background: Texture | None = None,
-    floor: Floor | None = None,
+    background: raster.Texture | None = None,
+    floor: raster.Floor | None = None,
 ) -> NDArray[np.uint8]:
     """Draw a picture: (height, width, 4) bytes, RGBA, transparent where there is nothing.
 
@@ -154,7 +138,7 @@ def draw(
     return pixels
 
 
-def _seen_from(solid: Solid, eye: Eye) -> Solid:
+def _seen_from(solid: Solid, eye: raster.Eye) -> Solid:
     """Return the solid as an eye sees it: a plane is more transparent from below."""
     if not solid.plane or solid.rotation[:, 2] @ (eye.position - solid.position) >= 0:
         return solid
@@ -162,19 +146,17 @@ def _seen_from(solid: Solid, eye: Eye) -> Solid:
     return replace(solid, rgba=(red, green, blue, alpha * _FROM_BELOW))
 
 
-def _reflects(solid: Solid, eye: Eye) -> bool:
-    """Whether an eye sees a mirror image in the upper face of a solid."""
+def _reflects(solid: Solid, eye: raster.Eye) -> bool:
     if solid.mirror is None or solid.material.reflectance <= 0 or not solid.opaque:
         return False
     return bool(solid.rotation[:, 2] @ (eye.position - solid.position) > solid.mirror)
 
 
-def _mirror_eye(solid: Solid, eye: Eye) -> Eye:
-    """Return the image of an eye in the upper face of a solid."""
+def _mirror_eye(solid: Solid, eye: raster.Eye) -> raster.Eye:
     normal = solid.rotation[:, 2]
     offset = float(normal @ solid.position) + (solid.mirror or 0.0)
     height = float(normal @ eye.position) - offset
-    axes = rotate(eye.axes, np.eye(3) - 2 * np.outer(normal, normal))
+    axes = raster.rotate(eye.axes, np.eye(3) - 2 * np.outer(normal, normal))
     position = eye.position - 2 * height * normal
     return replace(eye, position=position, axes=axes, mirror=(normal, offset))
 
@@ -182,7 +164,7 @@ def _mirror_eye(solid: Solid, eye: Eye) -> Eye:
 class _Canvas:
     """Colours of the samples."""
 
-    def __init__(self, eye: Eye, light: Light) -> None:
+    def __init__(self, eye: raster.Eye, light: Light) -> None:
         self.eye, self.light = eye, light
         self.colour = np.zeros((eye.size[1], eye.size[0], 4))
         """RGB, premultiplied with the coverage, and the coverage."""
@@ -192,22 +174,24 @@ class _Canvas:
         solids: Sequence[Solid],
         mirror: Solid | None,
         reflection: _Canvas | None,
-        floor: Floor | None = None,
+        floor: raster.Floor | None = None,
         *,
         lines: bool = False,
     ) -> None:
         """Draw solids, with lines around them; `mirror` shows `reflection`."""
-        buffer = GBuffer(self.eye)
+        buffer = raster.GBuffer(self.eye)
         opaque = [solid for solid in solids if solid.opaque and not solid.front]
         self._paint_opaque(buffer, opaque, mirror, reflection)
         if lines and opaque:
-            draw_edges(self.colour, buffer, np.array([solid.body for solid in opaque], dtype=bool))
+            raster.draw_edges(
+                self.colour, buffer, np.array([solid.body for solid in opaque], dtype=bool)
+            )
         if floor is not None:
             floor.paint(
                 self.colour, buffer, [solid.world_surface() for solid in solids if solid.body]
             )
         for solid in sorted((s for s in solids if not s.opaque), key=self._depth, reverse=True):
-            film = GBuffer(self.eye)
+            film = raster.GBuffer(self.eye)
             film.depth = buffer.depth.copy()
             # Only the outside is drawn, as in the live view.
             front = not (solid.open or solid.plane)
@@ -215,11 +199,11 @@ class _Canvas:
             self._colour(film, np.flatnonzero(film.solid == 0), solid, None)
         foremost = [solid for solid in solids if solid.opaque and solid.front]
         if foremost:
-            self._paint_opaque(GBuffer(self.eye), foremost, None, None)
+            self._paint_opaque(raster.GBuffer(self.eye), foremost, None, None)
 
     def _paint_opaque(
         self,
-        buffer: GBuffer,
+        buffer: raster.GBuffer,
         solids: Sequence[Solid],
         mirror: Solid | None,
         reflection: _Canvas | None,
@@ -233,15 +217,16 @@ class _Canvas:
             samples = order[ends[i] : ends[i + 1]]
             self._colour(buffer, samples, solid, reflection if solid is mirror else None)
 
-    def put_behind(self, background: Texture) -> None:
-        """Fill what is not covered with the sky."""
+    def put_behind(self, background: raster.Texture) -> None:
         width, height = self.eye.size
         for y, x in _batches(np.flatnonzero(self.colour[..., 3] < 1), width):
             sight = np.column_stack(
                 (x + 0.5 - width / 2, height / 2 - y - 0.5, np.full(len(x), self.eye.focal))
             )
             clear_share = 1 - self.colour[y, x, 3:]
-            self.colour[y, x, :3] += clear_share * sky(background, rotate(sight, self.eye.axes.T))
+            self.colour[y, x, :3] += clear_share * raster.sky(
+                background, raster.rotate(sight, self.eye.axes.T)
+            )
             self.colour[y, x, 3] = 1
 
     def _depth(self, solid: Solid) -> float:
@@ -249,7 +234,7 @@ class _Canvas:
 
     def _colour(
         self,
-        buffer: GBuffer,
+        buffer: raster.GBuffer,
         samples: NDArray[np.int64],
         solid: Solid,
         reflection: _Canvas | None,
@@ -262,14 +247,13 @@ class _Canvas:
             self.colour[y, x] = alpha * opaque_colour + (1 - alpha) * self.colour[y, x]
 
     def _shade(
-        self, buffer: GBuffer, solid: Solid, reflection: _Canvas | None, samples: Samples
+        self, buffer: raster.GBuffer, solid: Solid, reflection: _Canvas | None, samples: Samples
     ) -> Array:
-        """Return the colours of a solid at samples that show it."""
         attributes = buffer.attributes[samples].astype(float)
-        places, local_normals = attributes[:, POSITION], attributes[:, NORMAL]
+        places, local_normals = attributes[:, raster.POSITION], attributes[:, raster.NORMAL]
         local_normals = local_normals / _lengths(local_normals)
-        points = rotate(places, solid.rotation) + solid.position
-        normals = rotate(local_normals, solid.rotation)
+        points = raster.rotate(places, solid.rotation) + solid.position
+        normals = raster.rotate(local_normals, solid.rotation)
         view = self.eye.position - points
         toward_eye = view / _lengths(view)
         facing = (normals * toward_eye).sum(axis=1)
@@ -279,7 +263,7 @@ class _Canvas:
         if solid.texture is not None:
             longer = 1 / np.maximum(np.abs(facing), 1e-3)
             steps = buffer.depth[samples] / self.eye.focal * np.maximum(longer / _SHARPER, 1.0)
-            texel = solid.texture.texels(places, local_normals, attributes[:, UV], steps)
+            texel = solid.texture.texels(places, local_normals, attributes[:, raster.UV], steps)
         base = np.array(solid.rgba[:3])
         colour = shade(self.light, solid.material, base, texel, (points, normals, toward_eye))
         if reflection is not None:

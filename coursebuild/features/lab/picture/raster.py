@@ -1,10 +1,7 @@
 """Rasterizes triangles: finds the nearest surface at each sample, and its attributes there.
 
-Entry points: `GBuffer(eye).add(index, surface, position, rotation)`; `nearest_depth`, without
-attributes; `Floor.paint`, a floor with a grid and shadows, and `draw_edges` around bodies, which
-match the live view (`studio.js` of the page); `texture_of(record)`, from the record of a trial,
-`TextureMapping.texels` and `sky`. Texture coordinates are those of the live view (`geometry.js` and
-`materials.js` of the page), but computed at every point that is drawn.
+Floor and edges match the live view (`studio.js` of the page), and so do texture coordinates
+(`geometry.js` and `materials.js`), but computed at every point that is drawn.
 """
 
 from __future__ import annotations
@@ -86,18 +83,6 @@ class GBuffer:
             self.attributes[at] = attributes[order]
 
 
-def nearest_depth(eye: Eye, vertices: Array, faces: NDArray[np.int64]) -> Array:
-    """Return the depth of the nearest triangle at each sample; infinite where there is none."""
-    width, height = eye.size
-    nearest = np.full((height, width), np.inf)
-    with np.errstate(over="ignore", invalid="ignore"):
-        in_view = rotate(vertices - eye.position, eye.axes)
-    for part, shares, x, y in _fragments(eye, in_view, faces, front=False):
-        depth = 1.0 / (shares / part[..., 2]).sum(axis=1)
-        np.minimum.at(nearest, (y, x), depth)
-    return nearest
-
-
 Fragments: TypeAlias = Iterator[tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]]
 """Samples that triangles cover, each with its triangle, the shares of the triangle's corners in it,
 its column and its row."""
@@ -135,7 +120,6 @@ def _clip(triangles: Array, near: float) -> Array:
 
 
 def _project(eye: Eye, triangles: Array) -> Fragments:
-    """Yield the samples that triangles beyond the near plane cover."""
     width, height = eye.size
     scale = eye.focal / triangles[..., 2]
     px = width / 2 + scale * triangles[..., 0]
@@ -247,7 +231,11 @@ class Floor(Struct, frozen=True):
             slope = radius * np.array((np.cos(angle), np.sin(angle))) + LAMP[:2]
             flat = joined_surface.vertices[:, :2] - elevation * slope / LAMP[2]
             vertices = np.column_stack((flat, np.full(len(flat), height)))
-            shadow = nearest_depth(eye, vertices, joined_surface.faces)
+            with np.errstate(over="ignore", invalid="ignore"):
+                in_view = rotate(vertices - eye.position, eye.axes)
+            shadow = np.full_like(depth, np.inf)
+            for part, shares, x, y in _fragments(eye, in_view, joined_surface.faces, front=False):
+                np.minimum.at(shadow, (y, x), 1.0 / (shares / part[..., 2]).sum(axis=1))
             shade += shadow < depth * (1 + _DEPTH_TOLERANCE)
         return shade / _POINTS
 
@@ -282,7 +270,6 @@ def _lines(place: Array) -> Array:
 
 
 def _mix(colour: Array, grey: float, alpha: Array) -> None:
-    """Lay a grey over premultiplied colours."""
     cover = alpha[..., None]
     colour[:] = cover * np.array((grey, grey, grey, 1.0)) + (1 - cover) * colour
 
@@ -364,7 +351,6 @@ class TextureMapping(Struct, frozen=True):
         return colours
 
     def _direction(self, places: Array, half: Array) -> Array:
-        """Return the directions in which a cube texture is looked up."""
         if self.uniform or self.kind in ("mesh", "sdf", "hfield"):
             return places
         unit = places / half
@@ -385,7 +371,6 @@ class TextureMapping(Struct, frozen=True):
         return coordinates
 
     def _unrepeated_coordinates(self, unit: Array, places: Array, normals: Array) -> Array:
-        """Return the coordinates of a texture that covers the geom once."""
         x, y, z = unit.T
         angle = np.mod(np.arctan2(y, x) / (2 * np.pi), 1.0)
         match self.kind:
@@ -429,7 +414,6 @@ def _cube(direction: Array) -> tuple[NDArray[np.int64], Array, Array]:
 
 
 def _interpolate(level: Array, face: NDArray[np.int64], s: Array, t: Array, cube: bool) -> Array:
-    """Interpolate the colours at coordinates between the texels of a level."""
     _, height, width, _ = level.shape
     x, y = s * width - 0.5, t * height - 0.5
     left, top = np.floor(x), np.floor(y)

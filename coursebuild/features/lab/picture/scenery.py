@@ -1,7 +1,4 @@
-"""The solids of a lab's static picture, made from the record of its trial.
-
-Entry point: `scene_solids(scene, frame)`.
-"""
+"""The solids of a lab's static picture, made from the record of its trial."""
 
 from __future__ import annotations
 
@@ -11,24 +8,10 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
+from coursebuild.features.lab.picture import shapes
 from coursebuild.features.lab.picture.draw import Solid
 from coursebuild.features.lab.picture.raster import SKY, TextureMapping, texture_of
-from coursebuild.features.lab.picture.shapes import (
-    Array,
-    Kind,
-    Material,
-    Surface,
-    arrow,
-    flat_surface,
-    grid_faces,
-    join_surfaces,
-    material_of,
-    ropes,
-    sharpen,
-    smooth_surface,
-    surface,
-    unit,
-)
+from coursebuild.features.lab.picture.shapes import Array, Kind, Material, Surface
 
 RGBA = tuple[float, float, float, float]
 
@@ -61,8 +44,6 @@ def scene_solids(scene: dict[str, Any], frame: Array) -> Iterator[Solid]:
 
 
 class _Scene:
-    """A scene, with the data that its geoms share."""
-
     def __init__(self, scene: dict[str, Any], frame: Array) -> None:
         self.scene, self.frame, self.layout = scene, frame, scene["layout"]
         self.meshes = [_mesh(mesh) for mesh in scene["meshes"]]
@@ -70,13 +51,12 @@ class _Scene:
         self.textures = [texture_of(texture) for texture in scene["textures"]]
 
     def solids(self) -> Iterator[Solid]:
-        """Make all solids."""
         solids: list[Solid | None] = []
         for part in ("geoms", "sites"):
             for i, item in enumerate(self.scene[part]):
                 if item["group"] in _VISIBLE:
                     row = self._row(self.layout[part] + _GEOM * i, _GEOM)
-                    material = material_of(self.scene, item["material"])
+                    material = shapes.material_of(self.scene, item["material"])
                     data, index = item.get("data", -1), item["material"]
                     solid = self._solid(item["type"], data, row, material, index)
                     if solid is not None and part == "geoms" and not solid.plane:
@@ -95,9 +75,13 @@ class _Scene:
             a, b = (self._row(start, 3) for start in starts)
             if np.isfinite((a, b)).all() and np.any(a != b):
                 yield _coil(a, b, spring["radius"])
+        radius = _PIN * self.scene["camera"]["distance"]
         for hinge in self.scene["pins"]:
-            distance = self.scene["camera"]["distance"]
-            yield _pin(np.array(hinge["position"]), np.array(hinge["axis"]), distance)
+            position, half = np.array(hinge["position"]), 2.2 * radius * np.array(hinge["axis"])
+            ends = np.stack((position - half, position + half))
+            yield Solid(
+                shapes.ropes(ends, np.array([[0, 1]]), radius), np.zeros(3), np.eye(3), _IRON
+            )
 
     def _row(self, start: int, floats: int) -> Array:
         return self.frame[start : start + floats]
@@ -145,16 +129,16 @@ class _Scene:
         rgba = _rgba(row[15:19])
         if kind in _ARROWS:
             head = 1.0 if kind == _ARROWS[1] else _HEAD_WIDTH
-            pointer = arrow(size[0], size[2] / 2, head=head, double=kind == _ARROWS[2])
+            pointer = shapes.arrow(size[0], size[2] / 2, head=head, double=kind == _ARROWS[2])
             front = data == _IN_FRONT
             return Solid(pointer, position, rotation, rgba, material, front=front)
         if kind >= len(_KINDS):
             return None
         name = _KINDS[kind]
         endless = name == "plane" and min(size[:2]) <= 0
-        shapes = self.fields if name == "hfield" else self.meshes
-        mesh = shapes[data] if 0 <= data < len(shapes) else None
-        shape = self._endless_plane(row) if endless else surface(name, size, mesh)
+        meshes = self.fields if name == "hfield" else self.meshes
+        mesh = meshes[data] if 0 <= data < len(meshes) else None
+        shape = self._endless_plane(row) if endless else shapes.surface(name, size, mesh)
         if shape is None:
             return None
         has_uv = shape.uv is not None
@@ -167,7 +151,7 @@ class _Scene:
         """Make a plane without a size, around the camera's target."""
         far = _ENDLESS * self.scene["extent"]
         half = np.where(row[12:14] > 0, row[12:14], far)
-        shape = surface("plane", (float(half[0]), float(half[1])))
+        shape = shapes.surface("plane", (float(half[0]), float(half[1])))
         assert shape is not None
         target = np.array(self.scene["camera"]["target"], dtype=float)
         local_target = (target - row[:3]) @ row[3:12].reshape(3, 3)
@@ -190,7 +174,7 @@ class _Scene:
                 rgba = item["rgba"]
                 if index >= 0 and tuple(rgba) == _UNSET:
                     rgba = self.scene["materials"][index]["rgba"]
-                material = material_of(self.scene, index)
+                material = shapes.material_of(self.scene, index)
                 yield Solid(shape, *pose, _rgba(rgba), material, texture, open=True)
 
 
@@ -202,9 +186,11 @@ def _rgba(values: Any) -> RGBA:
 def _flex(item: dict[str, Any], points: Array) -> Surface:
     elements = np.asarray(item["elements"], dtype=np.int64)
     if item["dim"] == 1:
-        return ropes(points, elements.reshape(-1, 2), item["radius"])
+        return shapes.ropes(points, elements.reshape(-1, 2), item["radius"])
     faces = elements.reshape(-1, 3)
-    return flat_surface(points, faces) if item["flat"] else smooth_surface(points, faces)
+    return (
+        shapes.flat_surface(points, faces) if item["flat"] else shapes.smooth_surface(points, faces)
+    )
 
 
 def _skin(item: dict[str, Any], rows: Array) -> Surface:
@@ -223,7 +209,7 @@ def _mesh(mesh: dict[str, Any]) -> Surface:
         return corners
 
     corners = corner_rows("vertices", "faces", 3).reshape(-1, 3, 3)
-    normals = sharpen(corners, corner_rows("normals", "faceNormals", 3).reshape(-1, 3, 3))
+    normals = shapes.sharpen(corners, corner_rows("normals", "faceNormals", 3).reshape(-1, 3, 3))
     uv = None if mesh["texcoords"] is None else corner_rows("texcoords", "faceTexcoords", 2)
     faces = np.arange(3 * len(corners)).reshape(-1, 3)
     return Surface(corners.reshape(-1, 3), normals.reshape(-1, 3), faces, uv)
@@ -237,32 +223,26 @@ def _height_field(field: dict[str, Any]) -> Surface:
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     vertices = np.column_stack((grid, np.asarray(field["data"], dtype=float) * top))
     # Rows go up along y, so that seen from above the faces of the grid are clockwise.
-    parts = [smooth_surface(vertices, grid_faces(rows, columns)[:, ::-1])]
+    parts = [shapes.smooth_surface(vertices, shapes.grid_faces(rows, columns)[:, ::-1])]
     index = np.arange(rows * columns).reshape(rows, columns)
     for edge in (index[0], index[:, -1], index[-1, ::-1], index[::-1, 0]):
         upper = vertices[edge]
         lower = np.column_stack((upper[:, :2], np.full(len(edge), -base)))
-        parts.append(flat_surface(np.concatenate((upper, lower)), grid_faces(2, len(edge))))
-    return join_surfaces(parts)
+        parts.append(
+            shapes.flat_surface(np.concatenate((upper, lower)), shapes.grid_faces(2, len(edge)))
+        )
+    return shapes.join_surfaces(parts)
 
 
 def _coil(a: Array, b: Array, radius: float) -> Solid:
-    """Make a spring between two points."""
-    z = unit(b - a)
-    x = unit(np.array((-z[1], z[0], 0.0)) if abs(z[2]) < 0.9 else np.array((0.0, -z[2], z[1])))
+    z = shapes.unit(b - a)
+    x = shapes.unit(
+        np.array((-z[1], z[0], 0.0)) if abs(z[2]) < 0.9 else np.array((0.0, -z[2], z[1]))
+    )
     t = np.linspace(0.0, 1.0, _TURNS * _ROUND + 1)[:, None]
     coil_radius = radius * np.clip((np.minimum(t, 1 - t) - _STRAIGHT) / _STRAIGHT, 0.0, 1.0)
     angle = 2 * np.pi * _TURNS * t
     points = a + t * (b - a) + coil_radius * (np.cos(angle) * x + np.sin(angle) * np.cross(z, x))
     steps = np.arange(len(points))
     ends = np.column_stack((steps[:-1], steps[1:]))
-    return Solid(ropes(points, ends, _WIRE * radius), np.zeros(3), np.eye(3), _STEEL)
-
-
-def _pin(position: Array, axis: Array, distance: float) -> Solid:
-    """Make the pin of a hinge, for a camera at a distance."""
-    half = 2.2 * _PIN * distance * axis
-    surface = ropes(
-        np.stack((position - half, position + half)), np.array([[0, 1]]), _PIN * distance
-    )
-    return Solid(surface, np.zeros(3), np.eye(3), _IRON)
+    return Solid(shapes.ropes(points, ends, _WIRE * radius), np.zeros(3), np.eye(3), _STEEL)

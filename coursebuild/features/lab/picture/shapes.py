@@ -1,9 +1,5 @@
 """The surfaces of MuJoCo's geoms as triangles, in each geom's own frame, and their colours.
 
-Entry points: `surface(kind, size, mesh)`; `flat_surface`, `smooth_surface` and `ropes` of points;
-`shade(...)`, the colours of points of a surface; `light_of(scene, frame, forward)`;
-`material_of(scene, index)`.
-
 Sizes are MuJoCo's: half-lengths of a box, radius and half-length of the axis of a cylinder and a
 capsule, semi-axes of an ellipsoid. Triangles share vertices only where the surface is smooth, so
 that normals at the vertices make curves look smooth and edges sharp.
@@ -331,7 +327,6 @@ def shade(
 
 
 def _rays(lamp: PointLight, points: Array) -> tuple[Array, Array]:
-    """Return the directions from points to a lamp, and how much of its light reaches them."""
     if lamp.position is None:
         return -lamp.direction[None, :], np.ones(len(points))
     back = unit(lamp.position - points)

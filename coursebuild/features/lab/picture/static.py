@@ -1,8 +1,5 @@
 """The static form of a lab: what its trial recorded, as a picture, plots and a table.
 
-Entry points: `draw_picture(lab, main)`, `lab_record(lab, main)`; `png(pixels)`;
-`plot_svg(plot, times, traces)`, for paper, for readers without JavaScript, and until a lab starts.
-
 Lines of a plot have their names at their ends, and differ in dashes as well as in colour. Colours
 are classes that the style sheet defines for light and dark pages; text has the page's colour.
 """
@@ -208,7 +205,7 @@ def plot_svg(
     paths: list[str] = []
     names: list[tuple[float, str, int]] = []
     for n, (trace, points) in enumerate(zip(plot.traces, lines, strict=True)):
-        paths.append(_line(frame, points, n, _dash(trace, n)))
+        paths.append(_line(frame, points, n, trace))
         last = next((v for _, v in reversed(points) if _is_finite(v)), None)
         if last is not None:
             names.append((frame.y(last), trace.label, n))
@@ -227,16 +224,9 @@ def plot_svg(
     )
 
 
-def _dash(trace: TraceFields, n: int) -> str:
-    if trace.dash is True:
-        return _DASHES[1]
-    return _DASHES[n % len(_DASHES)] if not trace.dash else " ".join(f"{x:g}" for x in trace.dash)
-
-
 def _frame(
     low_t: float, high_t: float, low: float, high: float, labels: Sequence[str], narrow: bool
 ) -> _Frame:
-    """Make the frame, with room for ticks on the left and for the names of lines on the right."""
     width = _NARROW if narrow else _WIDE
     y = Scale(_HEIGHT - _BOTTOM, _TOP, low, high, logarithmic=False)
     longest = max(len(text) for _, text in y.ticks(_TICKS))
@@ -246,8 +236,6 @@ def _frame(
 
 
 class _Frame(Struct, frozen=True):
-    """The scales of times and values."""
-
     x: Scale
     y: Scale
     width: float
@@ -305,20 +293,23 @@ def _reference(frame: _Frame, y: float, label: str) -> str:
     )
 
 
-def _line(frame: _Frame, points: Sequence[tuple[float, float | None]], n: int, dash: str) -> str:
+def _line(
+    frame: _Frame, points: Sequence[tuple[float, float | None]], n: int, trace: TraceFields
+) -> str:
+    dash = _DASHES[n % len(_DASHES)]
+    if trace.dash is True:
+        dash = _DASHES[1]
+    elif trace.dash:
+        dash = " ".join(f"{x:g}" for x in trace.dash)
     path: list[str] = []
-    for run in _runs(points):
-        path += _path_commands(frame, run)
+    # Values that are not finite end a run of points.
+    for finite, group in groupby(points, key=lambda point: _is_finite(point[1])):
+        if finite:
+            run = [(t, min(max(v, -_LARGEST), _LARGEST)) for t, v in group if v is not None]
+            path += _path_commands(frame, run)
     style = f' stroke-dasharray="{dash}"' if dash else ""
     style += ' stroke-linecap="round"' if "h0" in path else ""
     return f'<path class="lab-trace lab-trace-{n % 7 + 1}"{style} d="{"".join(path)}"/>'
-
-
-def _runs(points: Sequence[tuple[float, float | None]]) -> Iterator[list[tuple[float, float]]]:
-    """Yield the runs of points between values that are not finite."""
-    for finite, run in groupby(points, key=lambda point: _is_finite(point[1])):
-        if finite:
-            yield [(t, min(max(v, -_LARGEST), _LARGEST)) for t, v in run if v is not None]
 
 
 def _is_finite(value: float | None) -> TypeGuard[float]:
@@ -326,7 +317,6 @@ def _is_finite(value: float | None) -> TypeGuard[float]:
 
 
 def _path_commands(frame: _Frame, run: list[tuple[float, float]]) -> Iterator[str]:
-    """Yield the path of a run of points, cut at the frame's lower and upper edges."""
     if len(run) == 1:
         t, v = run[0]
         if frame.y.low <= v <= frame.y.high:
@@ -368,7 +358,6 @@ def _clip_segment(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:
 
 
 def _labels(frame: _Frame, ends: list[tuple[float, str, int]]) -> list[str]:
-    """Write names at the ends of the lines, moved apart where they would overlap."""
     heights = [y for y, _, _ in sorted(ends)]
     places = separate_labels(heights, _LABEL_GAP, -math.inf, _HEIGHT - _BOTTOM)
     return [

@@ -1,7 +1,7 @@
 """Proposals for what to write at a place.
 
-Entry point: `completions`. They come from where the checks look things up: the course, anchors, the
-declarations of fields, the catalogue of rules, the engine.
+They come from where the checks look things up: the course, anchors, the declarations of fields, the
+catalogue of rules, the engine.
 """
 
 from __future__ import annotations
@@ -83,7 +83,6 @@ def completions(
 def _make_items(
     texts: OpenTexts, span: Span, kind: Kind, names: Mapping[str, str]
 ) -> list[types.CompletionItem]:
-    """Return proposals to replace a span by a name; each name has its description."""
     replaced_range = texts.places.range(span)
     return [
         types.CompletionItem(
@@ -140,7 +139,6 @@ def _find_names(
 def _find_engine_names(
     texts: OpenTexts, source: Source, subject: str, prefix: re.Match[str]
 ) -> Mapping[str, str]:
-    """Return names that inline code can begin with, or elements and attributes of MJCF."""
     engine, document = resolver_of(texts.library.course).engine, texts.document(source)
     note = None if document is None else document_names(document)
     names = {} if note is None else dict.fromkeys(note.names.definitions, "")
@@ -177,7 +175,6 @@ def _find_anchors(texts: OpenTexts, source: Source, prefix: re.Match[str]) -> Ma
 
 
 def _find_field_names(library: Library, place: FieldPlace) -> Mapping[str, str]:
-    """Return the keys that are not in the object yet, or the possible values of a key."""
     quote = "" if place.span.path.endswith(".toml") else '"'
     match place.key:
         case "":

@@ -1,14 +1,8 @@
 """The diagnostics of a course while its texts are edited, and the edits that are offered.
 
-Entry points: `current_diagnostics`; `to_lsp`, which converts one for the client; `actions`: the
-edits that diagnostics propose, one by one or all that are safe; "accept this output", as in the
-preview; "bind this number", for a number that the script above it printed.
-
-1. Reading and checking is repeated at each change.
-2. Recorded outputs and bound numbers of a changed text are compared with what the scripts printed
-   when they last ran.
-3. All other diagnostics of the last run are about the texts as they were then. They are shown at
-   lines that are still the same, wherever these stand now.
+Recorded outputs and bound numbers of a changed text are compared with what the scripts printed when
+they last ran. All other diagnostics of the last run are about the texts as they were then. They are
+shown at lines that are still the same, wherever these stand now.
 """
 
 from __future__ import annotations
@@ -193,7 +187,6 @@ def _overlap(first: Span, second: Span) -> bool:
 def _accept_outputs(
     texts: OpenTexts, place: Span, diagnostics: Iterable[Diagnostic]
 ) -> Iterator[types.CodeAction]:
-    """Yield the actions that replace recorded outputs here by what was printed."""
     library = texts.library
     for verdict in library.results.verdicts:
         span = verdict.recording.span
@@ -207,7 +200,6 @@ def _accept_outputs(
 
 
 def _bind_numbers(texts: OpenTexts, place: Span) -> Iterator[types.CodeAction]:
-    """Yield the actions that bind numbers here to what a script above them printed."""
     library, document = texts.library, texts.document(place.source)
     verdicts = library.results.verdicts
     printed = PrintedOutputs(verdicts, library.results.runs, library.scripts)

@@ -1,7 +1,5 @@
 """The fields that JSON in a fence or a TOML file can have at a place, also while it is edited.
 
-Entry points: `field_place`; `fence_at`, the fence around a place; `possible_values` of a type.
-
 The fields come from the declarations that the decoder checks against (`schema_roots`). Only
 brackets, keys and scalars of the text are read, so that mistakes anywhere do no harm.
 """
@@ -90,7 +88,11 @@ def field_place(source: Source, offset: int) -> FieldPlace | None:
     declared_type = inspect.type_info(roots[kind][0])
     for object, key in objects[:-1]:
         field = _fields(declared_type, object.members).get(key)
-        declared_type = _mapping_value(declared_type) if field is None else field.type
+        if field is not None:
+            declared_type = field.type
+            continue
+        mappings = (t for t in _alternatives(declared_type) if isinstance(t, inspect.DictType))
+        declared_type = next((mapping.value_type for mapping in mappings), inspect.AnyType())
     innermost, key = objects[-1]
     keys = frozenset(innermost.members) - {span.text.strip('"')}
     return FieldPlace(span, _fields(declared_type, innermost.members), keys, key)
@@ -144,11 +146,6 @@ def _fields(declared_type: inspect.Type, members: Mapping[str, str]) -> dict[str
         kinds = inspect.LiteralType(tuple(str(struct.tag) for struct in structs))
         fields[tag] = inspect.Field(tag, tag, kinds)
     return fields
-
-
-def _mapping_value(declared_type: inspect.Type) -> inspect.Type:
-    mappings = (t for t in _alternatives(declared_type) if isinstance(t, inspect.DictType))
-    return next((mapping.value_type for mapping in mappings), inspect.AnyType())
 
 
 def _alternatives(declared_type: inspect.Type) -> Iterator[inspect.Type]:

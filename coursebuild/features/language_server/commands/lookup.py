@@ -1,12 +1,7 @@
 """What something in a text refers to, and where that is defined.
 
-Entry points: `hover`, `definition`, `look_up`; `members`, the names that can follow a dot.
-
-1. In a document it is the smallest thing at the place that refers to something: a link, a term, a
-   bound number, a formula, a kind of callout, a model or a name of the engine in code.
-2. In JSON and TOML it is a key, whose declaration describes it, or the id of a lesson.
-3. Editors read a description as Markdown, some with HTML and commands in it. What an author wrote
-   is text there, by `escape_text`, or code, by `code_span` and `fence`.
+Editors read a description as Markdown, some with HTML and commands in it. What an author wrote is
+text there, by `escape_text`, or code, by `code_span` and `fence`.
 """
 
 from __future__ import annotations
@@ -37,14 +32,14 @@ from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
-from coursebuild.features.glossary.terms import definition_of
+from coursebuild.features.glossary import definition_of
 from coursebuild.features.language_server.commands.fields import field_place
 from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.engine import EngineName, KnownName, engine_names
 from coursebuild.features.names.resolve import resolver_of
 from coursebuild.features.references.citing import reference_text, works_of
-from coursebuild.features.symbols.uses import declared_symbol, symbols
+from coursebuild.features.symbols import declared_symbol, symbols
 from coursebuild.pipeline.reader import kept_formulas
 
 _ASSIGNMENT = re.compile(r"(\w+)\s*=\s*mujoco\.(Mj(?:Data|Model))\b")
@@ -139,7 +134,6 @@ class _Lookup:
         self.texts, self.library, self.document = texts, texts.library, document
 
     def look_up_node(self, node: model.Block | model.Inline, offset: int) -> Referent | None:
-        """Return the referent of a node, or of what is at an offset in it."""
         match node:
             case model.Link():
                 course = self.library.course
@@ -170,7 +164,6 @@ class _Lookup:
         return text_and_place and Referent(node.span, *text_and_place, target)
 
     def describe_target(self, target: model.Target) -> tuple[str, Span | None] | None:
-        """Return a description and the place of a link's target; `None` where there is none."""
         library = self.library
         match target:
             case model.LessonTarget(id=id, anchor=anchor) if id in library.lessons:
@@ -214,7 +207,6 @@ class _Lookup:
         return _paragraphs(*lines, text), place
 
     def describe_anchor(self, document: model.Document, anchor: str) -> tuple[str, Span] | None:
-        """Return what an anchor of a page marks, a formula or a line, and its place."""
         name = unquote(anchor)
         place = anchors(document).get(name)
         tex = next((f.tex for f in display_formulas(document) if name and f.id == name), None)
@@ -225,7 +217,6 @@ class _Lookup:
         return line if tex is None else fence("tex", tex.strip(), wary=True), place
 
     def describe_model(self, name: str) -> tuple[str, Span] | None:
-        """Return a description of a model with its sizes, and its place."""
         model_file = next((m for m in self.library.course.models if m.name == name), None)
         if model_file is None:
             return None
@@ -240,11 +231,9 @@ class _Lookup:
         return text, source.span(0, 0)
 
     def facts(self, models: Iterable[str]) -> ModelFacts | None:
-        """Return the facts of the first of some models that compiles."""
         return next(filter(None, map(self.library.facts.get, models)), None)
 
     def describe_term(self, id: str, owner: Owner) -> tuple[str, Span] | None:
-        """Return the definition of a term in the glossary, and its place."""
         document = self.texts.document(self.texts.source(owner.path))
         for block in () if document is None else model.document_blocks(document):
             inlines = block.children if isinstance(block, model.Paragraph) else ()
@@ -293,11 +282,15 @@ class _Lookup:
             for math in declarations
             if (meaning := math.meaning)
         )
-        at_offset = (m for m in declarations if _is_at(m.tex.text, formula.span, offset))
+        at_offset = (
+            math
+            for math in declarations
+            for match in re.finditer(re.escape(math.tex.text), formula.span.text)
+            if match.start() <= offset - formula.span.start < match.end()
+        )
         return Referent(formula.span, "\n".join(lines), next(at_offset, declarations[0]).span)
 
     def look_up_binding(self, binding: model.NumberBinding) -> Referent | None:
-        """Return the printed line that a bound number agrees with."""
         results, number = self.library.results, BoundText.of(binding.text)
         printed = PrintedOutputs(results.verdicts, results.runs, self.library.scripts)
         for verdict in printed.of_binding(binding) if number.numbers else ():
@@ -314,7 +307,6 @@ class _Lookup:
         node: model.Script | model.PlainCode | model.FeatureBlock | model.CodeSpan,
         offset: int,
     ) -> Referent | None:
-        """Look up a name of a model in quotes, or a name of the engine."""
         text = node.span.source.text
         for string in _STRING.finditer(text, node.span.start, node.span.end):
             if _covers(place := node.span.source.span(*string.span(2)), offset):
@@ -341,7 +333,6 @@ class _Lookup:
         return Referent(span, _paragraphs(f"{code}\n{escape_text(name.doc)}", shape))
 
     def look_up_name(self, code: model.CodeSpan, offset: int) -> Referent | None:
-        """Look up what the name in inline code at an offset means, or else its first name."""
         note = document_names(self.document)
         resolver, library = resolver_of(self.library.course), self.library
         claims = [] if note is None else [c for c in note.claims if c[1].start == code.span.start]
@@ -390,12 +381,6 @@ def _describe_shape(extent: tuple[str, ...], facts: ModelFacts | None) -> str:
     numbers = re.sub(r"\w+", lambda size: str(sizes.get(size[0], size[0])), text)
     suffix = f", here `{numbers}`" if numbers != text else ""
     return f"shape `{text}`{suffix}" if extent else ""
-
-
-def _is_at(tex: str, span: Span, offset: int) -> bool:
-    """Whether some TeX is part of a formula at an offset."""
-    matches = re.finditer(re.escape(tex), span.text)
-    return any(match.start() <= offset - span.start < match.end() for match in matches)
 
 
 def _paragraphs(*texts: str) -> str:

@@ -1,9 +1,8 @@
 """`coursebuild lsp`: a language server on standard input and output.
 
-1. The course is read before anything is answered, and then followed as in the preview: a thread
-   takes saves, the main thread runs scripts and labs (`preview.live_course`).
-2. A thread answers the client, another reads what is typed, another publishes diagnostics.
-3. Authors' files are only read: the client edits them.
+The course is followed as in the preview: a thread takes saves, the main thread runs scripts and
+labs. A thread answers the client, another reads what is typed, another publishes diagnostics.
+Authors' files are only read: the client edits them.
 """
 
 from __future__ import annotations
@@ -67,7 +66,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _answer(server: Server, stdin: BinaryIO, stdout: BinaryIO) -> None:
-    """Answer the client until it disconnects, then interrupt the main thread."""
     server.client.start_io(stdin, stdout)
     main = threading.main_thread().ident
     assert main is not None

@@ -1,10 +1,8 @@
 """Renames a lesson, a term or a label wherever the course names it.
 
-Entry points: `name_at`, the name at a place; `rename`, the edits that change it.
-
-1. A lesson gets a new id, and its file a new path, as with `coursebuild rename`.
-2. A term gets a new name in the glossary, and links to it the id that follows from the name.
-3. A label is that of what has a number, or the explicit id of a heading.
+A lesson gets a new id, and its file a new path. A term gets a new name in the glossary, and links
+to it the id that follows from the name. A label is that of what has a number, or the explicit id of
+a heading.
 """
 
 from __future__ import annotations
@@ -201,7 +199,6 @@ def _resolve_anchor(library: Library, target: model.Target, path: str) -> tuple[
 
 
 def _edit_anchor_links(texts: OpenTexts, path: str, anchor: str, new: str) -> Iterator[Edit]:
-    """Yield the edits that lead all links to an anchor of a file to a new one."""
     for link, target in _links(texts):
         if _resolve_anchor(texts.library, target, link.span.path) == (path, anchor):
             span = link.target_span

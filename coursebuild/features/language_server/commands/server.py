@@ -1,8 +1,7 @@
 """The requests of a client of the language server, and the diagnostics sent to it.
 
-Entry point: `Server`. `headings`, `folds` and `format_text` are about a single text. Answers are
-about the texts as they are in the editor, which sends the whole text at each change: partial
-changes would count other line ends than a course has.
+Answers are about the texts as they are in the editor, which sends the whole text at each change:
+partial changes would count other line ends than a course has.
 
 To open a folder runs nothing that lies in it. Scripts and features run from the first save on.
 """
@@ -162,7 +161,6 @@ class Server:
         return answer(texts, texts.source(self.places.path(params.text_document.uri)), params)
 
     def _begin(self) -> None:
-        """Start to send diagnostics to the client."""
         encoding = self.client.workspace.position_encoding or "utf-16"
         self.places.encoding = types.PositionEncodingKind(encoding).value
         self._loop = asyncio.get_running_loop()
@@ -171,7 +169,6 @@ class Server:
     # --- edits
 
     def _take_text(self, get_texts: Callable[[Any], Sequence[str | None]], params: Any) -> None:
-        """Note the new text of a file in the editor, or that the file is no longer open."""
         texts, session = get_texts(params), self.session
         path = self.places.path(params.text_document.uri)
         if not path.startswith(("content/", "models/")) and path not in session.files_elsewhere():

@@ -1,8 +1,7 @@
 """The texts of a course as they are now, in an editor or on the disk.
 
-Entry points: `OpenTexts`; `Places`, which converts places and edits between the course and a
-client. A client counts lines as CommonMark does, and within a line UTF-16 units or those of the
-agreed encoding. Other line ends that Python knows, such as U+2028, end no line.
+A client counts lines as CommonMark does, and within a line UTF-16 units or those of the agreed
+encoding. Other line ends that Python knows, such as U+2028, end no line.
 """
 
 from __future__ import annotations

@@ -8,8 +8,7 @@
  *    (at most 500). Every readout and trace is evaluated before and after.
  * 3. Every claim (`expect`), from a fresh start; claims after the same acts share a run. The acts (`after`, here always a list) are done
  *    at the start, with no time between them. A claim with `diverges` holds if the simulation has diverged by its time.
- * 4. The goal: its log has to reach it, within the length of the main run after the last act and the time to hold; doing nothing must
- *    not.
+ * 4. The goal: its log has to reach it, within the main run's length after the last act and the time to hold; doing nothing must not.
  *
  * The same request gives the same reply, but for `stepsPerSecond`. The request:
  *
@@ -52,6 +51,7 @@ import { OVERLAYS } from '../core/frame.js'
 import { Lab } from '../core/lab.js'
 import { LabError, call, current, numeric, plottable, readable } from '../core/piece.js'
 import { Framing } from '../core/framing.js'
+import { act, controlActs, describe } from './acts.js'
 import { packed } from './base64.js'
 import { deepContact } from './deep.js'
 import { ParityRecorder } from './parity.js'
@@ -112,9 +112,9 @@ class Trial {
     try {
       this.code = call([], () => new Function(`"use strict"; return ${this.text}`)())
       reply.main = this.attempt([], 'start', (lab) => this.mainRun(lab))
-      for (const { entry, what: title, act } of this.controlActs()) {
+      for (const { entry, what: title, act: change } of controlActs(this.config.controls)) {
         this.attempt(entry, title, (lab) => {
-          act(lab)
+          change(lab)
           this.probe(lab)
         })
       }
@@ -125,19 +125,13 @@ class Trial {
     } catch (error) {
       if (!(error instanceof Ended)) this.fail([], 'engine', String(error.message ?? error), null)
     }
-    const stepsPerSecond = this.took > 0 ? Math.round(this.steps / this.took) : null
-    return { ...reply, tried: this.attempts, failures: this.failures, stepsPerSecond }
+    const { attempts: tried, failures, steps, took } = this
+    return { ...reply, tried, failures, stepsPerSecond: took > 0 ? Math.round(steps / took) : null }
   }
 
   /** Measure the speed of a lab of which only the recorded run was tried: run it once more, without recording. */
   pace({ steps }) {
-    const lab = new Lab(this.engine, this.bytes, this.config, this.code)
-    try {
-      lab.start()
-      this.advance(lab, Infinity, Math.min(steps, PACE), ['stopAt', 'code'])
-    } finally {
-      lab.dispose()
-    }
+    this.fresh(this.config, (lab) => this.advance(lab, Infinity, Math.min(steps, PACE), ['stopAt', 'code']))
   }
 
   /** Place the camera so that it shows all of the motion, unless the lab places it. */
@@ -150,15 +144,16 @@ class Trial {
     main.fill = this.framing.fill(camera)
     main.mostFill = this.framing.fill(fitting)
     main.arrows = this.arrowScales.fit(2 * camera.distance * Math.tan((camera.fovy * Math.PI) / 360))
-    if (this.config.overlays.some((name) => name in main.arrows)) main.pictures[0] = packed(this.start(main.arrows))
+    const hasArrows = this.config.overlays.some((name) => name in main.arrows)
+    if (hasArrows) main.pictures[0] = packed(this.fresh({ ...this.config, arrows: main.arrows }, picture))
   }
 
-  /** The start once more, with its arrows. */
-  start(arrows) {
-    const lab = new Lab(this.engine, this.bytes, { ...this.config, arrows }, this.code)
+  /** Do something with a fresh lab whose failures are known. */
+  fresh(config, action) {
+    const lab = new Lab(this.engine, this.bytes, config, this.code)
     try {
       lab.start()
-      return picture(lab)
+      return action(lab)
     } finally {
       lab.dispose()
     }
@@ -286,7 +281,11 @@ class Trial {
       if (!(due > 0)) return null
       const sliceStart = (progress.last = this.now())
       const { steps, stopped: reason } = lab.step(Math.min(due, left, SLICE))
-      this.measure(lab, steps, this.now() - sliceStart)
+      if (lab.recorder === null) {
+        // recording costs time of its own
+        this.steps += steps
+        this.took += (this.now() - sliceStart) / 1000
+      }
       if (lab.diverged === null) this.observe(lab)
       left -= steps
       this.checkState(lab)
@@ -299,13 +298,6 @@ class Trial {
   observe(lab) {
     this.framing.observe(lab)
     this.arrowScales.observe(lab)
-  }
-
-  /** Count steps and their time, unless they are recorded, which costs time of its own. */
-  measure(lab, steps, ms) {
-    if (lab.recorder !== null) return
-    this.steps += steps
-    this.took += ms / 1000
   }
 
   probe(lab) {
@@ -365,26 +357,7 @@ class Trial {
     }
   }
 
-  // --- controls and claims
-
-  *controlActs() {
-    for (const [i, control] of this.config.controls.entries()) {
-      const entry = ['controls', i]
-      if (control.type === 'button') {
-        yield { entry, what: `button "${control.label}"`, act: (lab) => lab.press(i) }
-      } else if (control.type === 'select') {
-        for (const [label, value] of control.options) {
-          yield { entry, what: `"${control.label}" at "${label}"`, act: (lab) => lab.setControl(i, value) }
-        }
-      } else {
-        for (const [name, value] of [['minimum', control.min], ['maximum', control.max], ['value', control.value]]) {
-          if (value === null) continue
-          const title = `"${control.label}" at its ${name} ${value}`
-          yield { entry, what: title, act: (lab) => lab.setControl(i, value) }
-        }
-      }
-    }
-  }
+  // --- claims and the goal
 
   claims() {
     const groups = new Map()
@@ -394,7 +367,7 @@ class Trial {
     })
     for (const claims of groups.values()) {
       claims.sort((a, b) => a.t - b.t)
-      this.attempt(['expect', claims[0].i], this.describe(claims[0].after), (lab) => this.checkClaims(lab, claims))
+      this.attempt(['expect', claims[0].i], describe(claims[0].after), (lab) => this.checkClaims(lab, claims))
     }
   }
 
@@ -426,19 +399,8 @@ class Trial {
     return goal
   }
 
-  /** @param {(string | Record<string, number | string>)[]} after buttons to press and values of controls, in order */
-  describe(after) {
-    if (after.length === 0) return 'claims from the start'
-    const steps = after.map((step) => {
-      if (typeof step === 'string') return `"${step}"`
-      return Object.entries(step).map(([label, value]) => `"${label}" at ${JSON.stringify(value)}`).join(', ')
-    })
-    const only = after.length === 1 && typeof after[0] !== 'string'
-    return `claims ${only ? 'with' : 'after'} ${steps.join(', then ')}`
-  }
-
   checkClaims(lab, claims) {
-    this.act(lab, claims[0].after)
+    act(lab, this.config.controls, claims[0].after)
     for (const { i, t, min, max, diverges } of claims) {
       const entry = ['expect', i, 'expr']
       this.during.entry = current.trying = ['expect', i]
@@ -452,18 +414,6 @@ class Trial {
       if (value === null) continue
       if (min !== null && value < min) this.fail(entry, 'expect', `is ${value} at ${t} s, less than ${min}`, lab.time)
       if (max !== null && value > max) this.fail(entry, 'expect', `is ${value} at ${t} s, more than ${max}`, lab.time)
-    }
-  }
-
-  act(lab, after) {
-    const index = (label) => {
-      const i = this.config.controls.findIndex((control) => control.label === label)
-      if (i < 0) throw new RangeError(`there is no control "${label}"`)
-      return i
-    }
-    for (const step of after) {
-      if (typeof step === 'string') lab.press(index(step))
-      else for (const [label, value] of Object.entries(step)) lab.setControl(index(label), value)
     }
   }
 }
