@@ -12,7 +12,7 @@ changed. A change ends in one of these ways:
 - elsewhere: a message names another line;
 - same: the pages say the same;
 - prose: only words have changed, which nothing can know to be wrong;
-- reason: nothing can know that it is wrong, or another command lists it (`REASONS`);
+- reason: nothing can know that it is wrong, or another command lists it (`slips/reasons.py`);
 - silent: all others. They are listed.
 """
 
@@ -43,6 +43,7 @@ sys.path[:0] = [str(ROOT)]
 from benchmarks.measure.report import put_into  # noqa: E402
 from benchmarks.slips.changes import KINDS, Change, make_change  # noqa: E402
 from benchmarks.slips.pages import compare_pages  # noqa: E402
+from benchmarks.slips.reasons import REASONS  # noqa: E402
 from coursebuild.core.files.trust import FOLDER  # noqa: E402
 from coursebuild.core.model import Course  # noqa: E402
 from coursebuild.core.model.results import ScriptJob, ScriptRun  # noqa: E402
@@ -215,65 +216,6 @@ def _describe(diagnostic: Diagnostic) -> str:
     return f"{span.path}:{span.line}: {diagnostic.rule}: {diagnostic.message}"
 
 
-class Reason(Struct, frozen=True):
-    """Why nothing can know that a change of some sort is wrong."""
-
-    text: str
-    place: str
-    """What `Change.place` is, as a pattern, like all of these."""
-    letters: str = r"[\w.]*"
-    """The letters that the change took away and put in."""
-    line: str = ".*"
-    """The line as it is now."""
-    slip: str = ".*"
-
-
-REASONS = (
-    Reason("another level that a heading may have", "heading", "#+", "#{2,6} .*"),
-    Reason("without a heading, the one before it", "heading", "(?s).*", "(?s).*", "line lost"),
-    Reason(
-        "another formula that is whole: what it says is proven where it has numbers",
-        "formula",
-        r"[^$`\\]*",
-    ),
-    Reason("another word or number, with which all holds that is claimed of the lab", "lab"),
-    Reason("the script prints and draws the same", "script", "(?s).*", "(?s).*"),
-    Reason("an address or a setting that nothing contradicts", "map", r"[\w.]*", r"\w+ = .*"),
-    Reason("what is measured is the author's choice", "declarations", r"[\w.]*", r"\w+ = .*"),
-    Reason("a callout without its first line is a quotation", "callout", slip="line lost"),
-    Reason(
-        "without the first line of its item, or all of it: the rest belongs to the item above",
-        "list",
-        "(?s).*",
-        r" +\S.*|[-*] .*|\d+\. .*|",
-        "line lost",
-    ),
-    Reason("a name that nothing else names", "fence", r"[\w.]*", r".*file=\S+.*"),
-    Reason("given by the author: no script prints it", "number", r"[\d.°-]*", r".*\{given.*"),
-    Reason("another number that the script printed", "number", r"[\d.-]*", r".*\{out.*"),
-    Reason("another name of a source", "out", r"[\w ]*", r".*\{given=.*"),
-    Reason(
-        "another language of a block that is only shown",
-        "fence",
-        r"[a-z]*",
-        r"[ >]*`{3}(?:bash|c|cl|css|d|hs|html|js|json|md|pl|py|r|rs|s|sh|toml|xml|yaml)?",
-    ),
-    Reason("another side to which a column is aligned", "list", ":*", r"[ >]*\|[ :|-]+\|"),
-    Reason(
-        "a setting of a lab that may be left out, with which all holds that is claimed of it",
-        "lab",
-        "(?s).*",
-        slip="line lost",
-    ),
-    Reason("another number that a quiz may have", "quiz", r"[\d.]*", r".*\d.*"),
-    Reason("a formula that nothing links to", "formula|list", r"[\w-]*", r".*\{#eq:.*"),
-    Reason("a paragraph in another place", ".*", "(?s).*", "(?s).*", "paragraph moved"),
-    Reason("a printed number with a digit less, or a zero more", "output", r"\d"),
-    Reason("no name, as the author says", "number", r"[a-z]+", r".*\{code\}.*"),
-    Reason("a whole number without a unit, as words say one", "digits|emphasis", r"\d+"),
-    Reason("a whole number without a unit, as words say one", "number|code", r"\{?(out|given)\}?"),
-    Reason("a number in code that names something", "code", r"\d+"),
-)
 _QUOTED = frozenset("bash console html ini json markdown md sh text toml xml yaml".split())
 """Kinds of blocks that show what nothing runs."""
 

@@ -377,7 +377,7 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
         is_script = name.startswith("file=") and name.endswith(".py")
         help = Fix(help, f"python {kind.text}" if is_script else None, safe=True)
         yield diagnose("fence-info", kind.span(), message, help=help)
-    elif (likely := _find_misspelt(name, kinds)) is not None:
+    elif (likely := _find_misspelt(name, kinds, fence.body.text)) is not None:
         message = f"`{kind.text}` is not a known kind of block"
         help = propose(kind.text, likely, kinds)
         yield diagnose("fence-kind-near", kind.span(), message, help=help)
@@ -398,14 +398,24 @@ def _help_with_foreign(name: str) -> str:
     return "a callout is a quotation: `> [!note]`, and `> ` before each line"
 
 
-def _find_misspelt(name: str, kinds: Sequence[str]) -> str | None:
-    """The kind for which a name was surely meant; no name of a language is taken for another."""
+_BODIES = {"mjcf": re.compile(r"\s*<"), "lab": _OBJECT, "quiz": _OBJECT}
+"""How the texts of some kinds begin."""
+
+
+def _find_misspelt(name: str, kinds: Sequence[str], body: str) -> str | None:
+    """The kind for which a name was surely meant.
+
+    The name of a language, such as `mcf`, is taken for another one only if the text has its form.
+    """
     if name == "simlab":
         return "lab simlab"
     if name in kinds:
         return name
     likely = misspelt(name, kinds) or misspelt(name, LANGUAGES)
-    return None if likely is None or _is_language(name) else likely
+    if likely is None or not _is_language(name):
+        return likely
+    form = _BODIES.get(likely)
+    return likely if form is not None and form.match(body) else None
 
 
 def _check_unread_json(fence: Fence) -> Diagnostic | None:

@@ -44,9 +44,9 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
         for comparison in comparisons.get(tex.span().start, ()):
             span, message = tex.span(comparison.start, comparison.end), comparison.message
             if comparison.kind == "wrong":
-                result = re.match(r"the result is (-?[\d.]+)", message)
-                is_number = re.fullmatch(r"-?[\d.]+", span.text) is not None
-                fix = Fix(comparison.help, result[1] if result and is_number else None)
+                texts = (span.text, comparison.result)
+                are_plain = all(re.fullmatch(r"-?[\d.]+", text) for text in texts)
+                fix = Fix(comparison.help, comparison.result if are_plain else None)
                 mistake = diagnose("formula-arithmetic", span, message, help=fix)
                 diagnostics.append(mistake)
             elif comparison.kind == "unread":

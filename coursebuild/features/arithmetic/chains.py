@@ -143,10 +143,11 @@ def _find_mistake(left: Expression, right: Expression, relation: str) -> Formula
     if agrees(numeral, value, relation):
         return None
     digits = max(numeral.digits + 2, 4)
-    message = f"the result is {format_number(value / numeral.unit_size, digits)}, not this"
+    result = format_number(value / numeral.unit_size, digits)
+    message = f"the result is {result}, not this"
     is_rounded = numeral.is_whole and relation == "=" and agrees(numeral, value, "≈")
     help = "write `\\approx` where a whole number is rounded" if is_rounded else ""
-    return FormulaComparison("wrong", side.start, side.end, message, help)
+    return FormulaComparison("wrong", side.start, side.end, message, help, result)
 
 
 _LARGEST_COEFFICIENT = 12
@@ -301,7 +302,7 @@ class SymbolComparison:
                 if self._is_within_rounding(scaled):
                     return None
                 numbers = " and ".join(format_number(value) for value in scaled)
-                mistakes.append(self._mistake(1, f"{numbers} are not the same", ""))
+                mistakes.append(self._mistake(1, f"{numbers} are not the same"))
                 continue
             units_of = {i: size if i == bare else Fraction(1) for i in numerals}
             index = max(numerals, key=lambda i: (numerals[i].step * units_of[i], i))
@@ -314,10 +315,10 @@ class SymbolComparison:
                 return None
             digits = max(numeral.digits + 2, 4)
             result = format_number(value / (numeral.unit_size * unit_size), digits)
-            mistakes.append(self._mistake(index, f"the result is {result}", ", not this"))
+            mistakes.append(self._mistake(index, f"the result is {result}", result))
         return mistakes[0]
 
-    def _mistake(self, index: int, message: str, end: str) -> FormulaComparison:
+    def _mistake(self, index: int, message: str, result: str = "") -> FormulaComparison:
         """Return what is wrong with a side, with the values that the other side has."""
         side, opposite = self.expressions[index], self.expressions[1 - index]
         names = dict.fromkeys(part.text for part in opposite.walk() if part.text in self.known)
@@ -325,8 +326,9 @@ class SymbolComparison:
         help = ""
         if opposite.kind == "symbol":
             help = "`{given}` after the formula gives the symbol another value in this section"
-        message += (f" where {conditions}" if conditions else "") + end
-        return FormulaComparison("wrong", side.start, side.end, message, help)
+        message += f" where {conditions}" if conditions else ""
+        message += ", not this" if result else ""
+        return FormulaComparison("wrong", side.start, side.end, message, help, result)
 
     def _chain_units(self) -> Iterator[Unit]:
         """Yield the units that the chain names."""

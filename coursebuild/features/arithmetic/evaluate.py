@@ -42,6 +42,8 @@ class FormulaComparison(Struct, frozen=True):
     end: int
     message: str = ""
     help: str = ""
+    result: str = ""
+    """What should stand there, where a number that stands there is wrong."""
 
 
 class Numeral(Struct, frozen=True):

@@ -49,8 +49,6 @@ _HTML = ELEMENTS | frozenset(
     "body button canvas form head html iframe input label legend link main meta object optgroup "
     "option output script select style template textarea".split()
 )
-
-
 _resolvers: list[Resolver] = []
 """The one that was asked last."""
 
@@ -215,8 +213,8 @@ class Resolver:
             return None
         page_names = self._page_names(names) if self.engine is not None or len(name) > 4 else ()
         near = {word for word in page_names if is_one_edit(name, word)}
-        # Of 20,000 usual words of a language some 500 differ by a letter from any name: `weight` is
-        # no slip of `height`. In other languages than English, longer ones do as well.
+        # Of 20,000 usual words some 500 differ by a letter from any name, as `weight` from `height`,
+        # none by the key beside from one that is used often. Other languages have longer ones.
         slips = {slip.upper() for slip in slips_of(name.lower())} if is_constant else slips_of(name)
         is_english = self.course.language.partition("-")[0] == "en"
         near |= {
@@ -228,6 +226,7 @@ class Resolver:
             and (
                 sorted(word) == sorted(name)
                 or (is_english and (len(word) > 6 or re.sub(r"(.)\1", r"\1", name) == word))
+                or (is_english and len(word) == len(name) > 4 and self.uses[word] > 2)
             )
         }
         if is_english and name.isascii() and (len(name) > 5 or re.search("[0-9]", name)):
@@ -258,11 +257,11 @@ class Resolver:
         if self.uses[name] > 1:
             return None
         message = f"nothing that the course knows is called `{name}`"
-        sign = re.fullmatch(r"([\w.]*)(?:([\\<;,]|(?<=.)['\[\]])([\w.]*\w)|[\\'´])", name)
+        sign = re.fullmatch(r"([\w./-]*)(?:([\\<;,]|(?<=.)['\[\]])([\w./-]*\w)|[\\'´])", name)
         if sign is not None:  # it took the place of a letter, or came beside one
             head, tail = sign[1], sign[3] or ""
             lengths = {len(name), len(name) - 1} if head and tail else {len(name) - (not tail)}
-            candidates = self._page_names(names) | self.file_names | self.long_words
+            candidates = self._page_names(names) | self.files | self.file_names | self.long_words
             likely = (c for c in candidates if c.startswith(head) and c.endswith(tail))
             if fitting := sorted(c for c in likely if len(c) in lengths):
                 return Unknown(message, f"did you mean `{fitting[0]}`?", name)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 from itertools import chain
 
@@ -122,7 +121,7 @@ def _check_predictions(quiz: Quiz, document: Document) -> Iterator[Diagnostic]:
 
 
 def _check_answer(question: NumericQuestion) -> Iterator[Diagnostic]:
-    """Report an answer that is a number of its explanation, but for the order of its digits."""
+    """Report an answer that is a number of its explanation, but for two digits swapped."""
     text = " ".join(
         inline.tex.text if isinstance(inline, Math) else getattr(inline, "text", "")
         for block in walk_blocks(question.explain)
@@ -131,15 +130,17 @@ def _check_answer(question: NumericQuestion) -> Iterator[Diagnostic]:
     numbers = [n for n in scan_prose(text.replace("\\cdot", "·")) if n.is_finite]
     if any(abs(float(n.value) - question.answer) <= question.tolerance for n in numbers):
         return
-    digits = re.sub(r"\D", "", question.answer_text).strip("0")
+    answer = question.answer_text
+    swaps = {
+        answer[:n] + answer[n + 1] + answer[n] + answer[n + 2 :]
+        for n in range(len(answer) - 1)
+        if answer[n : n + 2].isdigit() and sum(map(str.isdigit, answer)) > 2
+    }
     for number in numbers:
-        number_digits = re.sub(r"\D", "", number.text).strip("0")
-        if len(digits) > 2 and digits != number_digits and sorted(digits) == sorted(number_digits):
-            place = question.span
-            if match := re.search(r'"answer"\s*:\s*([^\s,}]+)', place.text):
-                place = place.source.span(place.start + match.start(1), place.start + match.end(1))
-            message = f"the explanation says {number.text}, and not {question.answer_text}"
-            yield diagnose("quiz-answer", place, message)
+        if number.text in swaps - {answer}:
+            message = f"the explanation says {number.text}, and not {answer}"
+            help = "if both are right, write the answer in the explanation as well"
+            yield diagnose("quiz-answer", question.answer_span, message, help=help)
             return
 
 
