@@ -213,7 +213,7 @@ class Resolver:
             return None
         page_names = self._page_names(names) if self.engine is not None or len(name) > 4 else ()
         near = {word for word in page_names if is_one_edit(name, word)}
-        # Of 20,000 usual words some 500 differ by a letter from any name, as `weight` from `height`,
+        # Of 20,000 usual words some 500 differ by a letter from a name, as `weight` does;
         # none by the key beside from one that is used often. Other languages have longer ones.
         slips = {slip.upper() for slip in slips_of(name.lower())} if is_constant else slips_of(name)
         is_english = self.course.language.partition("-")[0] == "en"
