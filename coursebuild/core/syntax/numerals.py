@@ -26,7 +26,7 @@ _FORMS = (
     rf"{_BEGIN}(?P<first>\d+)\.\.(?P<last>\d+)(?!\d|[.,]\d)",
     r"(?<![\w.,)\]])\.\d+\.\d+(?![\w.])",
     # a letter for a digit
-    rf"{_BEGIN}(?:[Oo]\.\d+|\d+\.[oOl]\d*|\d+[oOl]\d*\.\d+)(?![\w(]|\.\w)",
+    rf"{_BEGIN}(?:[Oo]\.\d+|\d+\.(?:\d*[oO]|l)\d*|\d+[oOl]\d*\.\d+)(?![\w(]|\.\w)",
     # an exponent
     rf"{_BEGIN}\d[\d.]*(?:[eE](?:{_SIGNS}{{2,}}\d+|{_SIGNS}(?![\w+\u2212-]))|[-\u2212][eE]\d+"
     rf"|[eE]{{2}}{_SIGNS}\d+)",
