@@ -19,8 +19,8 @@ _PUNCTUATION = set(".,;:!?'\"()-/‘’“”–—…")
 _CODE = {"code", "pre", "math", "script", "style", "svg", "kbd", "samp"}
 _SAID = ("alt", "title", "aria-label", "content", "placeholder")
 """Attributes that hold prose."""
-_KEYS = ("data-key", "data-question")
-"""Attributes that hold what the tool made of words, such as a hash that may be a number."""
+_KEY = re.compile("[0-9a-f]{8}")
+"""What the tool made of words: a hash, which may be a number."""
 _SAID_FIELDS = frozenset(
     "title label text note q options explain hint hints reference ylabel xlabel unit name".split()
 )
@@ -53,7 +53,7 @@ class _Reader(HTMLParser):
         for name, value in values.items():
             if name in _SAID:
                 self._say(value)
-            elif name.startswith("data-") and name not in _KEYS:
+            elif name.startswith("data-") and not _KEY.fullmatch(value):
                 self._read_data(value)
         if tag not in {"img", "input", "br", "meta", "link", "hr", "source", "wbr"}:
             is_comment = re.search(r"\bc1?\b", values.get("class", "")) and self._in_code()

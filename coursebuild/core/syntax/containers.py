@@ -314,11 +314,28 @@ def check_numbers(spans: Sequence[Span]) -> Iterator[Diagnostic]:
             return
 
 
+_NUMBERED_LINE = re.compile(r"^[ >]*(\d{1,2}[.)])(?= +\S)", re.MULTILINE)
+
+
+def check_numbered_lines(content: Excerpt) -> Iterator[Diagnostic]:
+    """Report lines of a paragraph that were meant for a list, which begins with 1 there."""
+    marks = list(_NUMBERED_LINE.finditer(content.text))
+    if len(marks) > 1:
+        message = f"`{marks[0][1]}` would be shown as written: no item of a list begins here"
+        help = "begin the list with 1, or leave an empty line above it"
+        yield diagnose("markup-unread", content.span(*marks[0].span(1)), message, help=help)
+
+
 def check_item(span: Span) -> Iterator[Diagnostic]:
     """Report lines of an item that may have begun others."""
     source = span.source
     prefix = source.text[source.line_start(span.line) : span.start]
     number = re.match(r"\d+", span.text)
+    if double := re.match(r"(?:[-*+]|\d+[.)]) +([-*+]|\d+[.)]) +\S", span.text):
+        message = f"`{double[1]}` begins a list in an item that has no text"
+        help = "write the text before it, or delete one of the two marks"
+        place = source.span(span.start + double.start(1), span.start + double.end(1))
+        yield diagnose("markup-unread", place, message, help=help)
     mark = "-" if number is None else f"{int(number[0]) + 1}."
     slip = r"--+(?= )" if number is None else rf"{mark[:-1]}(?= )"
     for line in range(span.line + 1, span.end_line + 1):

@@ -13,6 +13,7 @@ from msgspec import Struct, field
 from coursebuild.core import model
 from coursebuild.core.syntax.attributes import collapse_spaces, read_meaning, read_term, term_id
 from coursebuild.core.syntax.block_parser import References
+from coursebuild.core.syntax.containers import check_numbered_lines
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
 from coursebuild.core.syntax.markup_kinds import BROKEN
@@ -129,6 +130,7 @@ class _TokenReader:
         self._flush()
         if not html:
             self.state.diagnostics += find_repetitions(self.content)
+            self.state.diagnostics += check_numbered_lines(self.content)
             self.state.diagnostics += check_numerals(self.content, self.texts)
         for diagnostic in check_unread_markup(self.content, self.texts, html=html):
             self.report(diagnostic)
@@ -369,7 +371,7 @@ _CELL = re.compile(r"\{[=.]?(?:bash|julia|js|ojs|python|py|r|sql)\}\s|r [A-Za-z_
 _OPEN_VALUE = re.compile(r'\b([A-Za-z]\w*)=(?:"|[\w.-]+")')
 _ATTRIBUTE = re.compile(r'[A-Za-z][\w:-]*="[^"]*"')
 _NO_EQUALS = re.compile(r'([A-Za-z]\w*)\W?"[\w. -]*"')
-_LONE_DASH = re.compile(r'([A-Za-z]\w*)[-+;]"[^"]*"')
+_LONE_DASH = re.compile(r'([A-Za-z]\w*)(?:[-+;]|(?<=\w\w\w))"[^"]*"')
 _LATE_QUOTE = re.compile(r'\b([A-Za-z]\w*)=(?:[-.]?\d[-\d. ]*"|="[-\d. ]+")')
 _BROKEN_VALUE = re.compile(
     r'\b[A-Za-z]\w*="(?:(?:[^"]*\s)?([-+]?\d+\.\.+\d+|[-+]?(?:\d*\.\d*[oOlI]|[oOlI]\.)\d*'
