@@ -135,7 +135,7 @@ class Checker:
             self.session.take_results(self._course, self.verification)
         if verdict != "other":
             return Outcome(change, verdict)
-        known_names = resolver_of(self._course).plain_words
+        known_names = resolver_of(self._course).guesses.plain_words
         reason = find_reason(change, old, claims, known_names)
         return Outcome(change, "reason" if reason else "silent", reason)
 

@@ -45,3 +45,6 @@ CLOSED_FORMS: tuple[str, ...] = tuple(
     """.split()
 )
 """The hard cases whose exact motion is a formula: a scenario may name one as its reference."""
+
+MJCF_KEYWORDS = frozenset("true false auto enable disable degree radian local global".split())
+"""Keywords of MJCF that have no name in MuJoCo's enumerations."""

@@ -34,6 +34,7 @@ from coursebuild.core.engine.digests import SPECIAL, file_state
 from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Limits
 from coursebuild.core.model.results import CompileResult, Misspelling, ModelFacts
+from coursebuild.core.model.vocabulary import MJCF_KEYWORDS
 from coursebuild.core.run import compile_main, mujoco_files
 from coursebuild.core.run.child import LIMITS, JsonChild
 from coursebuild.core.run.mujoco_files import ModelFiles
@@ -202,7 +203,7 @@ class _Compiler(JsonChild):
             return {}, frozenset()
         schema, words = answer
         forms = {form for w in words for form in (w.lower(), w.capitalize(), w.upper())}
-        return read_schema(schema), frozenset((*forms, *_KEYWORDS))
+        return read_schema(schema), frozenset((*forms, *MJCF_KEYWORDS))
 
 
 def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
@@ -252,8 +253,6 @@ def error_line(message: str, text: str) -> int | None:
 # --- names in MJCF
 
 _SCHEMA_LINE = re.compile(r"( *)(?:\((\w+)\))?(\w+) \(.\) +(.*)|( {20,})(\S.*)")
-_KEYWORDS = frozenset("true false auto enable disable degree radian local global".split())
-"""Keywords that have no name in MuJoCo's enumerations."""
 _TRIED = 5
 """The most names that are tried in the place of another one."""
 _NAMES = re.compile(r"""\b(?:name|class)\s*=\s*["']([^"'<>]+)["']""")

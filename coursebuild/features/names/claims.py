@@ -38,6 +38,7 @@ Kind: TypeAlias = Literal[
     "option",
     "table",
     "file",
+    "value",
     "plain",
     "token",
     "torn",
@@ -52,6 +53,7 @@ _SHAPE = re.compile(
 ENGINE_WORD = re.compile(r"(?:mj[A-Z]|mj[a-z]{0,2}_|mjt[A-Z]|Mj[A-Z])\w+")
 """A name that only MuJoCo has."""
 _ATTRIBUTES = re.compile(r'\s*([A-Za-z_][\w:-]*)\s*=\s*"[^"]*"')
+_VALUES = re.compile(r'[A-Za-z_][\w:-]*\s*=\s*"([a-zA-Z]{4,})"')
 _TAG = re.compile(rf"<(/?)([A-Za-z]\w*)((?:{_ATTRIBUTES.pattern[:-7]}\"[^\"]*\")*)\s*/?>")
 _HALF = re.compile(
     r"(?=.*[<>])(?!<.*>\Z)[^\w\s]?/?[A-Za-z]\w*/?[^\w\s]?|<\w+/\w+>|<<[a-z]+[ >/].*"
@@ -71,7 +73,7 @@ _CODE = (
     model.Script | model.PlainCode | model.CodeBlock | model.Mjcf | model.FeatureBlock
 ) | model.Recording
 _PLAIN = re.compile(
-    r"(?<![\w.\\/-])(?<!\A[,;])[A-Za-z]\w+[^\W_]"
+    r"(?<![\w.\\/-])(?<!\A[,;])_?[A-Za-z]\w+[^\W_]"
     r"(?:\.(?:md|py|toml|xml)\b)?(?![\w./\\-])"
 )
 """A word of inline code that is no part of a path."""
@@ -92,7 +94,7 @@ ENDINGS = {
 _MOST_PLAIN = 3
 """How many uses of a plain word are kept of a document: what is used again is no slip."""
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
-GUESSES = frozenset("plain token torn half".split())
+GUESSES = frozenset("value plain token torn half".split())
 """Kinds of claims that are none where nothing is called like them."""
 
 
@@ -290,9 +292,11 @@ def _find(text: str) -> Iterator[tuple[Kind, str, str]]:
             yield "element", tag[2], tag[2]
             for attribute in _ATTRIBUTES.findall(tag[3]):
                 yield "attribute", f"{tag[2]} {attribute}", attribute
+        yield from (("value", value, value) for value in _VALUES.findall(text))
     elif re.fullmatch(rf"(?:{_ATTRIBUTES.pattern})+", text):
         for attribute in _ATTRIBUTES.findall(text):
             yield "attribute", f" {attribute}", attribute
+        yield from (("value", value, value) for value in _VALUES.findall(text))
     elif _FILE.fullmatch(text) or _NEAR_FILE.fullmatch(text):
         yield "file", text, text
     elif not re.search(r"\.(?:py|xml|toml|md|json|js|svg|csv|txt|ya?ml|html|rst|css)\b", text):

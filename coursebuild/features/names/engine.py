@@ -18,6 +18,7 @@ from msgspec import Struct
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
+from coursebuild.core.model.vocabulary import MJCF_KEYWORDS
 from coursebuild.core.run import mjcf
 from coursebuild.core.run.child import JsonChild
 from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
@@ -80,6 +81,13 @@ class EngineNames(Struct, frozen=True, dict=True):
         """The attributes of all elements of MJCF."""
         places = (attributes for e in self.elements.values() for attributes in e.values())
         return frozenset(attribute for attributes in places for attribute in attributes)
+
+    @functools.cached_property
+    def keywords(self) -> frozenset[str]:
+        """What an attribute may say: the ends of names of enumerations, in any case, and others."""
+        ends = {member.partition("_")[2] for member in self.enum_of} - {""}
+        forms = (form for end in ends for form in (end.lower(), end.capitalize(), end))
+        return frozenset((*forms, *MJCF_KEYWORDS))
 
     @functools.cached_property
     def words(self) -> frozenset[str]:

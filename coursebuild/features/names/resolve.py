@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import builtins
 import functools
-import keyword
 import re
-from collections import Counter
 from collections.abc import Iterable
 
 from coursebuild import MANUAL
@@ -19,11 +17,9 @@ from coursebuild.core.model.addresses import line_anchor
 from coursebuild.core.syntax.html import ELEMENTS
 from coursebuild.core.text.diagnostics import (
     did_you_mean,
-    is_one_edit,
     misspelt,
     nearest,
     propose,
-    slips_of,
 )
 from coursebuild.features.names import claims, own_names
 from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, course_names
@@ -39,7 +35,8 @@ from coursebuild.features.names.engine import (
     element_href,
     find_engine_name,
 )
-from coursebuild.features.names.own_names import known_keys, options_by_command
+from coursebuild.features.names.guesses import Guesses
+from coursebuild.features.names.own_names import known_keys
 
 _MANUAL_ID = "coursebuild-manual"
 """The id of the manual, in docs/content/course.toml."""
@@ -74,7 +71,22 @@ class Resolver:
         self.course = course
         table = course.references.get("names")
         self.engine = table.names if not engine and isinstance(table, EngineTable) else engine
-        self._names_by_page: dict[int, frozenset[str]] = {}
+
+    @functools.cached_property
+    def guesses(self) -> Guesses:
+        """What words mean that have not the shape of a name."""
+        return Guesses(
+            self.course,
+            self.engine,
+            self.words,
+            self.imports,
+            self.files,
+            self._is_known_path,
+            has_engine=self.has_engine,
+        )
+
+    def _is_known_path(self, path: str, names: CodeNames) -> bool:
+        return isinstance(self._path(path, names), KnownName)
 
     @functools.cached_property
     def words(self) -> frozenset[str]:
@@ -126,14 +138,16 @@ class Resolver:
                 return own_names.resolve_table(self._manual("course-map"), *claim.name.split(" "))
             case "file":
                 return self._file(claim.name)
+            case "value":
+                return self.guesses.value(claim.name)
             case "plain":
-                return self._plain(claim.name, names)
+                return self.guesses.plain(claim.name, names)
             case "token":
-                return self._token(claim.name, names)
+                return self.guesses.token(claim.name, names)
             case "half":
-                return self._half(claim.name)
+                return self.guesses.half(claim.name)
             case "torn":
-                return self._torn(claim.name, names)
+                return self.guesses.torn(claim.name, names)
 
     # --- Python
 
@@ -161,123 +175,6 @@ class Resolver:
         candidates = {*self.words, *known_keys(), *(() if engine is None else engine.words)}
         message = f"nothing that the course knows is called `{name}`"
         return Unknown(message, _propose(name, candidates), name)
-
-    @functools.cached_property
-    def uses(self) -> Counter[str]:
-        """How often inline code has each word and each token that may be no name."""
-        uses = (claim for names in course_names(self.course) for claim in names.claims)
-        return Counter(claim.name for claim in uses if claim.kind in ("plain", "token"))
-
-    @functools.cached_property
-    def plain_words(self) -> dict[str, int]:
-        """Words without the shape of a name, each with the least length that is telling."""
-        uses, engine = self.uses, self.engine
-        common_words = {*known_keys(), *self.imports, *options_by_command(), *keyword.kwlist}
-        common_words |= {"jupyter", "pytest", "python", "python3"}
-        common_words.update(part for module in self.imports.values() for part in module.split("."))
-        common_words.update(vars(builtins), *(() if engine is None else engine.modules.values()))
-        own_words = {*self.words, *self.file_names}
-        own_words.update(word for word, count in uses.items() if count > 1)
-        frequent_words = {word for word, count in uses.items() if count > 4 and len(word) > 3}
-        engine_words = engine.words if engine is not None and self.has_engine else ()
-        sets = ((common_words, 6), (own_words, 4), (engine_words, 4), (frequent_words, 3))
-        return {word: length for words, length in sets for word in words}
-
-    @functools.cached_property
-    def long_words(self) -> frozenset[str]:
-        """Names of MuJoCo, and words that the course often has as code; shorter with a digit."""
-        words = {word for word, count in self.uses.items() if count > 2}
-        if self.engine is not None and self.has_engine:
-            words |= self.engine.words
-        return frozenset(w for w in words if len(w) > 6 or (re.search("[0-9]", w) and len(w) > 3))
-
-    def _torn(self, torn: str, names: CodeNames) -> Answer:
-        """A name of which a backtick stands before the last letters, as in "`Eule`r"."""
-        name, tail = torn.split(" ")
-        whole, words = name + tail, self.plain_words.keys() | names.words
-        language = self.course.language.partition("-")[0]
-        is_ending = tail in claims.ENDINGS.get(language, claims.ENDINGS["en"])
-        if whole in words and not (is_ending and name in words):
-            message = f"`{name}` and the letters after its backtick are the name `{whole}`"
-            return Unknown(message, f"did you mean `{whole}`?", name)
-        is_vague = len(name) < 2 or (len(tail) > 1 and language != "en")
-        if is_ending or is_vague or language not in claims.ENDINGS:
-            return None
-        message = f"`{tail}` stands directly behind a backtick, and is no ending of a word"
-        return Unknown(message, "move the backtick, or write a blank between them", name)
-
-    def _plain(self, name: str, names: CodeNames) -> Answer:
-        lengths, is_constant = self.plain_words, name.isupper()
-        is_initials = is_constant and len(name) < 7 and name.isalpha()
-        if name in lengths or name in names.words or is_initials:
-            return None
-        page_names = self._page_names(names) if self.engine is not None or len(name) > 4 else ()
-        near = {word for word in page_names if is_one_edit(name, word)}
-        # Of 20,000 usual words some 500 differ by a letter from a name, as `weight` does;
-        # none by the key beside from one that is used often. Other languages have longer ones.
-        slips = {slip.upper() for slip in slips_of(name.lower())} if is_constant else slips_of(name)
-        is_english = self.course.language.partition("-")[0] == "en"
-        near |= {
-            word
-            for word in slips
-            if len(word) >= lengths.get(word, len(word) + 1)
-            # `fields` is no slip of `hfields`
-            and (word[0] == name[0] or len(word) > 7 or self.uses[word] > 1)
-            and (
-                sorted(word) == sorted(name)
-                or (is_english and (len(word) > 6 or re.sub(r"(.)\1", r"\1", name) == word))
-                or (is_english and len(word) == len(name) > 4 and self.uses[word] > 2)
-            )
-        }
-        if is_english and name.isascii() and (len(name) > 5 or re.search("[0-9]", name)):
-            letters = ("", *"abcdefghijklmnopqrstuvwxyz_")
-            words = {name[:n] + x + name[n + 1 :] for n in range(1, len(name) - 1) for x in letters}
-            near |= words & self.long_words
-        if (likely := min(near, default=None)) is None:
-            return None
-        message = f"nothing that the course knows is called `{name}`"
-        return Unknown(message, propose(name, likely, near), name)
-
-    def _page_names(self, names: CodeNames) -> frozenset[str]:
-        """The names of a document, of three letters or more, for which others may be slips."""
-        key = id(names)
-        if key not in self._names_by_page:
-            words = {*names.words, *names.definitions, *names.imports}
-            words.update(part for module in names.imports.values() for part in module.split("."))
-            for claim in names.claims:
-                if claim.kind not in claims.GUESSES:
-                    words.update(re.findall(r"\w+", claim.name))
-                elif claim.kind == "plain" and claim.name in self.plain_words:
-                    words.add(claim.name)
-            self._names_by_page[key] = frozenset(word for word in words if len(word) > 2)
-        return self._names_by_page[key]
-
-    def _token(self, name: str, names: CodeNames) -> Answer:
-        """A token that is another one of the course but for a slip in or beside a word."""
-        if self.uses[name] > 1:
-            return None
-        message = f"nothing that the course knows is called `{name}`"
-        sign = re.fullmatch(r"([\w./-]*)(?:([\\<;,]|(?<=.)['\[\]])([\w./-]*\w)|[\\'´])", name)
-        if sign is not None:  # it took the place of a letter, or came beside one
-            head, tail = sign[1], sign[3] or ""
-            lengths = {len(name), len(name) - 1} if head and tail else {len(name) - (not tail)}
-            candidates = self._page_names(names) | self.files | self.file_names | self.long_words
-            likely = (c for c in candidates if c.startswith(head) and c.endswith(tail))
-            if fitting := sorted(c for c in likely if len(c) in lengths):
-                return Unknown(message, f"did you mean `{fitting[0]}`?", name)
-        path = re.sub(r"^(\w+)\.\.(?=\w)", r"\1.", name)
-        if path != name and isinstance(self._path(path, names), KnownName):
-            return Unknown(message, f"did you mean `{path}`?", name)
-        words = [word.span() for word in re.finditer("[A-Za-z_]{4,}", name)]
-        for candidate in slips_of(name):
-            is_word = len(candidate) > 5 and candidate in self.plain_words
-            is_file = candidate in self.files or candidate in self.file_names
-            if is_word or is_file or self.uses[candidate] > 1:
-                pairs = enumerate(zip(name, candidate, strict=False))
-                at = next((n for n, (a, b) in pairs if a != b), len(name))
-                if any(start - 1 <= at <= end + 1 for start, end in words):
-                    return Unknown(message, f"did you mean `{candidate}`?", name)
-        return None
 
     def _path(self, path: str, names: CodeNames) -> Answer:
         parts = [re.sub(r"[()\[\]]+", "", part) for part in path.split(".")]
@@ -387,16 +284,6 @@ class Resolver:
         message = f"MJCF of MuJoCo {engine.version} has no element `<{name}>`"
         return Unknown(message, did_you_mean(name, engine.elements), name)
 
-    def _half(self, text: str) -> Answer:
-        """An element of which a bracket is lost or another key, or has a sign for a letter."""
-        name, sign = re.sub(r"\W", "", text.split()[0]), re.fullmatch(r"<(\w*)[^\w/](\w*)>", text)
-        pattern = f"{sign[1]}.?{sign[2]}" if sign else f"{name}|{name[1:]}"
-        elements = set() if self.engine is None or not self.has_engine else self.engine.elements
-        element = next((word for word in sorted(elements) if re.fullmatch(pattern, word)), None)
-        if element is None:
-            return None
-        return Unknown(f"`{text}` is not a whole tag", f"did you mean `<{element}>`?", text)
-
     def _attribute(self, element: str, name: str) -> Answer:
         engine = self.engine
         if engine is None or not self.has_engine or (element and element not in engine.elements):
@@ -434,11 +321,6 @@ class Resolver:
             return None
         help = _propose(path, self.files) or "write it, or say `{code}` after the name"
         return Unknown(f"the course has no file `{path}`", help, path)
-
-    @functools.cached_property
-    def file_names(self) -> frozenset[str]:
-        """The names of its files without their folders."""
-        return frozenset(path.rpartition("/")[2] for path in self.files)
 
     @functools.cached_property
     def files(self) -> frozenset[str]:
