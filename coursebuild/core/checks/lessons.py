@@ -145,6 +145,11 @@ _PAIR = re.compile(
 """Brackets with none between them that belong together; those of an interval may differ."""
 _SLIPS = (
     (r"(?:^|[(\[=+,;&-])\s*(')", "this prime follows nothing", "write the letter before it"),
+    (
+        r"(?<![\\A-Za-z])[A-Za-z]{4,}(?=\{)",
+        "these letters and their braces are no command",
+        "write `\\` and the command's name",
+    ),
     (r"[-+=/]\s*(_)\w(?![\w^{(])", "this index follows nothing", "write the letter before it"),
     (
         r"(?<=[\w)}\]'])\s*(--|\+\s*\+|=\s*=|\\cdot\s*\\cdot\b)(?=\s*[\w\\({])",

@@ -86,7 +86,8 @@ class Resolver:
         )
 
     def _is_known_path(self, path: str, names: CodeNames) -> bool:
-        return isinstance(self._path(path, names), KnownName)
+        is_path = all(part.isidentifier() for part in path.split("."))
+        return is_path and isinstance(self._path(path, names), KnownName)
 
     @functools.cached_property
     def words(self) -> frozenset[str]:
