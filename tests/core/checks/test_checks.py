@@ -167,6 +167,45 @@ def block(keys: str, *lines: str) -> Course:
     return make_course(f"```mjcf{keys}\n{body}\n```\n")
 
 
+def test_a_fragment_gets_the_elements_around_it() -> None:
+    for keys, opening, closing in (
+        (" fragment=mujoco", "<mujoco>", "</mujoco>"),
+        (
+            ' fragment="worldbody/body"',
+            "<mujoco><worldbody><body>",
+            "</body></worldbody></mujoco>",
+        ),
+    ):
+        (wrapped,) = mjcf_texts(block(keys, "<geom/>"))
+        assert (wrapped.text, wrapped.lines_before) == (f"{opening}\n<geom/>\n\n{closing}", 1)
+
+
+def test_texts_of_blocks_and_labs_are_compiled_in_their_order() -> None:
+    lab = '```lab\n{"xml": "<mujoco/>"}\n```\n'
+    by_name = '```lab\n{"model": "box"}\n```\n'
+    course = make_course(f"```mjcf\n<a/>\n```\n\n{lab}", f"{by_name}\n```mjcf\n<b/>\n```\n")
+    assert [text.text for text in mjcf_texts(course)] == ["<a/>\n", "<mujoco/>", "<b/>\n"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "line", "expected"),
+    [
+        ("", 2, "<world/>"),
+        ("", 1, "<mujoco>"),
+        ("", 4, ""),
+        ("", 5, "```mjcf"),
+        ("", 0, "```mjcf"),
+        ("", None, "```mjcf"),
+        (" fragment=worldbody", 3, "<world/>"),
+        (" fragment=worldbody", 1, "```mjcf fragment=worldbody"),
+    ],
+)
+def test_an_error_is_reported_at_its_line_without_indent(
+    keys: str, line: int | None, expected: str
+) -> None:
+    assert rules_and_texts(check(block(keys), failure(line))) == [f"mjcf-error: {expected}"]
+
+
 PART = "<!-- a part -->\n<mujocoinclude/>\n"
 
 

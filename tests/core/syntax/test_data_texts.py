@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from decimal import Decimal
@@ -377,6 +378,16 @@ def test_values_of_right_texts(name: str, rewriting: bool) -> None:
     check_cases(VALUE_FOLDER / f"{name}.md", render, rewriting=rewriting)
 
 
+@pytest.mark.parametrize(("prefix", "newline"), [("> ", "\n"), ("  ", "\r\n")])
+def test_a_quiz_in_a_quotation_or_indented_is_the_same(prefix: str, newline: str) -> None:
+    text = read_cases(VALUE_FOLDER / "quiz.md")[0].input
+    quiz = parse_quiz(text, prefix, newline)
+    assert quiz.diagnostics == ()
+    values = (quiz.value, parse_quiz(text).value)
+    descriptions = {re.sub(r"\d+:\d+ ", "", describe(value)) for value in values}
+    assert len(descriptions) == 1
+
+
 @pytest.mark.parametrize(
     ("verify", "expected"),
     [
@@ -396,7 +407,7 @@ def test_how_outputs_are_compared(verify: str, expected: Comparison) -> None:
     assert course is not None and course.comparison == expected
 
 
-@settings(max_examples=150)
+@settings(max_examples=400)
 @given(st.sampled_from([*VALUES_READ]), st.data())
 def test_any_edit_of_a_right_text_is_parsed_or_reported(name: str, data: st.DataObject) -> None:
     text = read_cases(VALUE_FOLDER / f"{name}.md")[0].input
