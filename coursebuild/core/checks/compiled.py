@@ -6,6 +6,7 @@ A file that only other models include need not compile by itself.
 from __future__ import annotations
 
 import contextlib
+import math
 import re
 import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -319,13 +320,7 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
                 help = did_you_mean(measure.name, [name for name in model_names if name])
                 yield diagnose(_RULE, scenario.place("measure"), message, help=help)
         yield from _check_horizon_error(scenario, facts.sizes)
-        step, lengths = facts.timestep, ("sample", "hold", "duration")
-        name = next((n for n in lengths if getattr(scenario, n) is not None), "")
-        length = getattr(scenario, name, step)
-        if not is_multiple(length, step):
-            message = f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
-            help = f"a multiple near it is {max(round(length / step), 1) * step:.12g}"
-            yield diagnose(_RULE, scenario.place(name), message, help=help)
+        yield from _check_timestep(scenario, facts.timestep)
     for sweep in declarations.sweeps:
         yield from _check_sweep(sweep, declarations.scenarios, facts)
 
@@ -351,6 +346,25 @@ def _check_horizon_error(
             )
             help = f"state one from {least} to {most}"
             yield diagnose(_RULE, place, message, help=help)
+
+
+def _check_timestep(scenario: DeclaredScenario, step: float) -> Iterator[Diagnostic]:
+    """Report that the first length that is given has no whole number of steps.
+
+    MuJoCo compiles models with any timestep, also with 0 and NaN.
+    """
+    lengths = (
+        ("sample", scenario.sample),
+        ("hold", scenario.hold),
+        ("duration", scenario.duration),
+    )
+    name, length = next((pair for pair in lengths if pair[1] is not None), ("", None))
+    if length is None or (step > 0 and is_multiple(length, step)):
+        return
+    message, help = f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)", ""
+    if 1e-15 < step / length < math.inf:
+        help = f"a multiple near it is {max(round(length / step), 1) * step:.12g}"
+    yield diagnose(_RULE, scenario.place(name), message, help=help)
 
 
 MAX_SWEEP_STEPS = 2_000_000

@@ -25,6 +25,7 @@ from typing import TypeAlias
 from msgspec import Struct
 
 _Point: TypeAlias = int | tuple[int, int, int]
+"""A node, or an edge where it crosses a layer."""
 
 _SWEEPS = 12
 _PASSES = 40
@@ -76,7 +77,10 @@ def transitive_reduction(
 
 @functools.lru_cache(maxsize=256)
 def layered_layout(count: int, edges: tuple[tuple[int, int], ...], passing: float) -> Layout:
-    """Lay out a graph without cycles; an edge that crosses a layer is `passing` wide there."""
+    """Lay out a graph without cycles; the order of nodes breaks ties.
+
+    `passing` is the room, in widths of a node, for an edge that crosses a layer.
+    """
     layers = _assign_layers(count, edges)
     rows: list[list[_Point]] = [[] for _ in range(max(layers, default=-1) + 1)]
     for node, layer in enumerate(layers):

@@ -12,6 +12,7 @@ from itertools import pairwise
 from msgspec import Struct
 
 _LARGEST = 290.0
+"""Greater powers of ten are drawn as this one."""
 
 
 class Scale(Struct, frozen=True):

@@ -29,6 +29,7 @@ class Heading(Located, frozen=True):
     children: tuple[Inline, ...]
     anchor: str
     explicit: bool
+    """Whether the anchor was given by `{#id}`."""
     classes: tuple[str, ...] = ()
 
     @property
@@ -152,6 +153,7 @@ class Script(Labelled, frozen=True):
     """The lines between the fences, to the start of the closing one."""
     diverges: bool = False
     deep: bool = False
+    """Whether the author expects deep penetrations of bodies in it."""
     writes: tuple[str, ...] = ()
     once: bool = False
     """Whether the course keeps its output, and it runs only on request."""
@@ -221,6 +223,7 @@ class Recording(Struct, frozen=True):
     """The lines between the fences (from the start of the first to the start of the closing fence);
     for a table all of it."""
     prefix: str
+    """The text before each line in the lesson, as before those of `SourcePart`."""
     comparison: Comparison | None
     """`None`: the course's default."""
     script: str | None

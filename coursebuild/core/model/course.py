@@ -23,6 +23,7 @@ class ThemeFile(Struct, frozen=True):
     path: str
     span: Span
     data: bytes = b""
+    """Empty until it has been read."""
 
     @property
     def ending(self) -> str:
@@ -283,7 +284,9 @@ class Course(Struct, frozen=True):
     packages: tuple[NamedPath, ...] = ()
     """Folders that scripts import from, after their own and before all others."""
     environment: tuple[tuple[str, str], ...] = ()
+    """Variables of scripts, sorted."""
     python: NamedPath | None = None
+    """The interpreter of the scripts, if not the one that runs this tool."""
     strict: bool = False
     unproven: tuple[NamedPath, ...] = ()
     """The scripts that need not have been run where warnings count as errors."""

@@ -156,6 +156,7 @@ class ScriptRun(Struct, frozen=True):
     """The last 64 KiB, with extracted paths as the interpreter wrote them."""
     seconds: float
     missing: tuple[str, ...] = ()
+    """Modules that it requires and that are not installed."""
     cached: bool = False
     trace: Trace | None = None
     """What it read; `None` where that was not traced."""
@@ -327,6 +328,7 @@ class CachedFile(Struct, frozen=True):
     """A file of the site that is not made again if it was published under the same key."""
 
     path: str
+    """In the site, POSIX."""
     key: str
     """A hash of all that its bytes depend on."""
     make: Callable[[], bytes]
@@ -352,6 +354,7 @@ class FileFacts(Struct, frozen=True):
     digest: str
     """SHA-256 of its bytes, in hexadecimal digits."""
     size: int
+    """Bytes."""
 
 
 class FileList(Struct, frozen=True):

@@ -243,6 +243,7 @@ class Declarations(Struct, frozen=True):
     model: str
     """The name of the model: its path below `models/`, without suffix, POSIX."""
     source: Source
+    """The file, or the model's source if there is none."""
     scenarios: tuple[DeclaredScenario, ...] = ()
     keep: tuple[Keep, ...] = ()
     bench: BenchTable = BenchTable()

@@ -55,6 +55,8 @@ AnyInline = TypeVar("AnyInline", bound=Inline)
 
 _BLOCK_CONTAINERS = (BlockQuote, Callout, ListBlock, FeatureBlock, Recording)
 """Blocks that may contain blocks."""
+_INLINE_CONTAINERS = (Parent, Link)
+"""A tuple, since `Parent | Link` would be made anew at every step."""
 _COMMENTS = re.compile(r"(?:\s*<!--(?:(?!-->)[\s\S])*-->)*\s*")
 
 
@@ -186,7 +188,7 @@ def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
     """Every inline in order, a container before its content."""
     for inline in inlines:
         yield inline
-        if isinstance(inline, Parent | Link):
+        if isinstance(inline, _INLINE_CONTAINERS):
             yield from walk_inlines(inline.children)
         elif isinstance(inline, Math) and inline.value is not None:
             yield inline.value

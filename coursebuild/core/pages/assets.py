@@ -100,6 +100,7 @@ _SMALLEST = 8 << 10
 _LARGE = 2 << 20
 """Bytes; for larger files, the best quality would take a quarter of a minute."""
 Keep = Callable[[str, Callable[[], bytes]], bytes]
+"""Returns what was made under a key before, or makes it."""
 
 
 def compressed_files(files: Iterable[SiteFile], keep: Keep) -> tuple[CachedFile, ...]:

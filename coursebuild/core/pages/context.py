@@ -171,9 +171,12 @@ class SiteContext(Struct, frozen=True):
     pages: tuple[NotedPage, ...]
     """The pages with a note of this feature, in the order of the site."""
     note: Callable[[str], bytes]
+    """Returns the note of a page, by its site path."""
     get_or_make: Callable[[str, Callable[[], bytes]], bytes]
+    """Returns what was made under a key before, or makes it."""
     archives: Mapping[str, Archive]
     imports: Callable[[str], frozenset[str]]
+    """Returns the modules that a Python text imports."""
 
 
 class ExportContext(Struct, frozen=True):

@@ -237,7 +237,10 @@ _MODEL_NAMED = re.compile(
 
 
 def models_named(script: model.Script) -> frozenset[str]:
-    """The names in a script that may be models: of files, and single words in quotes."""
+    """The names in a script that may be models: of files, and single words in quotes.
+
+    A function of the script may pass such a word on to `model_path`.
+    """
     names: set[str] = set()
     for match in _MODEL_NAMED.finditer(script.code.text):
         name = (match["name"] or match["file"] or match["word"]).removesuffix(".xml")

@@ -257,7 +257,10 @@ def _fold_long(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:
 
 
 def _fold_rest(body: list[ast.stmt], cuts: list[int], lines: list[str]) -> tuple[Part, ...]:
-    """The parts after the head; statement `i` has the lines from `cuts[i]` to `cuts[i + 1]`."""
+    """The parts after the head; statement `i` has the lines from `cuts[i]` to before `cuts[i + 1]`.
+
+    Blank lines at the border of a fold belong to the fold.
+    """
     first, total = cuts[0], len(lines)
     shown_count = 1
     while shown_count < len(body) and cuts[shown_count + 1] - first <= SHOWN_LINES:

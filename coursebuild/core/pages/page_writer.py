@@ -153,8 +153,9 @@ class PageWriter(PageContext, frozen=True):
             key = "code.lines" if part.first < part.last else "code.line"
             holds = [words("code.docstring")] if part.docstring else []
             holds += [words("code.imports")] if part.imports else []
+            holds += part.names
             label = words(key, first=part.first, last=part.last)
-            label += ": " * bool(holds or part.names) + ", ".join((*holds, *part.names))
+            label += f": {', '.join(holds)}" if holds else ""
             html = numbered_lines(lines[part.first - 1 : part.last], block.path, part.first)
             parts.append(CodePart(html, part.first, part.folded, label))
         return self.template(
@@ -310,11 +311,9 @@ def _is_wide(block: model.Block) -> bool:
 
 
 def _docked(block: model.Block) -> model.FeatureBlock | None:
-    return (
-        block
-        if isinstance(block, model.FeatureBlock) and kind_of_block(block).docked(block)
-        else None
-    )
+    if isinstance(block, model.FeatureBlock) and kind_of_block(block).docked(block):
+        return block
+    return None
 
 
 _Blocks: TypeAlias = tuple[model.Block, ...]

@@ -117,7 +117,10 @@ _ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>
 
 
 def hoist_styles(html: str) -> tuple[str, frozenset[str]]:
-    """Replace `style` attributes by classes; return the page and the declarations."""
+    """Replace `style` attributes by classes; return the page and the declarations.
+
+    Most pages have some in their formulas only, and then nothing else is looked at.
+    """
     parts = FORMULA.split(html)
     if "style" in "".join(parts[::2]).lower():
         return _hoist_all.__wrapped__(html)

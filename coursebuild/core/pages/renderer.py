@@ -126,7 +126,10 @@ class Renderer(Struct, frozen=True):
     formulas: Mapping[Formula, str | MathError] = field(default_factory=dict)
 
     def render(self, template: str, **values: object) -> Markup:
-        """A filled-in template; it can use `t`, the interface texts, and `authored`, see `text`."""
+        """A filled-in template, without its last line end.
+
+        It can use `t`, the interface texts, and `authored`, see `text`.
+        """
         variables = {"t": self.words, "authored": self.text, **values}
         try:
             return Markup(self.templates.get_template(template).render(variables).rstrip("\n"))

@@ -137,7 +137,8 @@ def dark_drawing(svg: str, paired_colours: Mapping[str, str]) -> str:
 
     root = _ROOT.search(svg)
     if root is not None and " fill=" not in root[0]:  # the default colour of shapes
-        svg = svg.replace("<svg", '<svg fill="#000000"', 1)
+        at = root.start() + len("<svg")
+        svg = f'{svg[:at]} fill="#000000"{svg[at:]}'
     return _COLOUR.sub(dark, svg)
 
 

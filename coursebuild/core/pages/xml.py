@@ -59,7 +59,10 @@ def markup(content: Iterable[Element | str]) -> Markup:
 
 
 def identifier(prefix: str, text: str, *, most: int = 0) -> str:
-    """An ASCII NCName for each text; beyond `most` characters it ends with digits of its hash."""
+    """An ASCII NCName of a text, another one for each.
+
+    Beyond `most` characters it ends with digits of its hash.
+    """
     name = prefix + re.sub("[^A-Za-z0-9.-]", lambda match: f"_{ord(match[0]):x}_", text)
     if most and len(name) > most:
         digest = hashlib.sha256(name.encode()).hexdigest()[:12]

@@ -85,7 +85,10 @@ def same_lines(recorded: Side, printed: Side, comparison: Comparison) -> bool:
 
 
 def count_alike(text: Side, printed: Side, matcher: LineMatcher) -> int:
-    """How many lines of a text have a printed one, in order, with half of their words or more."""
+    """How many lines of a text have a printed one, in order, with half of their words or more.
+
+    Numbers count as alike, whatever their values.
+    """
     return len(_line_pairs(text, range(len(text.lines)), printed, matcher))
 
 
@@ -158,6 +161,7 @@ MATCH = 8
 """The weight of a pair that matches; smaller ones are for items that are alike, 0 for no pair."""
 
 _CELLS = 250_000
+"""The most cells that a table of dynamic programming may have."""
 
 
 def pair(

@@ -46,7 +46,10 @@ _FENCE = re.compile(r"`{3,}|~{3,}")
 
 
 def apply_edits(text: str, edits: Iterable[Edit]) -> str:
-    """The text with edits applied by offset; `ValueError` for edits that overlap."""
+    """The text with edits applied by offset.
+
+    `ValueError` for edits that overlap, stand at the same place, or belong to another text.
+    """
     places: list[tuple[int, int, str]] = []
     for edit in sorted(edits, key=lambda edit: (edit.span.start, edit.span.end)):
         start, end = edit.span.start, edit.span.end

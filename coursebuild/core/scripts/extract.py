@@ -96,6 +96,7 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
 
 
 _PATIENCE = 3.0
+"""How many times as long a script may take when its initial states are moved."""
 
 
 def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[ScriptJob, ...]:

@@ -32,6 +32,7 @@ PIXEL_TOLERANCE = 1.0
 
 MAX_PIXELS = 25_000_000
 MAX_TABLE = 4 << 20
+"""Bytes of data."""
 SVG_HELP = "an SVG may contain only what draws a still picture, and refer only to its own parts"
 
 _NUMBER = re.compile(r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?")

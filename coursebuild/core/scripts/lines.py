@@ -118,6 +118,7 @@ class Side(Struct, frozen=True):
     """Before the filters, its line ends as they came."""
     mapped: MappedText
     lines: tuple[str, ...]
+    """Without white space at their ends, and without empty ones at the end."""
     starts: tuple[int, ...]
     """Where the lines begin in the mapped text."""
 

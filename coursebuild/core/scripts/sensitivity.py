@@ -41,6 +41,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 
 PERTURBATION = 1e-12
+"""How far initial states are moved, relative."""
 RUNS = 4
 """Runs with moved states of each script: two pairs in opposite directions, the second pair half as
 far away."""
@@ -64,6 +65,7 @@ class Standing(enum.Enum):
     DRIFTED = "drifted"
     """It prints something other than recorded, or does not run to its end."""
     FAILED = "failed"
+    """It did not run to its end with moved states."""
 
 
 class Doubt(Struct, frozen=True):
@@ -72,7 +74,9 @@ class Doubt(Struct, frozen=True):
     span: Span
     printed: str
     digits: int
+    """Significant digits printed."""
     repeat: int
+    """How many of them stay the same when initial states are moved."""
     converged: int | None
     """How many of them are those of ever smaller timesteps; `None` where not known."""
     least: str
@@ -84,6 +88,7 @@ class Doubt(Struct, frozen=True):
     instead: str
     """The number with only the digits that repeat and converge; empty if none does, or a count."""
     compared: bool
+    """Whether verification would report the difference as drift."""
 
 
 class Flip(Struct, frozen=True):

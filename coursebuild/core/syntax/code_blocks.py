@@ -100,17 +100,7 @@ def _build_script(
     code = fence.body.slice(0, len(fence.body.text.rstrip("\n")) + 1)  # with one line end
     if not code.text.endswith("\n"):
         code = Excerpt(code.source, code.text + "\n", code.pieces)
-    timeout, word = DEFAULT_TIMEOUT, keys.get("timeout")
-    if word is not None and word.value is not None:
-        timeout = float(word.value) if _NUMBER.fullmatch(word.value) else 0.0
-        message = f"`{word.value}` is not a number of seconds above 0"
-        if timeout > MAX_TIMEOUT:
-            message = f"`{word.value}` s is more than a day"
-        if not 0 < timeout <= MAX_TIMEOUT:
-            number = re.fullmatch(rf"({_NUMBER.pattern})\s?s(?:ec)?", word.value)
-            help = "" if number is None else write(number[1])
-            diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
-            timeout = DEFAULT_TIMEOUT
+    timeout = _read_timeout(keys.get("timeout"), diagnostics)
     requires = [part.text for part in _read_list("requires", keys, diagnostics)]
     writes = [part.text.rstrip("/") for part in _read_list("writes", keys, diagnostics)]
     args: list[str] = []
@@ -147,6 +137,21 @@ def _build_script(
         once=record is not None,
         figures=tuple(FigureName(name.text, name.span()) for name in figures),
     )
+
+
+def _read_timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
+    if word is None or word.value is None:
+        return DEFAULT_TIMEOUT
+    seconds = float(word.value) if _NUMBER.fullmatch(word.value) else 0.0
+    if 0 < seconds <= MAX_TIMEOUT:
+        return seconds
+    message = f"`{word.value}` is not a number of seconds above 0"
+    if seconds > MAX_TIMEOUT:
+        message = f"`{word.value}` s is more than a day"
+    number = re.fullmatch(rf"({_NUMBER.pattern})\s?s(?:ec)?", word.value)
+    help = "" if number is None else write(number[1])
+    diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
+    return DEFAULT_TIMEOUT
 
 
 def _read_list(key: str, keys: FenceKeys, diagnostics: list[Diagnostic]) -> list[Excerpt]:

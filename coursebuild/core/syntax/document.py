@@ -91,7 +91,8 @@ def _unclaimed_blocks(
 ) -> Iterator[model.CodeBlock | model.Table]:
     """The texts and tables below a script of which nothing says what they are.
 
-    A table is claimed if one of its numbers is bound or given.
+    A table is claimed if one of its numbers is bound or given. Quizzes show what is wrong as
+    well, and of a block with a mistake in its first line that is to be mended first.
     """
     in_features = feature_block_ids(document)
     mistakes = {d.span.line for d in diagnostics if d.is_error}

@@ -260,9 +260,9 @@ def find_forbidden(html: Excerpt) -> tuple[ForbiddenHtml, ...]:
             element, end = tag[1].lower(), tag.end()
             if element not in ELEMENTS:
                 parts.append((at, end, f"`<{tag[1]}>` is not allowed in a page"))
-            for attribute in (
-                _ATTRIBUTES.finditer(text, *tag.span(2)) if element in ELEMENTS else ()
-            ):
+                at = end
+                continue
+            for attribute in _ATTRIBUTES.finditer(text, *tag.span(2)):
                 value = unescape((attribute[2] or "").strip("\"'"))
                 subject = _find_forbidden_part(element, attribute[1].lower(), value)
                 if subject:

@@ -54,7 +54,11 @@ _BINDING = re.compile(
 
 
 def _code_span(state: rules_inline.StateInline, silent: bool) -> bool:
-    """A code span; with braces after it a `number_binding` or `number_given`, with its `info`."""
+    """A code span; with `{out}` after it a `number_binding`, the script's path in its `info`.
+
+    With `{given}` it is a `number_given`, and its `info` the source; that of code is `code`, if
+    `{code}` follows.
+    """
     start = state.pos
     if not rules_inline.backtick(state, silent):
         return False

@@ -62,7 +62,7 @@ def find_misspelt_caption(
 ) -> Diagnostic | None:
     """The diagnostic of a paragraph that begins with a misspelt name and ends with a colon.
 
-    One that consists of the name may lack the colon.
+    One that consists of the name may lack the colon. Words in `unlike` are not misspelt.
     """
     match = _FIRST_WORD.match(content.text)
     is_alone = match is not None and match.end() == len(content.text)

@@ -29,6 +29,7 @@ def parse_toml(
     """A file or the body of a fence as a table; no value, and one diagnostic, if it is not TOML.
 
     `rule` is that of this diagnostic. A caller that finds any must not publish the value.
+    Never raises.
     """
     # As `tomllib` reads a file; a lone CR stays, since TOML refuses it.
     body = text.excerpt("\r\n") if isinstance(text, Source) else text

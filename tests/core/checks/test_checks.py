@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
+from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import check_compiled, check_scenarios, mjcf_texts
 from coursebuild.core.checks.lessons import (
@@ -13,7 +16,7 @@ from coursebuild.core.checks.lessons import (
 )
 from coursebuild.core.checks.links import anchors, link_targets
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import CompileResult, Formula, MathError
+from coursebuild.core.model.results import CompileResult, Formula, MathError, ModelFacts
 from coursebuild.core.text.diagnostics import Diagnostic
 from support.made_courses import BOX, document, facts, make_course, messages, rules_and_texts
 
@@ -76,10 +79,10 @@ GOOD_SCENARIOS = (
 )
 
 
-def scenario_messages(*scenarios: str) -> list[str]:
+def scenario_messages(*scenarios: str, model: ModelFacts = MODEL) -> list[str]:
     texts = (f'[[scenario]]\nname = "s{n}"\n{text}\n' for n, text in enumerate(scenarios))
     (declarations,) = make_course(models={}, declaration_texts={"box": "".join(texts)}).declarations
-    diagnostics = tuple(check_scenarios(declarations, MODEL))
+    diagnostics = tuple(check_scenarios(declarations, model))
     return [
         f"{a}; {b}"
         for a, b in zip(rules_and_texts(diagnostics), messages(diagnostics), strict=True)
@@ -88,6 +91,30 @@ def scenario_messages(*scenarios: str) -> list[str]:
 
 def test_scenarios_that_fit_their_model_are_good() -> None:
     assert scenario_messages(*GOOD_SCENARIOS) == []
+
+
+def test_a_mismatch_with_the_model_is_reported_at_its_value() -> None:
+    divides = "the model's timestep, 0.002 s, does not divide"
+    for line, expected in (
+        ('measure = "sensor:tip"', '"sensor:tip"; the model has no sensor `tip` [known: `gyro`]'),
+        (
+            "duration = 0.001",
+            f"0.001; {divides} `duration` (0.001 s) [a multiple near it is 0.002]",
+        ),
+        (
+            "controls = [[1], [2]]\nhold = 0.003",
+            f"0.003; {divides} `hold` (0.003 s) [a multiple near it is 0.004]",
+        ),
+    ):
+        assert scenario_messages(line) == [f"scenario-model: {expected}"]
+
+
+@pytest.mark.parametrize("step", [0.0, -0.1, 1e-320, math.inf, math.nan])
+def test_any_timestep_that_the_compiler_takes_is_judged(step: float) -> None:
+    model = replace(MODEL, timestep=step)
+    assert scenario_messages("", model=model) == []
+    (message,) = scenario_messages("duration = 1.0", model=model)
+    assert message.endswith(f"the model's timestep, {step:g} s, does not divide `duration` (1 s)")
 
 
 def test_all_mismatches_of_all_scenarios_are_reported() -> None:
@@ -138,6 +165,45 @@ def check(
 def block(keys: str, *lines: str) -> Course:
     body = "\n".join(lines or ("<mujoco>", "  <world/>", "</mujoco>"))
     return make_course(f"```mjcf{keys}\n{body}\n```\n")
+
+
+def test_a_fragment_gets_the_elements_around_it() -> None:
+    for keys, opening, closing in (
+        (" fragment=mujoco", "<mujoco>", "</mujoco>"),
+        (
+            ' fragment="worldbody/body"',
+            "<mujoco><worldbody><body>",
+            "</body></worldbody></mujoco>",
+        ),
+    ):
+        (wrapped,) = mjcf_texts(block(keys, "<geom/>"))
+        assert (wrapped.text, wrapped.lines_before) == (f"{opening}\n<geom/>\n\n{closing}", 1)
+
+
+def test_texts_of_blocks_and_labs_are_compiled_in_their_order() -> None:
+    lab = '```lab\n{"xml": "<mujoco/>"}\n```\n'
+    by_name = '```lab\n{"model": "box"}\n```\n'
+    course = make_course(f"```mjcf\n<a/>\n```\n\n{lab}", f"{by_name}\n```mjcf\n<b/>\n```\n")
+    assert [text.text for text in mjcf_texts(course)] == ["<a/>\n", "<mujoco/>", "<b/>\n"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "line", "expected"),
+    [
+        ("", 2, "<world/>"),
+        ("", 1, "<mujoco>"),
+        ("", 4, ""),
+        ("", 5, "```mjcf"),
+        ("", 0, "```mjcf"),
+        ("", None, "```mjcf"),
+        (" fragment=worldbody", 3, "<world/>"),
+        (" fragment=worldbody", 1, "```mjcf fragment=worldbody"),
+    ],
+)
+def test_an_error_is_reported_at_its_line_without_indent(
+    keys: str, line: int | None, expected: str
+) -> None:
+    assert rules_and_texts(check(block(keys), failure(line))) == [f"mjcf-error: {expected}"]
 
 
 PART = "<!-- a part -->\n<mujocoinclude/>\n"

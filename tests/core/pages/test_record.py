@@ -155,3 +155,5 @@ CSS = """--a: light-dark(#0072b2, #56b4e9); --b: light-dark(#1e1e1c,#e6e3dc);
 
 def test_colours_of_pages_are_known_and_others_turned_round() -> None:
     assert dark_drawing(DRAWING, dark_colours(CSS)) == DARK
+    note = "<!-- drawn by <svgtool> -->"
+    assert dark_drawing(f"{note}<svg/>", {}) == f'{note}<svg fill="#ffffff"/>', "the root is filled"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from decimal import Decimal
@@ -334,6 +335,12 @@ VALUES_READ: dict[str, Callable[[str], Parsed[Any]]] = {
 }
 
 
+def place(span: Span) -> str:
+    """Where a span begins and, if that is in another line, where it ends."""
+    end = f"-{span.end_line}:{span.end_column}" if span.end_line > span.line else ""
+    return f"{span.line}:{span.column}{end}"
+
+
 def describe(value: object, depth: int = 0) -> str:
     """A value in lines: its fields but for empty ones, and places as what stands there."""
     match value:
@@ -341,14 +348,15 @@ def describe(value: object, depth: int = 0) -> str:
             return f" {value.path}\n"
         case Span() | Excerpt():
             span = value if isinstance(value, Span) else value.span()
-            return f" {span.line}:{span.column} {span.first_line().text}\n"
+            return f" {place(span)} {span.first_line().text}\n"
         case ObjectNode():
             pairs = [(f"{key}:", member.value, None) for key, member in value.members.items()]
-            head = describe(value.mark)
+            head = f" {place(value.span)} {value.mark.text}\n" if depth else "\n"
         case ArrayNode():
-            pairs, head = [("-", item, None) for item in value.items], describe(value.mark)
+            pairs = [("-", item, None) for item in value.items]
+            head = f" {place(value.span)} {value.mark.text}\n"
         case StringNode() | NumberNode() | BoolNode() | DateNode():
-            return describe(value.mark)
+            return describe(value.span)
         case Struct():
             pairs = [(f"{f.name}:", getattr(value, f.name), f.default) for f in fields(value)]
             head = f" {type(value).__name__}\n"
@@ -377,6 +385,16 @@ def test_values_of_right_texts(name: str, rewriting: bool) -> None:
     check_cases(VALUE_FOLDER / f"{name}.md", render, rewriting=rewriting)
 
 
+@pytest.mark.parametrize(("prefix", "newline"), [("> ", "\n"), ("  ", "\r\n")])
+def test_a_quiz_in_a_quotation_or_indented_is_the_same(prefix: str, newline: str) -> None:
+    text = read_cases(VALUE_FOLDER / "quiz.md")[0].input
+    quiz = parse_quiz(text, prefix, newline)
+    assert quiz.diagnostics == ()
+    values = (quiz.value, parse_quiz(text).value)
+    descriptions = {re.sub(r"\d+:\d+(-\d+:\d+)? ", "", describe(value)) for value in values}
+    assert len(descriptions) == 1
+
+
 @pytest.mark.parametrize(
     ("verify", "expected"),
     [
@@ -396,7 +414,7 @@ def test_how_outputs_are_compared(verify: str, expected: Comparison) -> None:
     assert course is not None and course.comparison == expected
 
 
-@settings(max_examples=150)
+@settings(max_examples=400)
 @given(st.sampled_from([*VALUES_READ]), st.data())
 def test_any_edit_of_a_right_text_is_parsed_or_reported(name: str, data: st.DataObject) -> None:
     text = read_cases(VALUE_FOLDER / f"{name}.md")[0].input
