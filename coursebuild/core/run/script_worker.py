@@ -278,8 +278,8 @@ class SandboxWatch:
                 return None
             processes, threads, alive = [], 0, 0
             for name in names - zombies:
-                status = self._read(f"{name}/status")
-                processes.append((name, status))
+                name_of_thread, status = self._status(name)
+                processes.append((name_of_thread, status))
                 count = _sum(_THREADS, status)
                 threads += count
                 if count == 1 and _ENDED.search(status):  # with more, only its first thread has
@@ -291,6 +291,25 @@ class SandboxWatch:
             if max(threads, len(processes)) <= PROCESSES:
                 return processes
         return None
+
+    def _status(self, name: str) -> tuple[str, bytes]:
+        """The status of a process, and the number of the thread that gives it.
+
+        That of a first thread that has ended shows nothing of the memory that the others have.
+        """
+        status = self._read(f"{name}/status")
+        if _ENDED.search(status) and _sum(_THREADS, status) > 1:
+            with contextlib.suppress(OSError):
+                fd = os.open(f"{name}/task", os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._proc)
+                try:
+                    threads = os.listdir(fd)  # noqa: PTH208
+                finally:
+                    os.close(fd)
+                for thread in threads:
+                    other_status = self._read(f"{thread}/status")
+                    if other_status and not _ENDED.search(other_status):
+                        return thread, other_status
+        return name, status
 
     def kill(self) -> None:
         """Kill the first process, and so all in the sandbox, without waiting for others if it may.
