@@ -102,6 +102,7 @@ class Picture(Struct, frozen=True):
     """A picture of a block that links to it."""
 
     path: str
+    """Its path in the site."""
     width: int
     """Pixels, as the height."""
     height: int
@@ -156,6 +157,7 @@ class PageKind(Struct, frozen=True, kw_only=True):
     indexed: bool = True
     """Whether it is found by searches, and has a copy in Markdown."""
     form: bool = False
+    """Whether it has a form that leads to a page of the site; browsers send no other."""
 
     @property
     def path(self) -> str:
@@ -217,6 +219,7 @@ class Exporter(Struct, frozen=True, kw_only=True):
     summary: str
     """A few words on what it writes, for `coursebuild export --help`."""
     file: str
+    """Its name where `--out` gives none."""
     mark: str
     """The sign of an earlier export, which may be replaced: a path in the archive, or a text near
     the beginning of a single file."""
@@ -278,6 +281,7 @@ class Trial(Struct, frozen=True):
     name: str
     """Unique in the course, as `4.2-lab-1`."""
     owner: str
+    """The id of its lesson or page."""
     block: FeatureBlock
 
 
@@ -287,6 +291,7 @@ class TrialContext(Struct, frozen=True):
     root: Path
     course: Course
     models: Mapping[str, CompileResult]
+    """By the names of files in `models/`, without suffix."""
     run_store: RunStore
     """Notes of earlier trials; its `store` has their results, and takes new ones."""
     diagnostics: Sequence[Diagnostic] = ()
@@ -314,6 +319,7 @@ class Trials(Struct, frozen=True, kw_only=True):
     """The trials of a feature when a course is verified."""
 
     find: Callable[[Course], Iterable[Trial]]
+    """All trials of a course, in its order."""
     start: Callable[[TrialContext], TrialRun]
     inputs: Callable[[Trial], Inputs | None]
     """What a result depends on besides files; `None` for a trial that is not run."""

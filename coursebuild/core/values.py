@@ -86,7 +86,10 @@ def decode(data: bytes | None, kind: type[Value], source: Source | None = None) 
 
 
 def fingerprint(value: object, substitutes: Mapping[type, Callable[[Any], object]] = {}) -> str:
-    """A hash of a value, in which `substitutes` for some types are hashed in its place."""
+    """A hash of a value; the order of a mapping counts.
+
+    What `substitutes` make of values of some types is hashed in the place of these.
+    """
     return hashlib.sha256(_to_bytes(value, substitutes)).hexdigest()
 
 

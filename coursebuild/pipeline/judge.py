@@ -70,7 +70,7 @@ def judge(
     silences = course.silences if course is not None else ()
     mild = {d.rule for d in inventory}
 
-    def is_silenced(diagnostic: Diagnostic) -> bool:
+    def is_silenced(diagnostic: Diagnostic) -> bool:  # a map that silences an error is not valid
         return any(
             silence.rule == diagnostic.rule
             and (silence.path is None or fnmatchcase(diagnostic.span.path, silence.path))

@@ -67,14 +67,12 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Parsed[tuple[CourseS
     if names:
         selection = _find_models(names, models)
     else:
-        selection = list(models.values())
-        parts = {
-            path for m in selection for path in model_files(root, m.source.path, m.source.text)
-        }
+        sources = {name: model.source for name, model in models.items()}
+        parts = {path for s in sources.values() for path in model_files(root, s.path, s.text)}
         selection = [
-            m
-            for m in selection
-            if m.source.path not in parts and not INCLUDED_ROOT.match(m.source.text)
+            models[name]
+            for name, source in sources.items()
+            if source.path not in parts and not INCLUDED_ROOT.match(source.text)
         ]
     declarations, diagnostics = _read_declarations(read.value, selection, all_models=not names)
     diagnostics += [d for d in read.diagnostics if d.span.path.startswith("models/")]
@@ -99,7 +97,10 @@ def find_scenes(root: Path, names: tuple[str, ...] = ()) -> Parsed[tuple[CourseS
 
 
 def scene_digest(root: Path, model: MjcfModel, declarations: Declarations) -> str:
-    """A hash of a model with the files that it includes, and of its scenarios."""
+    """A hash of a model with the files that it includes, its scenarios and its exact motion.
+
+    It does not depend on the machine, or on declarations that no measurement depends on.
+    """
     digest = hashlib.sha256()
 
     def add(*parts: bytes) -> None:

@@ -106,9 +106,14 @@ def verify(
     runs, (trial_results, trial_diagnostics) = _run_with_trials(
         runner.run, trials, context, options.progress
     )
-    if not is_preview:
-        runs, other_runs = runner.run_doubtful(runs, repeat=repeat)
     verdicts, figure_diagnostics, lines = runner.judge(runs)
+    if not is_preview:
+        doubtful_paths = runner.find_doubtful(lines, repeat=repeat)
+        other_runs = {run.path: run for run in runs if run.path in doubtful_paths}
+        again = runner.run_again(doubtful_paths)
+        if again:
+            runs = tuple({run.path: run for run in (*runs, *again)}.values())
+            verdicts, figure_diagnostics, lines = runner.judge(runs)
     diagnostics = (
         *extracted_scripts.diagnostics,
         *model_diagnostics,
@@ -151,28 +156,28 @@ class _ScriptRunner:
             only_recorded=self.known_runs is None,
         )
 
-    def run_doubtful(
-        self, runs: tuple[ScriptRun, ...], *, repeat: bool
-    ) -> tuple[tuple[ScriptRun, ...], dict[str, ScriptRun]]:
-        """Run once more the scripts of which one run does not say enough.
+    def find_doubtful(self, lines: Iterable[ScriptLine], *, repeat: bool) -> set[str]:
+        """The scripts of which one run does not say enough, so that they should run once more.
 
         An output that has drifted though nobody edited its script may vary by itself: that is tried
         where it is quick, and was not tried before. With `repeat`, it is tried in any case, and
-        what was recorded from the only run must be borne out. Also return the runs before.
+        what was recorded from the only run must be borne out.
         """
         doubtful_paths = set[str]()
-        for line in self.judge(runs)[2]:
+        for line in lines:
             is_new = not line.cached and line.path not in self.store.edited_paths
             is_quick = is_new and line.seconds < _QUICK
             if (line.status == "drift" and (repeat or is_quick)) or (repeat and line.unrepeated):
                 doubtful_paths.add(line.path)
-        other_runs = {run.path: run for run in runs if run.path in doubtful_paths}
-        scripts = [e for e in self.scripts if e.path in doubtful_paths and not e.script.once]
-        if scripts:
-            store = self.options.run_store(fresh=True)
-            again = run(self.course, scripts, self.options, "running scripts again", store)
-            runs = tuple({run.path: run for run in (*runs, *again)}.values())
-        return runs, other_runs
+        return doubtful_paths
+
+    def run_again(self, paths: Collection[str]) -> tuple[ScriptRun, ...]:
+        """Run some of the scripts anew, but none that is to run once only."""
+        scripts = [e for e in self.scripts if e.path in paths and not e.script.once]
+        if not scripts:
+            return ()
+        store = self.options.run_store(fresh=True)
+        return run(self.course, scripts, self.options, "running scripts again", store)
 
     def judge(
         self, runs: Sequence[ScriptRun]

@@ -107,6 +107,8 @@ def change(root: Path, kind: str) -> None:
             (root / "public").rename(root / "elsewhere")
         case "in the site":
             (root / "public/note.txt").touch()
+        case _:
+            assert kind == ""
 
 
 @pytest.mark.parametrize("kind", CHANGES)

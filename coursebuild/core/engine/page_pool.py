@@ -88,7 +88,8 @@ class Workers(Generic[Task, Result]):
     def map(self, tasks: Iterable[tuple[int | None, Task]]) -> Iterator[tuple[Result, int | None]]:
         """Yield the results in the order of the tasks, each with the number of its worker.
 
-        A task comes with the number of the worker that it is reserved for, if any.
+        A task comes with the number of the worker that it is reserved for, if any. Tasks are made
+        while workers do earlier ones. What a worker raises is raised here.
         """
         new_tasks = (_Task(number, *task) for number, task in enumerate(tasks))
         unassigned: list[_Task] = []

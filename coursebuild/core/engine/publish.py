@@ -46,7 +46,10 @@ _AUTHOR_FOLDERS = ("content", "features", "models", "examples", ".coursebuild", 
 
 
 def check_output_folder(root: Path, out: Path) -> Path:
-    """Where the site goes: `out`, or the folder it links to; undo a killed build."""
+    """Where the site goes: `out`, or the folder it links to; undo a killed build.
+
+    A `PublishRefusedError` says why no site may go there.
+    """
     place = Path(os.path.realpath(out))
     with folder_lock(place.parent):
         _check_place(Path(os.path.realpath(root)), out, place)
@@ -143,7 +146,10 @@ def _check_place(root: Path, out: Path, place: Path) -> None:
 
 
 def exchange(a: Path, b: Path) -> bool:
-    """Swap two folders in one step; return `False` where the system or file system cannot."""
+    """Swap two folders in one step; return `False` where the system or file system cannot.
+
+    An `OSError` says that it can, but refused.
+    """
     try:
         native = getattr(ctypes.CDLL(None, use_errno=True), _EXCHANGE[sys.platform])
     except (KeyError, OSError, AttributeError):

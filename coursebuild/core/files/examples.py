@@ -232,9 +232,8 @@ def _load_manifest(root: Path) -> dict[str, tuple[str, ...]]:
     try:
         files = msgspec.json.decode((root / MANIFEST).read_bytes(), type=_Manifest).files
     except OSError as error:
-        if errors.lacking(
-            error
-        ):  # an empty manifest would make all files look edited, now and later
+        # An empty manifest would make all files look edited, now and later.
+        if errors.lacking(error):
             raise
         return {}
     except ValueError:

@@ -48,7 +48,11 @@ class CourseFiles(Struct, frozen=True):
 
 
 def find_root(path: Path | None, start: Path) -> Path:
-    """The course folder: the one named, or the nearest from `start` upwards with a course map."""
+    """The course folder: the one named, or the nearest from `start` upwards with a course map.
+
+    Raises:
+        UsageError: the named folder is none, or there is no course here.
+    """
     if path is not None:
         folder = start / path
         if folder.is_dir():

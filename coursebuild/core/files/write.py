@@ -159,7 +159,10 @@ def _move(temporary: str, target: Path, path: str, *, new: bool) -> None:
 
 
 def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
-    """Raise a `FileChangedError` unless a file has this content, or there is none (`None`)."""
+    """Raise a `FileChangedError` unless a file has this content, or there is none (`None`).
+
+    One that cannot be read is an `EffectError`.
+    """
     try:
         current: bytes | None = target.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
@@ -288,7 +291,11 @@ def _kept_journals(journal: Path) -> list[Path]:
 
 
 def undo_changes(root: Path, tell: Callable[[str], None] | None = None) -> None:
-    """Undo the changes of a command that was killed; `tell` gets a line that says which."""
+    """Undo the changes of a command that was killed; `tell` gets a line that says which.
+
+    Raises:
+        EffectError: a file cannot be written.
+    """
     journal = journal_path(root)
     if journal is not None and journal.exists():
         with project_lock(root), project_lock(root, name=_LOCK):  # whoever is at work holds it

@@ -173,7 +173,7 @@ def replace_rollout(mujoco: Any, new: Callable[[Callable[..., Any]], Callable[..
 
 
 def active_tracer() -> Tracer:
-    """The tracer, which hooks have, as nothing is hooked before it is set."""
+    """The tracer, which hooks have: none is called before it is set."""
     assert tracer is not None
     return tracer
 

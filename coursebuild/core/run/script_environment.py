@@ -160,7 +160,8 @@ def engine_version() -> str:
 def package_version(name: str, folders: Iterable[str] | None = None) -> str:
     """The version of a distribution, here or in these folders; `none` where it is not installed."""
     installed = distributions(name=name, path=list(sys.path if folders is None else folders))
-    return next((distribution.version for distribution in installed), "none")
+    # What an interrupted installation left may say no version.
+    return next((distribution.version for distribution in installed), None) or "none"
 
 
 # --- the course's own environment

@@ -186,10 +186,13 @@ class Worker:
 PROCESSES = 256
 """Processes and threads that a script may have, with all that it starts."""
 _MANY = f"had more than {PROCESSES} processes and threads"
+_LOOKS = 3
+"""How often the processes are listed, at most, to tell those that have ended from the others."""
 _FIELD = re.compile(rb"^(?:RssAnon|VmSwap|VmPTE|HugetlbPages):\s*(\d+) kB$", re.MULTILINE)
 """What a process takes for itself; files, and memory that is a file's, are counted elsewhere."""
 _SHARE = re.compile(rb"^(?:Pss_Anon|SwapPss):\s*(\d+) kB$", re.MULTILINE)
 _THREADS = re.compile(rb"^Threads:\s*(\d+)$", re.MULTILINE)
+_ENDED = re.compile(rb"^State:\s*[ZX]", re.MULTILINE)
 _SOCKETS = re.compile(rb"^sockets: used (\d+)$", re.MULTILINE)
 SUPERVISOR_MEMORY = 32
 """MiB, at most, that the supervisor takes for itself, beside what its copy, the script, shares."""
@@ -250,23 +253,63 @@ class SandboxWatch:
         if not self.is_ready():
             return ""
         most = memory + SUPERVISOR_MEMORY << 10
-        names = [name for name in os.listdir(self._proc) if name.isdigit()]  # noqa: PTH208
-        if len(names) > PROCESSES:  # to read them all would give time for more
+        processes = self._processes()
+        if processes is None:
             return _MANY
-        processes, threads, size = [], 0, self._size_of_files()
-        for name in names:
-            status = self._read(f"{name}/status")
-            threads += _sum(_THREADS, status)
-            size += _sum(_FIELD, status)
-            processes.append((name, status))
-        if threads > PROCESSES:
-            return _MANY
+        size = self._size_of_files() + sum(_sum(_FIELD, status) for _, status in processes)
         if size > most:  # what copies of a process still share was counted for each
             shares = ((self._read(f"{name}/smaps_rollup"), status) for name, status in processes)
             size = self._size_of_files() + sum(
                 _sum(_SHARE, share) if share else _sum(_FIELD, status) for share, status in shares
             )
         return f"took more than {memory} MiB of memory" if size > most else ""
+
+    def _processes(self) -> list[tuple[str, bytes]] | None:
+        """The processes, each with its status; `None` where they and their threads are too many.
+
+        Those that have ended do not count, as on a busy machine the supervisor reaps them late. One
+        is left out only if it had ended before the others were listed: among processes that fork
+        and end without pause, each may have ended when it is read, with a child that is not listed.
+        """
+        zombies: set[str] = set()
+        for _ in range(_LOOKS):
+            names = {name for name in os.listdir(self._proc) if name.isdigit()}  # noqa: PTH208
+            if len(names) > 2 * PROCESSES:  # to read them all would give time for more
+                return None
+            processes, threads, alive = [], 0, 0
+            for name in names - zombies:
+                name_of_thread, status = self._status(name)
+                processes.append((name_of_thread, status))
+                count = _sum(_THREADS, status)
+                threads += count
+                if count == 1 and _ENDED.search(status):  # with more, only its first thread has
+                    zombies.add(name)
+                    continue
+                alive += count
+                if alive > PROCESSES:
+                    return None
+            if max(threads, len(processes)) <= PROCESSES:
+                return processes
+        return None
+
+    def _status(self, name: str) -> tuple[str, bytes]:
+        """The status of a process, and the number of the thread that gives it.
+
+        That of a first thread that has ended shows nothing of the memory that the others have.
+        """
+        status = self._read(f"{name}/status")
+        if _ENDED.search(status) and _sum(_THREADS, status) > 1:
+            with contextlib.suppress(OSError):
+                fd = os.open(f"{name}/task", os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._proc)
+                try:
+                    threads = os.listdir(fd)  # noqa: PTH208
+                finally:
+                    os.close(fd)
+                for thread in threads:
+                    other_status = self._read(f"{thread}/status")
+                    if other_status and not _ENDED.search(other_status):
+                        return thread, other_status
+        return name, status
 
     def kill(self) -> None:
         """Kill the first process, and so all in the sandbox, without waiting for others if it may.

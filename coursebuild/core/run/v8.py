@@ -249,7 +249,11 @@ class MathEngine:
             self._isolate = None
 
     def typeset(self, formulas: Sequence[Formula]) -> list[str | MathError]:
-        """The MathML of each formula, or why there is none; no macro outlives its formula."""
+        """The MathML of each formula, or why there is none; no macro outlives its formula.
+
+        Raises:
+            EffectError: Temml or V8 is not installed.
+        """
         with self._lock:
             results: dict[Formula, str | MathError] = {
                 formula: self._mathml[formula] for formula in formulas if formula in self._mathml

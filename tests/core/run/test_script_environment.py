@@ -14,6 +14,7 @@ from coursebuild.core.run.script_environment import (
     cpu_name,
     find_cpu_name,
     machine,
+    package_version,
     places,
     wanted_packages,
 )
@@ -31,6 +32,14 @@ def test_conditions_do_not_depend_on_the_user() -> None:
     additions = [(f"environment variable {name}", value) for name, value in graphics.items()]
     expected = tuple(sorted((*empty_conditions, *additions)))
     assert conditions(user_environment | graphics) == expected
+
+
+def test_a_distribution_without_a_version_is_not_installed(tmp_path: Path) -> None:
+    folder = tmp_path / "mujoco-3.0.0.dist-info"
+    folder.mkdir()
+    assert package_version("mujoco", [str(tmp_path)]) == "none"
+    (folder / "METADATA").write_text("Name: mujoco\nVersion: 3.0.0\n")
+    assert package_version("mujoco", [str(tmp_path)]) == "3.0.0"
 
 
 def test_places_come_longest_first() -> None:
