@@ -37,6 +37,7 @@ from coursebuild.numerics.measure import (
     energy_scale,
     errors,
     find_sticks,
+    friction_holds,
     largest_errors,
     momentum_drift,
     visible_error,
@@ -360,6 +361,8 @@ class Cone(Struct, frozen=True):
     """The same as a visible error; 0 where the errors contain it already."""
     sticks: Sticks | None = None
     """What sticks in the reference; `None` where nothing touches."""
+    is_held: bool = False
+    """Whether friction is below its limit there, so that what moves is creep."""
 
 
 def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[str, Cone]:
@@ -377,18 +380,19 @@ def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[st
     for cone, limit in limits.items():
         truth = reference if reference.kind == "closed" else limits["elliptic"]
         sticks = find_sticks(model, scene, limit.states)
+        is_held = friction_holds(model, scene, limit.states, sticks)
         if cone == "elliptic" and truth is limit:
-            cones[cone] = Cone(limit, None, 0.0, sticks)
+            cones[cone] = Cone(limit, None, 0.0, sticks, is_held)
             continue
         count = min(len(limit.states.times), len(truth.states.times))
         limit_states, true_states = limit.states.head(count), truth.states.head(count)
         gap = _gap(model, limit_states, true_states).place
         least = FLOORS * max(limit.floor.place, truth.floor.place)
         if truth is reference:
-            cones[cone] = Cone(reference, max(gap, least), 0.0, sticks)
+            cones[cone] = Cone(reference, max(gap, least), 0.0, sticks, is_held)
         else:
             visible = visible_error(model, scene, limit_states, true_states) if gap > least else 0.0
-            cones[cone] = Cone(limit, max(gap, least), visible, sticks)
+            cones[cone] = Cone(limit, max(gap, least), visible, sticks, is_held)
     return cones
 
 

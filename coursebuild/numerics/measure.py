@@ -9,7 +9,8 @@
    interval holds that limit too.
 4. In the reference, two geoms stick to each other between two samples where a point in which they
    touch hardly moves along the surface, at both of them. A body that rolls sticks too. In another
-   run the speed of that point along the surface, added up over the same time, is creep.
+   run the speed of that point along the surface, added up over the same time, is creep: by the
+   solver, by soft contact, or by the timestep.
 """
 
 from __future__ import annotations
@@ -333,6 +334,34 @@ def find_sticks(model: Any, scene: Scene, states: EngineStates) -> Sticks:
     return tuple(slow_pairs[max(0, i - 1)] & slow_pairs[i] for i in range(len(slow_pairs)))
 
 
+def friction_holds(model: Any, scene: Scene, states: EngineStates, sticks: Sticks) -> bool:
+    """Whether friction is below its limit at all that sticks, at every sample of these states."""
+    model = with_integrator(model, Integrator.EULER, scene.timestep)
+    model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    data, force = initial_data(scene.scenario, model), np.zeros(6)
+    commands = scene.scenario.commands(scene.scenario.sample)
+    rows = zip(states.qpos, states.qvel, states.act, commands, sticks, strict=False)
+    for qpos, qvel, act, command, pairs in rows:
+        data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
+        if command:
+            data.ctrl[:] = command
+        mujoco.mj_forward(model, data)
+        loads = {pair: np.zeros(2) for pair in pairs}  # friction over its coefficient, and pressure
+        for number, contact in enumerate(data.contact[: data.ncon]):
+            pair = (int(contact.geom[0]), int(contact.geom[1]))
+            if pair in loads:
+                mujoco.mj_contactForce(model, data, number, force)
+                friction = force[1 : contact.dim] / contact.friction[: contact.dim - 1]
+                loads[pair] += np.linalg.norm(friction), force[0]
+        if any(friction > _BELOW_LIMIT * normal for friction, normal in loads.values()):
+            return False
+    return True
+
+
+_BELOW_LIMIT = 0.99
+"""The part of its limit to which friction counts as below it."""
+
+
 def measure_slip(model: Any, scene: Scene, states: EngineStates, sticks: Sticks) -> float:
     """The largest creep, m, of a pair that sticks in the reference."""
     total: dict[Pair, float] = {}
@@ -379,8 +408,9 @@ def contact_speeds(model: Any, data: Any, contact: Any) -> tuple[float, float]:
     relative = _velocity(model, data, second, contact.pos)
     relative = relative - _velocity(model, data, first, contact.pos)
     normal = contact.frame[:3]
-    parting_speed = float(normal @ relative)
-    return parting_speed, float(np.linalg.norm(relative - normal * parting_speed))
+    slip = relative - _belt_velocity(model, data, first, contact.pos)
+    slip = slip + _belt_velocity(model, data, second, contact.pos)
+    return float(normal @ relative), float(np.linalg.norm(slip - normal * (normal @ slip)))
 
 
 def _velocity(model: Any, data: Any, geom: int, point: Array) -> Array:
@@ -388,4 +418,12 @@ def _velocity(model: Any, data: Any, geom: int, point: Array) -> Array:
     twist = np.zeros(6)
     mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_GEOM, geom, twist, 0)
     velocity: Array = twist[3:] + np.cross(twist[:3], point - data.geom_xpos[geom])
+    return velocity
+
+
+def _belt_velocity(model: Any, data: Any, geom: int, point: Array) -> Array:
+    """The velocity (3,) that `surfacevel` adds to that; only its part along the surface counts."""
+    turn = data.geom_xmat[geom].reshape(3, 3)
+    linear, angular = model.geom_surfacevel[geom].reshape(2, 3) @ turn.T
+    velocity: Array = linear + np.cross(angular, point - data.geom_xpos[geom])
     return velocity

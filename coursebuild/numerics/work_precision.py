@@ -250,11 +250,12 @@ def _notes(
     if pilot.jumps:
         reasons = ", ".join(pilot.jumps)
         notes.append(f"errors follow no power of the timestep, because of {reasons}")
-    slip = next((row.slip for row in rows if row.own), None)
-    if slip is not None and slip > scene_report.FLOORS * reference.floor.position:
+    slip = next((row.slip for row in rows if row.own), None) or 0.0
+    cone = basis.cones[basis.baseline.cone]
+    if cone.is_held and slip > scene_report.FLOORS * reference.floor.position:
         notes.append(
-            f"what sticks creeps by {slip:.3g} m under the scene's own setting: "
-            "dry friction would hold it still, and that of the engine is soft"
+            f"what sticks creeps by {slip:.3g} m under the scene's own setting, "
+            "though friction stays below its limit: in the engine it is soft"
         )
     if reference.horizon < pilot.scene.scenario.duration * (1 - 1e-9):
         notes.append(

@@ -13,13 +13,19 @@ import pytest
 from msgspec.structs import astuple, replace
 
 from coursebuild.numerics.cases import measure, orders
-from coursebuild.numerics.measure import errors, find_sticks, fit_order, measure_slip
-from coursebuild.numerics.problem import STANDARD, Integrator, Motion, Sizes
+from coursebuild.numerics.measure import (
+    errors,
+    find_sticks,
+    fit_order,
+    friction_holds,
+    measure_slip,
+)
+from coursebuild.numerics.problem import STANDARD, Integrator, Motion, Setup, Sizes
 from coursebuild.numerics.problems import all_problems, extremes, impact, linked_bodies
 from coursebuild.numerics.reports.case_report import ErrorLine
 from coursebuild.numerics.scene import Scene, scenes
-from coursebuild.numerics.simulation import EngineStates
-from support.surveys import NO_DECLARATIONS
+from coursebuild.numerics.simulation import EngineStates, simulate
+from support.surveys import NO_DECLARATIONS, parse_declared
 
 FIRST = tuple(integrator for integrator in STANDARD if integrator is not Integrator.RK4)
 
@@ -237,3 +243,48 @@ def test_only_what_sticks_in_the_reference_creeps() -> None:
     assert measure_slip(model, scene, creeping, rolls) == pytest.approx(0.009)
     assert measure_slip(model, scene, creeping, slides) == pytest.approx(0.004)
     assert measure_slip(model, scene, creeping, (frozenset(),) * 3) == 0.0
+
+
+FRICTION = """\
+<mujoco>
+  <option gravity="{gravity}"/>
+  <worldbody>
+    <geom type="plane" size="5 5 1" surfacevel="{belt} 0 0"/>
+    <body pos="0 0 0.1">
+      <joint name="along" type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>{turn}
+      <geom type="{shape}" size="0.1 0.1 0.1" mass="1"/>
+    </body>
+  </worldbody>
+  <actuator><motor joint="along"/></actuator>
+</mujoco>
+"""
+FRICTION_CASES = {
+    # title: (slope, force in N, belt in m/s, shape), below the limit, creep in m
+    "a block under the angle of friction": ((0.2, 0, 0, "box"), True, (1e-4, 1e-3)),
+    "a block over it": ((1.01, 0, 0, "box"), False, (1e-3, 1e-1)),
+    "a ball that rolls down": ((0.2, 0, 0, "sphere"), True, (1e-5, 1e-3)),
+    "a push below the limit": ((0, 3, 0, "box"), True, (1e-4, 1e-3)),
+    "a push above it": ((0, 9.9, 0, "box"), False, (1e-3, 1e-1)),
+    "a ride on a slow belt": ((0, 0, 0.02, "box"), True, (0, 2e-4)),
+    "a block held against a belt": ((-0.2, 0, 0.02, "box"), True, (1e-4, 1e-3)),
+}
+
+
+def test_creep_is_told_from_what_slides_rolls_or_rides() -> None:
+    mismatches = []
+    for title, ((slope, force, belt, shape), is_held, (least, most)) in FRICTION_CASES.items():
+        gravity = f"{9.81 * slope / math.hypot(1, slope)} 0 {-9.81 / math.hypot(1, slope)}"
+        turn = '<joint axis="0 1 0"/>' if shape == "sphere" else ""
+        mjcf = FRICTION.format(gravity=gravity, belt=belt, shape=shape, turn=turn)
+        model = mujoco.MjModel.from_xml_string(mjcf)
+        declarations = parse_declared(
+            f'[[scenario]]\nname = "a"\nduration = 0.48\nsample = 0.016\ncontrols = [[{force}]]\n'
+        )
+        (scene,) = scenes(model, declarations)
+        states = simulate(Setup(scenario=scene.scenario), model).states
+        sticks = find_sticks(model, scene, states)
+        outcome = friction_holds(model, scene, states, sticks)
+        creep = measure_slip(model, scene, states, sticks)
+        if outcome != is_held or not least <= creep <= most:
+            mismatches.append((title, outcome, creep))
+    assert mismatches == []

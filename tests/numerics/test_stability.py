@@ -20,6 +20,7 @@ from coursebuild.numerics.linearization import Theory, find_rest, find_theory
 from coursebuild.numerics.pilot import run_pilot
 from coursebuild.numerics.problem import STANDARD, Integrator, Scenario, Setup
 from coursebuild.numerics.problems import all_problems
+from coursebuild.numerics.problems.oscillators import rk4_factor, rk4_limit
 from coursebuild.numerics.reports.scene_report import StableRow
 from coursebuild.numerics.reports.shown_errors import limit_text, map_text
 from coursebuild.numerics.scene import scenes
@@ -306,3 +307,9 @@ def test_growth_beyond_the_boundary_is_that_of_theory() -> None:
     endless = replace(endless, span=100 * z)
     trial = attempt(endless, Integrator.EULER_EXPLICIT, z / 10)
     assert trial.growth == pytest.approx(root, rel=1e-8)
+
+
+def test_the_polynomial_of_runge_and_kutta() -> None:
+    assert rk4_limit(0.0) == pytest.approx(2 * math.sqrt(2), rel=1e-12)
+    assert rk4_limit(1.0) == pytest.approx(2.785293563405282, rel=1e-9)
+    assert abs(rk4_factor(2j * math.sqrt(2))) == pytest.approx(1.0, rel=1e-15)

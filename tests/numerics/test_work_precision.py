@@ -245,8 +245,8 @@ def test_a_block_that_sticks_creeps_alike_in_each_measurement() -> None:
     assert report.notes == (
         "the same motion to the bit, and no time saved, with 4 iterations",
         "errors follow no power of the timestep, because of contact",
-        "what sticks creeps by 0.000511 m under the scene's own setting: dry friction would hold "
-        "it still, and that of the engine is soft",
+        "what sticks creeps by 0.000511 m under the scene's own setting, though friction stays "
+        "below its limit: in the engine it is soft",
         "beyond 0.01 s refsafe softens constraints: stable, but another model",
     )
     settings = [line.setting for line in report.rows]

@@ -14,7 +14,7 @@ from coursebuild.numerics.pruning.candidates import SETTINGS
 from coursebuild.numerics.pruning.comparison import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
 from coursebuild.numerics.pruning.readers import read_code
-from coursebuild.numerics.pruning.survey import Survey, Surveyor
+from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
 from coursebuild.numerics.reports.diet_report import Finding
 from support.bench_reports import MACHINE
 
@@ -82,6 +82,7 @@ def run_survey(
     declarations: Declarations = NO_DECLARATIONS,
     quick: bool = True,
     clock: Clock | None = None,
+    rerun: Rerun | None = None,
 ) -> Survey:
     """Survey a model; `lesson` is a script that uses it."""
     model = open_files(text if isinstance(text, Mapping) else {PATH: text})
@@ -99,6 +100,7 @@ def run_survey(
         clock=clock,
         quick=quick,
         tell=lambda _: None,
+        rerun=rerun,
     ).survey()
 
 

@@ -296,6 +296,7 @@ def _finding(words: Strings, finding: Finding) -> FindingView:
         label += Markup(" ({})").format(
             finding.shown or grids.unbroken(grids.power(finding.difference, 2))
         )
+    label += "; in what is left" if finding.in_rest else ""
     parts = []
     if saving.time is not None:
         text = words("measured.saves_time", factor=f"{saving.time:.3g}")

@@ -144,7 +144,11 @@ def _users(
         and any(
             attribute.value in names
             for attribute in element.attributes
-            if (attribute.name in references.split() if references else attribute.name != "name")
+            if (
+                attribute.name in references.split()
+                if references
+                else attribute.name not in _NOT_REFERENCES
+            )
         )
     ]
     actuators = [user for user in users if section_of(user) == "actuator"]

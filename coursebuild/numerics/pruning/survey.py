@@ -171,8 +171,8 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         if not any(group.finding.kind == "contact-off" for group in groups):
             candidates += [idle_contacts(text, runs), inner_geoms(text), primitive_meshes(text)]
         groups += self._try_by_running(candidates)
-        removed_kinds = ("far-body", "resting-joint", "coupling-idle")
-        removed_items = [i for group in groups for i in group.items if i.kind in removed_kinds]
+        kinds = ("far-body", "resting-joint", "coupling-idle")
+        removed_items = [i for group in groups for i in group.items if i.kind in kinds]
         if not any(group.finding.kind in ("contact-off", "contact-idle") for group in groups):
             groups += self._try_by_running([contact_of_rest(text, removed_items)])
         groups = self._confirm(groups)
@@ -210,10 +210,15 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         """The groups without which scripts and labs of the course print the same."""
         self.tell("scripts and labs")
         unkept = [group for group in groups if not group.finding.kept]
-        confirmed = largest_subset(unkept, lambda groups: not self._find_changed_output(groups))
+
+        def change_nothing(groups: Sequence[_PrunedGroup]) -> bool:
+            return self._prune(groups) is not None and not self._find_changed_output(groups)
+
+        confirmed = largest_subset(unkept, change_nothing)
         for group in unkept:
             if group not in confirmed:
-                reason = f"{self._find_changed_output([group])} prints something else then"
+                path = self._find_changed_output([*confirmed, group])
+                reason = f"{path} prints something else then" if path else "something needs it"
                 self._reject(group.items, group.finding.difference, reason)
         return [group for group in groups if group.finding.kept or group in confirmed]
 
@@ -254,8 +259,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         self, names: Collection[str], kinds: Collection[str], change: Collection[str]
     ) -> ModelReader | None:
         """The first reader that may notice that things are gone."""
-        readers = (reader for reader in self.readers if reader.notices(names, kinds, change))
-        return next(readers, None)
+        return next((r for r in self.readers if r.notices(names, kinds, change)), None)
 
     def _is_needless(self, items: Sequence[Item]) -> bool:
         """Whether the model without these items is otherwise the same, in any state."""
@@ -266,7 +270,10 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         own_fields = {field for item in items for field in KINDS[item.kind].fields.split()}
         if unrelated_fields(difference(self.text.model, trial.model), kinds) - own_fields:
             return False
-        change = self.trials.difference(trial, self.trials.whole)
+        try:
+            change = self.trials.difference(trial, self.trials.whole)
+        except ValueError:  # no state of plugins or delays can be brought over
+            return False
         sleeps = int(self.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
         may_sleep = sleeps or any(reader.touches({"enableflags"}) for reader in self.readers)
         if may_sleep and "tree_sleep_policy" in change:
@@ -280,14 +287,16 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         """Take out of each list of items as many of a kind as change no motion."""
         groups: list[_PrunedGroup] = []
         absences = {element for item in self.trials.absences for element in item.removals}
+        edits = {edit for item in self.trials.absences for edit in item.edits}
+
+        def is_left(item: Item) -> bool:
+            if item.element is None:
+                return True
+            is_whole = absences.isdisjoint((item.element, *item.element.ancestors()))
+            return is_whole and not (item.edits and edits.issuperset(item.edits))
+
         for items in candidates:
-            left = (
-                item
-                for item in items
-                if item.element is None
-                or absences.isdisjoint((item.element, *item.element.ancestors()))
-            )
-            for reason, similar in self._group_items(left):
+            for reason, similar in self._group_items(filter(is_left, items)):
                 self.tell(similar[0].kind)
                 group = self._try_items(similar, reason)
                 groups += [] if group is None else [group]
@@ -368,7 +377,8 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             kept=reason,
             doubt=f"{reader.path} may notice" if reader is not None else "",
             shown=comparison.shown,
-            starts=len(self.trials.runs),
+            starts=len(trials.runs),
+            in_rest=bool(trials.absences),
         )
         return _PrunedGroup(tuple(items), finding)
 
@@ -388,18 +398,15 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     def _reject(self, items: Sequence[Item], difference: float | None, reason: str) -> None:
         finite = difference if difference is not None and math.isfinite(difference) else None
         names = tuple(item.name for item in items)
-        attempt = RejectedTrial(items[0].kind, message_of(items), names, finite, reason)
-        self.rejected.append(attempt)
+        self.rejected.append(RejectedTrial(items[0].kind, message_of(items), names, finite, reason))
 
     def _prune(self, groups: Sequence[_PrunedGroup]) -> PrunedModel | None:
         return self.trials.prune([item for group in groups for item in group.items])
 
     def _find_changed_output(self, groups: Sequence[_PrunedGroup]) -> str:
         """Which script or lab of the course prints something else without these groups."""
-        trial, rerun = self._prune(groups), self.rerun
-        if trial is None or rerun is None:
-            return ""
-        return rerun(self.text.files(trial.edits))
+        trial = self._prune(groups)
+        return self.rerun(self.text.files(trial.edits)) if trial and self.rerun else ""
 
     def _save_most(self, groups: Sequence[_PrunedGroup]) -> tuple[Saving | None, float | None]:
         """The saving and difference of all groups that go together, or of the best one alone."""

@@ -161,9 +161,9 @@ class PruningTrials(Struct, eq=False, dict=True):
         timed: bool = True,
     ) -> Saving:
         """Measure the saving of a change, in time and bytes; `None`: it does not go alone."""
-        text = self._count_saved_bytes(edits)
         if trial is None:
-            return Saving(None, None, False, 0, text)
+            return Saving(None, None, False, 0, self._count_saved_bytes(edits))
+        text = self._count_saved_bytes(trial.edits) - self._count_saved_bytes(base.edits)
         memory = len(model_bytes(base.model)) - len(model_bytes(trial.model))
         timing = self._measure_time(trial, base) if timed else None
         if timing is None:

@@ -98,6 +98,8 @@ class Finding(Record, frozen=True):
     starts: int = 0
     """How many runs were compared: of each scenario, and from random starts nearby; 0 where that
     was not recorded."""
+    in_rest: bool = False
+    """Whether it was tried, and timed, in what is left without what is proved and far bodies."""
 
     @property
     def is_fault(self) -> bool:

@@ -243,11 +243,11 @@ def scene_departures(
         for sweep in report.sweeps:
             table: _Table = {("", "sweep"): {}}
             for row in sweep.rows:
-                figures = {"status": _Figure(status_text(row.status))}
+                parts = {"status": _Figure(status_text(row.status))}
                 for name in ("change", "penetration", "slip", "restitution"):
-                    figures[name] = _Figure(getattr(row, name), bench.band, _INVISIBLE)
+                    parts[name] = _Figure(getattr(row, name), bench.band, _INVISIBLE)
                 if row.parameter != "threads":
-                    table[f"{row.parameter} {row.value}", "value"] = figures
+                    table[f"{row.parameter} {row.value}", "value"] = parts
             tables.append((sweep.name, table))
         return _by_name(tables)
 

@@ -41,6 +41,7 @@ FAR_FINDING = replace(
     proof="",
     shown="the body puck is off by 1.7e-06 rad at 0.59 s",
     starts=3,
+    in_rest=True,
     edits=(),
     fixable=False,
     unfixed="only what is proved is changed",

@@ -124,9 +124,16 @@ def test_engines_are_chosen_by_name() -> None:
 
 @pytest.mark.site
 def test_what_cannot_be_asked_for(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["-C", str(course), "bench", "box", "--engines", "mujoco", "--check"]) == 2
-    message = "--check takes no --engines: 32 bits do not repeat from one device to the next"
-    assert message in capsys.readouterr().err
+    for arguments, message in (
+        (
+            "--check",
+            "--check takes no --engines: 32 bits do not repeat from one device to the next",
+        ),
+        ("--record --quick", "--record cannot be combined with --quick"),
+    ):
+        command = ["-C", str(course), "bench", "box", "--engines", "mujoco", *arguments.split()]
+        assert main(command) == 2
+        assert message in capsys.readouterr().err
 
 
 def interval(value: float) -> Interval:

@@ -227,6 +227,14 @@ def test_muscles_filters_and_delays() -> None:
     assert 'name="idle"' not in left and 'name="f"' in left and 'name="v"' in left
 
 
+def test_nothing_is_proved_where_delays_keep_states_from_being_brought_over() -> None:
+    motor = '<actuator><motor joint="pivot" nsample="3" delay="0.004"/></actuator>'
+    world = '<body><joint name="pivot"/><geom size=".1" pos=".3 0 0"/></body>'
+    text = f"<mujoco><worldbody>{world}</worldbody>{motor}<sensor><clock/></sensor></mujoco>"
+    findings = findings_by_kind(run_survey(text))
+    assert "resting-joint" in findings and not any(f.is_fault for f in findings.values())
+
+
 SHAPES = ("sphere", "box", "capsule", "ellipsoid", "cylinder")
 
 

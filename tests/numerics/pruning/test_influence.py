@@ -105,6 +105,15 @@ def test_limbs_that_nothing_commands_go_while_one_arm_moves() -> None:
     assert "resting-joint" not in findings  # these went with their limbs
 
 
+def test_limbs_that_rest_and_that_code_names_are_welded() -> None:
+    survey = run_survey(humanoid(), declarations=WAVE, lesson='"waist", "left_arm"')
+    findings = findings_by_kind(survey)
+    (welded,) = {frozenset(" ".join(names(findings["resting-joint"])).replace(",", "").split())}
+    assert {"left_thigh_x", "left_arm_x", "left_forearm_y", "waist_y"} <= welded
+    assert not any(name.startswith(("right_arm", "right_forearm")) for name in welded)
+    assert findings["contact-left"].difference < ALIKE and "far-body" not in findings
+
+
 @pytest.mark.slow
 def test_humanoid_of_which_one_arm_moves_gets_as_quick_as_by_hand() -> None:
     """By hand, with three joints alone and no contact, a similar one got 3.2 times as quick."""

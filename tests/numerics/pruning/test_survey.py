@@ -71,6 +71,40 @@ def test_a_texture_of_a_kept_material_is_used() -> None:
     assert "unused-texture" not in findings and survey.report.stale == ()
 
 
+def test_what_a_needed_part_uses_is_needed_and_the_rest_is_tried() -> None:
+    """No word of the script says that it counts sensors, but its output does."""
+    tip = PENDULUM.replace("</body>", '<site name="tip"/></body>')
+    far = '<body name="far" pos="9 0 0"><freejoint/><geom size=".1"/></body>'
+    sensor = '<sensor><framepos name="place" objtype="site" objname="tip"/></sensor>'
+    survey = run_survey(
+        scene(tip + far, rest=sensor),
+        lesson='x = "pivot"',
+        rerun=lambda files: "" if b"<framepos" in files[PATH] else "examples/a.py",
+    )
+    reasons = {name: t.reason for t in survey.report.tried for name in t.places}
+    assert reasons["place"] == "examples/a.py prints something else then"
+    assert reasons["tip"] == "something needs it"
+    findings = findings_by_kind(survey)
+    assert "unused-site" not in findings and names(findings["far-body"]) == ["far"]
+    assert not findings["far-body"].in_rest and findings["contact-idle"].in_rest
+
+
+def test_a_geom_that_nothing_can_reach_is_not_idle_too() -> None:
+    limbs = "".join(
+        f'<body pos="0 {y} {z}"><joint axis="0 1 0" stiffness="{stiffness}"/>'
+        f'<geom name="{name}" size=".1" pos=".3 0 {below}"/></body>'
+        for y, z, stiffness, name, below in (
+            (0, 5, 0, "high", 0),
+            (5, 0.3, 100, "stiff", 0),
+            (9, 0.3, 0, "low", -0.1),
+        )
+    )
+    survey = run_survey(scene(f'<geom type="plane" size="9 9 1"/>{limbs}'))
+    findings = findings_by_kind(survey)
+    assert names(findings["collision-unreachable"]) == ["high"]
+    assert names(findings["collision-idle"]) == ["stiff"]
+
+
 def test_an_asset_is_called_after_its_file() -> None:
     mesh = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
     head = '<asset><mesh file="one.obj"/><mesh file="two.obj"/></asset>'

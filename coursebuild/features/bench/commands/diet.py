@@ -377,11 +377,10 @@ def _finding(finding: Finding, style: Style) -> list[str]:
     if finding.starts and finding.label != PROVED_LABEL:
         label += f" (in {plural(finding.starts, 'run')}"
         label += f"; at most {finding.shown})" if finding.shown else ", to the bit)"
-    lines += style.wrap(f"{label}; {_saving(finding.saving)}", "    ")
+    label += "; in what is left, " if finding.in_rest else "; "
+    lines += style.wrap(label + _saving(finding.saving), "    ")
     if finding.proof:
         lines += style.wrap(f"because {finding.proof}", "    ")
-    if finding.kind == "far-body" and not finding.kept:
-        lines += style.wrap("what only runs speak for, below, was tried without it", "    ")
     if finding.kept:
         return [*lines, *style.wrap(f"kept: {finding.kept}", "    ")]
     for edit in finding.edits[:_EDITS]:
