@@ -375,9 +375,14 @@ _LONE_DASH = re.compile(r'([A-Za-z]\w*)(?:[-+;]|(?<=\w\w\w))"[^"]*"')
 _LATE_QUOTE = re.compile(r'\b([A-Za-z]\w*)=(?:[-.]?\d[-\d. ]*"|="[-\d. ]+")')
 _BROKEN_VALUE = re.compile(
     r'\b[A-Za-z]\w*="(?:(?:[^"]*\s)?([-+]?\d+\.\.+\d+|[-+]?(?:\d*\.\d*[oOlI]|[oOlI]\.)\d*'
-    r'|(?<=[\d.]\s)[oOl])(?=[\s"])|-(?= -?\w+")|[^"\s]+ -(?="))'
+    r"|(?<=[\d.]\s)[oOl]|[-+]?0\d+(?:\.\d+)?(?=\s+[-\d.])|(?<=[\d.]\s)[-+]?0\d+(?:\.\d+)?)"
+    r'(?=[\s"])|-(?= -?\w+")|[^"\s]+ -(?="))'
 )
 """The value of an attribute with a part that is a number but for a slip."""
+_NO_COMPARISON = re.compile(
+    r"(?:while|if|elif|assert) (?!.*&)[^(]*?\w (<<|>>|=) (?!(?<=[<>] )\d+\b)"
+)
+"""A condition that shifts bits or assigns where it surely was to compare."""
 _END = re.compile(r"[\w.]*[._][\w.]*(?:\[\w*\]|\(\))?[\\'´]|[0DSWbdnrstw]\\")
 """A name, or a letter of an escape, with a backslash or a quotation mark after it."""
 _PAIR = re.compile(r"\([^()\[\]{}]*\)|\[[^()\[\]{}]*\]|\{[^()\[\]{}]*\}")
@@ -418,9 +423,12 @@ def _check_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[D
         yield diagnose("markup-unread", span, message, help="write the missing one, or a blank")
     if broken := _BROKEN_VALUE.search(code):
         part = broken[1] or "-"
-        message = f"`{part}` stands in the value of an attribute, and is no number"
-        help = "write a number with one point, and a blank between two"
+        message = f"`{part}` stands in the value of an attribute, and no number is written so"
+        help = "write a number with one point and no needless zero, and a blank between two"
         yield diagnose("number-form", span, message, help=help)
+    if slip := _NO_COMPARISON.match(code):
+        help = f"write `{'==' if slip[1] == '=' else slip[1][0]}`"
+        yield diagnose("markup-unread", span, f"`{slip[1]}` compares nothing", help=help)
     if (end_mark := _END.fullmatch(code)) is not None and code.count(code[-1]) == 1:
         message = f"`{code[-1]}` stands at the end of `{shorten(code[:-1])}`"
         is_escape = end_mark[0][:-1].isalnum() and len(code) == 2

@@ -196,7 +196,8 @@ BROKEN = {
         "a link is `[text](address)`, with no blank before the `(` and none in the address",
     ),
     "bracket": MarkupKind(
-        r"(?<![\\\w])\[(?=(?:[^\W\d_]?\s+)?[^\W\d_]{2})(?![^\[\]]*\])|(?<=[^\W\d_])\[(?=(?-i:[a-z]))(?![^\[\]]*\])",
+        r"(?<![\\\w])\[(?=(?:[^\W\d_]?\s+)?[^\W\d_]{2})(?![^\[\]]*\])|(?<=[^\W\d_])\[(?=(?-i:[a-z]))(?![^\[\]]*\])"
+        r"|(?<![\\\w])\[(?=[^\W\d_]?[.,;:!?]?\Z)",
         "no link begins here",
         "a link is `[text](address)`; write a backslash before a bracket that is meant to be seen",
     ),
@@ -245,7 +246,7 @@ BROKEN = {
     "item": MarkupKind(
         r"^\d{1,2}(?:[.)][.,)]|[,;]) (?=(?-i:[A-Z\0]))|^\d{1,2}[.)](?=(?-i:[A-Z][a-z]))"
         r"|\A1 (?=(?:[^\n]*\n)+?2\. )|^-(?=(?-i:[A-Z][a-z]))"
-        r"|^[•‣◦▪●] ?(?=\w)|^-- (?=\0)"
+        r"|^[•‣◦▪●] ?(?=\w)|^-- (?=\0)|\A-- (?=(?-i:[A-Z]\w* [a-z]))"
         r"|(?:^[=_]|(?<=\n)0) (?=(?-i:[A-Z][a-z]))|^[.)] (?=(?-i:[A-Z][a-z]))"
         r"|^[0=_] (?=(?-i:\0\0?[A-Z]))|^[=_] (?=\0)",
         "no item of a list begins here",

@@ -27,7 +27,7 @@ from coursebuild.core.text.source import Excerpt, Span
 
 LABELS = ("INPUT", "PROCESS", "OUTPUT")
 _LABEL = re.compile(r"\s*(INPUT|PROCESS|OUTPUT):")
-_LIKE_LABEL = re.compile(r"\s*([A-Za-z]+)\s*:")
+_LIKE_LABEL = re.compile(r"\s*([A-Za-z]+)(?:\s*:|(?<=[A-Z]{3})[^\w\s]?(?!\S))")
 
 
 class Io(FeatureBlock, frozen=True):
@@ -110,10 +110,9 @@ def _diagnose_missing(
         word = _LIKE_LABEL.match(line.text)
         if word is not None and nearest(word[1].upper(), LABELS, cutoff=0.75) == label:
             span = line.span(word.start(1), word.end())
-            notes.append(Note(f"`{word[1]}:` is read as text", span))
-            place = line.span(*word.span(1))
+            notes.append(Note(f"`{span.text}` is read as text", span))
             is_safe = propose(word[1].upper(), label, LABELS).safe or word[1].upper() == label
-            fix = Fix(f"write `{label}:`", edits=(Edit(place, label),), safe=is_safe)
+            fix = Fix(f"write `{label}:`", edits=(Edit(span, f"{label}:"),), safe=is_safe)
     message = f"the io block has no line `{label}:`"
     return diagnose("io-missing", fence.head, message, help=fix, notes=notes)
 
