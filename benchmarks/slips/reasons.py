@@ -29,6 +29,7 @@ REASONS = (
     Reason("another word or number, with which all holds that is claimed of the lab", "lab"),
     Reason("the script prints and draws the same", "script", "(?s).*", "(?s).*"),
     Reason("an address or a setting that nothing contradicts", "map", r"[\w.]*", r"\w+ = .*"),
+    Reason("a setting of the map that may be left out", "map", r"\w+ = .*\n?", slip="line lost"),
     Reason("what is measured is the author's choice", "declarations", r"[\w.]*", r"\w+ = .*"),
     Reason("a callout without its first line is a quotation", "callout", slip="line lost"),
     Reason(
@@ -55,6 +56,7 @@ REASONS = (
         r' *"(?:stopAt|height|dock|camera|toggles|overlays|autoplay|forceScale)": .*\n?',
         slip="line lost",
     ),
+    Reason("an answer may have no unit", "quiz", r' *"unit": .*\n?', slip="line lost"),
     Reason("another number that a quiz may have", "quiz", r"[\d.]*", r".*\d.*"),
     Reason("a formula that nothing links to", "formula|list", r"[\w-]*", r".*\{#eq:.*"),
     Reason("a paragraph in another place", ".*", "(?s).*", "(?s).*", "paragraph moved"),

@@ -415,10 +415,10 @@ def _check_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[D
         message = f'the value of `{value[1]}` does not stand between `="` and `"`'
         help = f'write `{value[1]}="…"`'
         yield diagnose("markup-unread", span, message, help=help)
-    rest = code if re.fullmatch(r"[A-Za-z][\w.()\[\]{}:-]+", code) else ""
+    rest = code if re.fullmatch(r"[A-Za-z][\w.()\[\]{}:-]+|[(\[{][A-Za-z]\w\w+", code) else ""
     while (shorter := _PAIR.sub(lambda pair: "_" * len(pair[0]), rest)) != rest:
         rest = shorter
-    if bracket := re.search(r"(?<=\w)[()\[\]{}](?=\w)|(?<=\w\w)[)\]}]\Z", rest):
+    if bracket := re.search(r"\A[(\[{]|(?<=\w)[()\[\]{}](?=\w)|(?<=\w\w)[)\]}]\Z", rest):
         message = f"`{bracket[0]}` has no matching bracket"
         yield diagnose("markup-unread", span, message, help="write the missing one, or a blank")
     if broken := _BROKEN_VALUE.search(code):

@@ -281,7 +281,7 @@ BROKEN = {
         rf"{_BEFORE}(?:\*\*\*?|__|~~)(?=[^\W_]|[\"'“„(\[$\\\0])"
         rf"|(?:(?<=[^\W\d_])|(?<=[\"'”\].!?…\0]))(?:\*\*|__|~~)(?!\*){_AFTER}"
         rf"|(?<={_WIDE})\*\*|\*\*(?={_WIDE})"
-        r"|(?<=[ \t(])\*(?=[^\W\d_]{2}|(?-i:[aA]) [a-z])|(?<=\0)\*|\*(?=\0)",
+        r"|(?<=[ \t(])\*(?=[^\W\d_]{2}|(?-i:[aA]) [a-z])|(?<=\0)\*|\*(?=\0)|\A\*(?=[,.;:] )",
         "no emphasis begins or ends here",
         "put the same mark at both ends, in the same paragraph and with no blank inside it; write "
         "a backslash before each character that is meant to be seen",

@@ -188,7 +188,8 @@ def _diagnose(
         case "link" if markup == ")" and (before != ")" or "(" in match.string[: match.start()]):
             return None
         case "emphasis" if markup == "*" and "**" not in before[-1:] + markup + after[:1]:
-            if match[0] == "*" and not re.match(r"[^\W\d_]{2}|[aA] ", after):
+            follows = r"[^\W\d_]{2}|[aA] |[,.;:] " if at == 0 else r"[^\W\d_]{2}|[aA] "
+            if match[0] == "*" and not re.match(follows, after):
                 return None
         case "letter" if before != "$" or whole[: at - 1].endswith(("\\", "$")):
             return None

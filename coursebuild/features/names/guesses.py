@@ -101,6 +101,7 @@ class Guesses:
         # Of 20,000 usual words some 500 differ by a letter from a name, as `weight` does;
         # none by the key beside from one that is used often. Other languages have longer ones.
         slips = {slip.upper() for slip in slips_of(name.lower())} if is_constant else slips_of(name)
+        engine_words = self.engine.words if self.engine is not None and self.has_engine else ()
         is_english = self.language == "en"
         near |= {
             word
@@ -111,7 +112,10 @@ class Guesses:
             and (
                 sorted(word) == sorted(name)
                 or (is_english and (len(word) > 6 or re.sub(r"(.)\1", r"\1", name) == word))
-                or (is_english and len(word) == len(name) > 4 and self.uses[word] > 2)
+                or (
+                    (is_english and len(word) == len(name) > 4)
+                    and (self.uses[word] > 2 or (word in engine_words and word in self.words))
+                )
             )
         }
         if is_english and name.isascii() and (len(name) > 5 or re.search("[0-9]", name)):
