@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal, TypeAlias
 
 from msgspec import Struct
@@ -52,6 +52,10 @@ class Strings(Struct, frozen=True):
             k.removeprefix(prefix): t for k, t in self.texts.items() if k.startswith(prefix)
         }
         return Strings(dict(sorted((dict(self.texts) | preferred).items())), self.language)
+
+    def join(self, items: Iterable[str]) -> str:
+        """The items one after the other, with the comma of the language between them."""
+        return f"{self('site.comma')} ".join(items)
 
     def has(self, key: str) -> bool:
         """Whether there is a text of this key."""
