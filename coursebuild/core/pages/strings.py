@@ -22,6 +22,8 @@ from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
+from coursebuild.core.pages.quantities import isolate_quantities
+
 DEFAULT_LANGUAGE = "en"
 Category: TypeAlias = Literal["zero", "one", "two", "few", "many", "other"]
 
@@ -44,7 +46,10 @@ class Strings(Struct, frozen=True):
             text = self.texts.get(f"{key}.{form}", self.texts.get(f"{key}.other"))
         if text is None:
             raise KeyError(f"no interface text {key!r}")
-        return text.format_map(values) if values else text
+        if not values:
+            return text
+        text = text.format_map(values)
+        return isolate_quantities(text) if direction(self.language) == "rtl" else text
 
     def prefer(self, prefix: str) -> Strings:
         """The texts in which one of the key `prefix` + KEY replaces that of KEY."""
