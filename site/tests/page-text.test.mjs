@@ -82,6 +82,12 @@ test('texts take values by name', () => {
   assert.equal(fill('at {t} s, {x}: {t}', { t: '1.20' }), 'at 1.20 s, {x}: 1.20')
 })
 
+test('in texts from the right, numbers keep their signs and units before and behind them', () => {
+  assert.equal(fill('عند {t}، {n} صفحات', { t: '−0.20 s', n: 3 }), 'عند \u2066−0.20 s\u2069، 3 صفحات')
+  assert.equal(fill('عند t = {t} s', { t: '1.20' }), 'عند t = 1.20 s')
+  assert.equal(fill('{a}: {b}', { a: 'MuJoCo 3.14.0', b: '1.1 البندول' }), 'MuJoCo 3.14.0: 1.1 البندول')
+})
+
 test('a state comes back from a link bit for bit, whatever its values', async () => {
   const physics = new Float64Array([0, -0, NaN, 1 / 3, -1e-310, Infinity])
   new DataView(physics.buffer).setBigUint64(16, 0x7ff0_0000_0a0a_0001n, true) // a NaN of another kind, with line ends in it

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -142,6 +143,22 @@ def test_every_document_is_a_page_of_the_manual_without_mistakes() -> None:
 
 def git(*words: str) -> str:
     return subprocess.run(["git", *words], cwd=DOCS, capture_output=True, text=True).stdout
+
+
+def test_the_first_change_records_its_words_wherever_they_stand() -> None:
+    """The files that hold the text of the example, and the tests that its last command runs."""
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    places = git("grep", "-lF", "begin with a line `INPUT: …`", ":/tests/fixtures").split()
+    assert [place for place in places if f"`{place.removeprefix('../')}`" not in text] == []
+    (command,) = re.findall(r"`\.venv/bin/(pytest [^`]*) --rewrite-fixtures`", text)
+    options = [*shlex.split(command), "--collect-only", "-p", "no:cacheprovider"]
+    run = subprocess.run([sys.executable, "-m", *options], cwd=ROOT, capture_output=True, text=True)
+    tests = [line.partition("::test_")[2] for line in run.stdout.splitlines() if "::" in line]
+    assert sorted(tests) == [
+        "documents_are_as_their_fixtures_say[io]",
+        "the_page_of_rules_is_in_step",
+        "what_the_author_sees[io-stray]",
+    ]
 
 
 def test_course_and_manual_link_to_no_placeholder() -> None:

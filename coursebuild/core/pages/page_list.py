@@ -230,7 +230,8 @@ def level_inputs(library: Library, level: Level) -> PageInputs:
         if position + 1 < len(levels)
         else None,
     }
-    title = f"{library.words('level.label', id=level.id)}: {level.title}"
+    label = library.words("level.label", id=level.id)
+    title = library.words("site.pair", first=label, second=level.title)
     head = PageHead(place.path, "level", title, level.summary)
     return PageInputs(head, "level.html", values)
 
@@ -270,9 +271,10 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
     for use in library.uses[model.name]:
         text = use.owner.title
         if isinstance(use.owner, Lesson):
-            text = f"{words('lesson.label', id=use.owner.id)}: {text}"
+            label = words("lesson.label", id=use.owner.id)
+            text = words("site.pair", first=label, second=text)
         href = place.href(urls.owner_path(use.owner))
-        uses.append(NamedLink(href, text, ", ".join(map(words, use.ways))))
+        uses.append(NamedLink(href, text, words.join(map(words, use.ways))))
     values = {
         "home": place.href(urls.HOME),
         "gallery": place.href(library.gallery) if library.gallery else "",
@@ -311,9 +313,9 @@ def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
         (words("model.mass"), f"{number(facts.total_mass)} kg"),
         (words("model.timestep"), f"{number(facts.timestep)} s"),
         (words("model.integrator"), facts.integrator),
-        (words("model.keyframes"), ", ".join(name or unnamed for name in facts.keyframes)),
-        (words("model.sites"), ", ".join(name or unnamed for name in facts.sites)),
-        (words("model.includes"), ", ".join(facts.includes)),
+        (words("model.keyframes"), words.join(name or unnamed for name in facts.keyframes)),
+        (words("model.sites"), words.join(name or unnamed for name in facts.sites)),
+        (words("model.includes"), words.join(facts.includes)),
     )
     return tuple((label, value) for label, value in rows if value)
 

@@ -254,7 +254,7 @@ def script_receipt(page: PageContext, block: model.Script) -> Receipt:
 
 def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
     if run is not None and run.outcome is Outcome.SKIPPED:
-        return Receipt("unverified", words("receipt.skipped", modules=", ".join(run.missing)))
+        return Receipt("unverified", words("receipt.skipped", modules=words.join(run.missing)))
     if run is not None and run.outcome is Outcome.NORUN:
         return Receipt("unverified", words("receipt.norun"))
     return Receipt("unverified", words("receipt.unchecked"))

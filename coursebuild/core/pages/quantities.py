@@ -38,7 +38,7 @@ _QUANTITY = (
     rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_SPACES}?{_UNITS})?|{_NUMBER}{_SPACES}?{_UNITS})"
 )
 """Compiled when it is needed, as few pages do: it takes longer than all others together."""
-_LATIN_BEFORE = re.compile("[A-Za-z]\\s*$")
+_LATIN_BEFORE = re.compile("[A-Za-z]\\s*(?:=\\s*)?$")
 
 
 def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:
@@ -49,6 +49,14 @@ def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:
     pieces = ((escape(piece), is_quantity) for piece, is_quantity in split_quantities(text))
     return Markup("").join(
         isolate_ltr(piece) if is_quantity else piece for piece, is_quantity in pieces
+    )
+
+
+def isolate_quantities(text: str) -> str:
+    """Text from the right with its quantities isolated, where no markup may stand."""
+    pieces = split_quantities(text)
+    return "".join(
+        f"\u2066{piece}\u2069" if is_quantity else piece for piece, is_quantity in pieces
     )
 
 

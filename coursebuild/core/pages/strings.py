@@ -17,10 +17,12 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal, TypeAlias
 
 from msgspec import Struct
+
+from coursebuild.core.pages.quantities import isolate_quantities
 
 DEFAULT_LANGUAGE = "en"
 Category: TypeAlias = Literal["zero", "one", "two", "few", "many", "other"]
@@ -44,7 +46,10 @@ class Strings(Struct, frozen=True):
             text = self.texts.get(f"{key}.{form}", self.texts.get(f"{key}.other"))
         if text is None:
             raise KeyError(f"no interface text {key!r}")
-        return text.format_map(values) if values else text
+        if not values:
+            return text
+        text = text.format_map(values)
+        return isolate_quantities(text) if direction(self.language) == "rtl" else text
 
     def prefer(self, prefix: str) -> Strings:
         """The texts in which one of the key `prefix` + KEY replaces that of KEY."""
@@ -52,6 +57,10 @@ class Strings(Struct, frozen=True):
             k.removeprefix(prefix): t for k, t in self.texts.items() if k.startswith(prefix)
         }
         return Strings(dict(sorted((dict(self.texts) | preferred).items())), self.language)
+
+    def join(self, items: Iterable[str]) -> str:
+        """The items one after the other, with the comma of the language between them."""
+        return f"{self('site.comma')} ".join(items)
 
     def has(self, key: str) -> bool:
         """Whether there is a text of this key."""

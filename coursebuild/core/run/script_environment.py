@@ -159,9 +159,12 @@ def engine_version() -> str:
 
 def package_version(name: str, folders: Iterable[str] | None = None) -> str:
     """The version of a distribution, here or in these folders; `none` where it is not installed."""
-    installed = distributions(name=name, path=list(sys.path if folders is None else folders))
-    # What an interrupted installation left may say no version.
-    return next((distribution.version for distribution in installed), None) or "none"
+    path = list(sys.path if folders is None else folders)
+    for distribution in distributions(name=name, path=path):
+        # What an interrupted installation left may say no version, or have no metadata.
+        with contextlib.suppress(FileNotFoundError, KeyError):
+            return distribution.version or "none"
+    return "none"
 
 
 # --- the course's own environment

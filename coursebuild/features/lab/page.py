@@ -208,7 +208,7 @@ def _values(words: Strings, control: Control) -> str:
             )
             initial = f"{number(control.value, control.digits)} {control.unit}".rstrip()
         case Select():
-            values = ", ".join(label for label, _ in control.options)
+            values = words.join(label for label, _ in control.options)
             initial = next(label for label, value in control.options if value == control.start)
         case _:
             return words("lab.button")

@@ -80,13 +80,16 @@ FEATURE = Feature(
     ),
     parts=(
         PagePart(
-            mark="data-mark", kinds=("home", "level"), bundled="map.js", texts=("progress.map.",)
+            mark="data-mark",
+            kinds=("home", "level"),
+            bundled="map.js",
+            texts=("progress.map.", "site.comma"),
         ),
         PagePart(mark='data-progress="lesson"', texts=("progress.lesson.", _TROUBLE)),
         PagePart(
             mark='data-progress="overall"',
             bundled="progress.js",
-            texts=("progress.live.", "progress.map.", _TROUBLE),
+            texts=("progress.live.", "progress.map.", _TROUBLE, "site.comma"),
         ),
         PagePart(
             mark='data-progress="review"',

@@ -138,7 +138,8 @@ def _listing(
             key.removeprefix(_LIVE): text
             for key, text in site.library.words.texts.items()
             if key.startswith(_LIVE)
-        },
+        }
+        | {"comma": site.library.words("site.comma")},
     }
 
 

@@ -45,7 +45,7 @@ export function showMark(place, state, words) {
   if (state.answered) {
     parts.push(
       h('span', { class: 'mark-count', 'aria-hidden': 'true' }, `${state.right}/${state.questions}`),
-      h('span', { class: 'unseen' }, `, ${say(words, 'progress.map.questions', { n: state.questions, right: state.right })}`),
+      h('span', { class: 'unseen' }, `${words('site.comma')} ${say(words, 'progress.map.questions', { n: state.questions, right: state.right })}`),
     )
   }
   place.replaceChildren(...parts)

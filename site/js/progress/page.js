@@ -52,7 +52,7 @@ function showOverall(place, sum, words, trouble) {
 function amounts(sum, words) {
   const parts = []
   if (sum.lessons) {
-    const begunText = sum.begun ? `, ${say(words, 'progress.live.begun', { n: sum.begun })}` : ''
+    const begunText = sum.begun ? `${words('site.comma')} ${say(words, 'progress.live.begun', { n: sum.begun })}` : ''
     parts.push(amount(say(words, 'progress.live.lessons', { n: sum.lessons, read: sum.read }) + begunText, sum.read, sum.lessons))
   }
   if (sum.questions) parts.push(amount(say(words, 'progress.map.questions', { n: sum.questions, right: sum.right }), sum.right, sum.questions))

@@ -52,6 +52,7 @@ export const fillIn = (text, values) => text.replace(/\{(\w+)\}/g, (match, key) 
 export function summary(result, strings) {
   if (result.count === 0) return fillIn(strings.none, { query: result.query })
   const count = fillIn(form((key) => strings[key] ?? key, 'count', result.count), { n: result.count })
-  const instead = result.instead.length > 0 ? fillIn(strings.instead, { words: result.instead.map((word) => `“${word}”`).join(', ') }) : ''
+  const quoted = result.instead.map((word) => fillIn(strings.quoted, { word })).join(`${strings.comma} `)
+  const instead = quoted ? fillIn(strings.instead, { words: quoted }) : ''
   return [`${count}.`, instead, result.complete ? '' : strings.part_failed].filter(Boolean).join(' ')
 }

@@ -42,6 +42,14 @@ def test_a_regional_language_takes_the_general_one_first(assets: Assets) -> None
     assert words("code.copy") == "Copy"
 
 
+def test_lists_and_pairs_have_the_marks_of_the_language(assets: Assets) -> None:
+    arabic, french = (strings_for(assets.templates, language) for language in ("ar", "fr"))
+    assert arabic.join(["1.1", "1.2"]) == "1.1، 1.2"
+    assert arabic("lab.stops", t=3) == "تتوقف عند \u20663 s\u2069."
+    assert "t = 3 s" in arabic("lab.at", t=3)
+    assert french("site.pair", first="Niveau 1", second="Chute") == "Niveau 1\u00a0: Chute"
+
+
 def test_captions_and_mentions_follow_the_language(assets: Assets) -> None:
     """However letters with marks are typed; English ones hold too."""
     assert words_for(assets.templates, "en") == words_for(assets.templates, "pt") == ENGLISH
