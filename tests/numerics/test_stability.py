@@ -201,7 +201,10 @@ def test_a_servo_is_stable_as_far_as_the_spring_and_damper_that_it_is() -> None:
         assert (rows["discrete"].theory, rows["discrete"].largest) == (None, None)
     assert servo["RK4"].gain is None, "a motor drives it"
     # It overshoots in one step, which no damper does, and decays: a gain, and no loss.
-    assert spring["RK4"].gain is not None and spring["RK4"].gain[0] < 0.021
+    # Between two stages RK4 has more energy from 16.5 ms on, and in no state before 19.8 ms.
+    assert spring["RK4"].gain is not None and spring["RK4"].gain[0] == pytest.approx(
+        0.0199, rel=0.03
+    )
 
 
 def test_a_state_of_an_actuator_that_nothing_excites_is_lost_from_starts_nearby() -> None:
