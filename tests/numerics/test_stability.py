@@ -172,6 +172,13 @@ def test_only_digits_on_which_spans_and_starts_agree_are_printed() -> None:
     assert limit_text(StableRow("RK4", 0.123456, (0.1, 1.0), None, 1.0, 8, 8, None)) == "120 ms"
 
 
+def test_what_falls_farther_in_a_longer_time_is_not_lost() -> None:
+    ball = """<mujoco><worldbody><body pos="0 0 10"><joint type="slide" axis="0 0 1"/>
+    <geom size="0.1" mass="1"/></body></worldbody></mujoco>"""
+    for row in rows_of(ball, stable_for=6.0).values():
+        assert (row.largest, row.bracket) == (None, None), row.integrator
+
+
 ARM = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
 <joint name="j" axis="0 1 0" {}/><inertial pos="0 0 0" mass="10" diaginertia="13.33 13.33 13.33"/>
 </body></worldbody>{}</mujoco>"""
