@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from coursebuild.core.model.scenarios import Declarations, DeclaredScenario
 from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.measurement import english
-from coursebuild.features.bench.scenario_view import stable_cells
+from coursebuild.features.bench.scenario_view import missed_islands, stable_cells
 from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.linearization import Theory, find_rest, find_theory
 from coursebuild.numerics.pilot import run_pilot
@@ -161,6 +161,7 @@ def test_only_digits_on_which_spans_and_starts_agree_are_printed() -> None:
     assert limit_text(row) == "25.4 s"
     assert row.bracket == pytest.approx((25.44, 25.48), abs=5e-3)
     assert limit_text(replace(row, theory=25.2)) == "25 s"
+    assert limit_text(replace(row, theory=16.0)) == "16 s – 25 s", "unstable where it comes to rest"
     assert limit_text(replace(row, theory=40.0)) == "25.4 s", "that is another limit"
     row = search(lambda start, step, _: step > (19 if start == 2 else 25.4), (1.0, 1000.0))
     assert limit_text(row) == "19 s – 25 s"
@@ -170,6 +171,17 @@ def test_only_digits_on_which_spans_and_starts_agree_are_printed() -> None:
     row = search(lambda start, step, _: start == 1 and step > 500, (1.0, 1000.0))
     assert (row.largest, limit_text(row)) == (None, "500 s – 1000 s")
     assert limit_text(StableRow("RK4", 0.123456, (0.1, 1.0), None, 1.0, 8, 8, None)) == "120 ms"
+
+
+def test_what_the_gaps_between_timesteps_may_hide_is_said() -> None:
+    """Where limits have islands, their digits are no finer than the gaps."""
+    row = search(lambda _, step, __: step > 25.4 and not 60 < step < 80, (1.0, 1000.0))
+    assert row.islands is not None and limit_text(row) == "25 s"
+    assert missed_islands(english(), [row]) == [
+        "Islands of lost timesteps can be missed if they are narrower than 2.3 %, or than 15 % "
+        "below half the limit."
+    ]
+    assert missed_islands(english(), [replace(row, tries=())]) == []
 
 
 def test_what_falls_farther_in_a_longer_time_is_not_lost() -> None:
