@@ -212,7 +212,9 @@ def mark_luck(
         limit = limits.get(setting.integrator, math.inf)
         luck, is_usual = "", setting.solver_settings == own_setting.solver_settings
         if place is not None and is_usual and setting.timestep > limit * (1 + 1e-9):
-            luck = f"it is beyond its largest stable timestep, {seconds_text(limit, 3)}"
+            luck = "the shortest timestep that was tried is lost"
+            if limit:
+                luck = f"it is beyond its largest stable timestep, {seconds_text(limit, 3)}"
         for rival in rows:
             dear, error, work = rival.setting, quantity.value_of(rival), ""
             if dear == replace(setting, timestep=dear.timestep):
@@ -308,13 +310,12 @@ def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> R
         return RowVerdict(False, None, None, None, None, text)
     better = min(candidates, key=lambda c: (c[0].error, c[0].cost.value, c[1]))[1]
     text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
-    cheap_place, cheapest = min(candidates, key=lambda c: (c[0].cost.value, c[1]))
+    unseen = [(p.cost.value, n) for p, n in candidates if (rows[n].seen or 0.0) < 1]
+    cost, cheapest = min(unseen, default=(0.0, better))
     if cheapest != better:
-        share = (
-            cheap_place.cost.value
-            / candidates[[n for _, n in candidates].index(better)][0].cost.value
-        )
-        text += f", {setting_text(rows[cheapest].setting)} the cheapest, at {share:.2g} of its cost"
+        share = cost / next(p.cost.value for p, n in candidates if n == better)
+        text += f", {setting_text(rows[cheapest].setting)} the cheapest without an error that is "
+        text += f"seen, at {share:.2g} of its cost"
     return RowVerdict(False, better, None, None, None, text)
 
 

@@ -68,7 +68,8 @@ class Peaks(Struct, frozen=True):
     overlap: tuple[int, int, float] = (-1, -1, 0.0)
     """Two geoms that lie deepest in each other, by number, and when, s."""
     energy: float = -math.inf
-    """Potential and kinetic, J, where MuJoCo computes it: of the state before the last step."""
+    """Potential and kinetic, J: under RK4 of the state, else of that before the last step, where
+    MuJoCo computes it."""
     kinetic: float = 0.0
     """J."""
 
@@ -98,6 +99,15 @@ def update_peaks(data: Any, before: Peaks, thickness: Array | None = None) -> Pe
     `thickness`: half the thickness of every geom (ngeom + 1,), m; the last is for index -1, which
     stands for no geom.
     """
+    if data.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        # Contacts and energy are those of the last stage of a step, which is no state.
+        for compute in (
+            mujoco.mj_fwdPosition,
+            mujoco.mj_fwdVelocity,
+            mujoco.mj_energyPos,
+            mujoco.mj_energyVel,
+        ):
+            compute(data.model, data)
     penetration, sunk, overlap = before.penetration, before.sunk, before.overlap
     if data.ncon:
         geoms, depths = data.contact.geom, -data.contact.dist

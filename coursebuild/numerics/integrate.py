@@ -255,21 +255,30 @@ def _rate(model: Any, data: Any, evaluations: float) -> Rate:
 _TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL))
 
 
-def tends_to(model: Any, setup: Setup, states: EngineStates, step: float, parting: float) -> bool:
+def tends_to(
+    model: Any,
+    setup: Setup,
+    states: EngineStates,
+    step: float,
+    parting: float,
+    near: Array,
+) -> bool:
     """Whether the engine comes nearer to these states, the smaller its steps are, from `step` (s).
 
     Two integrations over the same accelerations agree also where these are not the engine's own,
     as of an activation that only a step clamps. Motions are compared at the difference `parting`,
-    where it grows beyond: later they have nothing in common, however small the steps.
+    where it grows beyond: later they have nothing in common, however small the steps. Smaller
+    differences than `near` (n,) count as none: in chaos rounding grows as large.
     """
+    near = np.maximum(AGREEMENT, near)
     before = _gaps(model, setup, states, step)
-    if before.max() <= AGREEMENT:
+    if np.all(before <= near):
         return True
     for part in _PARTS:
         now = _gaps(model, setup, states, step / part)
         parted = np.flatnonzero(before > parting)
         at = int(parted[0]) if parted.size else int(np.argmax(before))
-        if now[at] <= max(NEARER * before[at], AGREEMENT):
+        if now[at] <= max(NEARER * before[at], near[at]):
             return True
         before = now
     return False

@@ -42,7 +42,7 @@ from coursebuild.numerics.measure import (
     momentum_drift,
     visible_error,
 )
-from coursebuild.numerics.pilot import CONES, Pilot, horizon_errors, position_distances
+from coursebuild.numerics.pilot import CONES, NUDGE, Pilot, horizon_errors, position_distances
 from coursebuild.numerics.problem import ROUNDING, Integrator, Setup, Sizes
 from coursebuild.numerics.reports.scene_report import FLOORS
 from coursebuild.numerics.scene import ExactMotion, SceneError
@@ -63,7 +63,7 @@ FINER, QUICK_FINER = 16, 8
 """How many times shorter the steps of a `self` reference are than the shortest measured."""
 PARTING_DISTANCE, _PARTING_SHARE = 0.01, 0.1
 """The difference from which on motions have nothing in common, rad or relative to the extent; the
-same of two runs of the engine that are to be a reference, relative to the error to be told."""
+same of two that are to be a reference, relative to the error to be told."""
 FOREIGN = 1e-3
 """The difference from which on a closed form is that of another scene, in the same units."""
 PRECISION, _VOTES = 1e-8, 100.0
@@ -167,7 +167,8 @@ def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
         if reference is not None:
             setup = _with_duration(pilot.setup, float(reference.states.times[-1]))
             states, step = reference.states, min(pilot.scene.timesteps)
-            if not integrate.tends_to(model, setup, states, step, PARTING_DISTANCE):
+            near = NUDGE * np.exp((pilot.lyapunov or 0.0) * states.times)
+            if not integrate.tends_to(model, setup, states, step, PARTING_DISTANCE, near):
                 reference, note = None, f"no integration: {_TENDS_ELSEWHERE}"
         if reference is None and note.endswith(_TENDS_ELSEWHERE) and declaration.reference == "ode":
             raise _no_integration(_TENDS_ELSEWHERE, declaration)
@@ -271,7 +272,7 @@ def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
     states = run(partial(integrate.bulirsch_stoer, tolerance=1e-13))
     source = "Bulirsch–Stoer over mj_forward"
     second_states, second = run(integrate.dop853), "DOP853 over mj_forward"
-    return _combine(model, "ode", source, states, second, second_states)
+    return _combine(model, pilot, "ode", source, states, second, second_states)
 
 
 def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMotion:
@@ -287,13 +288,9 @@ def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         if not np.isfinite(run.states.qpos).all():
             raise SceneError(f"it diverges even at {step:g} s a step")
         runs.append(run.states)
-    gaps = position_distances(model, runs[0].qpos, runs[1].qpos, horizon_errors(model, pilot.scene))
-    parted = np.flatnonzero(gaps > _PARTING_SHARE)
-    good = max(1, int(parted[0])) if parted.size else len(runs[0].times)
-    states, second_states = (motion.head(good) for motion in runs)
     source = f"the engine itself: implicitfast at {1e6 * step:.6g} µs, Newton's solver"
     second = f"the same under Euler at {2e6 * step:.6g} µs"
-    return _combine(model, "self", source, states, second, second_states)
+    return _combine(model, pilot, "self", source, runs[0], second, runs[1])
 
 
 def _with_duration(setup: Setup, duration: float) -> Setup:
@@ -302,12 +299,18 @@ def _with_duration(setup: Setup, duration: float) -> Setup:
 
 def _combine(
     model: Any,
+    pilot: Pilot,
     kind: str,
     source: str,
     states: EngineStates,
     second: str,
     second_states: EngineStates,
 ) -> KnownMotion:
+    unit = horizon_errors(model, pilot.scene)
+    gaps = position_distances(model, states.qpos, second_states.qpos, unit)
+    parted = np.flatnonzero(gaps > _PARTING_SHARE)
+    good = max(1, int(parted[0])) if parted.size else len(gaps)
+    states, second_states = states.head(good), second_states.head(good)
     gap, horizon = _gap(model, states, second_states), float(states.times[-1])
     floor = gap.at_least(ROUNDING)
     return KnownMotion(kind, source, states, second_states, floor, second, gap.largest, horizon)

@@ -156,9 +156,8 @@ def with_energy_bound(problem: Problem) -> Problem:
     longer = replace(problem, scenario=replace(scenario, duration=duration))
     energy = simulate(longer, compile_model(problem.mjcf, Integrator.RK4, step)).energy
     most, kinetic = float(energy.sum(axis=1).max()), float(energy[:, 1].max())
-    return replace(
-        problem, energy_bound=most + problem.room * kinetic, energy=most, kinetic=kinetic
-    )
+    bound = most + problem.room * kinetic
+    return replace(problem, energy_bound=bound, energy=most, kinetic=kinetic)
 
 
 def boundary(
@@ -170,8 +169,7 @@ def boundary(
     search = max(low, problem.span / MOST_STEPS), high
 
     def run(start: int, step: float, span: float) -> StabilityTrial:
-        model = compile_model(problem.mjcf, integrator, step)
-        return run_trial(problem, model, span, start=start)
+        return run_trial(problem, compile_model(problem.mjcf, integrator, step), span, start=start)
 
     laboratory = Laboratory(run, problem.span, STARTS)
     row = search_row(laboratory, integrator, search, problem, theory or Theory(problem.limit))
@@ -335,8 +333,7 @@ def step_count(span: float, timestep: float) -> int:
 
 def attempt(problem: Problem, integrator: Integrator, timestep: float) -> StabilityTrial:
     """Run the problem over its span at a timestep (s)."""
-    model = compile_model(problem.mjcf, integrator, timestep)
-    return run_trial(problem, model, problem.span)
+    return run_trial(problem, compile_model(problem.mjcf, integrator, timestep), problem.span)
 
 
 def run_trial(
@@ -375,11 +372,9 @@ def run_trial(
         count, now = stop, update_peaks(data, Peaks(), thickness)
         energy = max(energy, now.energy)
         if count <= _TRANSIENT:
-            limits = replace(
-                limits,
-                velocity_bound=max(limits.velocity_bound, now.velocity),
-                energy_bound=max(limits.energy_bound, now.energy),
-            )
+            fastest = max(limits.velocity_bound, now.velocity)
+            most = max(limits.energy_bound, now.energy)
+            limits = replace(limits, velocity_bound=fastest, energy_bound=most)
         excess_end = excess_end if now.is_within(setup) else count * timestep
         is_lost = not now.is_within(limits) or any(data.warning[n].number for n in BAD_STATES)
         if is_lost or (count > max(commands) and now.velocity < _AT_REST * peak_speed):
@@ -432,8 +427,16 @@ def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[Stabl
 
     def row(integrator: Integrator) -> StableRow | None:
         def run(start: int, step: float, span: float) -> StabilityTrial:
-            variant = with_integrator(model, integrator, step)
-            return run_trial(pilot.setup, variant, span, half_thickness, start=start)
+            variant, setup = with_integrator(model, integrator, step), pilot.setup
+            longer = 1.0 if pilot.settles else max(1.0, span / scene.scenario.duration)
+            setup = (
+                replace(  # what falls is four times as far, and twice as fast, in twice the time
+                    setup,
+                    position_bound=setup.position_bound * longer**2,
+                    velocity_bound=setup.velocity_bound * max(1.0, longer / 2),
+                )
+            )
+            return run_trial(setup, variant, span, half_thickness, start=start)
 
         span, limit = duration, theory.limit(integrator, (low, high))
         if pilot.settles and pilot.smooth and limit is not None and math.isfinite(limit.timestep):

@@ -270,6 +270,8 @@ def test_errors_that_do_not_fall_or_belong_to_no_stable_run_are_luck() -> None:
     assert rows[0].lucky == "it is beyond its largest stable timestep, 2.5 ms"
     assert rows[1].lucky == "its error rises with shorter timesteps"
     assert [row.front for row in front(rows)] == [False, False, True, True]
+    (lost,) = mark_luck([row(own=True, seen=1e-3)], {"Euler": 0.0}, Quantity("seen", ""))
+    assert lost.lucky == "the shortest timestep that was tried is lost"
     # Below the floor of the reference nothing rises.
     assert [bool(row.lucky) for row in ladder(8e-3, 1e-7, 1e-6)] == [True, False, False]
 
@@ -323,8 +325,10 @@ def test_what_is_not_resolved_makes_no_setting_better() -> None:
 
 def test_where_the_own_setting_is_lost_the_others_are_weighed() -> None:
     rows = rows_with_front(None, (2, 1e-5), (0.5, 1e-3))
-    text = verdict(rows, [None] * 3).text
-    assert "is the most accurate that does, RK4 at 10 ms the cheapest, at 0.25 of its cost" in text
+    words = "RK4 at 10 ms the cheapest without an error that is seen, at 0.25 of its cost"
+    assert f"is the most accurate that does, {words}" in verdict(rows, [None] * 3).text
+    text = verdict(rows_with_front(None, (2, 1e-5), (0.5, 170.0)), [None] * 3).text
+    assert text.endswith("is the most accurate that does"), "a wrong motion is not cheap"
 
 
 def test_chaotic_scene_is_judged_by_how_long_runs_last() -> None:

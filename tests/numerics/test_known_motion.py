@@ -171,3 +171,34 @@ def test_a_closed_form_comes_first_and_is_refused_where_it_is_of_something_else(
         assert caught.value.message.startswith(message)
         assert caught.value.span is not None
         assert caught.value.span.text.startswith('"closed:')
+
+
+TWO_POINTS = """<body><joint axis="0 1 0"/>
+  <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/>
+  <body pos="0 0 -1"><joint axis="0 1 0"/>
+    <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/></body></body>"""
+LINK = '<body pos="0.1 0 0"><joint axis="0 1 0"/><geom type="capsule" size="0.02" '
+LINK += 'fromto="0 0 0 0.1 0 0"/>'
+CHAOTIC = '<mujoco><option><flag contact="disable"/></option><worldbody>{}</worldbody></mujoco>'
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("bodies", "table", "horizon"),
+    [
+        # Rounding in small steps grows to more than 1e-6, though the motion is the engine's.
+        (TWO_POINTS, "qpos = [2, 0.5]\nduration = 14\nsample = 0.02\ntimesteps = [62.5e-6]", 12.8),
+        # The twins, in the engine's steps, stay near for longer than the two integrations do.
+        (LINK * 10 + "</body>" * 10, "duration = 5\nsample = 0.05\ntimesteps = [0.000125]", 3.65),
+    ],
+    ids=["pendulums", "chain"],
+)
+def test_a_chaotic_motion_is_integrated_as_long_as_it_is_known(
+    bodies: str, table: str, horizon: float
+) -> None:
+    model = mujoco.MjModel.from_xml_string(CHAOTIC.format(bodies))
+    (scene,) = scenes(model, parse_declared(f'[[scenario]]\nname = "a"\n{table}\n'))
+    reference = find_reference(model, run_pilot(model, scene))
+    assert (reference.kind, reference.note) == ("ode", "")
+    assert reference.horizon == pytest.approx(horizon, abs=0.1)
+    assert reference.floor.position < 0.1 * 0.1

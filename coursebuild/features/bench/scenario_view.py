@@ -44,6 +44,7 @@ from coursebuild.numerics.reports.shown_errors import (
     setting_text,
     solving_parts,
     status_text,
+    widest_gaps,
 )
 
 _QUANTITIES = {
@@ -106,6 +107,7 @@ def scenario_view(
         if row.largest is None and is_cut_short(report):
             remark = words("measured.stable_short", steps=FEWEST_STEPS)
         rows.append((row.integrator, (*stable_cells(words, row), remark)))
+    notes += missed_islands(words, report.stable)
     label = stable_title(words, report.stable[0]) if rows else ""
     return ScenarioView(
         anchor=anchor,
@@ -304,6 +306,12 @@ def stable_again(words: Strings, row: StableRow) -> str:
         return ""
     first, last = (seconds_text(float(f"{step:.3g}")) for step in row.islands)
     return words("measured.islands", first=first, last=last)
+
+
+def missed_islands(words: Strings, rows: Sequence[StableRow]) -> list[str]:
+    """Say what the search for largest stable timesteps cannot see; nothing without a search."""
+    near, far = (f"{100 * (gap - 1):.2g}" for gap in widest_gaps(rows))
+    return [words("measured.gaps", near=near, far=far)] if float(near) > 0 else []
 
 
 class EngineView(Struct, frozen=True):

@@ -22,11 +22,10 @@ from coursebuild.numerics.pruning.comparison import WatchedRun
 from coursebuild.numerics.pruning.model_text import ModelText, section_of, thing_kind
 from coursebuild.numerics.pruning.reachability import (
     Pair,
-    depths,
     find_separate,
+    hull_distance,
     is_enclosed,
     iterate_pairs,
-    mesh_vertices,
 )
 from coursebuild.numerics.pruning.xml_edits import (
     Element,
@@ -365,13 +364,7 @@ def primitive_meshes(text: ModelText) -> list[Item]:
                 variant = text.compile(edits)
             except ValueError:
                 continue
-            turn, i = np.zeros(9), ids[0]
-            whole_turn, vertices = np.zeros(9), mesh_vertices(model, int(model.geom_dataid[i]))
-            mujoco.mju_quat2Mat(whole_turn, model.geom_quat[i])
-            mujoco.mju_quat2Mat(turn, variant.geom_quat[i])
-            places = model.geom_pos[i] + vertices @ whole_turn.reshape(3, 3).T
-            local = (places - variant.geom_pos[i]) @ turn.reshape(3, 3)
-            fits.append((float(np.abs(depths(variant, i, local)).max()), shape, edits))
+            fits.append((hull_distance(model, variant, ids[0]), shape, edits))
         if fits:
             off, shape, edits = min(fits)
             name = f"{display_name(element)} ({shape}, off by {off:.2g} m)"

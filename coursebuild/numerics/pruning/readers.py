@@ -123,7 +123,7 @@ _OPAQUE = frozenset(
     "__import__ breakpoint compile delattr dir eval exec format format_map getattr globals hasattr"
     " locals setattr vars Function Object Reflect"
     # the file of the model, or names of things
-    " fromfile genfromtxt glob iterdir listdir load loadtxt memmap modules open read_bytes"
+    " from_zip fromfile genfromtxt glob iterdir listdir load loadtxt memmap modules open read_bytes"
     " read_text rglob scandir st_size walk MjSpec MjvScene Renderer rollout".split(" ")
 )
 _THING = re.compile(r"""\w+\s*\.\s*(\w+)\(\s*(?:"[^"\\]*"|'[^'\\]*')\s*\)(?:\s*\.\s*(\w+))?""")
@@ -222,6 +222,7 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Mod
         harmless = _LEAVE_MODELS_ALONE.union(course_modules)
         reasons += [f"it imports {name}" for name in modules if name not in harmless]
         reasons += ["it matches patterns by position"] if _POSITIONAL.search(text) else []
+        reasons += ["it uses `bind`"] if "bind" in members else []  # to any element of a spec
     elif match := _SCRIPT.search(code):
         reasons.append(f"it lists what exists: `{match[0]}`")
     kinds = {VIEWS[word] for word in members if word in VIEWS}

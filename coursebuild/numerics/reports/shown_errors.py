@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 from typing import TypeAlias
 
 from msgspec import Struct
@@ -158,19 +159,36 @@ def is_cut_short(report: ScenarioReport) -> bool:
 def limit_text(row: StableRow) -> str:
     """A largest stable timestep with the digits on which theory and all runs agree, or a range.
 
-    Theory at rest counts where it is within a tenth: else the motion is lost far from rest.
+    Theory at rest counts up to a tenth above: else the motion is lost far from rest. Where limits
+    have islands, no digit is finer than the gaps between timesteps that were tried.
     """
     assert row.largest is not None or row.bracket is not None
     if row.bracket is None:  # recorded before runs were compared
         return seconds_text(row.largest or 0.0, 2)
     low, high = row.bracket
-    if row.theory and abs(row.theory / high - 1) < _TOGETHER:
+    if row.islands is not None:
+        low = min(low, high / max(1.0, widest_gaps([row])[0]))
+    if row.theory and row.theory < high * (1 + _TOGETHER):
         low, high = min(low, row.theory), max(high, row.theory)
     if low <= 0 or high / low > 1 + _TOGETHER:
         return f"{seconds_text(low, 2)} – {seconds_text(high, 2)}"
     least = max(high - low, low * 10.0**-_MOST_DIGITS)
     digits = math.floor(math.log10(low)) - math.ceil(math.log10(least) - 1e-9) + 1
     return seconds_text(low, max(1, digits))
+
+
+def widest_gaps(rows: Iterable[StableRow]) -> tuple[float, float]:
+    """The largest ratios of timesteps that were tried next to each other: above half, and in all.
+
+    They count up to the largest stable one; 0 without any.
+    """
+    near, far = [0.0], [0.0]
+    for row in rows:
+        top = row.searched[1] if row.largest is None else row.largest
+        steps = [step for step, _, _ in row.tries if step <= top * (1 + 1e-9)]
+        for step, following in pairwise(steps):
+            (near if step >= top / 2 else far).append(following / step)
+    return max(near), max(*near, *far)
 
 
 _TOGETHER, _MOST_DIGITS = 0.1, 4

@@ -173,4 +173,6 @@ def test_couplings_shapes_and_hidden_geoms() -> None:
     findings = findings_by_kind(survey)
     assert names(findings["coupling-idle"]) == ["idle"]
     assert names(findings["geom-inside"]) == ["core"]
-    assert names(findings["mesh-primitive"])[0].startswith("shell (box, off by ")
+    shape = findings["mesh-primitive"]
+    assert names(shape)[0].startswith("shell (box, off by ")
+    assert (shape.label, shape.fixable) == (MEASURED_LABEL, False), "another shape is another scene"

@@ -55,6 +55,8 @@ HOSTILE = {
         "mujoco.mj_step(model, data)\nprint(data.subtree_angmom)",
     ),
     "spec": ("sensor", "spec = mujoco.MjSpec.from_file('x')\nprint(len(spec.sensors))"),
+    "bound element": ("sensor", "def read(part):\n    return data.bind(part).data\nprint(read)"),
+    "zip": ("sensor", "spec = mujoco.from_zip('x')\nprint(len(spec.sensors))"),
     "exec": ("sensor", 'exec("print(data." + "sensor" + "data)")'),
     "dunder": ("sensor", 'print(data.__getattribute__("sensor" + "data"))'),
     "include": ("sensor", "x = '<mujoco><include file=\"leg.xml\"/></mujoco>'"),
