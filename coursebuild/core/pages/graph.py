@@ -16,8 +16,8 @@ from coursebuild.core.drawing.layered import Layout, layered_layout, transitive_
 from coursebuild.core.drawing.scales import markup_text, shorten_to_width, text_width
 from coursebuild.core.model import Lesson, Level
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.context import GraphNode, LessonGraph
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import GraphNode, LessonGraph
 from coursebuild.core.pages.strings import Strings
 
 _MOST_LINKED = 5

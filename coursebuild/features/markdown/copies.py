@@ -16,11 +16,10 @@ from urllib.parse import urlsplit
 
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.context import PageContext, SiteContext
+from coursebuild.core.pages.context import PageContext, PageInputs, SiteContext
 from coursebuild.core.pages.document_inputs import LessonLink, LevelView
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import code_span, escape_line, guard_lines, link
-from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.strings import Strings
 from coursebuild.core.registry import has_copies
 from coursebuild.core.text.characters import visible

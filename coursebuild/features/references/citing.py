@@ -11,9 +11,9 @@ from msgspec import Struct
 
 from coursebuild.core.model import Citation, CitedWork, Course, Document, Owner, find_inlines
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.context import Citations, CitedEntry
 from coursebuild.core.pages.document_inputs import OwnerLinks, owner_links
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import Citations, CitedEntry
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.features.references.bibtex import Work, check_identifier, read_works
 from coursebuild.features.references.csl import FormattedWorks, StyleFailure, format_works
