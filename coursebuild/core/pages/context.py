@@ -25,8 +25,7 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.markup import HtmlWriter
 from coursebuild.core.pages.numbering import item_name, number_items
 from coursebuild.core.pages.references import ids_and_addresses
-from coursebuild.core.pages.renderer import Renderer
-from coursebuild.core.pages.strings import Strings, direction
+from coursebuild.core.pages.renderer import Renderer, Strings, direction
 from coursebuild.core.pages.zips import Archive
 from coursebuild.core.text.source import Span
 

@@ -24,8 +24,7 @@ from coursebuild.core.pages.assets import Assets, Names
 from coursebuild.core.pages.context import PageHead
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.materials import renderer_for
-from coursebuild.core.pages.renderer import Texts
-from coursebuild.core.pages.strings import direction
+from coursebuild.core.pages.renderer import Texts, direction
 from coursebuild.core.registry import added_pages, features, has_copies, page_copies, page_kind
 from coursebuild.core.text.characters import visible
 

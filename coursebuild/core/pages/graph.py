@@ -18,7 +18,7 @@ from coursebuild.core.model import Lesson, Level
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import GraphNode, LessonGraph
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.renderer import Strings
 
 _MOST_LINKED = 5
 """The most prerequisites that are shown of a lesson, and the most lessons it leads to."""

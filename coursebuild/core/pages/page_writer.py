@@ -28,8 +28,7 @@ from coursebuild.core.pages.context import (
 from coursebuild.core.pages.graph import drawings
 from coursebuild.core.pages.listings import Part, fold, highlight_lines
 from coursebuild.core.pages.markup import SpecialBlock
-from coursebuild.core.pages.renderer import Renderer
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.renderer import Renderer, Strings
 from coursebuild.core.registry import kind_of_block, model_parts, page_kind
 from coursebuild.core.text.characters import visible
 

@@ -20,7 +20,7 @@ from coursebuild.core.pages.context import PageContext, PageInputs, SiteContext
 from coursebuild.core.pages.document_inputs import LessonLink, LevelView
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import code_span, escape_line, guard_lines, link
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.registry import has_copies
 from coursebuild.core.text.characters import visible
 from coursebuild.features.markdown.from_html import html_to_markdown

@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids, scenario_view
 from coursebuild.numerics.reports.case_report import (
     CaseReport,
