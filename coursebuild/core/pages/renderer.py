@@ -182,6 +182,7 @@ def direction(language: str) -> Literal["ltr", "rtl"]:
 
 
 # --- templates
+
 Texts: TypeAlias = tuple[tuple[str, str], ...]
 """Files of `templates/` by path."""
 

@@ -14,7 +14,7 @@ import msgspec.inspect as inspect
 from msgspec import Struct
 
 from coursebuild.core.files.course_root import MAP
-from coursebuild.core.syntax.schemas import schema_roots
+from coursebuild.core.syntax.course_schema import schema_roots
 from coursebuild.core.text.source import Source, Span
 
 _FENCE = re.compile(
