@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from unicodedata import normalize
 
 from coursebuild.core.model import Course
+from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.model.results import Formula, MathError, PublishedTrials, Reports, Results
-from coursebuild.core.model.vocabulary import ENGLISH, Words
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.renderer import (

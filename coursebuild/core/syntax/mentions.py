@@ -28,8 +28,8 @@ from coursebuild.core.model import (
     Text,
     UrlTarget,
 )
+from coursebuild.core.model.course import Words
 from coursebuild.core.model.inlines import LABEL_KINDS
-from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.syntax.attributes import term_id
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, misspelt, nearest, propose
 from coursebuild.core.text.source import Excerpt, Span

@@ -16,7 +16,7 @@ from pygls import uris
 
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.model import Document, Lesson, Owner
-from coursebuild.core.model.vocabulary import Words
+from coursebuild.core.model.course import Words
 from coursebuild.core.pages.library import Library
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Edit
