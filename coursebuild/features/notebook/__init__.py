@@ -34,7 +34,7 @@ from coursebuild.core.model.results import CachedFile, Outcome
 from coursebuild.core.pages import urls, zips
 from coursebuild.core.pages.context import PageContext, PageInputs, SiteContext
 from coursebuild.core.pages.marks import code_span, escape_marks, hang, link
-from coursebuild.features.markdown.copies import head
+from coursebuild.features.markdown import head
 from coursebuild.features.markdown.writer import DocumentWriter
 
 Cell: TypeAlias = dict[str, Any]

@@ -29,7 +29,7 @@ from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.own_names import options_by_command
 from coursebuild.features.names.resolve import resolver_of
-from coursebuild.features.references.citing import works_of
+from coursebuild.features.references import works_of
 
 _NAME = r"[A-Za-z_]\w*"
 _SUBJECTS = (
