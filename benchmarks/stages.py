@@ -31,9 +31,9 @@ from coursebuild.core.model.results import Formula, MathError, Reports, Results
 from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages import listings
 from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.context import PageHead
 from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.materials import make_library
-from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.page_writer import draw
 from coursebuild.core.pages.record import record

@@ -16,7 +16,7 @@ from coursebuild.cli.output import CLEAN, write
 from coursebuild.cli.unchanged import split_directory
 from coursebuild.core.files.course_root import MAP, find_course_root
 from coursebuild.core.registry import features
-from coursebuild.core.syntax.schemas import schema_roots
+from coursebuild.core.syntax.course_schema import schema_roots
 from coursebuild.core.text.rules import RULES
 
 EXAMPLES = """\

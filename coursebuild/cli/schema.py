@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from coursebuild.cli.output import CLEAN, USAGE, fail, write
-from coursebuild.core.syntax.schemas import json_schema, schema_roots
+from coursebuild.core.syntax.course_schema import json_schema, schema_roots
 
 EXAMPLES = """\
 examples:

@@ -29,9 +29,14 @@ from coursebuild.core.model.results import (
     TrialResult,
 )
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.context import ExportContext, PageContext, SiteContext
+from coursebuild.core.pages.context import (
+    Citations,
+    ExportContext,
+    PageContext,
+    PageInputs,
+    SiteContext,
+)
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import Citations, PageInputs
 from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.run.dependencies import Inputs

@@ -32,8 +32,8 @@ from coursebuild.core.model import Course, Document, FeatureBlock
 from coursebuild.core.model.results import Mathml, PublishedTrials, Results, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.context import Citations
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import Citations
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed

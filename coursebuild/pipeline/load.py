@@ -29,8 +29,15 @@ from coursebuild.core.model import (
     document_inlines,
     local_file,
 )
-from coursebuild.core.model.course import BIBLIOGRAPHY, CITATION_STYLE, TEMPLATES, Theme
-from coursebuild.core.model.vocabulary import CALLOUTS, ENGLISH, Words
+from coursebuild.core.model.course import (
+    BIBLIOGRAPHY,
+    CALLOUTS,
+    CITATION_STYLE,
+    ENGLISH,
+    TEMPLATES,
+    Theme,
+    Words,
+)
 from coursebuild.core.pages.materials import words_for
 from coursebuild.core.registry import read_references
 from coursebuild.core.run.script_environment import course_environment, engine_version

@@ -30,8 +30,8 @@ from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import prepared_folder, template_texts
 from coursebuild.core.model import Course, Declarations, Document, document_scripts
+from coursebuild.core.model.course import Words
 from coursebuild.core.model.results import Formula, MathError
-from coursebuild.core.model.vocabulary import Words
 from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.listings import find_imports

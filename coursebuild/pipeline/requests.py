@@ -24,9 +24,9 @@ from coursebuild.core.model import (
     document_blocks,
     walk_inlines,
 )
+from coursebuild.core.model.course import Words
 from coursebuild.core.model.results import Reports, Results
-from coursebuild.core.model.vocabulary import Words
-from coursebuild.core.pages.page_inputs import PageHead, PageInputs
+from coursebuild.core.pages.context import PageHead, PageInputs
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.pages.renderer import Texts
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed

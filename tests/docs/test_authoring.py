@@ -21,7 +21,7 @@ from typing import Any
 import pytest
 
 from coursebuild.cli import main
-from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.text.rules import RULES
 from support.markdown_files import PAGES, Fence, code_spans, fences, write_files
 from support.scratch_course import Folder

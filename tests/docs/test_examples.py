@@ -21,8 +21,8 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from coursebuild.cli.commands import known_commands, parser_of
+from coursebuild.core.syntax.course_schema import json_schema
 from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.syntax.schemas import json_schema
 from coursebuild.core.text.source import Source
 from support.fixture_cases import fixture_text
 from support.markdown_files import PAGES, ROOT, Fence, fences

@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from coursebuild.cli.commands import known_commands, parser_of
-from coursebuild.core.syntax.schemas import json_schema
+from coursebuild.core.syntax.course_schema import json_schema
 from support.markdown_files import PAGES
 
 _PART = re.compile(r"(<!-- generated: ([^>\n]+) -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.core.model.vocabulary import CLOSED_FORMS
+from coursebuild.core.model.course import CLOSED_FORMS
 from coursebuild.numerics.known_motion import KnownMotion, find_reference
 from coursebuild.numerics.pilot import run_pilot
 from coursebuild.numerics.problems import all_problems

@@ -303,7 +303,7 @@ def test_signal_ends_a_command_wherever_it_is(
     )
     for code in ("signal.raise_signal(number)", becomes_another):
         code = COMMAND.format(code, "signal.default_int_handler")
-        result = run_code(code, "schema", "coursebuild.core.syntax.schemas", int(number))
+        result = run_code(code, "schema", "coursebuild.core.syntax.course_schema", int(number))
         assert (result.returncode, result.stdout, result.stderr) == (status, "", f"{word}\n")
 
 
@@ -318,7 +318,7 @@ def test_ctrl_c_while_the_tool_is_loaded_ends_it_without_a_word() -> None:
 def test_ctrl_c_is_ignored_where_it_was_before() -> None:
     """As under `nohup`, or in the background of a shell: the command goes on and ends well."""
     code = COMMAND.format("signal.raise_signal(number)", "signal.SIG_IGN")
-    for module in ("coursebuild.cli.unchanged", "coursebuild.core.syntax.schemas"):
+    for module in ("coursebuild.cli.unchanged", "coursebuild.core.syntax.course_schema"):
         result = run_code(code, "schema", module, int(signal.SIGINT))
         assert result.returncode == 2
         assert result.stderr.startswith(f"coursebuild: there is no schema '{module}'")

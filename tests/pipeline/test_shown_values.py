@@ -21,10 +21,10 @@ from coursebuild.core.files.resources import Bundle, prepared_folder, template_t
 from coursebuild.core.model import Document
 from coursebuild.core.model.results import Reports
 from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.context import PageHead
 from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.materials import make_library
-from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.text.source import Excerpt, Source, Span

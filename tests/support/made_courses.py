@@ -8,8 +8,8 @@ from typing import Any
 from msgspec.structs import replace
 
 from coursebuild.core.model import Course, Document, MjcfModel
+from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.model.results import ModelFacts
-from coursebuild.core.model.vocabulary import CALLOUTS
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.syntax.document import parse_document

@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 from coursebuild.core import model
 from coursebuild.core.pages.markup import HtmlWriter, SpecialBlock
-from coursebuild.core.pages.strings import Strings, parse_strings
+from coursebuild.core.pages.renderer import Strings, parse_strings
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.model.course import CALLOUTS
 from support.fixture_cases import fixture_tables
 
 KINDS = frozenset(CALLOUTS)

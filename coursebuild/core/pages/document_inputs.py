@@ -11,17 +11,17 @@ from coursebuild.core import model
 from coursebuild.core.model import Document, Lesson, Level, Owner, document_scripts
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.frame import lesson_data
-from coursebuild.core.pages.graph import neighbourhood
-from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.numbering import name_elsewhere, number_prefix
-from coursebuild.core.pages.page_inputs import (
+from coursebuild.core.pages.context import (
     DocumentInputs,
     PageHead,
     PageInputs,
     ShownRun,
     ShownVerdict,
 )
+from coursebuild.core.pages.frame import lesson_data
+from coursebuild.core.pages.graph import neighbourhood
+from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.numbering import name_elsewhere, number_prefix
 from coursebuild.core.registry import citations, code_links, kind_of_block, page_copies, page_kind
 from coursebuild.core.text.characters import visible
 

@@ -21,11 +21,10 @@ from coursebuild.core.features import PageKind, PagePart
 from coursebuild.core.model import Course, Lesson
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets, Names
+from coursebuild.core.pages.context import PageHead
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.materials import renderer_for
-from coursebuild.core.pages.page_inputs import PageHead
-from coursebuild.core.pages.renderer import Texts
-from coursebuild.core.pages.strings import direction
+from coursebuild.core.pages.renderer import Texts, direction
 from coursebuild.core.registry import added_pages, features, has_copies, page_copies, page_kind
 from coursebuild.core.text.characters import visible
 

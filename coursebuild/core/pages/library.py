@@ -23,8 +23,7 @@ from coursebuild.core.model.results import (
 )
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.renderer import Renderer, known_mathml
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.renderer import Renderer, Strings, known_mathml
 
 Value = TypeVar("Value")
 

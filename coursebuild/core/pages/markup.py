@@ -16,7 +16,7 @@ from markupsafe import Markup
 
 from coursebuild.core import model
 from coursebuild.core.pages.quantities import isolate_ltr, join_units, split_quantities, unit_length
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.renderer import Strings
 
 SpecialBlock: TypeAlias = (
     model.Callout

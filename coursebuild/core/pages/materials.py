@@ -7,12 +7,18 @@ from collections.abc import Mapping
 from unicodedata import normalize
 
 from coursebuild.core.model import Course
+from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.model.results import Formula, MathError, PublishedTrials, Reports, Results
-from coursebuild.core.model.vocabulary import ENGLISH, Words
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.renderer import Renderer, Texts, templates_of
-from coursebuild.core.pages.strings import DEFAULT_LANGUAGE, Strings, parse_strings
+from coursebuild.core.pages.renderer import (
+    DEFAULT_LANGUAGE,
+    Renderer,
+    Strings,
+    Texts,
+    parse_strings,
+    templates_of,
+)
 from coursebuild.core.registry import feature_trials, features, publish_trials
 
 

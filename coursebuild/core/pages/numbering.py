@@ -22,7 +22,7 @@ from markupsafe import Markup
 from coursebuild.core import model
 from coursebuild.core.model.results import Mathml
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.renderer import Strings
 
 TextT = TypeVar("TextT", str, Markup)
 

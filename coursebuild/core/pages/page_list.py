@@ -25,6 +25,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.pages import urls
+from coursebuild.core.pages.context import AddedParts, HighlightedFile, PageHead, PageInputs
 from coursebuild.core.pages.document_inputs import (
     LessonLink,
     document_inputs,
@@ -37,7 +38,6 @@ from coursebuild.core.pages.document_inputs import (
 from coursebuild.core.pages.frame import course_data, page_title, place_of
 from coursebuild.core.pages.graph import level_graph
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import AddedParts, HighlightedFile, PageHead, PageInputs
 from coursebuild.core.pages.quantities import number
 from coursebuild.core.registry import added_pages, kind_of_block, model_parts, page_kind
 

@@ -16,20 +16,19 @@ from coursebuild.core import model
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.graph import drawings
-from coursebuild.core.pages.listings import Part, fold, highlight_lines
-from coursebuild.core.pages.markup import SpecialBlock
-from coursebuild.core.pages.page_inputs import (
+from coursebuild.core.pages.context import (
     AddedParts,
     HighlightedFile,
     LessonGraph,
+    PageContext,
     PageHead,
     PageInputs,
     ShownRun,
 )
-from coursebuild.core.pages.renderer import Renderer
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.graph import drawings
+from coursebuild.core.pages.listings import Part, fold, highlight_lines
+from coursebuild.core.pages.markup import SpecialBlock
+from coursebuild.core.pages.renderer import Renderer, Strings
 from coursebuild.core.registry import kind_of_block, model_parts, page_kind
 from coursebuild.core.text.characters import visible
 

@@ -23,11 +23,10 @@ from coursebuild.core.model.course import Theme, ThemeFile
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import fonts, formulas
 from coursebuild.core.pages.assets import SCRIPTS, Assets, Names, hashed_name, page_script
-from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.context import PageContext, PageHead
 from coursebuild.core.pages.formulas import FORMULA
 from coursebuild.core.pages.frame import FRAME_IDS, LOGO_HEIGHT, parts_of, script_words
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import PageHead
 from coursebuild.core.pages.references import (
     Reference,
     ids_and_addresses,

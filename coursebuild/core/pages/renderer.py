@@ -1,4 +1,18 @@
-"""The renderer of pages: words, templates in Jinja's language, formulas.
+"""The renderer of pages: interface texts, templates in Jinja's language, formulas.
+
+Of interface texts there is a file for each language:
+
+1. A file is TOML: tables of texts, addressed by dotted path. `{name}` in a text is replaced by a
+   value.
+2. A text that depends on a number is a table with the plural forms of its language, `other` among
+   them; the value `n` selects one. The forms are the categories of CLDR 48 for whole numbers:
+   https://www.unicode.org/cldr/charts/48/supplemental/language_plural_rules.html
+3. A key missing in a language is taken from English; one missing in English is a programming error
+   (`KeyError`). All forms of a text are of one language.
+
+The direction in which a language is written is that of the script that its tag names (`az-Arab`),
+if any; else of the region, where that writes it in another script than others (`pa-PK`). Sources:
+the Unicode Standard (chapters 9, 10, 14 and 19), and the likely scripts of languages in CLDR.
 
 Templates that the tool was bundled with are loaded as the Python they were compiled to then; those
 of a source tree are compiled on use. A course may replace templates by its own. Errors in these are
@@ -9,10 +23,11 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import re
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 from jinja2 import (
     BaseLoader,
@@ -29,8 +44,151 @@ from msgspec import Struct, field
 
 from coursebuild.core.model.course import TEMPLATES
 from coursebuild.core.model.results import Formula, MathError, Mathml
-from coursebuild.core.pages.quantities import text_html
-from coursebuild.core.pages.strings import Strings, direction
+from coursebuild.core.pages.quantities import isolate_quantities, text_html
+
+DEFAULT_LANGUAGE = "en"
+Category: TypeAlias = Literal["zero", "one", "two", "few", "many", "other"]
+
+CATEGORIES: tuple[Category, ...] = ("zero", "one", "two", "few", "many", "other")
+"""All categories; every language has the last."""
+
+
+class Strings(Struct, frozen=True):
+    """The interface texts in one language."""
+
+    texts: Mapping[str, str]
+    language: str = DEFAULT_LANGUAGE
+
+    def __call__(self, key: str, **values: str | int | float) -> str:
+        """The text of a key, with values inserted."""
+        text = self.texts.get(key)
+        if text is None and "n" in values:
+            n = values["n"]
+            form = "other" if isinstance(n, str) else category(self.language, n)
+            text = self.texts.get(f"{key}.{form}", self.texts.get(f"{key}.other"))
+        if text is None:
+            raise KeyError(f"no interface text {key!r}")
+        if not values:
+            return text
+        text = text.format_map(values)
+        return isolate_quantities(text) if direction(self.language) == "rtl" else text
+
+    def prefer(self, prefix: str) -> Strings:
+        """The texts in which one of the key `prefix` + KEY replaces that of KEY."""
+        preferred = {
+            k.removeprefix(prefix): t for k, t in self.texts.items() if k.startswith(prefix)
+        }
+        return Strings(dict(sorted((dict(self.texts) | preferred).items())), self.language)
+
+    def join(self, items: Iterable[str]) -> str:
+        """The items one after the other, with the comma of the language between them."""
+        return f"{self('site.comma')} ".join(items)
+
+    def has(self, key: str) -> bool:
+        """Whether there is a text of this key."""
+        return key in self.texts
+
+
+def parse_strings(
+    text: str, fallback: Strings | None = None, language: str = DEFAULT_LANGUAGE
+) -> Strings:
+    """Read a file of texts; what it lacks comes from `fallback`."""
+    import tomllib
+
+    texts = dict(_flatten(tomllib.loads(text), ""))
+    table = dict(fallback.texts) if fallback is not None else {}
+    for key in texts:
+        stem, _, form = key.rpartition(".")
+        if form in CATEGORIES and f"{stem}.other" in texts:
+            for other_form in CATEGORIES:
+                table.pop(f"{stem}.{other_form}", None)
+    table.update(texts)
+    return Strings(dict(sorted(table.items())), language)
+
+
+def _flatten(table: dict[str, object], prefix: str) -> Iterator[tuple[str, str]]:
+    for name, value in table.items():
+        if isinstance(value, dict):
+            yield from _flatten(value, f"{prefix}{name}.")
+        elif isinstance(value, str):
+            yield prefix + name, value
+        else:
+            raise TypeError(f"interface text {prefix + name!r} is not a text")
+
+
+def category(language: str, n: float) -> Category:
+    """The plural form that goes with a number; a language without texts follows English."""
+    if n != int(n):
+        return "other"
+    n = abs(int(n))
+    match language.replace("_", "-").split("-")[0].lower():
+        case "ar":
+            if n <= 2:
+                return CATEGORIES[n]
+            if 3 <= n % 100 <= 10:
+                return "few"
+            return "many" if n % 100 >= 11 else "other"
+        case "fr" | "es" if n and n % 1_000_000 == 0:
+            return "many"
+        case "fr":
+            return "one" if n <= 1 else "other"
+        case _:
+            return "one" if n == 1 else "other"
+
+
+_FROM_THE_RIGHT = frozenset(
+    "adlm arab aran armi avst chrs cprt elym gara hatr hebr hung khar lydi mand mani mend merc mero"
+    " narb nbat nkoo orkh ougr palm phli phlp phnx prti rohg samr sarb sogd sogo syrc syre syrj"
+    " syrn thaa todr yezi".split()
+)
+
+_LANGUAGES = frozenset(
+    # of Arabic script
+    "aeb afb ajp apc apd ar ara arb arq ars ary arz ayl bal bcc bej bft bgn bqi brh ckb fa fas fia"
+    " gbz gju gjk glk haz hnd hno khw kvx kxp ks lah lki lrc luz mvy mzn pbt pbu per pes phl phr"
+    " pnb prs ps pst pus rmt sd sdh shu skr snd swb trw tda ug uig ur urd wni xpr zdj azb"
+    " acm acq ajt aao"
+    # of Hebrew
+    " he heb iw yi yid ji jpr jrb sam"
+    # of others
+    " arc aii syr syc tru dv div nqo rhg".split()
+)
+"""Languages that are written from the right unless their tag names a script."""
+
+_REGIONS = {
+    "az": "ir iq",
+    "ha": "sd",
+    "kk": "af cn ir mn",
+    "ku": "iq ir lb",
+    "ky": "cn",
+    "ms": "cc",
+    "pa": "pk",
+    "tk": "af ir",
+    "tt": "cn",
+    "uz": "af cn",
+}
+"""Regions that write a language from the right, though others do not."""
+
+
+@functools.lru_cache(maxsize=16)
+def direction(language: str) -> Literal["ltr", "rtl"]:
+    """The direction of the text of a language, by its tag (`ar`, `uz-Arab-AF`)."""
+    name, *rest = re.split(r"[-_]", language.lower())
+    script, region = "", ""
+    for part in rest:
+        if len(part) == 1:  # an extension begins: nothing after it names a script
+            break
+        if len(part) == 4 and part.isalpha() and not script:
+            script = part
+        elif len(part) == 2:
+            region = part
+    if script:
+        return "rtl" if script in _FROM_THE_RIGHT else "ltr"
+    from_the_right = name in _LANGUAGES or region in _REGIONS.get(name, "").split()
+    return "rtl" if from_the_right else "ltr"
+
+
+# --- templates
 
 Texts: TypeAlias = tuple[tuple[str, str], ...]
 """Files of `templates/` by path."""

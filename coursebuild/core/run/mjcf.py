@@ -33,8 +33,8 @@ from msgspec.structs import replace
 from coursebuild.core.engine.digests import SPECIAL, file_state
 from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Limits
+from coursebuild.core.model.course import MJCF_KEYWORDS
 from coursebuild.core.model.results import CompileResult, Misspelling, ModelFacts
-from coursebuild.core.model.vocabulary import MJCF_KEYWORDS
 from coursebuild.core.run import compile_main, mujoco_files
 from coursebuild.core.run.child import LIMITS, JsonChild
 from coursebuild.core.run.mujoco_files import ModelFiles

@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from coursebuild.core import model
 from coursebuild.core.model import Cell, Inline, Table
-from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.syntax.spans import PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,

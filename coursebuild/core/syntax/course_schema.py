@@ -1,12 +1,17 @@
-"""The tables and fields of course.toml, its theme, and where notebooks run."""
+"""What course.toml may hold: its tables and fields; and JSON Schemas of all that authors declare.
+
+The schemas are made from the types by which the decoder reads JSON and TOML.
+"""
 
 from __future__ import annotations
 
+import copy
 import re
 import unicodedata
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeAlias
 
+import msgspec
 from msgspec import Meta, Struct
 
 from coursebuild.core.drawing.contrast import (
@@ -19,6 +24,8 @@ from coursebuild.core.drawing.contrast import (
 from coursebuild.core.model import Filter, LessonTable, Limits, Pace, Silence
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
 from coursebuild.core.model.fields import NotNegative, Slug, Text, describe, matching
+from coursebuild.core.registry import features
+from coursebuild.core.syntax.declarations import ModelFile
 from coursebuild.core.syntax.nodes import ObjectNode, format_name
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 
@@ -326,3 +333,37 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
     silence: tuple[Silence, ...] = ()
     level: tuple[LevelTable, ...] = ()
     page: tuple[PageTable, ...] = ()
+
+
+# --- JSON Schemas
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+_ROOTS: dict[str, tuple[type[Struct], str]] = {
+    "course": (CourseFile, "The course map, content/course.toml"),
+    "model": (ModelFile, "The file beside a model, models/NAME.toml"),
+}
+
+
+def schema_roots() -> dict[str, tuple[type[Struct], str]]:
+    """The declared type and the title of each schema, by name."""
+    return _ROOTS | {name: root for feature in features() for name, root in feature.schemas.items()}
+
+
+def json_schema(name: str) -> bytes:
+    """The JSON Schema (draft 2020-12), indented, keys in a fixed order, with a final newline."""
+    root, title = schema_roots()[name]
+    schema = copy.deepcopy(msgspec.json.schema(root))
+    definitions: dict[str, Any] = schema["$defs"]
+    if name == "course":
+        definitions["Silence"]["required"].append("reason")
+    for refine in (feature.refine_schema for feature in features()):
+        if refine is not None:
+            refine(definitions)
+    schema = {
+        "$schema": DIALECT,
+        "title": title,
+        "$ref": schema["$ref"],
+        "$defs": dict(sorted(definitions.items())),
+    }
+    return msgspec.json.format(msgspec.json.encode(schema), indent=2) + b"\n"

@@ -15,8 +15,7 @@ from itertools import pairwise
 from msgspec.structs import asdict, replace
 
 from coursebuild.core import model
-from coursebuild.core.model.course import Launch
-from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.model.course import CALLOUTS, Launch
 from coursebuild.core.syntax.course_schema import (
     CourseFile,
     LevelTable,

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from msgspec import Struct
 from msgspec.structs import asdict
 
+from coursebuild.core.model.course import CLOSED_FORMS
 from coursebuild.core.model.scenarios import (
     BenchTable,
     Declarations,
@@ -23,7 +24,6 @@ from coursebuild.core.model.scenarios import (
     Variation,
     is_multiple,
 )
-from coursebuild.core.model.vocabulary import CLOSED_FORMS
 from coursebuild.core.syntax.decode import Decoding, check_unique, decode
 from coursebuild.core.syntax.nodes import TOML, ObjectNode, shorten
 from coursebuild.core.syntax.toml_text import parse_toml

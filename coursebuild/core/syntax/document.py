@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.model.blocks import title_line
-from coursebuild.core.model.vocabulary import ENGLISH, Words
+from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.model.walk import DisplayFormula, feature_block_ids
 from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.syntax.parsing_state import ParsingState

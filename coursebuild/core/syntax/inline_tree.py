@@ -20,6 +20,7 @@ from coursebuild.core.syntax.markup_kinds import BROKEN
 from coursebuild.core.syntax.mentions import (
     TextPiece,
     check_link_text,
+    check_numerals,
     check_scheme,
     classify,
     link_mentions,
@@ -27,7 +28,6 @@ from coursebuild.core.syntax.mentions import (
     text_inlines,
 )
 from coursebuild.core.syntax.nodes import shorten
-from coursebuild.core.syntax.numerals import check_numerals
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.syntax.unread_markup import (

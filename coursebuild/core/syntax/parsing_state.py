@@ -10,7 +10,7 @@ from typing import TypeVar
 from msgspec import Struct, field
 
 from coursebuild.core.model import LABEL_KINDS, Block, Footnote, FootnoteRef, Label
-from coursebuild.core.model.vocabulary import Words
+from coursebuild.core.model.course import Words
 from coursebuild.core.syntax.attributes import Anchors, read_pairs, value_text
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean

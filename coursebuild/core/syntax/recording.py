@@ -11,7 +11,7 @@ from decimal import Decimal
 
 from coursebuild.core import model
 from coursebuild.core.model.blocks import volatile_pattern
-from coursebuild.core.model.vocabulary import Words
+from coursebuild.core.model.course import Words
 from coursebuild.core.syntax.fence import Fence, FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.unread_markup import is_known_kind

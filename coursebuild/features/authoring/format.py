@@ -16,7 +16,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.vocabulary import ENGLISH, Words
+from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.registry import fence_names
 from coursebuild.core.scripts.edit import apply_edits, whole_lines
 from coursebuild.core.syntax.block_parser import block_tokens

@@ -10,7 +10,7 @@ from markupsafe import Markup, escape
 from msgspec import Struct
 
 from coursebuild.core.model.results import Machine
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.renderer import Strings
 
 _MINUS = "\u2212"
 _THIN = "\u2009"

@@ -16,8 +16,7 @@ from coursebuild.core.model import MjcfModel, find_blocks, scenario_anchor
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import escape_marks, guard_lines
-from coursebuild.core.pages.renderer import Renderer
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.renderer import Renderer, Strings
 from coursebuild.features.bench import grids
 from coursebuild.features.bench.model import Bench, declared_scenarios
 from coursebuild.features.bench.scenario_view import (

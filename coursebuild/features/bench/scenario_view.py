@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids
 from coursebuild.numerics.reports.engine_report import (
     BatchCost,

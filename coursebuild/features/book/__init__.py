@@ -1,9 +1,8 @@
 """All lessons in one file: as an e-book (EPUB 3), as one page, as a PDF of it; one as slides."""
 
 from coursebuild.core.features import Exporter, Feature
-from coursebuild.features.book.chapters import page_file
+from coursebuild.features.book.chapters import PDF_MARK, page_file, pdf_file
 from coursebuild.features.book.epub import epub_files
-from coursebuild.features.book.pdf import MARK, pdf_file
 from coursebuild.features.book.slides import slides_file
 
 EPUB = Exporter(
@@ -25,7 +24,7 @@ PDF = Exporter(
     name="pdf",
     summary="the lessons as a PDF, printed by a Chromium of this machine",
     file="course.pdf",
-    mark=MARK,
+    mark=PDF_MARK,
     archive=False,
     make=lambda context: (pdf_file(context),),
 )

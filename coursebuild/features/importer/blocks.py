@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping
 
 from msgspec.structs import replace
 
-from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.pages.marks import block_quote, fence
 from coursebuild.core.registry import CORE_FENCES, fence_names
 from coursebuild.core.syntax.course_schema import slug_of

@@ -17,8 +17,8 @@ from coursebuild.core.features import (
     Trials,
 )
 from coursebuild.features.lab import page
+from coursebuild.features.lab.compile import lab_trials, trial_inputs
 from coursebuild.features.lab.equations.declared import OdeLab, PlotLab
-from coursebuild.features.lab.inputs import lab_trials, trial_inputs
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.parse import parse_fence
 from coursebuild.features.lab.relations import check_labs, check_model_names

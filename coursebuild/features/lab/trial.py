@@ -29,7 +29,14 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab import verdict
-from coursebuild.features.lab.compile import LabModule, compile_lab, pieces
+from coursebuild.features.lab.compile import (
+    LabModule,
+    compile_lab,
+    equation_inputs,
+    inputs_of,
+    pieces,
+    trial_data,
+)
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError, lab_digest
 from coursebuild.features.lab.equations.equation_trial import (
@@ -39,7 +46,6 @@ from coursebuild.features.lab.equations.equation_trial import (
     run_trial,
 )
 from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
-from coursebuild.features.lab.inputs import equation_inputs, inputs_of, trial_data
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
 from coursebuild.features.lab.reply import LabOutput, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera

@@ -18,7 +18,7 @@ from msgspec import Struct
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.model.vocabulary import MJCF_KEYWORDS
+from coursebuild.core.model.course import MJCF_KEYWORDS
 from coursebuild.core.run import mjcf
 from coursebuild.core.run.child import JsonChild
 from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version

@@ -16,8 +16,7 @@ import msgspec.inspect as inspect
 from msgspec import Struct
 
 from coursebuild.core.registry import CORE_COMMANDS, features
-from coursebuild.core.syntax.course_schema import CourseFile
-from coursebuild.core.syntax.schemas import schema_roots
+from coursebuild.core.syntax.course_schema import CourseFile, schema_roots
 from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest, propose
 from coursebuild.features.names.engine import Answer, KnownName, Unknown
 

@@ -32,10 +32,9 @@ from coursebuild.core.engine.tool import step_key
 from coursebuild.core.features import Feature, PageCopy
 from coursebuild.core.model.results import CachedFile, Outcome
 from coursebuild.core.pages import urls, zips
-from coursebuild.core.pages.context import PageContext, SiteContext
+from coursebuild.core.pages.context import PageContext, PageInputs, SiteContext
 from coursebuild.core.pages.marks import code_span, escape_marks, hang, link
-from coursebuild.core.pages.page_inputs import PageInputs
-from coursebuild.features.markdown.copies import head
+from coursebuild.features.markdown import head
 from coursebuild.features.markdown.writer import DocumentWriter
 
 Cell: TypeAlias = dict[str, Any]

@@ -39,7 +39,7 @@ from coursebuild.features.bench.commands.measurement import (
     run_measurement,
     write_records,
 )
-from coursebuild.features.numerics.page import case_view
+from coursebuild.features.numerics import case_view
 from coursebuild.numerics.cases import DisagreementError, measure_case
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.reports.case_report import (

@@ -21,7 +21,7 @@ from coursebuild.core.model.results import FileFacts, FileList, OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import hashed_name, page_script
 from coursebuild.core.pages.context import SiteContext
-from coursebuild.core.pages.strings import direction
+from coursebuild.core.pages.renderer import direction
 from coursebuild.core.pages.theme import picture_size
 
 PAPER = GROUNDS_LIGHT[0]

@@ -18,7 +18,7 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import page_script
 from coursebuild.core.pages.context import ExportContext
 from coursebuild.core.pages.frame import policy
-from coursebuild.core.pages.strings import direction
+from coursebuild.core.pages.renderer import direction
 from coursebuild.core.pages.xml import identifier, render_xml
 
 _COPIES = (".br", ".gz")

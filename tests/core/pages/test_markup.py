@@ -22,7 +22,7 @@ from coursebuild.core.pages.quantities import (
     text_html,
     unit_length,
 )
-from coursebuild.core.pages.strings import Strings, direction, parse_strings
+from coursebuild.core.pages.renderer import Strings, direction, parse_strings
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source, Span
 from support.fixture_cases import fixture_tables

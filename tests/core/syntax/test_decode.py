@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 from msgspec import Meta, Struct
 
 from coursebuild.core.model.fields import Blocks, Inlines, Text
-from coursebuild.core.syntax.course_schema import CourseFile
+from coursebuild.core.syntax.course_schema import CourseFile, json_schema
 from coursebuild.core.syntax.decode import Decoding, decode
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.syntax.nodes import JSON, TOML
-from coursebuild.core.syntax.schemas import json_schema
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.text.source import Excerpt, Source
 from coursebuild.features.lab.schema import SimLab

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from markdown_it.common.utils import unescapeAll
 
 from coursebuild.core import model
-from coursebuild.core.model.vocabulary import CALLOUTS
+from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span

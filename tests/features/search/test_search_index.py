@@ -12,9 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model.results import CachedFile
-from coursebuild.core.pages.context import NotedPage, SiteContext
+from coursebuild.core.pages.context import NotedPage, PageInputs, SiteContext
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.page_inputs import PageInputs
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.features import search
 from coursebuild.features.search import IndexPlan, search_files

@@ -24,7 +24,7 @@ from coursebuild.core.files.resources import template_texts
 from coursebuild.core.files.write import resolve_inside, write_atomic
 from coursebuild.core.model.results import Machine
 from coursebuild.core.pages.materials import strings_for
-from coursebuild.core.pages.strings import Strings
+from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.core.values import decode, encode, fingerprint

@@ -33,12 +33,11 @@ from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.glossary import definition_of
-from coursebuild.features.language_server.commands.fields import field_place
-from coursebuild.features.language_server.commands.texts import OpenTexts
+from coursebuild.features.language_server.commands.texts import OpenTexts, field_place
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.engine import EngineName, KnownName, engine_names
 from coursebuild.features.names.resolve import resolver_of
-from coursebuild.features.references.citing import reference_text, works_of
+from coursebuild.features.references import reference_text, works_of
 from coursebuild.features.symbols import declared_symbol, symbols
 from coursebuild.pipeline.reader import kept_formulas
 
