@@ -6,7 +6,7 @@ A run is judged first: the error of a run that was lost is not given.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -20,6 +20,7 @@ from coursebuild.numerics import simulation
 from coursebuild.numerics.costs import Clock, scenario_job, time_jobs
 from coursebuild.numerics.detector import driving_force
 from coursebuild.numerics.integrate import forward_motion
+from coursebuild.numerics.linearization import find_rest, step_excess
 from coursebuild.numerics.measure import (
     energy_drift,
     errors,
@@ -35,6 +36,7 @@ from coursebuild.numerics.problem import (
     Integrator,
     Motion,
     Problem,
+    ScalarCheck,
     Scenario,
     SecondReference,
     Sizes,
@@ -53,19 +55,27 @@ from mjcourse.spatial import quat_conj, quat_mul
 
 _ENGINE = SecondReference("MuJoCo’s accelerations over the MJCF, DOP853", forward_motion)
 """Shares nothing with MuJoCo's integrators."""
+_LIMIT_WIDTH, _STILL = 2e-7, 2e-9
+"""How near to a limit, relative to it, steps are tried on both sides, and the most growth in one
+that is still rounding: there it is 1e-10 or less, and beyond a limit 6e-9 or more."""
 
 
 class DisagreementError(ArithmeticError):
-    """One of the references of a hard case is wrong."""
+    """One of the references of a hard case, or theory of its steps, is wrong."""
 
 
 def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport:
-    """Measure everything on a problem; a `DisagreementError` if its references differ too much."""
+    """Measure everything on a problem.
+
+    Raises:
+        DisagreementError: references differ too much, or theory is not that of the engine's steps.
+    """
     first, second = problem.reference, problem.second or _ENGINE
     model = simulation.compile_model(problem.mjcf, Integrator.EULER, 1e-3)
     drivers = problem.search and driving_force(model, problem.scenario)
     notes = (problem.note, f"energy is not judged: {drivers}" if drivers else "")
     reference = ReferenceLine(first.kind, first.source, second.source, *astuple(floor(problem)))
+    check_limits(problem)
     runs = {
         integrator: [measure(problem, integrator, h) for h in problem.timesteps]
         for integrator in STANDARD
@@ -78,7 +88,7 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         note="; ".join(note for note in notes if note),
         reference=reference,
         boundaries=boundaries(problem),
-        figures=tuple(_figures(problem)),
+        figures=tuple(measure_figures(problem, problem.checks)),
         orders=tuple(orders(problem, lines) for lines in runs.values() if lines),
         errors=tuple(line for lines in runs.values() for line in lines),
         costs=_costs(problem, runs, clock),
@@ -134,8 +144,13 @@ def orders(problem: Problem, lines: Sequence[ErrorLine]) -> OrderRow:
     return fit_orders(integrator, runs, floor(problem))
 
 
-def _figures(problem: Problem) -> Iterator[FigureLine]:
-    for check in problem.checks:
+def measure_figures(problem: Problem, checks: Iterable[ScalarCheck]) -> Iterator[FigureLine]:
+    """Quantities as they are measured.
+
+    Raises:
+        DisagreementError: theory of a step is not what the engine does.
+    """
+    for check in checks:
         for integrator in check.integrators:
             figure, exact = check.measure(integrator), check.expected(integrator)
             spread = None
@@ -143,9 +158,41 @@ def _figures(problem: Problem) -> Iterator[FigureLine]:
                 quantiles = np.quantile(figure, (0.1, 0.5, 0.9), method="nearest")
                 low, figure, high = quantiles.tolist()
                 spread = (low, high) if math.isfinite(high) else None
+            elif exact is not None and integrator in check.precise:
+                gap = abs(figure - exact)
+                if not gap <= check.precision:
+                    raise DisagreementError(
+                        f"theory of `{problem.name}` ({check.name}, {integrator.value}) differs "
+                        f"from the engine by {gap:.2g}, where {check.precision:.0e} is said"
+                    )
             value = figure if math.isfinite(figure) else None
             line = check.name, check.unit, integrator.value, value, exact, check.source, spread
             yield FigureLine(*line)
+
+
+def check_limits(problem: Problem) -> None:
+    """A `DisagreementError` where a formula for a limit is not that of the model's own steps."""
+    if problem.limit is None:
+        return
+    growth = problem.growth or _growth_at_rest(problem)
+    for integrator in Integrator:
+        limit = problem.limit(integrator)
+        if limit is None or not 0 < limit.timestep < math.inf:
+            continue
+        sides = (1 - _LIMIT_WIDTH, 1 + _LIMIT_WIDTH)
+        before, after = (growth(integrator, limit.timestep * side) - 1 for side in sides)
+        if not before <= _STILL < after:
+            raise DisagreementError(
+                f"`{problem.name}`: {limit.timestep:.8g} s under {integrator.value} is not where "
+                f"its steps begin to grow ({limit.source})"
+            )
+
+
+def _growth_at_rest(problem: Problem) -> Callable[[Integrator, float], float]:
+    model = simulation.compile_model(problem.mjcf, Integrator.RK4, min(problem.timesteps))
+    rest = find_rest(model, problem.scenario)
+    assert rest is not None, "a hard case without a rest says how it grows"
+    return lambda integrator, step: 1 + step_excess(model, rest, integrator, step)
 
 
 @lru_cache(maxsize=64)

@@ -223,6 +223,18 @@ def _polished(model: Any, data: Any) -> FixedState | None:
     return state
 
 
+def step_excess(model: Any, rest: FixedState, integrator: Integrator, timestep: float) -> float:
+    """How far a step of two states is beyond stability at rest; below 0 where it is stable.
+
+    Of the coefficients of the characteristic polynomial, which unlike its roots are smooth where
+    two of these meet.
+    """
+    variant = _converged(model, integrator, timestep)
+    matrix, _ = _step_derivative(variant, mujoco.MjData(variant), rest)
+    trace, determinant = float(np.trace(matrix)), float(np.linalg.det(matrix))
+    return max(determinant - 1, abs(trace) - 1 - determinant)
+
+
 def rest_limit(
     model: Any, rest: FixedState, integrator: Integrator, search: tuple[float, float]
 ) -> float:

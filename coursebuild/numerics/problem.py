@@ -189,6 +189,10 @@ class ScalarCheck(Struct, frozen=True):
     """Several numbers are the values of an ensemble."""
     source: str
     integrators: tuple[Integrator, ...] = STANDARD
+    precision: float = float("inf")
+    """How far a measurement may be from theory: beyond it one of them is wrong."""
+    precise: tuple[Integrator, ...] = STANDARD
+    """The integrators to which that applies."""
 
     def expected(self, integrator: Integrator) -> float | None:
         """Its value in theory for an integrator."""
@@ -234,6 +238,9 @@ class Problem(Setup, frozen=True, kw_only=True):
     checks: tuple[ScalarCheck, ...] = ()
     limit: Callable[[Integrator], Limit | None] | None = None
     """Theory of the largest stable timestep; `None` where there is none to be had."""
+    growth: Callable[[Integrator, float], float] | None = None
+    """The factor by which a step of that timestep (s) multiplies what grows first, to hold `limit`
+    against; `None`: by the step, linearized at rest."""
     search: tuple[float, float] | None = None
     """Timesteps (s) between which the largest stable one is looked for."""
     span: float = 0.0

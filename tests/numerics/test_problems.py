@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,8 +11,13 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.numerics.cases import DisagreementError, floor
-from coursebuild.numerics.problem import Integrator, Problem
+from coursebuild.numerics.cases import (
+    DisagreementError,
+    check_limits,
+    floor,
+    measure_figures,
+)
+from coursebuild.numerics.problem import STANDARD, Integrator, Limit, Problem
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.simulation import compile_model
 
@@ -120,6 +126,42 @@ def change_each_number(value: Any, names: tuple[str, ...] = ()) -> Iterator[tupl
             new = tuple(OFF * x for x in entry) if isinstance(entry, tuple) else OFF * entry
             if new != entry:
                 yield f"{name} {n}", replace(value, **{name: (*field[:n], new, *field[n + 1 :])})
+
+
+def test_theory_of_a_step_that_the_engine_does_not_follow_is_refused() -> None:
+    projectile = all_problems()["projectile"]
+    figures = list(measure_figures(projectile, projectile.checks))
+    assert [figure.integrator for figure in figures] == [i.value for i in STANDARD]
+    off = replace(projectile.checks[0], exact=-0.04905 * OFF)
+    expected = (
+        "theory of `projectile` (error of the height after 1 s at 10 ms, Euler) differs "
+        "from the engine by 4.9e-08, where 1e-12 is said"
+    )
+    with pytest.raises(DisagreementError, match=f"^{re.escape(expected)}$"):
+        list(measure_figures(projectile, (off,)))
+    assert list(measure_figures(projectile, (replace(off, precise=(Integrator.RK4,), exact=0.0),)))
+
+
+def test_a_limit_that_is_off_by_a_millionth_is_refused() -> None:
+    refusals = []
+    for name, part in itertools.product(("damped-spring-0", "coin"), (1.0, OFF, 1 / OFF)):
+        try:
+            check_limits(with_limits_scaled(all_problems()[name], part))
+        except DisagreementError as error:
+            refusals.append(str(error))
+    assert len(refusals) == 4
+    assert refusals[0] == (
+        "`damped-spring-0`: 0.2000002 s under Euler is not where its steps begin to grow "
+        "(hω = 2(√(ζ²+1) + ζ))"
+    )
+
+
+def with_limits_scaled(problem: Problem, part: float) -> Problem:
+    def limit(integrator: Integrator) -> Limit | None:
+        limit = problem.limit(integrator) if problem.limit else None
+        return limit and replace(limit, timestep=limit.timestep * part)
+
+    return replace(problem, limit=limit)
 
 
 def test_problems_are_small_models_that_timesteps_divide(

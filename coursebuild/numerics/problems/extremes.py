@@ -30,10 +30,13 @@ FAR, CRAWL = 1e9, 1e-3
 """m and m/s."""
 _FAR_AWAY = Scenario(1.0, 0.1, (1e9,), (1e-3,))
 
-_CUBE = '<geom type="box" size="0.0005 0.0005 0.0005" density="1000"/>'
+_HALF_EDGE = 0.0005
+"""m, of the cube."""
+_CUBE = f'<geom type="box" size="{_HALF_EDGE} {_HALF_EDGE} {_HALF_EDGE}" density="1000"/>'
 CUBE = model_text(f"    <body><freejoint/>{_CUBE}</body>", NO_GRAVITY, NO_CONTACT)
 RESTING_CUBE = model_text(
-    f'    <geom type="plane" size="1 1 1"/>\n    <body pos="0 0 0.0005"><freejoint/>{_CUBE}</body>',
+    '    <geom type="plane" size="1 1 1"/>\n'
+    f'    <body pos="0 0 {_HALF_EDGE}"><freejoint/>{_CUBE}</body>',
     'gravity="0 0 -9.81"',
 )
 DISTANT = model_text(
@@ -45,7 +48,7 @@ PLATE_MOMENTS = (0.0833, 0.0833, 0.1667)
 """A square plate of 1 kg and 1 m: 1/12, 1/12, 1/6, with four digits; A + B is less than C."""
 
 
-ROUNDED_PLATE = free_body("0.0833 0.0833 0.1667")
+ROUNDED_PLATE = free_body(" ".join(map(str, PLATE_MOMENTS)))
 
 
 def _axial_moment(_: Integrator) -> float:
@@ -56,7 +59,7 @@ def _axial_moment(_: Integrator) -> float:
 def relative_depth(integrator: Integrator) -> float:
     """The depth of the resting cube in the floor, relative to its edge, after 1 s at 1 ms."""
     data = run_steps(RESTING_CUBE, Scenario(1.0, 0.1), integrator, 1e-3, 1000)
-    return float((0.0005 - data.qpos[2]) / 0.001)
+    return float((_HALF_EDGE - data.qpos[2]) / (2 * _HALF_EDGE))
 
 
 def distance_crawled(integrator: Integrator, timestep: float) -> float:

@@ -181,15 +181,15 @@ def _servo_problem(ratio: float) -> Problem:
     gains = f'kp="10000" kv="{_KV[ratio]}"'
     motor = f'  <actuator><position joint="slide" {gains}/></actuator>\n'
     source = "the linear oscillator about each target"
-    limit = POSITION_BOUND / 10
+    bound = POSITION_BOUND / 10
     return Problem(
         name=f"stiff-servo-{ratio:g}",
         title=f"Stiff servo, ζ = {ratio:g}",
         case=6,
         mjcf=model_text(_ball(_SLIDE), NO_GRAVITY, NO_CONTACT, motor),
         scenario=Scenario(0.1, 0.01, controls=((0.1,), (-0.05,)), hold=0.05),
-        position_bound=limit,
-        velocity_bound=limit * rate * (1 + 4 * ratio),
+        position_bound=bound,
+        velocity_bound=bound * rate * (1 + 4 * ratio),
         reference=Reference("closed", source, Pursuit(ratio, rate)),
         timesteps=divisions(0.01, 4, 8, 16, 32, 64, 128, 256),
         limit=lambda integrator: limit_of(ratio, rate, integrator, *explicit),

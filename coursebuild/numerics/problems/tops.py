@@ -144,6 +144,7 @@ def _growth(name: str, z: float) -> ScalarCheck:
         lambda integrator: transverse_growth(integrator, z),
         lambda integrator: measured_growth(name, integrator, z),
         "√(1+z²), 1/√(1+z²), |R(iz)|",
+        precision=1e-8,
     )
 
 
@@ -162,6 +163,7 @@ def _free_problem(name: str) -> Problem:
         timesteps=divisions(0.05, 40, 60, 80, 120, 160, 320, 640, 1280),
         checks=tuple(_growth(name, z) for z in (0.03, 0.1, 0.3)),
         limit=lambda integrator: _limit(top, integrator),
+        growth=lambda integrator, step: measured_growth(name, integrator, step * abs(top.rate)),
         search=(1e-2 / abs(top.rate), 1e1 / abs(top.rate)),
         span=100.0,
         energy_conserved=True,
