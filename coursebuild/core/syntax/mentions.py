@@ -229,6 +229,8 @@ _FORMS = (
     rf"{_BEGIN}\d[\d.]*(?:[eE](?:{_SIGNS}{{2,}}\d+|{_SIGNS}(?![\w+\u2212-]))|[-\u2212][eE]\d+"
     rf"|[eE]{{2}}{_SIGNS}\d+)",
     r"(?<=10)[⁺⁻]{2,}[⁰¹²³⁴-⁹]+",
+    # a sign
+    r"(?<![\w)\u2212-])(?:\u2212{2,}|--)\d[\d.]*",
 )
 _BEFORE_UNITS = (
     rf"{_BEGIN}(?!\d{{1,3}}(?:\.\d{{3}})+(?!\d))\d+(?:\.\d+){{2,}}(?=[ \u00a0]|\Z)",
@@ -254,7 +256,9 @@ def _pattern(*, is_alone: bool) -> re.Pattern[str]:
     return re.compile("|".join((*_FORMS, before_units, in_prose)) + alone)
 
 
-_HINT = re.compile(r"[\d.][.,;>/⁺⁻ ]|[eE][-+\u2212eE]|\d[oOl]|[Ool]\.\d|0\d|\d[-\u2212][eE]")
+_HINT = re.compile(
+    r"[\d.][.,;>/⁺⁻ ]|[eE][-+\u2212eE]|\d[oOl]|[Ool]\.\d|0\d|\d[-\u2212][eE]|[-\u2212]{2}\d"
+)
 """What all of them have somewhere, so that most texts are passed over quickly."""
 
 
