@@ -108,6 +108,10 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
             if index == 0 or gap[index - 1] < 1:
                 simulation.advance(variant, twin, steps_per_sample)
                 gap[index] = position_distance(variant, data.qpos, twin.qpos, errors)
+    if not look.constrained:  # what no constraint pushes has most at the beginning
+        first = simulation.initial_data(scenario, variant)
+        energy = simulation.invariants(variant, first, first.qpos, first.qvel)[:2].sum()
+        peaks = replace(peaks, energy=float(energy))
     horizons, growth_rates = [], []
     for gap, size in zip(gaps, nudge_sizes, strict=True):
         parted = np.flatnonzero(gap >= 1)

@@ -191,6 +191,16 @@ def test_what_falls_farther_in_a_longer_time_is_not_lost() -> None:
         assert (row.largest, row.bracket) == (None, None), row.integrator
 
 
+def test_the_energy_that_nothing_can_raise_is_that_of_the_beginning() -> None:
+    """The first run, in steps of Euler's method, has more now and then."""
+    mjcf = """<mujoco><option timestep="0.01"/><worldbody><body><joint axis="0 1 0"/>
+    <inertial pos="1 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+    model, source = mujoco.MjModel.from_xml_string(mjcf), Source("m.xml", mjcf)
+    table = DeclaredScenario("s", span=source.span(0, 0), duration=2.0, qvel=(1.0,))
+    (scene,) = scenes(model, Declarations("m", source, (table,)))
+    assert run_pilot(model, scene).setup.energy == 1.0, "½ (1 + 1) 1²"
+
+
 ARM = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
 <joint name="j" axis="0 1 0" {}/><inertial pos="0 0 0" mass="10" diaginertia="13.33 13.33 13.33"/>
 </body></worldbody>{}</mujoco>"""
