@@ -40,6 +40,8 @@ _REST_SPEED = 0.01
 """A body is at rest below this part of the speed of a fall through the model's extent."""
 _SETTLED = 1e-6
 """A motion has come to rest below this part of its largest kinetic energy."""
+_EXCESS = 0.1
+"""The share of the largest kinetic energy above what there can be, from which it is nonsense."""
 _PEAK_INTERVAL = 8
 """Steps from one look at how large the state is to the next."""
 
@@ -108,6 +110,14 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
             if index == 0 or gap[index - 1] < 1:
                 simulation.advance(variant, twin, steps_per_sample)
                 gap[index] = position_distance(variant, data.qpos, twin.qpos, errors)
+    if not (look.constrained or driving_force(model, scenario)):  # most is at the beginning
+        first = simulation.initial_data(scenario, variant)
+        energy = float(simulation.invariants(variant, first, first.qpos, first.qvel)[:2].sum())
+        kinetic = peaks.kinetic
+        if peaks.energy > energy + _EXCESS * kinetic:  # the integrator itself is lost
+            fine = simulation.with_integrator(variant, Integrator.RK4, step)
+            kinetic = simulation.simulate(Setup(scenario=scenario), fine).energy[:, 1].max()
+        peaks = replace(peaks, energy=energy, kinetic=float(np.fmin(kinetic, peaks.kinetic)))
     horizons, growth_rates = [], []
     for gap, size in zip(gaps, nudge_sizes, strict=True):
         parted = np.flatnonzero(gap >= 1)

@@ -191,6 +191,30 @@ def test_what_falls_farther_in_a_longer_time_is_not_lost() -> None:
         assert (row.largest, row.bracket) == (None, None), row.integrator
 
 
+def test_the_energy_that_nothing_can_raise_is_that_of_the_beginning() -> None:
+    """The first run, in steps of Euler's method, has more now and then."""
+    mjcf = """<mujoco><option timestep="0.01"/><worldbody><body><joint axis="0 1 0"/>
+    <inertial pos="1 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+    model, source = mujoco.MjModel.from_xml_string(mjcf), Source("m.xml", mjcf)
+    table = DeclaredScenario("s", span=source.span(0, 0), duration=2.0, qvel=(1.0,))
+    (scene,) = scenes(model, Declarations("m", source, (table,)))
+    assert run_pilot(model, scene).setup.energy == 1.0, "½ (1 + 1) 1²"
+
+
+def test_energies_of_a_first_run_that_gains_energy_bound_nothing() -> None:
+    """Euler's method loses a top that spins at 200 rad/s at every timestep."""
+    mjcf = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint type="ball"/>
+    <inertial pos="0 0 0" mass="1" diaginertia="0.006 0.006 0.0004"/></body></worldbody></mujoco>"""
+    model, source = mujoco.MjModel.from_xml_string(mjcf), Source("m.xml", mjcf)
+    start = {"qvel": (0.0, 20.0, 200.0), "duration": 2.0}
+    table = DeclaredScenario("s", span=source.span(0, 0), timesteps=(5e-4,), **start)
+    (scene,) = scenes(model, Declarations("m", source, (table,)))
+    energy = 0.5 * (0.006 * 20**2 + 0.0004 * 200**2)
+    setup = run_pilot(model, scene).setup
+    assert (setup.energy, setup.kinetic) == pytest.approx((energy, energy), rel=1e-6)
+    assert setup.energy_bound == pytest.approx(11 * energy, rel=1e-6)
+
+
 ARM = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
 <joint name="j" axis="0 1 0" {}/><inertial pos="0 0 0" mass="10" diaginertia="13.33 13.33 13.33"/>
 </body></worldbody>{}</mujoco>"""

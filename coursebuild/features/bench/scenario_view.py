@@ -168,11 +168,11 @@ def _settings_table(words: Strings, report: ScenarioReport) -> grids.Grid:
         (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
         (evaluations, [f"{row.work:,}" for row in rows]),
         (iterations, ["" if r.iterations is None else f"{r.iterations:,.0f}" for r in rows]),
-        *(error_column(quantity) for quantity in quantities(report) if quantity.is_resolved(rows)),
         (
             words("measured.parted", error=horizon_error_text(report.horizon_error)),
             ["" if r.parted is None else seconds_text(r.parted, 3) for r in rows],
         ),
+        *(error_column(quantity) for quantity in quantities(report) if quantity.is_resolved(rows)),
         (words("measured.energy"), [grids.percent(row.energy_drift) for row in rows]),
         (words("measured.momentum"), [grids.power(row.momentum_drift, 2) for row in rows]),
         (words("measured.depth"), [grids.power(row.penetration or None, 2) for row in rows]),

@@ -58,6 +58,13 @@ def test_text_is_as_wide_as_the_terminal(rewriting: bool) -> None:
         assert all(cells(line) <= width for line in text.splitlines())
 
 
+def test_how_long_chaotic_runs_last_is_not_left_out_on_a_narrow_terminal() -> None:
+    chaotic = scene().scenarios[0]
+    rows = tuple(replace(r, parted=2.42 if r.own else None) for r in chaotic.rows)
+    text = bench_text([scene(replace(chaotic, rows=rows))], Style(width=80))
+    assert "Error passes 0.1 after" in text and " 2.42 s" in text
+
+
 def test_departures_as_text(rewriting: bool) -> None:
     text = format_checks([RECORD_CHECK, replace(RECORD_CHECK, name="leg", departures=())], Style())
     check_text(HERE / "departures.txt", text, rewriting=rewriting)
