@@ -287,7 +287,9 @@ def test_each_note_is_there_once_and_folded_ones_wait(open_page: OpenPage) -> No
 # ------------------------------------------------------------------------- from the right
 
 
-def test_a_page_from_the_right_is_mirrored_and_its_code_is_not(open_page: OpenPage) -> None:
+def test_a_page_from_the_right_is_mirrored_and_its_code_is_not(
+    sites: Mapping[str, Site], open_page: OpenPage
+) -> None:
     page = open_page("arabic")
 
     def box(selector: str) -> dict[str, float]:
@@ -304,6 +306,11 @@ def test_a_page_from_the_right_is_mirrored_and_its_code_is_not(open_page: OpenPa
         " getComputedStyle(document.querySelector(s)).direction)"
     )
     assert directions == ["ltr"] * 5
+    page.goto(sites["arabic"].url("lessons/1.2-two.html"))
+    page.set_viewport_size({"width": 390, "height": 900})
+    expect(page.locator(".level-nav .way").first).to_have_css(
+        "transform", "matrix(-1, 0, 0, 1, 0, 0)"
+    )
 
 
 POSITIONS = fixture_text("scripts/positions.js")

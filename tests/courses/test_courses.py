@@ -89,7 +89,7 @@ def _files(root: Path) -> Iterator[Path]:
 def replace_varying(text: str) -> str:
     """Remove what changes with a style sheet, the Python version or the machine."""
     text = re.sub(r"(assets/[\w./%-]+?)\.[0-9a-f]{8}\.", r"\1.HASH.", text)
-    text = re.sub(r"; [^;]*native MuJoCo[^<]*", "; PARITY", text)  # differs by processor
+    text = re.sub(r"; [^;]*nativem? MuJoCo[^<]*", "; PARITY", text)  # differs by processor
     return text.replace(f"Python {platform.python_version()}", "Python PYTHON")
 
 

@@ -25,7 +25,7 @@ from coursebuild.core.syntax.course_schema import json_schema
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from support.fixture_cases import fixture_text
-from support.markdown_files import PAGES, ROOT, Fence, fences
+from support.markdown_files import PAGES, ROOT, Fence, code_spans, fences
 from support.scratch_course import Folder
 from support.workflows import commit, git
 
@@ -176,6 +176,25 @@ def test_every_command_and_option_is_known() -> None:
             parser_of(known_commands()[name]).parse_args(arguments)
         elif program == "make":
             assert re.search(rf"^{words[0]}:", makefile, re.MULTILINE), line
+
+
+def test_commands_in_sentences_are_known(capsys: pytest.CaptureFixture[str]) -> None:
+    """The sentence may say what is left out."""
+    refusals = {}
+    for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES):
+        for line in code_spans(path):
+            called = re.match(
+                r"(?:\.venv/bin/)?coursebuild (?:-C \S+ )?([a-z]+)((?: [^=…]+)?)$", line
+            )
+            if called is None or called[1] == "help":
+                continue
+            try:
+                parser_of(known_commands()[called[1]]).parse_args(shlex.split(called[2]))
+            except SystemExit:
+                message = capsys.readouterr().err
+                if not re.search("are required:|expected one argument", message):
+                    refusals[f"{path.name}: {line}"] = message
+    assert refusals == {}
 
 
 def test_whatever_is_not_run_has_its_reason() -> None:

@@ -52,14 +52,6 @@ def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:
     )
 
 
-def isolate_quantities(text: str) -> str:
-    """Text from the right with its quantities isolated, where no markup may stand."""
-    pieces = split_quantities(text)
-    return "".join(
-        f"\u2066{piece}\u2069" if is_quantity else piece for piece, is_quantity in pieces
-    )
-
-
 def isolate_ltr(html: Markup) -> Markup:
     """Isolate HTML as running from the left in text of any direction."""
     return Markup('<bdi dir="ltr">') + html + Markup("</bdi>")

@@ -68,10 +68,12 @@ class Strings(Struct, frozen=True):
             text = self.texts.get(f"{key}.{form}", self.texts.get(f"{key}.other"))
         if text is None:
             raise KeyError(f"no interface text {key!r}")
-        if not values:
+        text = text.format_map(values) if values else text
+        if not values or direction(self.language) == "ltr":
             return text
-        text = text.format_map(values)
-        return isolate_quantities(text) if direction(self.language) == "rtl" else text
+        return "".join(
+            f"\u2066{q}\u2069" if isolated else q for q, isolated in split_quantities(text)
+        )
 
     def prefer(self, prefix: str) -> Strings:
         """The texts in which one of the key `prefix` + KEY replaces that of KEY."""

@@ -184,16 +184,17 @@ def _recorded_view(
     record = live.record if live is not None else None
     if live is None or record is None:
         return None
-    count = str(live.attempt_count)
+    count, (key, values) = str(live.attempt_count), live.parity
+    parity = words(key, **values) if key else ""
     if record.scale is None:
         alt, length = words("lab.curves", title=title), ""
         at = words("lab.at_place", place=record.place)
-        verification = words("lab.computed", tried=count, parity=live.parity)
+        verification = words("lab.computed", tried=count, parity=parity)
     else:
         alt = words("lab.picture", title=title, t=number(record.time, 4))
         length = f"{number(record.scale[0])} m"
         at = words("lab.at", t=number(round(record.end, 3)))
-        verification = words("lab.proven", engine=LAB_ENGINE, tried=count, parity=live.parity)
+        verification = words("lab.proven", engine=LAB_ENGINE, tried=count, parity=parity)
     return RecordedView(record, place.href(live.picture), alt, length, at, verification)
 
 

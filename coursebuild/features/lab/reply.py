@@ -72,14 +72,17 @@ class Parity(Struct, frozen=True, kw_only=True):
         tolerance = self.tolerance(rtol)
         return self.first is None or (tolerance > 0 and self.relative <= tolerance)
 
-    def describe(self) -> str:
-        """Describe the comparison in words."""
+    def describe(self) -> tuple[str, dict[str, str]]:
+        """The key of an interface text that describes the comparison, and its values."""
         if self.unrepeated:
-            return f"not compared with native MuJoCo: {self.unrepeated}"
+            return "lab.parity.unrepeated", {"reason": self.unrepeated}
+        steps = {"steps": str(self.steps)}
         if self.first is None:
-            return f"bit-identical to native MuJoCo over {self.steps} steps"
-        text = f"bit-identical to native MuJoCo for {self.first - 1} of {self.steps} steps"
-        return f"{text}, then within {self.relative:.0e}" if self.relative > 0 else text
+            return "lab.parity.whole", steps
+        steps["same"] = str(self.first - 1)
+        if self.relative > 0:
+            return "lab.parity.within", steps | {"difference": f"{self.relative:.0e}"}
+        return "lab.parity.begun", steps
 
 
 class MainRecord(TypedDict):
@@ -218,6 +221,7 @@ class LabOutput(Struct, frozen=True):
     script: tuple[str, str] | None = None
     """Name and text of a Python script that does the same; `{{control:N}}` in it stands for the
     value of control N."""
+    parity: tuple[str, dict[str, str]] = ("", {})
 
 
 class PublishedLab(Struct, frozen=True):
@@ -232,7 +236,8 @@ class PublishedLab(Struct, frozen=True):
     picture: str
     """Site path; empty if there is no record."""
     attempt_count: int
-    parity: str
+    parity: tuple[str, dict[str, str]]
+    """The key of a text that says what agrees with another engine, and its values."""
 
 
 def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
@@ -279,7 +284,7 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
         data = json.dumps(config, ensure_ascii=False, separators=(",", ":")).encode()
         address = publish(f"{name}.json", data)
         labs[name] = PublishedLab(
-            name, address, script, lab.record, picture, line.tried, line.parity
+            name, address, script, lab.record, picture, line.tried, lab.parity
         )
     return PublishedTrials(labs, tuple(files.values()))
 

@@ -21,8 +21,10 @@ from msgspec.structs import replace
 
 from coursebuild.core.features import Trial, TrialContext, TrialOutcome
 from coursebuild.core.files.read import read_bytes
+from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Limits
 from coursebuild.core.model.results import TrialLine, TrialResult
+from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.mjcf import model_files, model_key
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
@@ -165,10 +167,10 @@ class LabTrials:
             status="failed" if reply.findings else "ok",
             seconds=reply.seconds,
             tried=reply.tried,
-            parity=reply.describe(lab.kind),
+            parity=_in_english(*reply.describe(lab.kind)),
             cached=kept_reply is not None,
         )
-        output = LabOutput("", {"id": trial.name} | config)
+        output = LabOutput("", {"id": trial.name} | config, parity=reply.describe(lab.kind))
         if self._context.static and not reply.findings and reply.start is not None:
             from coursebuild.features.lab.picture.static import equation_record, plots_file
 
@@ -201,6 +203,11 @@ class LabTrials:
         config = {"id": trial.name, "kind": lab.kind, "title": lab.fields.title, "data": data}
         line = TrialLine(trial.name, lab.fields.title, trial.owner, "ok")
         return TrialResult(lab.span, line, LabOutput(module, config, mjb)), []
+
+
+def _in_english(key: str, values: dict[str, str]) -> str:
+    """A text of pages in the language of messages."""
+    return strings_for(template_texts(), "en")(key, **values) if key else ""
 
 
 def _find_model(context: TrialContext, name: str) -> Source | None:
@@ -269,9 +276,9 @@ class _LabTrial(Struct, frozen=True):
             timestamp=reply.timestamp,
         )
         parity = None if reply.main is None else reply.main["parity"]
-        parity_text = "" if parity is None else parity.describe()
+        comparison: tuple[str, dict[str, str]] = ("", {}) if parity is None else parity.describe()
         if parity is not None and parity.unrepeated and export.script is not None:
-            parity_text = "compared with native MuJoCo as its Python export"
+            comparison = "lab.parity.exported", {}
         line = TrialLine(
             name=module.name,
             title=lab.fields.title,
@@ -280,12 +287,12 @@ class _LabTrial(Struct, frozen=True):
             seconds=reply.seconds,
             steps_per_second=reply.steps_per_second,
             tried=len(reply.attempts),
-            parity=parity_text,
+            parity=_in_english(*comparison),
             fill=None if reply.main is None else reply.main["fill"],
             cached=cached_evaluation is not None,
             unexported=export.reason,
         )
-        output = replace(evaluation.output, mjb=mjb, script=export.script)
+        output = replace(evaluation.output, mjb=mjb, script=export.script, parity=comparison)
         return TrialResult(lab.span, line, output), [*failures, *evaluation.remarks]
 
     def _fail(

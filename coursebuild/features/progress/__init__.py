@@ -60,6 +60,7 @@ def _question_pages(library: Library, place: urls.Place) -> tuple[QuestionPage, 
 
 
 _TROUBLE = "progress.trouble."
+_MAP_TEXTS = ("progress.map.", "site.comma")
 FEATURE = Feature(
     name="progress",
     pages=(
@@ -79,17 +80,12 @@ FEATURE = Feature(
         ),
     ),
     parts=(
-        PagePart(
-            mark="data-mark",
-            kinds=("home", "level"),
-            bundled="map.js",
-            texts=("progress.map.", "site.comma"),
-        ),
+        PagePart(mark="data-mark", kinds=("home", "level"), bundled="map.js", texts=_MAP_TEXTS),
         PagePart(mark='data-progress="lesson"', texts=("progress.lesson.", _TROUBLE)),
         PagePart(
             mark='data-progress="overall"',
             bundled="progress.js",
-            texts=("progress.live.", "progress.map.", _TROUBLE, "site.comma"),
+            texts=("progress.live.", *_MAP_TEXTS, _TROUBLE),
         ),
         PagePart(
             mark='data-progress="review"',

@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from coursebuild.core.files.resources import template_texts
+from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.features.lab.reply import (
     Attempt,
@@ -169,13 +171,15 @@ def test_what_is_so_from_the_start_is_told_once() -> None:
 
 
 def test_parity_in_words() -> None:
+    english = strings_for(template_texts(), "en")
     whole = "bit-identical to native MuJoCo"
     for first, relative, text in (
         (None, 0.0, f"{whole} over 100 steps"),
         (31, 0.0, f"{whole} for 30 of 100 steps"),
         (31, 2.2e-12, f"{whole} for 30 of 100 steps, then within 2e-12"),
     ):
-        assert Parity(steps=100, first=first, relative=relative).describe() == text
+        key, values = Parity(steps=100, first=first, relative=relative).describe()
+        assert english(key, **values) == text
 
 
 def test_difference_from_native_mujoco_is_allowed_as_the_lab_or_its_model_says() -> None:

@@ -77,10 +77,11 @@ class EquationReply(Struct, frozen=True):
     timestamp: int = 0
     lasting: bool = True
 
-    def describe(self, kind: str) -> str:
-        """Describe the comparison in words."""
+    def describe(self, kind: str) -> tuple[str, dict[str, str]]:
+        """The key of an interface text that describes the comparison, and its values."""
         library = "NumPy" if kind == PLOT else "SciPy"
-        return f"{library} agrees to {self.difference:.0e}" if self.start is not None else ""
+        values = {"library": library, "difference": f"{self.difference:.0e}"}
+        return ("lab.parity.library", values) if self.start is not None else ("", {})
 
 
 class EquationEngine(V8Engine):
