@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
@@ -17,8 +18,9 @@ from coursebuild.numerics.cases import (
     floor,
     measure_figures,
 )
-from coursebuild.numerics.problem import STANDARD, Integrator, Limit, Problem
+from coursebuild.numerics.problem import STANDARD, Array, Integrator, Limit, Motion, Problem
 from coursebuild.numerics.problems import all_problems
+from coursebuild.numerics.problems.impact import Bounce
 from coursebuild.numerics.simulation import compile_model
 
 OFF = 1 + 1e-6
@@ -126,6 +128,22 @@ def change_each_number(value: Any, names: tuple[str, ...] = ()) -> Iterator[tupl
             new = tuple(OFF * x for x in entry) if isinstance(entry, tuple) else OFF * entry
             if new != entry:
                 yield f"{name} {n}", replace(value, **{name: (*field[:n], new, *field[n + 1 :])})
+
+
+class BentBounce(Bounce, frozen=True):
+    """An impact whose formula is off in the contact, where no sample falls."""
+
+    def motion(self, times: Array) -> Motion:
+        motion = super().motion(times)
+        bend = np.where((times > 0.05) & (times < 0.053), OFF, 1.0)
+        return replace(motion, position=motion.position * bend[:, None])
+
+
+def test_references_are_compared_between_samples_too() -> None:
+    problem = all_problems()["elastic-impact"]
+    bent = replace(problem.reference, solution=BentBounce())
+    with pytest.raises(DisagreementError):
+        floor(replace(problem, reference=bent))
 
 
 def test_theory_of_a_step_that_the_engine_does_not_follow_is_refused() -> None:

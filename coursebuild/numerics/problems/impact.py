@@ -133,8 +133,8 @@ BOUNCE = model_text(
 )
 CRADLE = model_text("\n".join(map(_ball, ("0", "0.25", "0.5"))), _OPTION)
 TOUCHING_BALLS = model_text("\n".join(map(_ball, ("0", "0.25", "0.45"))), _OPTION)
-_BOUNCE_SCENARIO = Scenario(0.1, 0.0025, (0.0,), (1.0,))  # some samples fall in contacts
-_CRADLE_SCENARIO = Scenario(0.13, 0.0025, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+_BOUNCE_SCENARIO = Scenario(0.1, 0.01, (0.0,), (1.0,))
+_CRADLE_SCENARIO = Scenario(0.13, 0.01, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 _TOUCHING_SCENARIO = Scenario(0.06, 0.002, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
 
