@@ -18,14 +18,14 @@ from coursebuild.core.registry import CORE_FENCES, fence_names
 from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
-from coursebuild.features.language_server.commands.fields import (
+from coursebuild.features.language_server.commands.lookup import label_titles, members
+from coursebuild.features.language_server.commands.texts import (
     FieldPlace,
+    OpenTexts,
     fence_at,
     field_place,
     possible_values,
 )
-from coursebuild.features.language_server.commands.lookup import label_titles, members
-from coursebuild.features.language_server.commands.texts import OpenTexts
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.own_names import options_by_command
 from coursebuild.features.names.resolve import resolver_of

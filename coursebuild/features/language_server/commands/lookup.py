@@ -33,8 +33,7 @@ from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.glossary import definition_of
-from coursebuild.features.language_server.commands.fields import field_place
-from coursebuild.features.language_server.commands.texts import OpenTexts
+from coursebuild.features.language_server.commands.texts import OpenTexts, field_place
 from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.engine import EngineName, KnownName, engine_names
 from coursebuild.features.names.resolve import resolver_of

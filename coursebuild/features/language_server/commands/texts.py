@@ -1,23 +1,32 @@
-"""The texts of a course as they are now, in an editor or on the disk.
+"""The texts of a course as they are now, in an editor or on the disk; what can stand at a place.
 
 A client counts lines as CommonMark does, and within a line UTF-16 units or those of the agreed
 encoding. Other line ends that Python knows, such as U+2028, end no line.
+
+JSON in a fence and a TOML file are read also while they are edited: only brackets, keys and scalars
+count, so that mistakes anywhere do no harm. The fields come from the declarations that the decoder
+checks against (`schema_roots`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 
+import msgspec.inspect as inspect
 from lsprotocol import types
 from msgspec import Struct
 from pygls import uris
 
+from coursebuild.core.files.course_root import MAP
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.model import Document, Lesson, Owner
 from coursebuild.core.model.course import Words
 from coursebuild.core.pages.library import Library
+from coursebuild.core.syntax.course_schema import schema_roots
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.source import Source, Span
@@ -118,3 +127,162 @@ class OpenTexts(Struct, frozen=True):
 def _parse(source: Source, callouts: frozenset[str], lesson: bool, words: Words) -> Document:
     """Cached, since an editor sends many requests about the same text."""
     return parse_document(source, callouts, lesson=lesson, words=words).value
+
+
+# --- the fields that there can be at a place
+
+_FENCE = re.compile(
+    r"^[ \t>]*(?P<marks>`{3,}+|~{3,}+)[ \t]*(?P<kind>[\w-]*).*\n(?P<body>[\s\S]*?)"
+    # An unclosed fence ends where the next one begins.
+    r"(?:(?=^[ \t>]*(?P=marks)[ \t]*\w)|^[ \t>]*(?P=marks).*|\Z)",
+    re.MULTILINE,
+)
+_TOKEN = r'[{}\[\]:,=]|"(?:[^"\\\n]|\\.)*"|"[\w./-]*|[^\s"{}\[\]:,=>]+'
+_JSON = re.compile(_TOKEN)
+_TOML = re.compile(
+    rf"(?:^[ \t]*\[\[?(?P<header>[\w. -]+)\]\]?[ \t\r]*)?(?:#.*)?\n|{_TOKEN}", re.MULTILINE
+)
+
+
+class FieldPlace(Struct, frozen=True):
+    """The place of a key or a value, or one where it can be inserted."""
+
+    span: Span
+    """What is there of it, with quotes."""
+    fields: Mapping[str, inspect.Field]
+    """The fields that the enclosing object can have, by name."""
+    keys: frozenset[str]
+    """The keys that the enclosing object has."""
+    key: str = ""
+    """The key whose value this is; empty where this is a key."""
+
+    @property
+    def text(self) -> str:
+        """The key or value without quotes."""
+        return self.span.text.strip('"')
+
+    @property
+    def field(self) -> inspect.Field | None:
+        """The field of the key or the value."""
+        return self.fields.get(self.key or self.text)
+
+
+class _Object(Struct):
+    """An object or table, as far as it has been read."""
+
+    key: str = ""
+    """The key whose value comes next."""
+    members: dict[str, str] = {}
+    """The text of each scalar, by key; empty for other values."""
+
+    def read(self, token: str) -> None:
+        """Read the next token that is not part of a nested object or array."""
+        if token[-1] in ",\n":
+            self.key = ""
+        elif self.key and token not in ":=":
+            self.members[self.key] = token.strip('"')
+        elif token not in ":=":
+            self.key = token.strip('"')
+            self.members.setdefault(self.key, "")
+
+
+def field_place(source: Source, offset: int) -> FieldPlace | None:
+    """Return the place of a key or a value at an offset, where its declaration is known."""
+    if source.path == MAP:
+        kind, body = "course", source.span()
+    elif source.path.startswith("models/") and source.path.endswith(".toml"):
+        kind, body = "model", source.span()
+    else:
+        kind, body = fence_at(source, offset) or ("", source.span(0, 0))
+    if kind not in (roots := schema_roots()):
+        return None
+    span, objects = _find_token(body, offset)
+    if not objects:
+        return None
+    declared_type = inspect.type_info(roots[kind][0])
+    for object, key in objects[:-1]:
+        field = _fields(declared_type, object.members).get(key)
+        if field is not None:
+            declared_type = field.type
+            continue
+        mappings = (t for t in _alternatives(declared_type) if isinstance(t, inspect.DictType))
+        declared_type = next((mapping.value_type for mapping in mappings), inspect.AnyType())
+    innermost, key = objects[-1]
+    keys = frozenset(innermost.members) - {span.text.strip('"')}
+    return FieldPlace(span, _fields(declared_type, innermost.members), keys, key)
+
+
+def fence_at(source: Source, offset: int) -> tuple[str, Span] | None:
+    """Return the kind of the fence around an offset, and the text between its marks."""
+    for fence in _FENCE.finditer(source.text):
+        if fence.start("body") <= offset <= fence.end("body"):
+            return fence["kind"], source.span(*fence.span("body"))
+    return None
+
+
+def _find_token(body: Span, offset: int) -> tuple[Span, list[tuple[_Object, str]]]:
+    """Return the token at an offset, and the objects around it, each with the key that leads there.
+
+    All of the body is read, since an object can have further keys after the offset.
+    """
+    is_toml = body.path.endswith(".toml")
+    stack: list[_Object | None] = [_Object()] if is_toml else []  # `None` is an array
+    position: tuple[Span, list[tuple[_Object, str]]] | None = None
+    for match in (_TOML if is_toml else _JSON).finditer(body.text + "\n}"):
+        token, start, end = match[0], body.start + match.start(), body.start + match.end()
+        is_scalar = token[-1] not in "\n{}[]:,="
+        if position is None and (end > offset or (end == offset and is_scalar)):
+            bounds = (start, end) if is_scalar and start <= offset else (offset, offset)
+            objects = [(object, object.key) for object in stack if object is not None]
+            position = Span(body.source, *bounds), objects if match.lastgroup is None else []
+        if match.lastgroup is not None:
+            stack = [*map(_Object, match["header"].split(".")), _Object()]
+        elif token in "{[":
+            stack.append(_Object() if token == "{" else None)
+        elif token in "}]":
+            del stack[-1:]
+        elif stack and stack[-1] is not None:
+            stack[-1].read(token)
+    assert position is not None  # the bracket added at the end is after every offset
+    return position
+
+
+# --- declarations
+
+
+def _fields(declared_type: inspect.Type, members: Mapping[str, str]) -> dict[str, inspect.Field]:
+    """Return the fields of a struct; of a union, the tag and the fields that its value admits."""
+    structs = [t for t in _alternatives(declared_type) if isinstance(t, inspect.StructType)]
+    tag = next((struct.tag_field for struct in structs if struct.tag_field), "")
+    with_tag = [struct for struct in structs if tag and struct.tag == members.get(tag)]
+    fields = {field.name: field for struct in with_tag or structs for field in struct.fields}
+    if tag:
+        kinds = inspect.LiteralType(tuple(str(struct.tag) for struct in structs))
+        fields[tag] = inspect.Field(tag, tag, kinds)
+    return fields
+
+
+def _alternatives(declared_type: inspect.Type) -> Iterator[inspect.Type]:
+    """Yield the types of a union, and of the items of an array."""
+    match declared_type:
+        case inspect.Metadata():
+            yield from _alternatives(declared_type.type)
+        case inspect.UnionType():
+            yield from chain.from_iterable(map(_alternatives, declared_type.types))
+        case inspect.VarTupleType():
+            yield from _alternatives(declared_type.item_type)
+        case inspect.TupleType():
+            yield from chain.from_iterable(map(_alternatives, declared_type.item_types))
+        case _:
+            yield declared_type
+
+
+def possible_values(declared_type: inspect.Type) -> tuple[str, ...]:
+    """Return the possible values of a field as text, where they can be listed."""
+    values: list[str] = []
+    for alternative in _alternatives(declared_type):
+        if isinstance(alternative, inspect.LiteralType):
+            values += (f'"{value}"' for value in alternative.values)
+        elif isinstance(alternative, inspect.BoolType):
+            values += ("true", "false")
+    return tuple(values)
