@@ -25,8 +25,8 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnos
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.scenes import shown_reports
 from coursebuild.pipeline.scripts import measure_sensitivity
-from coursebuild.pipeline.shown_reports import shown_reports
 from coursebuild.pipeline.verify import Verification, verify
 from coursebuild.report import Report, ScriptLine, Summary
 from coursebuild.report.values import plural, unproven_things

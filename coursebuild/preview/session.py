@@ -33,7 +33,7 @@ from coursebuild.pipeline.load import MAP, Code, load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.progress import Progress
 from coursebuild.pipeline.reader import Reader
-from coursebuild.pipeline.shown_reports import shown_reports
+from coursebuild.pipeline.scenes import shown_reports
 from coursebuild.pipeline.theme_files import template_diagnostic
 from coursebuild.pipeline.verify import Verification
 from coursebuild.preview.run_history import RunHistory, ScriptKey
