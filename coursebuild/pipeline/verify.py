@@ -38,8 +38,7 @@ from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
