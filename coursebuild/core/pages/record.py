@@ -21,10 +21,9 @@ from msgspec import Struct
 
 from coursebuild.core.model.course import Theme, ThemeFile
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
-from coursebuild.core.pages import fonts, formulas
+from coursebuild.core.pages import fonts, typography
 from coursebuild.core.pages.assets import SCRIPTS, Assets, Names, hashed_name, page_script
 from coursebuild.core.pages.context import PageContext, PageHead
-from coursebuild.core.pages.formulas import FORMULA
 from coursebuild.core.pages.frame import FRAME_IDS, LOGO_HEIGHT, parts_of, script_words
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.references import (
@@ -34,6 +33,7 @@ from coursebuild.core.pages.references import (
     references,
 )
 from coursebuild.core.pages.theme import picture_size, theme_faces, theme_style
+from coursebuild.core.pages.typography import FORMULA
 from coursebuild.core.registry import features
 from coursebuild.core.text.characters import visible
 
@@ -76,7 +76,7 @@ def record(
 ) -> tuple[PageRecord, str]:
     """The record of a page just drawn, with its document if any, and its body as published."""
     # A plain string, since `Markup` would escape what is inserted.
-    html, declarations = hoist_styles(formulas.glue_formulas(str(body)))
+    html, declarations = hoist_styles(typography.glue_formulas(str(body)))
     text, mathematics = page_characters(html)
     html = visible(html)
     ids, addresses, repeated_ids = ids_and_addresses(html)
