@@ -27,7 +27,7 @@ from coursebuild.features.language_server.commands.texts import (
     possible_values,
 )
 from coursebuild.features.names.claims import document_names
-from coursebuild.features.names.own_names import options_by_command
+from coursebuild.features.names.known_names import options_by_command
 from coursebuild.features.names.resolve import resolver_of
 from coursebuild.features.references import works_of
 
