@@ -27,13 +27,12 @@ from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.scenes import shown_reports
 from coursebuild.pipeline.scripts import measure_sensitivity
-from coursebuild.pipeline.verify import Verification, verify
+from coursebuild.pipeline.verify import Shard, Verification, verify, write_timings
 from coursebuild.report import Report, ScriptLine, Summary
 from coursebuild.report.values import plural, unproven_things
 
 if TYPE_CHECKING:
     from coursebuild.core.scripts.sensitivity import Sensitivity
-    from coursebuild.pipeline.shards import Shard
 
 
 def check(
@@ -61,8 +60,6 @@ def check(
             return checked_course
         course, verification = checked_course.course, checked_course.verification
         if timings is not None:
-            from coursebuild.pipeline.shards import write_timings
-
             seconds = {s.path: s.seconds for s in verification.scripts if s.did_run}
             seconds |= {lab.name: lab.seconds for lab in verification.labs if lab.tried}
             names_of_course = [*(e.path for e in extract(course).value), *feature_trials(course)]
