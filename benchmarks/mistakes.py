@@ -53,7 +53,7 @@ from coursebuild.core.registry import unproven  # noqa: E402
 from coursebuild.core.run.script_server import ScriptServer  # noqa: E402
 from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
 from coursebuild.features.names.resolve import resolver_of  # noqa: E402
-from coursebuild.pipeline.judge import judge  # noqa: E402
+from coursebuild.pipeline.check import judge  # noqa: E402
 from coursebuild.pipeline.options import Options, open_store  # noqa: E402
 from coursebuild.pipeline.verify import verify  # noqa: E402
 from coursebuild.preview.run_history import script_keys  # noqa: E402

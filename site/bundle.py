@@ -61,7 +61,6 @@ _PREPARING = (
     "site/prepare_templates.py",
     "coursebuild/core/pages/assets.py",
     "coursebuild/core/pages/theme.py",
-    "coursebuild/core/pages/fonts.py",
     "coursebuild/core/pages/renderer.py",
     "templates/icon.svg",
 )

@@ -3,7 +3,7 @@
     python site/prepare_fonts.py FOLDER [OLD]
 
 `site/bundle.py` calls it with the bundle that it makes, and with the old one, from which the
-results are taken where nothing has changed. See `coursebuild/core/pages/fonts.py`.
+results are taken where nothing has changed. See `coursebuild/core/pages/theme.py`.
 
 1. The weights that no style sheet asks for are cut away, and so are hints and most names.
 2. In a font for mathematics the larger radicals become as narrow as the smallest: Chromium gives
@@ -24,9 +24,9 @@ from fontTools.ttLib import TTFont
 from fontTools.varLib import instancer
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from coursebuild.core.pages import fonts, theme
+from coursebuild.core.pages import theme
 
-WEIGHTS = {fonts.TEXT: (400, 700), fonts.CODE: (400, 700)}
+WEIGHTS = {theme.TEXT: (400, 700), theme.CODE: (400, 700)}
 """The weights that the style sheet uses."""
 RADICAL = "√"
 WIDEST = 1.07
@@ -96,15 +96,15 @@ def prepare(folder: Path, cuts: Path) -> None:
         face["weight"] = weights or face["weight"]
         with prepare_font(data, weights) as font:
             characters = "".join(sorted(map(chr, font.getBestCmap())))
-            face["characters"] = fonts.unicode_range(characters)
+            face["characters"] = theme.unicode_range(characters)
             font.save(folder / face["file"])
     listing.write_text(json.dumps(faces, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     files_by_key: dict[str, str] = {}
-    prepared_faces = fonts.read_faces(listing.read_bytes())
+    prepared_faces = theme.read_faces(listing.read_bytes())
     faces_with_data = [(face, (folder / face.file).read_bytes()) for face in prepared_faces]
-    for job in fonts.font_jobs(faces_with_data, "".join(fonts.GREEK), " "):
+    for job in theme.font_jobs(faces_with_data, "".join(theme.GREEK), " "):
         files_by_key[job.key] = job.face.file.replace(".ttf", ".woff2")
-        (cuts / files_by_key[job.key]).write_bytes(fonts.subset_font(job))
+        (cuts / files_by_key[job.key]).write_bytes(theme.subset_font(job))
     text = json.dumps(files_by_key, indent=1, sort_keys=True)
     (cuts / "fonts.json").write_text(f"{text}\n", encoding="utf-8")
 
@@ -113,7 +113,7 @@ def hash_sources(bundle: Path) -> str:
     """A hash of the fonts and of the modules that cut them."""
     digest = hashlib.sha256()
     for path in (
-        *map(Path, (__file__, fonts.__file__, theme.__file__)),
+        *map(Path, (__file__, theme.__file__, theme.__file__)),
         *sorted((bundle / "fonts").iterdir()),
     ):
         digest.update(f"{path.name}\0".encode() + path.read_bytes())

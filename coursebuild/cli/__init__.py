@@ -2,8 +2,8 @@
 
 Exit status 0: clean; 1: something is wrong in the course; 2: wrong usage. Heavy imports happen in
 the command that needs them, and here in `main`: first `unchanged`, for a command that has nothing
-to do, then `handover`, for one that a running `serve` does (`command_server`), then `commands`,
-which runs one of the modules here, or of features.
+to do, then `handover`, for one that a running `serve` does, then `commands`, which runs one of the
+modules here, or of features.
 """
 
 from __future__ import annotations

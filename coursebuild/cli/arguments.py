@@ -17,8 +17,7 @@ from coursebuild.cli.unchanged import Watcher, identify_command
 from coursebuild.core.engine.store import Store
 from coursebuild.core.registry import installed_features, package_paths
 from coursebuild.core.run.sandbox import find_sandbox
-from coursebuild.pipeline.options import Options, find_course, open_store
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.options import Options, Progress, find_course, open_store
 from coursebuild.report import Report, Style, render_report, unchanged_report
 
 

@@ -13,7 +13,7 @@ from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.errors import UsageError
 from coursebuild.pipeline.check import check
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.shards import read_shard
+from coursebuild.pipeline.verify import read_shard
 from coursebuild.report import Report
 
 EXAMPLES = """\

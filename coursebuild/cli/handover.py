@@ -1,6 +1,6 @@
 """Hands a command to `coursebuild serve`, where that runs for the same course, and waits for it.
 
-The other side is `command_server`.
+The other side is `CommandServer` in `serve`.
 
 1. A preview listens at a Unix socket in a folder that only its user can enter: `coursebuild` in
    `$XDG_RUNTIME_DIR`, or `run` in the state folder. The socket's name is made of the real path of

@@ -6,8 +6,7 @@ import argparse
 
 from coursebuild.cli.output import CLEAN, FAILURE, fail, write
 from coursebuild.core.files.write import take_back
-from coursebuild.pipeline.options import find_course
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.options import Progress, find_course
 
 EXAMPLES = """\
 examples:

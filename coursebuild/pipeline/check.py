@@ -1,33 +1,38 @@
-"""`coursebuild check`: verify the course, or some lessons of it; publish nothing."""
+"""`coursebuild check`: verify the course, or some lessons of it, and report; publish nothing.
+
+In a report, silenced warnings are left out, the rest is sorted and counted.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, TypeAlias
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
-from coursebuild.core.model import Course
-from coursebuild.core.model.results import Reports
+from coursebuild.core.model import Course, Script, document_scripts
+from coursebuild.core.model.results import Reports, Results, TrialLine
 from coursebuild.core.registry import feature_trials, unproven
+from coursebuild.core.run.dependencies import sought_files
+from coursebuild.core.run.script_environment import Interpreter
+from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.scripts.extract import extract
-from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.pipeline.judge import depends_on, judge
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.scenes import shown_reports
 from coursebuild.pipeline.scripts import measure_sensitivity
-from coursebuild.pipeline.shown_reports import shown_reports
-from coursebuild.pipeline.verify import Verification, verify
-from coursebuild.report import Report
-from coursebuild.report.values import plural
+from coursebuild.pipeline.verify import Shard, Verification, verify, write_timings
+from coursebuild.report import Report, ScriptLine, Summary
+from coursebuild.report.values import plural, unproven_things
 
 if TYPE_CHECKING:
     from coursebuild.core.scripts.sensitivity import Sensitivity
-    from coursebuild.pipeline.shards import Shard
 
 
 def check(
@@ -55,8 +60,6 @@ def check(
             return checked_course
         course, verification = checked_course.course, checked_course.verification
         if timings is not None:
-            from coursebuild.pipeline.shards import write_timings
-
             seconds = {s.path: s.seconds for s in verification.scripts if s.did_run}
             seconds |= {lab.name: lab.seconds for lab in verification.labs if lab.tried}
             names_of_course = [*(e.path for e in extract(course).value), *feature_trials(course)]
@@ -147,3 +150,168 @@ def read_and_verify(
     reports = shown_reports(options.root, course)
     diagnostics = (*parsed_course.diagnostics, *verification.diagnostics, *reports.diagnostics)
     return CheckedCourse(began, course, options, selected, verification, reports.value, diagnostics)
+
+
+# --- from diagnostics to a report
+
+_RULES_OF_RUNS = (
+    "script-failed",
+    "script-timeout",
+    "script-killed",
+    "script-output-limit",
+    "script-encoding",
+    "script-silent",
+    "script-diverged",
+    "script-penetration",
+    "script-writes",
+    "script-connects",
+    "script-unproven",
+)
+"""Rules broken only by scripts that were to run; the line may be in another lesson."""
+
+
+def judge(
+    course: Course | None,
+    diagnostics: Iterable[Diagnostic],
+    began: float | None = None,
+    *,
+    scripts: Sequence[ScriptLine] = (),
+    labs: tuple[TrialLine, ...] = (),
+    documents: Collection[str] | None = None,
+    remarks: tuple[str, ...] = (),
+    strict: bool = False,
+    inventory: Sequence[Diagnostic] = (),
+) -> Report:
+    """Make the report of a command that began at this moment of `time.monotonic`.
+
+    `documents` limits it to these lessons and pages, by path: to mistakes in them and in the map,
+    and those of the scripts that ran. `strict`: warnings count as errors, and so does a script that
+    was not run, unless the map lets it pass, or was recorded from its only run. `inventory`:
+    warnings that somebody asked for, such as a list of numbers; they stay warnings.
+    """
+    unrun = () if course is None else tuple(_unrun_scripts(course, scripts))
+    if strict and course is not None:
+        unrepeated = _refuse_unrepeated(course, scripts)
+        diagnostics = (*diagnostics, *_refuse_unproven(course, unrun), *unrepeated)
+    if course is None:
+        lesson_count = 0
+    elif documents is None:
+        lesson_count = len(course.written_lessons)
+    else:
+        lesson_count = sum(lesson.path in documents for lesson in course.lessons)
+    relevant = sort_diagnostics(_without_consequences([*diagnostics, *inventory]))
+    if documents is not None and course is not None:
+        paths = {*documents, course.map.path}
+        relevant = tuple(d for d in relevant if d.span.path in paths or d.rule in _RULES_OF_RUNS)
+    silences = course.silences if course is not None else ()
+    mild = {d.rule for d in inventory}
+
+    def is_silenced(diagnostic: Diagnostic) -> bool:  # a map that silences an error is not valid
+        return any(
+            silence.rule == diagnostic.rule
+            and (silence.path is None or fnmatchcase(diagnostic.span.path, silence.path))
+            for silence in silences
+        )
+
+    reported = tuple(
+        replace(d, strict=strict and d.rule not in mild) for d in relevant if not is_silenced(d)
+    )
+    errors = sum(d.is_error for d in reported)
+    summary = Summary(
+        lessons=lesson_count,
+        scripts=len(scripts),
+        ran=sum(line.did_run for line in scripts),
+        skipped=sum(line.status == "skipped" for line in scripts),
+        errors=errors,
+        warnings=len(reported) - errors,
+        silenced=len(relevant) - len(reported),
+        seconds=0.0 if began is None else time.monotonic() - began,
+        cached=sum(line.cached for line in scripts),
+        unproven=len(unrun),
+        reasons=tuple(dict.fromkeys(name for _, _, names in unrun for name in names)),
+        unrepeated=sum(line.unrepeated for line in scripts),
+    )
+    return Report(reported, tuple(scripts), summary, remarks, labs)
+
+
+_Unrun: TypeAlias = tuple[Script, ScriptLine, tuple[str, ...]]
+"""A script that was not run, and why: missing modules, or a key of its fence."""
+
+
+def _unrun_scripts(course: Course, lines: Iterable[ScriptLine]) -> Iterator[_Unrun]:
+    by_path = {s.path: s for document in course.documents for s in document_scripts(document)}
+    for line in lines:
+        if not line.did_run and line.path in by_path:
+            script = by_path[line.path]
+            reason = "record=once" if script.once else "norun"
+            reason = "nothing recorded" if line.status == "unrecorded" else reason
+            yield script, line, line.missing or (reason,)
+
+
+def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diagnostic]:
+    allowed_paths = {entry.path for entry in course.unproven}
+    for script, line, reasons in scripts:
+        if line.path in allowed_paths or not (line.missing or script.norun):
+            continue  # another mistake says that nothing is recorded
+        names = " and ".join(f"`{name}`" for name in reasons)
+        are = "are" if len(reasons) > 1 else "is"
+        reason = f"{names} {are} not installed" if line.missing else "its fence says `norun`"
+        cure = f"install {names}" if line.missing else "remove `norun`"
+        unproven = unproven_things(line) or "that it runs"
+        yield diagnose(
+            "script-unproven",
+            script.span.first_line(),
+            f"`{line.path}` was not run ({reason}), so nothing proves {unproven}",
+            help=f'{cure}, or allow it: `unproven = ["{line.path}"]` in `[verify]` of the map',
+        )
+
+
+def _refuse_unrepeated(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Diagnostic]:
+    by_path = {s.path: s for document in course.documents for s in document_scripts(document)}
+    for line in lines:
+        if line.unrepeated and line.path in by_path:
+            yield diagnose(
+                "output-unrepeated",
+                by_path[line.path].span.first_line(),
+                f"the output recorded from `{line.path}` comes from its only run, "
+                "which is not yet repeated",
+                help=f"run `coursebuild check --sensitivity {line.lesson}`",
+            )
+
+
+def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
+    """The diagnostics without what only follows from a merge conflict or a wrong encoding."""
+    broken = {d.span.path for d in diagnostics if d.rule == "merge-conflict"}
+    misread = {d.span.path for d in diagnostics if d.rule == "file-encoding"}
+    for diagnostic in diagnostics:
+        rule, path = diagnostic.rule, diagnostic.span.path
+        if rule == "merge-conflict" or (
+            path not in broken and not (rule == "control-character" and path in misread)
+        ):
+            yield diagnostic
+
+
+def depends_on(
+    course: Course, results: Results, interpreter: Interpreter | None
+) -> tuple[str, ...] | None:
+    """The files outside the course's own folders that the report depends on.
+
+    `None` where they cannot all be known, as where a script starts other programs.
+    """
+    packages = {package.path for package in course.packages}  # archives hold all of them
+    if "." in packages:
+        return None
+    files = {*(page.path for page in course.pages), *shown_files(course), *packages}
+    if interpreter is not None:
+        files |= {interpreter.python, f"{interpreter.prefix}/pyvenv.cfg", *interpreter.packages}
+    for run in results.runs:
+        if not run.did_run:
+            continue  # installed packages are compared in any case
+        if run.trace is None or run.trace.opaque or "." in run.trace.folders:
+            return None
+        files |= {*run.trace.files, *run.trace.folders, *run.trace.outside}
+        files |= {file for name in run.trace.sought for file in sought_files(name)}
+    for _, result in results.models:
+        if result.facts is not None:
+            files |= {*result.facts.includes}
+    return tuple(sorted(files))

@@ -21,8 +21,7 @@ from coursebuild.core.files.write import FileChange, change_files, check_writabl
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
-from coursebuild.pipeline.check import read_and_verify
-from coursebuild.pipeline.judge import judge
+from coursebuild.pipeline.check import judge, read_and_verify
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.outputs import changed_text

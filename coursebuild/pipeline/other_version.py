@@ -34,8 +34,7 @@ from coursebuild.core.scripts.compare import (
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import failure_diagnostic
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options, select
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.options import Options, Progress, select
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.scripts import extract_scripts, run
 from coursebuild.pipeline.verify import compile_models

@@ -28,7 +28,7 @@ from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import collect_evidence, script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.pipeline.judge import judge
+from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.recordings import (

@@ -68,7 +68,7 @@ from coursebuild.pipeline.requests import (
 )
 
 if TYPE_CHECKING:
-    from coursebuild.core.pages.fonts import FontJob
+    from coursebuild.core.pages.theme import FontJob
 
 _INDEX = "index"
 """The kind of the entry in the store that has the records of the last build's pages."""
@@ -348,7 +348,7 @@ def page_request(entry: PageEntry, library: Library) -> PageRequest:
 
 def _cut_font(store: Store, job: FontJob) -> bytes:
     def make() -> bytes:
-        from coursebuild.core.pages.fonts import subset_font
+        from coursebuild.core.pages.theme import subset_font
 
         return subset_font(job)
 

@@ -35,8 +35,8 @@ from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.scripts.findings import find_instability
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
+from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.fix import may_edit
-from coursebuild.pipeline.judge import judge
 from coursebuild.pipeline.recordings import read_recorded
 from coursebuild.preview.session import Session
 from coursebuild.report import Report

@@ -29,7 +29,7 @@ from coursebuild.core.scripts.bindings import BindingEvidence
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.sensitivity import noise_warnings
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.options import Progress
 from coursebuild.pipeline.scripts import measure_sensitivity, run
 from coursebuild.pipeline.verify import verify
 from coursebuild.preview.messages import report_now

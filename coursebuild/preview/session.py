@@ -30,10 +30,9 @@ from coursebuild.core.registry import publish_trials
 from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.pipeline.load import MAP, Code, load
-from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.reader import Reader
-from coursebuild.pipeline.shown_reports import shown_reports
+from coursebuild.pipeline.scenes import shown_reports
 from coursebuild.pipeline.theme_files import template_diagnostic
 from coursebuild.pipeline.verify import Verification
 from coursebuild.preview.run_history import RunHistory, ScriptKey

@@ -30,7 +30,7 @@ from coursebuild.core.engine.store import Store
 from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.lab.engines.browser import LabEngine
-from coursebuild.pipeline.judge import judge
+from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.verify import compile_models

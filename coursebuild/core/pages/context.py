@@ -19,7 +19,7 @@ from msgspec.structs import asdict
 
 from coursebuild.core import model
 from coursebuild.core.model.results import Outcome, SiteFile
-from coursebuild.core.pages import formulas, urls
+from coursebuild.core.pages import typography, urls
 from coursebuild.core.pages.assets import Assets, Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.markup import HtmlWriter
@@ -216,7 +216,7 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     def math(self, tex: str) -> Markup:
         """A formula in a line of text."""
         label = self.words("markup.formula")
-        return Markup(formulas.inline_formula(str(self.renderer.mathml(tex, False)), label))
+        return Markup(typography.inline_formula(str(self.renderer.mathml(tex, False)), label))
 
     def display(self, tex: str, start: int) -> Markup:
         """A formula on a line of its own, which scrolls if it is too wide."""

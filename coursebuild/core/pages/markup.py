@@ -15,8 +15,8 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from coursebuild.core import model
-from coursebuild.core.pages.quantities import isolate_ltr, join_units, split_quantities, unit_length
 from coursebuild.core.pages.renderer import Strings
+from coursebuild.core.pages.typography import isolate_ltr, join_units, split_quantities, unit_length
 
 SpecialBlock: TypeAlias = (
     model.Callout

@@ -38,7 +38,7 @@ from coursebuild.core.pages.document_inputs import (
 from coursebuild.core.pages.frame import course_data, page_title, place_of
 from coursebuild.core.pages.graph import level_graph
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.quantities import number
+from coursebuild.core.pages.typography import number
 from coursebuild.core.registry import added_pages, kind_of_block, model_parts, page_kind
 
 

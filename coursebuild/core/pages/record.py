@@ -21,10 +21,9 @@ from msgspec import Struct
 
 from coursebuild.core.model.course import Theme, ThemeFile
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
-from coursebuild.core.pages import fonts, formulas
+from coursebuild.core.pages import typography
 from coursebuild.core.pages.assets import SCRIPTS, Assets, Names, hashed_name, page_script
 from coursebuild.core.pages.context import PageContext, PageHead
-from coursebuild.core.pages.formulas import FORMULA
 from coursebuild.core.pages.frame import FRAME_IDS, LOGO_HEIGHT, parts_of, script_words
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.references import (
@@ -33,7 +32,17 @@ from coursebuild.core.pages.references import (
     merge_line_ids,
     references,
 )
-from coursebuild.core.pages.theme import picture_size, theme_faces, theme_style
+from coursebuild.core.pages.theme import (
+    BASE,
+    FontJob,
+    face_rules,
+    font_jobs,
+    picture_size,
+    read_faces,
+    theme_faces,
+    theme_style,
+)
+from coursebuild.core.pages.typography import FORMULA
 from coursebuild.core.registry import features
 from coursebuild.core.text.characters import visible
 
@@ -76,7 +85,7 @@ def record(
 ) -> tuple[PageRecord, str]:
     """The record of a page just drawn, with its document if any, and its body as published."""
     # A plain string, since `Markup` would escape what is inserted.
-    html, declarations = hoist_styles(formulas.glue_formulas(str(body)))
+    html, declarations = hoist_styles(typography.glue_formulas(str(body)))
     text, mathematics = page_characters(html)
     html = visible(html)
     ids, addresses, repeated_ids = ids_and_addresses(html)
@@ -89,7 +98,7 @@ def record(
         kind=head.kind,
         title=head.title,
         indexed=head.indexed,
-        text="".join(sorted(text.union(head.title) - fonts.BASE)),
+        text="".join(sorted(text.union(head.title) - BASE)),
         mathematics="".join(sorted(mathematics)),
         declarations=tuple(sorted(declarations)),
         ids=tuple(sorted(merge_line_ids(ids))),
@@ -214,18 +223,18 @@ def common_characters(library: Library, parts: frozenset[str]) -> frozenset[str]
 
 def common_files(
     assets: Assets,
-    cut_font: Callable[[fonts.FontJob], bytes] | None,
+    cut_font: Callable[[FontJob], bytes] | None,
     facts: PageFacts,
     theme: Theme,
 ) -> tuple[tuple[SiteFile, ...], Names]:
     """The files for pages with these facts, merged, and their names; fonts whole if not cut."""
     shared = _SharedFiles(assets)
-    faces = fonts.read_faces(assets.file("fonts/fonts.json"))
+    faces = read_faces(assets.file("fonts/fonts.json"))
     fonts_with_data = ((face, assets.file(f"fonts/{face.file}")) for face in faces)
     text, mathematics = "".join(sorted(facts.text)), "".join(sorted(facts.mathematics))
-    jobs = fonts.font_jobs(fonts_with_data, text, mathematics, theme_faces(theme))
+    jobs = font_jobs(fonts_with_data, text, mathematics, theme_faces(theme))
     cut_fonts = [(job, shared.add_font(job, cut_font)) for job in jobs]
-    rules = fonts.face_rules((job, name.removeprefix("assets/")) for job, name in cut_fonts)
+    rules = face_rules((job, name.removeprefix("assets/")) for job, name in cut_fonts)
     style = style_rules(facts.declarations) + "".join(f.style for f in features())
     style += theme_style(theme)
     part_scripts = tuple(shared.add_part_scripts(facts.parts))
@@ -287,9 +296,7 @@ class _SharedFiles:
                 elif part.code:
                     yield part.mark, self.add(f"{feature.name}.js", page_script(part.code.encode()))
 
-    def add_font(
-        self, job: fonts.FontJob, cut_font: Callable[[fonts.FontJob], bytes] | None
-    ) -> str:
+    def add_font(self, job: FontJob, cut_font: Callable[[FontJob], bytes] | None) -> str:
         stem, _, ending = job.face.file.rpartition(".")
         if cut_font is None:
             ending = "woff2" if job.data.startswith(b"wOF2") else ending

@@ -15,7 +15,7 @@ from msgspec import Struct
 from coursebuild.core.model import linked_lines
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
-from coursebuild.core.pages.html_tree import elements_with
+from coursebuild.core.pages.html_xml import elements_with
 from coursebuild.core.text.diagnostics import nearest
 
 _ADDRESSES = {

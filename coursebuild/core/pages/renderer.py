@@ -44,7 +44,7 @@ from msgspec import Struct, field
 
 from coursebuild.core.model.course import TEMPLATES
 from coursebuild.core.model.results import Formula, MathError, Mathml
-from coursebuild.core.pages.quantities import isolate_quantities, text_html
+from coursebuild.core.pages.typography import split_quantities, text_html
 
 DEFAULT_LANGUAGE = "en"
 Category: TypeAlias = Literal["zero", "one", "two", "few", "many", "other"]

@@ -22,7 +22,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.pages.quantities import unit_length
+from coursebuild.core.pages.typography import unit_length
 from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span

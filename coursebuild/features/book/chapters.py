@@ -35,7 +35,7 @@ from coursebuild.core.model import Lesson, Level
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import ExportContext
-from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html, to_html
+from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, parse_html, to_html
 from coursebuild.core.pages.renderer import direction
 from coursebuild.core.text.characters import visible
 

@@ -22,10 +22,9 @@ from coursebuild.core.model import Lesson, Level
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import ExportContext
-from coursebuild.core.pages.fonts import COURSE
-from coursebuild.core.pages.html_tree import to_xml
+from coursebuild.core.pages.html_xml import to_xml
 from coursebuild.core.pages.renderer import direction
-from coursebuild.core.pages.theme import accents
+from coursebuild.core.pages.theme import COURSE, accents
 from coursebuild.core.text.characters import visible
 from coursebuild.features.book import chapters
 

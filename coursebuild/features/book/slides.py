@@ -23,7 +23,7 @@ from markupsafe import Markup
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import ExportContext
-from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, to_html
+from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, to_html
 from coursebuild.core.pages.renderer import direction
 from coursebuild.core.text.characters import visible
 from coursebuild.features.book import chapters

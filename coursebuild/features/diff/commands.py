@@ -25,7 +25,7 @@ from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model import Comparison, Course, Recording, find_blocks
 from coursebuild.core.model.addresses import recorded_figures
-from coursebuild.core.pages.html_tree import elements_with
+from coursebuild.core.pages.html_xml import elements_with
 from coursebuild.core.pages.marks import code_span, escape_text, fence, table
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import feature_trials

@@ -24,7 +24,7 @@ from msgspec.structs import replace
 from coursebuild.core import model
 from coursebuild.core.features import Feature, PageKind
 from coursebuild.core.model.results import Mathml
-from coursebuild.core.pages import document_inputs, formulas, urls
+from coursebuild.core.pages import document_inputs, typography, urls
 from coursebuild.core.pages.library import Library, links
 from coursebuild.core.pages.markup import HtmlWriter
 from coursebuild.core.pages.numbering import UNNAMED, fill_in, name_outside
@@ -62,7 +62,7 @@ class _ExcerptWriter(HtmlWriter):
 
     def math(self, tex: str) -> Markup:
         mathml = self._mathml(tex, False)
-        return Markup(formulas.split_formula(mathml)) if mathml else super().math(tex)
+        return Markup(typography.split_formula(mathml)) if mathml else super().math(tex)
 
     def display(self, tex: str, start: int) -> Markup:
         return Markup(self._mathml(tex, True)) or super().display(tex, start)

@@ -32,8 +32,7 @@ from coursebuild.features.importer.convert import (
 from coursebuild.features.importer.source_files import SourceFiles
 from coursebuild.pipeline.check import check
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options, check_path, open_store
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.options import Options, Progress, check_path, open_store
 from coursebuild.pipeline.scripts import extract_scripts, recorded_outputs
 from coursebuild.pipeline.scripts import run as run_scripts
 from coursebuild.report.values import plural

@@ -18,12 +18,11 @@ from coursebuild.core.features import (
 )
 from coursebuild.features.lab import page
 from coursebuild.features.lab.compile import lab_trials, trial_inputs
-from coursebuild.features.lab.equations.declared import OdeLab, PlotLab
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.parse import parse_fence
 from coursebuild.features.lab.relations import check_labs, check_model_names
 from coursebuild.features.lab.reply import publish_labs
-from coursebuild.features.lab.schema import SimLab, refine_schema
+from coursebuild.features.lab.schema import OdeLab, PlotLab, SimLab, refine_schema
 
 
 def start(context: TrialContext) -> TrialRun:

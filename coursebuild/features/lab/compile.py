@@ -236,7 +236,7 @@ def equation_inputs(lab: Lab, name: str) -> Inputs:
     """Return what the trial of a lab without an engine depends on."""
     conditions = (
         ("SciPy", package_version("scipy")),
-        ("how a lab without an engine is tried", native.lab_digest("equations")[:12]),
+        ("how a lab without an engine is tried", native.lab_digest("equations", "schema.py")[:12]),
         ("the page's own code", native.asset_digest(native.EQUATION_TRIAL)[:12]),
     )
     return Inputs(f"lab {name}", key_of(lab.config), (), LIMITS.lab, (), conditions)

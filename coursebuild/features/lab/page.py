@@ -35,8 +35,8 @@ from coursebuild.core.pages.marks import (
     picture,
     table,
 )
-from coursebuild.core.pages.quantities import number
 from coursebuild.core.pages.renderer import Renderer, Strings
+from coursebuild.core.pages.typography import number
 from coursebuild.core.pages.urls import Place
 from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab

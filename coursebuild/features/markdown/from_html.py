@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Iterator
 
 from coursebuild.core.pages import marks
-from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
+from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, parse_html
 
 _SKIPPED_ELEMENTS = frozenset(
     "nav script style svg template button form input select label dialog".split()

@@ -1,7 +1,7 @@
 """Names in inline code are claims: each one means something, or is a mistake.
 
 1. `claims` finds them in a document, and what its code defines.
-2. `engine` lists the names of MuJoCo, of MJCF and of imported modules, by a child (`introspect`).
+2. `known_names` lists those of MuJoCo, MJCF and imported modules, by a child (`introspect`).
 3. `resolve` says what a name means; its page links to that, an editor shows it.
 """
 
@@ -20,7 +20,7 @@ from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.features.names.claims import GUESSES, course_names, document_names, names_of
-from coursebuild.features.names.engine import (
+from coursebuild.features.names.known_names import (
     EngineTable,
     KnownName,
     Unknown,

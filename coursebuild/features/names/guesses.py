@@ -16,8 +16,13 @@ from coursebuild.core.model import Course
 from coursebuild.core.text.diagnostics import is_one_edit, propose, slips_of
 from coursebuild.features.names import claims
 from coursebuild.features.names.claims import CodeNames, course_names
-from coursebuild.features.names.engine import Answer, EngineNames, Unknown
-from coursebuild.features.names.own_names import known_keys, options_by_command
+from coursebuild.features.names.known_names import (
+    Answer,
+    EngineNames,
+    Unknown,
+    known_keys,
+    options_by_command,
+)
 
 
 class Guesses:

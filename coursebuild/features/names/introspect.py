@@ -1,7 +1,7 @@
 """The child process that lists the names of MuJoCo, of MJCF and of the modules that scripts import.
 
-Entry point: run as a file by `engine`, in the environment of the scripts. It says `ready`; then
-each line is a list of modules, and the answer is an `engine.EngineNames`.
+Entry point: run as a file by `known_names`, in the environment of the scripts. It says `ready`;
+then each line is a list of modules, and the answer is a `known_names.EngineNames`.
 
 Only MuJoCo and what it imports itself are imported. Other modules are read, and not run: the names
 that their file defines or imports; `*` stands for those that only running it would tell.

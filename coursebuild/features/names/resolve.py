@@ -21,9 +21,10 @@ from coursebuild.core.text.diagnostics import (
     nearest,
     propose,
 )
-from coursebuild.features.names import claims, own_names
+from coursebuild.features.names import claims, known_names
 from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, course_names
-from coursebuild.features.names.engine import (
+from coursebuild.features.names.guesses import Guesses
+from coursebuild.features.names.known_names import (
     ITEM_CLASSES,
     Answer,
     EngineName,
@@ -34,9 +35,8 @@ from coursebuild.features.names.engine import (
     class_href,
     element_href,
     find_engine_name,
+    known_keys,
 )
-from coursebuild.features.names.guesses import Guesses
-from coursebuild.features.names.own_names import known_keys
 
 _MANUAL_ID = "coursebuild-manual"
 """The id of the manual, in docs/content/course.toml."""
@@ -132,11 +132,11 @@ class Resolver:
             case "attribute":
                 return self._attribute(*claim.name.split(" "))
             case "command":
-                return own_names.resolve_command(self._manual("commands"), claim.name)
+                return known_names.resolve_command(self._manual("commands"), claim.name)
             case "option":
-                return own_names.resolve_option(self._manual("commands"), *claim.name.split(" "))
+                return known_names.resolve_option(self._manual("commands"), *claim.name.split(" "))
             case "table":
-                return own_names.resolve_table(self._manual("course-map"), *claim.name.split(" "))
+                return known_names.resolve_table(self._manual("course-map"), *claim.name.split(" "))
             case "file":
                 return self._file(claim.name)
             case "value":

@@ -58,8 +58,7 @@ from coursebuild.numerics.reports.records import (
 from coursebuild.numerics.reports.scene_report import SceneReport
 from coursebuild.numerics.reports.shown_errors import seconds_text, status_text
 from coursebuild.pipeline.options import Options, UsageError
-from coursebuild.pipeline.scenes import find_scenes
-from coursebuild.pipeline.shown_reports import read_record
+from coursebuild.pipeline.scenes import find_scenes, read_record
 from coursebuild.report.text import BOLD, Column, Style, table
 from coursebuild.report.values import json_text
 

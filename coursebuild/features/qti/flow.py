@@ -12,8 +12,14 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from urllib.parse import urlsplit
 
-from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
-from coursebuild.core.pages.xml import Element, add, element
+from coursebuild.core.pages.html_xml import (
+    Element,
+    HtmlContent,
+    HtmlElement,
+    add,
+    element,
+    parse_html,
+)
 
 STRIKE_CLASS = "struck"
 _BLOCKS = frozenset(

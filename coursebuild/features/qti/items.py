@@ -20,7 +20,7 @@ from coursebuild.core.model import Block, Course, Inline, find_blocks
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import ExportContext, PageContext
-from coursebuild.core.pages.xml import element, identifier, markup, render_xml
+from coursebuild.core.pages.html_xml import element, identifier, markup, render_xml
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.qti.flow import STRIKE_CLASS, Flow
 from coursebuild.features.quiz import model

@@ -18,8 +18,8 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import page_script
 from coursebuild.core.pages.context import ExportContext
 from coursebuild.core.pages.frame import policy
+from coursebuild.core.pages.html_xml import identifier, render_xml
 from coursebuild.core.pages.renderer import direction
-from coursebuild.core.pages.xml import identifier, render_xml
 
 _COPIES = (".br", ".gz")
 _MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.NOT_FOUND, urls.WORKER, urls.FILES)

@@ -20,7 +20,7 @@ from coursebuild.core.model import Document
 from coursebuild.core.model.inlines import CodeSpan
 from coursebuild.core.pages.context import DocumentInputs, HighlightedFile, PageContext, PageInputs
 from coursebuild.core.pages.document_inputs import LessonLink
-from coursebuild.core.pages.html_tree import HtmlContent, parse_html
+from coursebuild.core.pages.html_xml import HtmlContent, parse_html
 from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.characters import visible
 from coursebuild.features.search.words import count_terms, plain_formula

@@ -13,16 +13,17 @@ from hypothesis import strategies as st
 from markupsafe import Markup
 
 from coursebuild.core.model import Document, NumberBinding, Target, Text
-from coursebuild.core.pages.formulas import glue_formulas, split_formula
 from coursebuild.core.pages.markup import SpecialBlock
-from coursebuild.core.pages.quantities import (
+from coursebuild.core.pages.renderer import Strings, direction, parse_strings
+from coursebuild.core.pages.typography import (
+    glue_formulas,
     isolate_ltr,
     join_units,
+    split_formula,
     split_quantities,
     text_html,
     unit_length,
 )
-from coursebuild.core.pages.renderer import Strings, direction, parse_strings
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source, Span
 from support.fixture_cases import fixture_tables

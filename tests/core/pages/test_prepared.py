@@ -19,7 +19,8 @@ from markupsafe import Markup
 from coursebuild.core.files.resources import PREPARED, assets_dir, prepared_file, template_texts
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.assets import SCRIPTS, Assets, compressed_files, page_script
-from coursebuild.core.pages.fonts import (
+from coursebuild.core.pages.renderer import compile_templates, compiled_name, templates_of
+from coursebuild.core.pages.theme import (
     CODE,
     FALLBACKS,
     GREEK,
@@ -34,7 +35,6 @@ from coursebuild.core.pages.fonts import (
     subset_font,
     unicode_range,
 )
-from coursebuild.core.pages.renderer import compile_templates, compiled_name, templates_of
 
 SAMPLES = {
     "latin": "AZaz09 é×÷±²−“”…",

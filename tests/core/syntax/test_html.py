@@ -16,7 +16,7 @@ from coursebuild.core.model import (
     document_blocks,
     walk_inlines,
 )
-from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html
+from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, parse_html
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from support.fixture_cases import fixture_text

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import pytest
 from hypothesis import given
 
-from coursebuild.core.pages.html_tree import HtmlContent, HtmlElement, parse_html, to_html, to_xml
+from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, parse_html, to_html, to_xml
 from coursebuild.core.pages.urls import Place
 from coursebuild.features.book.chapters import RewriteRules, rewrite
 from coursebuild.features.book.epub import xml_id

@@ -11,7 +11,7 @@ from urllib.parse import unquote
 
 import pytest
 
-from coursebuild.core.pages.html_tree import HtmlElement, parse_html
+from coursebuild.core.pages.html_xml import HtmlElement, parse_html
 from support.fixture_cases import fixture_text
 from support.scratch_course import GOOD, Folder, Make
 

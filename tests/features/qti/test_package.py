@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from coursebuild.core.pages.xml import Element, element, markup
+from coursebuild.core.pages.html_xml import Element, element, markup
 from coursebuild.features.qti.flow import Flow
 from support.archives import (
     Package,

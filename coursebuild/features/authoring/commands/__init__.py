@@ -8,7 +8,7 @@ from pathlib import Path
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.write import FileChange, change_files
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.options import Progress
 
 
 def apply_changes(root: Path, changes: Sequence[FileChange]) -> int:

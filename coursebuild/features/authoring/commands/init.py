@@ -16,8 +16,7 @@ from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.resources import locked_requirements
 from coursebuild.core.files.write import FileChange, change_files, undo_changes
 from coursebuild.core.syntax.course_schema import json_schema
-from coursebuild.pipeline.options import check_path
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.options import Progress, check_path
 from coursebuild.report.values import plural
 
 EXAMPLES = """\

@@ -50,8 +50,7 @@ from coursebuild.numerics.reports.scene_report import (
 from coursebuild.numerics.reports.shown_errors import is_idle
 from coursebuild.numerics.sweep import THREADS
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.scenes import CourseScene, find_scenes
-from coursebuild.pipeline.shown_reports import read_record
+from coursebuild.pipeline.scenes import CourseScene, find_scenes, read_record
 from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 
 _T = TypeVar("_T")

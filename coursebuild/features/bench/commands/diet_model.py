@@ -42,8 +42,7 @@ from coursebuild.numerics.pruning.readers import VIEWS, ModelReader, read_code
 from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
 from coursebuild.numerics.pruning.xml_edits import MarkupError
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
 from coursebuild.pipeline.verify import verify
 

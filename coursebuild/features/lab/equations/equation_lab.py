@@ -39,7 +39,6 @@ from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
 from coursebuild.features.lab import relations, schema
 from coursebuild.features.lab.compile import control_data
-from coursebuild.features.lab.equations import declared
 from coursebuild.features.lab.equations.formula import (
     ARITIES,
     CONSTANTS,
@@ -70,7 +69,7 @@ def parse_equations(
     )
     if text.value is None:
         return Parsed(None, sort_diagnostics(text.diagnostics))
-    fields_type: type[declared.EquationLab] = declared.PlotLab if kind == PLOT else declared.OdeLab
+    fields_type: type[schema.EquationLab] = schema.PlotLab if kind == PLOT else schema.OdeLab
     decoding = decode(text.value, fields_type, "the lab", JSON if is_json else TOML)
     prose = Prose.read(decoding.texts, texts)
     diagnostics = [*text.diagnostics, *decoding.diagnostics, *prose.diagnostics]
@@ -95,7 +94,7 @@ def parse_equations(
     return Parsed(None if diagnostics else lab, sort_diagnostics(diagnostics))
 
 
-def _common_fields(fields: declared.EquationLab, config: Mapping[str, Any]) -> schema.SimLab:
+def _common_fields(fields: schema.EquationLab, config: Mapping[str, Any]) -> schema.SimLab:
     """What the static form, copies and the search know of a lab of any kind."""
     goal = fields.goal
     return schema.SimLab(
@@ -169,7 +168,7 @@ def _check_units(node: ObjectNode) -> Iterator[Diagnostic]:
 class _Compiler:
     """Makes the data of a lab from fields that are right, and collects what is wrong with it."""
 
-    def __init__(self, kind: str, node: ObjectNode, fields: declared.EquationLab) -> None:
+    def __init__(self, kind: str, node: ObjectNode, fields: schema.EquationLab) -> None:
         self.kind, self.node, self.fields = kind, node, fields
         self.diagnostics: list[Diagnostic] = []
         self.slots: dict[str, int] = {}
@@ -178,8 +177,8 @@ class _Compiler:
 
     def compile(self) -> dict[str, Any]:
         node, fields = self.node, self.fields
-        axis_name = "x" if isinstance(fields, declared.PlotLab) else "t"
-        axis = fields.x if isinstance(fields, declared.PlotLab) else fields.t  # type: ignore[attr-defined]
+        axis_name = "x" if isinstance(fields, schema.PlotLab) else "t"
+        axis = fields.x if isinstance(fields, schema.PlotLab) else fields.t  # type: ignore[attr-defined]
         axis_data = self.axis(node.object(axis_name), axis, axis_name)
         axis_label = axis.label or axis.name or axis_name
         axis_label += f" ({axis.unit})" if axis.unit else ""
@@ -228,7 +227,7 @@ class _Compiler:
             ],
             "goal": self.goal(controls),
             "expect": [self.claim(n, controls) for n in node.objects("expect")],
-            "verify": to_builtins(fields.verify or declared.Tolerance()),
+            "verify": to_builtins(fields.verify or schema.Tolerance()),
         }
 
     def report(self, rule: str, span: Span, message: str, help: str = "") -> None:
@@ -249,7 +248,7 @@ class _Compiler:
             key = f"{key} {len(self.slots)}"  # so that what follows keeps its slot
         return self.slots.setdefault(key, len(self.slots))
 
-    def axis(self, node: ObjectNode, axis: declared.Axis, name: str) -> dict[str, Any]:
+    def axis(self, node: ObjectNode, axis: schema.Axis, name: str) -> dict[str, Any]:
         self.diagnostics += _check_units(node)
         name_node = node.get("name")
         self.declare(axis.name or name, node.mark if name_node is None else name_node.span)
@@ -313,9 +312,7 @@ class _Compiler:
 
     # --- what is shown, and what is claimed
 
-    def plot(
-        self, node: ObjectNode, plot: declared.EquationPlot, axis_label: str
-    ) -> dict[str, Any]:
+    def plot(self, node: ObjectNode, plot: schema.EquationPlot, axis_label: str) -> dict[str, Any]:
         traces: list[dict[str, Any]] = [
             {"label": trace.label, "dash": trace.dash, "value": self.formula(n.get("expr"))}
             for n, trace in zip(node.objects("traces"), plot.traces, strict=True)
@@ -340,7 +337,7 @@ class _Compiler:
         traces = tuple(schema.TraceFields(name, name) for name in names) or (
             schema.TraceFields("", "0"),
         )
-        data: dict[str, Any] = to_builtins(declared.EquationPlot(traces))
+        data: dict[str, Any] = to_builtins(schema.EquationPlot(traces))
         lines = [
             {"label": name, "dash": False, "value": [[self.slots.get(normalise_name(name), 0)]]}
             for name in names

@@ -71,6 +71,28 @@ class Solid(Struct, frozen=True):
         """Whether nothing shows through it."""
         return self.rgba[3] >= _OPAQUE_ALPHA
 
+    def seen_from(self, eye: raster.Eye) -> Solid:
+        """Return it as an eye sees it: a plane is more transparent from below."""
+        if not self.plane or self.rotation[:, 2] @ (eye.position - self.position) >= 0:
+            return self
+        red, green, blue, alpha = self.rgba
+        return replace(self, rgba=(red, green, blue, alpha * _FROM_BELOW))
+
+    def reflects(self, eye: raster.Eye) -> bool:
+        """Whether an eye sees other things in it."""
+        if self.mirror is None or self.material.reflectance <= 0 or not self.opaque:
+            return False
+        return bool(self.rotation[:, 2] @ (eye.position - self.position) > self.mirror)
+
+    def mirrored(self, eye: raster.Eye) -> raster.Eye:
+        """Return the eye behind this mirror that sees what another sees in it."""
+        normal = self.rotation[:, 2]
+        offset = float(normal @ self.position) + (self.mirror or 0.0)
+        height = float(normal @ eye.position) - offset
+        axes = raster.rotate(eye.axes, np.eye(3) - 2 * np.outer(normal, normal))
+        position = eye.position - 2 * height * normal
+        return replace(eye, position=position, axes=axes, mirror=(normal, offset))
+
 
 class FreeCamera(Struct, frozen=True):
     """MuJoCo's free camera."""
@@ -121,11 +143,11 @@ def draw(
     canvas = _Canvas(camera.eye(width * _SAMPLES, height * _SAMPLES), light)
     # A diverged simulation throws things out of the world.
     visible = (s for s in solids if s.rgba[3] > _CLEAR_ALPHA and np.isfinite(s.position).all())
-    scene = [_seen_from(solid, canvas.eye) for solid in visible]
-    mirror = next((solid for solid in scene if _reflects(solid, canvas.eye)), None)
+    scene = [solid.seen_from(canvas.eye) for solid in visible]
+    mirror = next((solid for solid in scene if solid.reflects(canvas.eye)), None)
     reflection = None
     if mirror is not None:
-        reflection = _Canvas(_mirror_eye(mirror, camera.eye(width, height)), light)
+        reflection = _Canvas(mirror.mirrored(camera.eye(width, height)), light)
         reflection.paint([solid for solid in scene if solid is not mirror], None, None)
     canvas.paint(scene, mirror, reflection, floor, lines=True)
     if background is not None:
@@ -136,29 +158,6 @@ def draw(
     steps = np.rint(_STEPS * np.clip(mean, 0.0, 1.0))
     pixels: NDArray[np.uint8] = np.rint(255 / _STEPS * steps).astype(np.uint8)
     return pixels
-
-
-def _seen_from(solid: Solid, eye: raster.Eye) -> Solid:
-    """Return the solid as an eye sees it: a plane is more transparent from below."""
-    if not solid.plane or solid.rotation[:, 2] @ (eye.position - solid.position) >= 0:
-        return solid
-    red, green, blue, alpha = solid.rgba
-    return replace(solid, rgba=(red, green, blue, alpha * _FROM_BELOW))
-
-
-def _reflects(solid: Solid, eye: raster.Eye) -> bool:
-    if solid.mirror is None or solid.material.reflectance <= 0 or not solid.opaque:
-        return False
-    return bool(solid.rotation[:, 2] @ (eye.position - solid.position) > solid.mirror)
-
-
-def _mirror_eye(solid: Solid, eye: raster.Eye) -> raster.Eye:
-    normal = solid.rotation[:, 2]
-    offset = float(normal @ solid.position) + (solid.mirror or 0.0)
-    height = float(normal @ eye.position) - offset
-    axes = raster.rotate(eye.axes, np.eye(3) - 2 * np.outer(normal, normal))
-    position = eye.position - 2 * height * normal
-    return replace(eye, position=position, axes=axes, mirror=(normal, offset))
 
 
 class _Canvas:

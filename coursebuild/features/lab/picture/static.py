@@ -201,18 +201,19 @@ def plot_svg(
     values += [line.y for line in plot.refLines] + [y for _, y in marks]
     low, high = _range(values, plot.ymin, plot.ymax)
     labels = [trace.label for trace in plot.traces]
-    frame = _frame(low_t, high_t if high_t > low_t else low_t + 1.0, low, high, labels, narrow)
+    last_t = high_t if high_t > low_t else low_t + 1.0
+    frame = _Frame.of(low_t, last_t, low, high, labels, narrow=narrow)
     paths: list[str] = []
     names: list[tuple[float, str, int]] = []
     for n, (trace, points) in enumerate(zip(plot.traces, lines, strict=True)):
-        paths.append(_line(frame, points, n, trace))
+        paths.append(frame.trace(points, n, trace))
         last = next((v for _, v in reversed(points) if _is_finite(v)), None)
         if last is not None:
             names.append((frame.y(last), trace.label, n))
     references = [
-        _reference(frame, line.y, line.label) for line in plot.refLines if low <= line.y <= high
+        frame.reference(line.y, line.label) for line in plot.refLines if low <= line.y <= high
     ]
-    parts = [*_axes(frame, plot), *references, *paths, *_labels(frame, names)]
+    parts = [*frame.axes(plot), *references, *paths, *frame.labels(names)]
     parts += [
         f'<circle class="lab-measured" cx="{frame.x(x):.1f}" cy="{frame.y(y):.1f}" r="3"/>'
         for x, y in marks
@@ -222,23 +223,6 @@ def plot_svg(
         f'<svg class="lab-plot" viewBox="0 0 {frame.width:g} {_HEIGHT:g}" role="img" '
         f'aria-label="{_text(": ".join((title, ", ".join(labels))))}">' + "".join(parts) + "</svg>"
     )
-
-
-def _frame(
-    low_t: float, high_t: float, low: float, high: float, labels: Sequence[str], narrow: bool
-) -> _Frame:
-    width = _NARROW if narrow else _WIDE
-    y = Scale(_HEIGHT - _BOTTOM, _TOP, low, high, logarithmic=False)
-    longest = max(len(text) for _, text in y.ticks(_TICKS))
-    left = min(8.0 + _LETTER * longest, 0.35 * width)
-    room = min(14.0 + _LETTER * max((len(label) for label in labels), default=0), 0.35 * width)
-    return _Frame(Scale(left, width - room, low_t, high_t, logarithmic=False), y, width)
-
-
-class _Frame(Struct, frozen=True):
-    x: Scale
-    y: Scale
-    width: float
 
 
 def _range(values: list[float], ymin: float | None, ymax: float | None) -> tuple[float, float]:
@@ -254,26 +238,6 @@ def _range(values: list[float], ymin: float | None, ymax: float | None) -> tuple
     return (low if ymin is not None else low - pad), (high if ymax is not None else high + pad)
 
 
-def _axes(frame: _Frame, plot: Plot) -> list[str]:
-    left, right, bottom = frame.x.start, frame.x.end, frame.y.start
-    parts = []
-    for y, text in frame.y.ticks(_TICKS):
-        parts.append(f'<path class="lab-grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>')
-        parts.append(f'<text x="{left - 6:.1f}" y="{y + 3.5:.1f}" text-anchor="end">{text}</text>')
-    for x, text in _time_ticks(frame.x):
-        parts.append(f'<path class="lab-axis" d="M{x:.1f} {bottom:g}v4"/>')
-        parts.append(f'<text x="{x:.1f}" y="{bottom + 16:g}" text-anchor="middle">{text}</text>')
-    parts.append(f'<path class="lab-axis" d="M{left:.1f} {_TOP:g}V{bottom:g}H{right:.1f}"/>')
-    # Along the axis a long name would be cut.
-    parts.append(f'<text x="0" y="11">{_text(plot.ylabel)}</text>')
-    centre = (left + right) / 2
-    parts.append(
-        f'<text x="{centre:.1f}" y="{_HEIGHT - 5:g}" text-anchor="middle">'
-        f"{_text(plot.xlabel)}</text>"
-    )
-    return parts
-
-
 def _time_ticks(times: Scale) -> list[tuple[float, str]]:
     """Return ticks of the time, few enough that their texts do not touch."""
     for count in (6, 4, 3, 2):
@@ -284,84 +248,124 @@ def _time_ticks(times: Scale) -> list[tuple[float, str]]:
     return ticks[:1]
 
 
-def _reference(frame: _Frame, y: float, label: str) -> str:
-    at = frame.y(y)
-    return (
-        f'<path class="lab-reference" d="M{frame.x.start:.1f} {at:.1f}H{frame.x.end:.1f}"/>'
-        f'<text x="{frame.x.start + 4:.1f}" y="{at - 4 if at > _TOP + 12 else at + 11:.1f}">'
-        f"{_text(label)}</text>"
-    )
-
-
-def _line(
-    frame: _Frame, points: Sequence[tuple[float, float | None]], n: int, trace: TraceFields
-) -> str:
-    dash = _DASHES[n % len(_DASHES)]
-    if trace.dash is True:
-        dash = _DASHES[1]
-    elif trace.dash:
-        dash = " ".join(f"{x:g}" for x in trace.dash)
-    path: list[str] = []
-    # Values that are not finite end a run of points.
-    for finite, group in groupby(points, key=lambda point: _is_finite(point[1])):
-        if finite:
-            run = [(t, min(max(v, -_LARGEST), _LARGEST)) for t, v in group if v is not None]
-            path += _path_commands(frame, run)
-    style = f' stroke-dasharray="{dash}"' if dash else ""
-    style += ' stroke-linecap="round"' if "h0" in path else ""
-    return f'<path class="lab-trace lab-trace-{n % 7 + 1}"{style} d="{"".join(path)}"/>'
-
-
 def _is_finite(value: float | None) -> TypeGuard[float]:
     return value is not None and math.isfinite(value)
 
 
-def _path_commands(frame: _Frame, run: list[tuple[float, float]]) -> Iterator[str]:
-    if len(run) == 1:
-        t, v = run[0]
-        if frame.y.low <= v <= frame.y.high:
-            yield from (
-                f"M{frame.x(t):.1f} {frame.y(v):.1f}",
-                "h0",
-            )  # round ends make a single point visible
-        return
-    pen = False
-    for (t0, v0), (t1, v1) in pairwise(run):
-        begin, end = _clip_segment(frame, v0, v1)
-        if begin > end:
-            pen = False
-            continue
-        if not pen:
-            yield f"M{_interpolate(frame, (t0, v0), (t1, v1), begin)}"
-        yield f"L{_interpolate(frame, (t0, v0), (t1, v1), end)}"
-        pen = end == 1
+class _Frame(Struct, frozen=True):
+    """The place of a plot in its drawing, and what is drawn in it."""
 
+    x: Scale
+    y: Scale
+    width: float
 
-def _interpolate(
-    frame: _Frame, first: tuple[float, float], second: tuple[float, float], fraction: float
-) -> str:
-    """Write the point at a fraction of a segment; it is inside the frame, up to rounding."""
-    t, v = (
-        a + fraction * (b - a) if fraction < 1 else b for a, b in zip(first, second, strict=True)
-    )
-    return f"{frame.x(t):.1f} {frame.y(v):.1f}"
+    @classmethod
+    def of(
+        cls,
+        low_t: float,
+        high_t: float,
+        low: float,
+        high: float,
+        labels: Sequence[str],
+        *,
+        narrow: bool,
+    ) -> _Frame:
+        width = _NARROW if narrow else _WIDE
+        y = Scale(_HEIGHT - _BOTTOM, _TOP, low, high, logarithmic=False)
+        longest = max(len(text) for _, text in y.ticks(_TICKS))
+        left = min(8.0 + _LETTER * longest, 0.35 * width)
+        room = min(14.0 + _LETTER * max((len(label) for label in labels), default=0), 0.35 * width)
+        return cls(Scale(left, width - room, low_t, high_t, logarithmic=False), y, width)
 
+    def axes(self, plot: Plot) -> list[str]:
+        left, right, bottom = self.x.start, self.x.end, self.y.start
+        parts = []
+        for y, text in self.y.ticks(_TICKS):
+            parts.append(f'<path class="lab-grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>')
+            place = f'x="{left - 6:.1f}" y="{y + 3.5:.1f}"'
+            parts.append(f'<text {place} text-anchor="end">{text}</text>')
+        for x, text in _time_ticks(self.x):
+            parts.append(f'<path class="lab-axis" d="M{x:.1f} {bottom:g}v4"/>')
+            place = f'x="{x:.1f}" y="{bottom + 16:g}"'
+            parts.append(f'<text {place} text-anchor="middle">{text}</text>')
+        parts.append(f'<path class="lab-axis" d="M{left:.1f} {_TOP:g}V{bottom:g}H{right:.1f}"/>')
+        # Along the axis a long name would be cut.
+        parts.append(f'<text x="0" y="11">{_text(plot.ylabel)}</text>')
+        centre = (left + right) / 2
+        parts.append(
+            f'<text x="{centre:.1f}" y="{_HEIGHT - 5:g}" text-anchor="middle">'
+            f"{_text(plot.xlabel)}</text>"
+        )
+        return parts
 
-def _clip_segment(frame: _Frame, v0: float, v1: float) -> tuple[float, float]:
-    """Return the fractions between which a segment is inside the frame; start > end if none is."""
-    if v0 == v1:
-        return (0.0, 1.0) if frame.y.low <= v0 <= frame.y.high else (1.0, 0.0)
-    # Halved, so that the difference of two large numbers is finite.
-    change = v1 / 2 - v0 / 2
-    cuts = sorted((edge / 2 - v0 / 2) / change for edge in (frame.y.low, frame.y.high))
-    return max(cuts[0], 0.0), min(cuts[1], 1.0)
+    def reference(self, y: float, label: str) -> str:
+        at = self.y(y)
+        return (
+            f'<path class="lab-reference" d="M{self.x.start:.1f} {at:.1f}H{self.x.end:.1f}"/>'
+            f'<text x="{self.x.start + 4:.1f}" y="{at - 4 if at > _TOP + 12 else at + 11:.1f}">'
+            f"{_text(label)}</text>"
+        )
 
+    def trace(
+        self, points: Sequence[tuple[float, float | None]], n: int, trace: TraceFields
+    ) -> str:
+        dash = _DASHES[n % len(_DASHES)]
+        if trace.dash is True:
+            dash = _DASHES[1]
+        elif trace.dash:
+            dash = " ".join(f"{x:g}" for x in trace.dash)
+        path: list[str] = []
+        # Values that are not finite end a run of points.
+        for finite, group in groupby(points, key=lambda point: _is_finite(point[1])):
+            if finite:
+                run = [(t, min(max(v, -_LARGEST), _LARGEST)) for t, v in group if v is not None]
+                path += self._path_commands(run)
+        style = f' stroke-dasharray="{dash}"' if dash else ""
+        style += ' stroke-linecap="round"' if "h0" in path else ""
+        return f'<path class="lab-trace lab-trace-{n % 7 + 1}"{style} d="{"".join(path)}"/>'
 
-def _labels(frame: _Frame, ends: list[tuple[float, str, int]]) -> list[str]:
-    heights = [y for y, _, _ in sorted(ends)]
-    places = separate_labels(heights, _LABEL_GAP, -math.inf, _HEIGHT - _BOTTOM)
-    return [
-        f'<text class="lab-name lab-name-{n % 7 + 1}" x="{frame.x.end + 6:.1f}" '
-        f'y="{place + 3.5:.1f}">{_text(label)}</text>'
-        for (_, label, n), place in zip(sorted(ends), places, strict=True)
-    ]
+    def _path_commands(self, run: list[tuple[float, float]]) -> Iterator[str]:
+        if len(run) == 1:
+            t, v = run[0]
+            if self.y.low <= v <= self.y.high:
+                yield from (
+                    f"M{self.x(t):.1f} {self.y(v):.1f}",
+                    "h0",
+                )  # round ends make a single point visible
+            return
+        pen = False
+        for (t0, v0), (t1, v1) in pairwise(run):
+            begin, end = self._clip_segment(v0, v1)
+            if begin > end:
+                pen = False
+                continue
+            if not pen:
+                yield f"M{self._interpolate((t0, v0), (t1, v1), begin)}"
+            yield f"L{self._interpolate((t0, v0), (t1, v1), end)}"
+            pen = end == 1
+
+    def _interpolate(
+        self, first: tuple[float, float], second: tuple[float, float], fraction: float
+    ) -> str:
+        """Write the point at a fraction of a segment; it is inside, up to rounding."""
+        pairs = zip(first, second, strict=True)
+        t, v = (a + fraction * (b - a) if fraction < 1 else b for a, b in pairs)
+        return f"{self.x(t):.1f} {self.y(v):.1f}"
+
+    def _clip_segment(self, v0: float, v1: float) -> tuple[float, float]:
+        """Return the fractions between which a segment is inside; start > end if none is."""
+        if v0 == v1:
+            return (0.0, 1.0) if self.y.low <= v0 <= self.y.high else (1.0, 0.0)
+        # Halved, so that the difference of two large numbers is finite.
+        change = v1 / 2 - v0 / 2
+        cuts = sorted((edge / 2 - v0 / 2) / change for edge in (self.y.low, self.y.high))
+        return max(cuts[0], 0.0), min(cuts[1], 1.0)
+
+    def labels(self, ends: list[tuple[float, str, int]]) -> list[str]:
+        heights = [y for y, _, _ in sorted(ends)]
+        places = separate_labels(heights, _LABEL_GAP, -math.inf, _HEIGHT - _BOTTOM)
+        return [
+            f'<text class="lab-name lab-name-{n % 7 + 1}" x="{self.x.end + 6:.1f}" '
+            f'y="{place + 3.5:.1f}">{_text(label)}</text>'
+            for (_, label, n), place in zip(sorted(ends), places, strict=True)
+        ]

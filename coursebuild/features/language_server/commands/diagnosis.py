@@ -23,8 +23,8 @@ from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
 from coursebuild.core.text.rules import rule_address
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.language_server.commands.texts import OpenTexts, Places
+from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.fix import choose_fixes
-from coursebuild.pipeline.judge import judge
 from coursebuild.preview.messages import new_output
 from coursebuild.preview.session import Session
 

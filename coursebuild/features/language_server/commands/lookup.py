@@ -35,7 +35,7 @@ from coursebuild.core.text.source import Source, Span
 from coursebuild.features.glossary import definition_of
 from coursebuild.features.language_server.commands.texts import OpenTexts, field_place
 from coursebuild.features.names.claims import document_names
-from coursebuild.features.names.engine import EngineName, KnownName, engine_names
+from coursebuild.features.names.known_names import EngineName, KnownName, engine_names
 from coursebuild.features.names.resolve import resolver_of
 from coursebuild.features.references import reference_text, works_of
 from coursebuild.features.symbols import declared_symbol, symbols

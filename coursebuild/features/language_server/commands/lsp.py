@@ -20,7 +20,7 @@ from msgspec.structs import replace
 from coursebuild.cli.arguments import add_cache, options_of
 from coursebuild.cli.output import CLEAN
 from coursebuild.core.files.errors import require
-from coursebuild.pipeline.progress import Progress
+from coursebuild.pipeline.options import Progress
 from coursebuild.preview.live_course import LiveCourse
 from coursebuild.report import Style
 

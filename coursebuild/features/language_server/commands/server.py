@@ -28,14 +28,13 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.authoring.format import format_document
-from coursebuild.features.language_server.commands.completion import completions
 from coursebuild.features.language_server.commands.diagnosis import (
     actions,
     current_diagnostics,
     to_lsp,
 )
 from coursebuild.features.language_server.commands.lookup import definition, hover
-from coursebuild.features.language_server.commands.renaming import name_at, rename
+from coursebuild.features.language_server.commands.proposals import completions, name_at, rename
 from coursebuild.features.language_server.commands.texts import OpenTexts, Places
 from coursebuild.preview.session import Session
 

@@ -1,1 +1,0 @@
-"""The engines of trials: the browser's MuJoCo in V8, and the native one in a child process."""

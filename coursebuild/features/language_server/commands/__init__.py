@@ -1,1 +1,0 @@
-"""The language server, which keeps the course in memory as the preview does."""
