@@ -59,6 +59,7 @@ REASONS = (
     Reason("an answer may have no unit", "quiz", r' *"unit": .*\n?', slip="line lost"),
     Reason("another number that a quiz may have", "quiz", r"[\d.]*", r".*\d.*"),
     Reason("a formula that nothing links to", "formula|list", r"[\w-]*", r".*\{#eq:.*"),
+    Reason("a table without one of its rows", ".*", r"[ >]*\|.*\|\n?", slip="line lost"),
     Reason("a paragraph in another place", ".*", "(?s).*", "(?s).*", "paragraph moved"),
     Reason("a printed number with a digit less, or a zero more", "output", r"\d"),
     Reason("no name, as the author says", "number", r"[a-z]+", r".*\{code\}.*"),

@@ -113,7 +113,12 @@ class Guesses:
             for word in slips
             if len(word) >= lengths.get(word, len(word) + 1)
             # `fields` is no slip of `hfields`
-            and (word[0] == name[0] or len(word) > 7 or self.uses[word] > 1)
+            and (
+                sorted(word) == sorted(name)
+                or word[0] == name[0]
+                or len(word) > 7
+                or self.uses[word] > 1
+            )
             and (
                 sorted(word) == sorted(name)
                 or (is_english and (len(word) > 6 or re.sub(r"(.)\1", r"\1", name) == word))
