@@ -429,13 +429,10 @@ def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[Stabl
         def run(start: int, step: float, span: float) -> StabilityTrial:
             variant, setup = with_integrator(model, integrator, step), pilot.setup
             longer = 1.0 if pilot.settles else max(1.0, span / scene.scenario.duration)
-            setup = (
-                replace(  # what falls is four times as far, and twice as fast, in twice the time
-                    setup,
-                    position_bound=setup.position_bound * longer**2,
-                    velocity_bound=setup.velocity_bound * max(1.0, longer / 2),
-                )
-            )
+            # What falls is four times as far, and twice as fast, in twice the time.
+            farther = setup.position_bound * longer**2
+            faster = setup.velocity_bound * max(1.0, longer / 2)
+            setup = replace(setup, position_bound=farther, velocity_bound=faster)
             return run_trial(setup, variant, span, half_thickness, start=start)
 
         span, limit = duration, theory.limit(integrator, (low, high))
