@@ -32,6 +32,7 @@ from coursebuild.numerics.reports.scene_report import MeasuredSetting, RowVerdic
 from coursebuild.numerics.reports.shown_errors import (
     ERROR_SLACK,
     SEEN,
+    FrontPoint,
     Quantity,
     Rows,
     front_point,
@@ -196,6 +197,8 @@ def scenario_job(
 
 _WORTH_SAYING = 0.1
 """An advantage that is smaller in both respects is none on another day."""
+_NEGLIGIBLE = 0.01
+"""The share of the scene's own error below which others may rise, as those of rounding do."""
 
 
 def mark_luck(
@@ -205,12 +208,13 @@ def mark_luck(
 
     `limits`: the largest stable timesteps (s) under the scene's own solver, by integrator.
     """
-    own_setting = next(row.setting for row in rows if row.own)
+    own_row = next(row for row in rows if row.own)
+    least = max(quantity.least, _NEGLIGIBLE * (quantity.value_of(own_row) or 0.0))
     marked_rows = []
     for row in rows:
         setting, place = row.setting, quantity.value_of(row)
         limit = limits.get(setting.integrator, math.inf)
-        luck, is_usual = "", setting.solver_settings == own_setting.solver_settings
+        luck, is_usual = "", setting.solver_settings == own_row.setting.solver_settings
         if place is not None and is_usual and setting.timestep > limit * (1 + 1e-9):
             luck = "the shortest timestep that was tried is lost"
             if limit:
@@ -223,7 +227,7 @@ def mark_luck(
                 work = "more iterations" if dear.iterations > setting.iterations else ""
             if luck or not work or place is None or error is None:
                 continue
-            if error > max(place * (1 + ERROR_SLACK), quantity.least):
+            if error > max(place * (1 + ERROR_SLACK), least):
                 luck = f"its error rises with {work}"
         marked_rows.append(replace(row, lucky=luck))
     return tuple(marked_rows)
@@ -261,7 +265,8 @@ def verdict(
         text = f"nothing can be said of the scene's own setting: {row.lucky}"
         return RowVerdict(False, None, None, None, is_noticeable, text + remark)
     if row.dominated_by is None:
-        text = "no other setting is cheaper without being less accurate"
+        text = _describe_lucky(rows, own_place, quantity)
+        text = text or "no other setting is cheaper without being less accurate"
         return RowVerdict(True, None, None, None, is_noticeable, text + remark)
     better = rows[row.dominated_by]
     better_place = front_point(better, quantity)
@@ -287,6 +292,18 @@ def verdict(
     elif better_place.error <= quantity.least:
         text += ", or more: the reference resolves no more"
     return RowVerdict(False, row.dominated_by, *ratios, is_noticeable, text + remark)
+
+
+def _describe_lucky(rows: Rows, own_place: FrontPoint, quantity: Quantity) -> str:
+    """The cheapest setting that is better only by luck; empty if there is none."""
+    points = [(point, row) for row in rows if row.lucky and (point := front_point(row, quantity))]
+    better = [(p, r) for p, r in points if p.is_cheaper(own_place) and p.beats(own_place)]
+    if not better:
+        return ""
+    place, row = min(better, key=lambda pair: pair[0].cost.value)
+    cost = place.cost.value / own_place.cost.value
+    ratios = _describe_ratios(cost, place.error / own_place.error if own_place.error else 1.0)
+    return f"no difference that holds: {setting_text(row.setting)} {ratios} here, but {row.lucky}"
 
 
 def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
