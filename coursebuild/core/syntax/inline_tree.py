@@ -380,7 +380,7 @@ _BROKEN_VALUE = re.compile(
 )
 """The value of an attribute with a part that is a number but for a slip."""
 _NO_COMPARISON = re.compile(
-    r"(?:while|if|elif|assert) (?!.*&)[^(]*?\w (<<|>>|=) (?!(?<=[<>] )\d+\b)"
+    r"(?:while|if|elif|assert) (?!.*(?:&| then\b))[^(]*?\w (<<|>>|=<|=) (?!(?<=[<>] )\d+\b)"
 )
 """A condition that shifts bits or assigns where it surely was to compare."""
 _END = re.compile(r"[\w.]*[._][\w.]*(?:\[\w*\]|\(\))?[\\'´]|[0DSWbdnrstw]\\")
@@ -427,7 +427,8 @@ def _check_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[D
         help = "write a number with one point and no needless zero, and a blank between two"
         yield diagnose("number-form", span, message, help=help)
     if slip := _NO_COMPARISON.match(code):
-        help = f"write `{'==' if slip[1] == '=' else slip[1][0]}`"
+        sign = {"=": "==", "=<": "<="}.get(slip[1], slip[1][0])
+        help = f"write `{sign}`"
         yield diagnose("markup-unread", span, f"`{slip[1]}` compares nothing", help=help)
     if (end_mark := _END.fullmatch(code)) is not None and code.count(code[-1]) == 1:
         message = f"`{code[-1]}` stands at the end of `{shorten(code[:-1])}`"

@@ -235,7 +235,7 @@ _FORMS = (
 _BEFORE_UNITS = (
     rf"{_BEGIN}(?!\d{{1,3}}(?:\.\d{{3}})+(?!\d))\d+(?:\.\d+){{2,}}(?=[ \u00a0]|\Z)",
     rf"{_BEGIN}0(?:[;/>]| \.|\. )\d+",
-    rf"{_BEGIN}0{{2,}}\.\d+|{_BEGIN}(?<![-+:/])(?<!\d[ \u00a0\u202f])0\d+",
+    rf"{_BEGIN}0{{2,}}\.\d+|{_BEGIN}(?<![-+:/])(?<![\dhn°][ \u00a0\u202f])0\d+",
     rf"{_BEGIN}l\.\d+",
 )
 """What is wrong only where a unit follows."""
