@@ -1,7 +1,7 @@
 """What a line of text names: targets of links, mentions as in "Lesson 2.2", and numbers.
 
-A page must not have all schemes of links. Text and soft line ends that follow each other make one
-run, as a mention may be broken over two lines.
+Only some schemes of links are safe on a page. Text and soft line ends that follow each other make
+one run, as a mention may be broken over two lines.
 
 Of numbers those are told that are none: with two points, a letter among the digits, a sign too many
 (`check_numerals`). What may be meant is no mistake: a range such as `3..5`, a version, thousands
