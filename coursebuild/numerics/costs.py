@@ -250,7 +250,7 @@ def verdict(
     if row.reasons:
         return _verdict_of_lost(rows, row, quantity)
     error = None if is_noticeable is None else row.seen
-    remark = "; whether its error can be seen is not known"
+    remark = "; whether the scene's own error can be seen is not known"
     if error is not None:
         least = quantity.least if quantity.name == SEEN.name else 0.0
         remark = _describe_error(rows, noticeable, row, error, least)
@@ -355,8 +355,8 @@ def _describe_error(
     """Whether the own error is seen, and where it is, the cheapest setting with one that is not."""
     if error < 1:
         size = f"{'less than ' if 0 < error <= least else ''}{error:.2g}"
-        return f"; its error cannot be seen: it is {size} of what an eye can tell"
-    text = f"; its error can be seen: it is {error:.2g} times what an eye can tell"
+        return f"; the scene's own error cannot be seen: it is {size} of what an eye can tell"
+    text = f"; the scene's own error can be seen: it is {error:.2g} times what an eye can tell"
     unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost is not None]
     if own_row.cost is None:
         return text

@@ -210,7 +210,7 @@ def test_costs_that_timing_cannot_tell_apart_are_equal() -> None:
 
 OWN_BEST = "no other setting is cheaper without being less accurate"
 OWN_FAILS = "the scene does not run under its own setting, Euler at 2 ms: the state is not finite"
-ERROR_SEEN = "its error can be seen: it is 2.5 times what an eye can tell"
+ERROR_SEEN = "the scene's own error can be seen: it is 2.5 times what an eye can tell"
 
 
 @pytest.mark.parametrize(
@@ -219,7 +219,8 @@ ERROR_SEEN = "its error can be seen: it is 2.5 times what an eye can tell"
         (
             ((1, 1e-3), (4, 1e-7)),
             None,
-            f"{OWN_BEST}; its error cannot be seen: it is 0.001 of what an eye can tell",
+            f"{OWN_BEST}; the scene's own error cannot be seen: it is 0.001 of what an eye can "
+            "tell",
         ),
         (
             ((1, 2.5), (0.94, 2.5e-6)),
@@ -248,7 +249,7 @@ def test_a_verdict_where_an_error_is_not_known_or_nothing_was_timed() -> None:
     assert judgement.noticeable is None
     assert judgement.text == (
         "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more; "
-        "whether its error can be seen is not known"
+        "whether the scene's own error can be seen is not known"
     )
     judgement = verdict(front([row(own=True, cost=None, seen=0.5)]), [False])
     assert judgement.text.startswith("nothing was timed, so no setting can be called better; ")
@@ -317,15 +318,15 @@ def test_what_is_not_resolved_makes_no_setting_better() -> None:
     assert judgement.better is None and not judgement.on_front
     assert judgement.text == (
         "no setting can be called better: the reference resolves no error of RK4 at 10 ms, or of "
-        "the scene's own setting; whether its error can be seen is not known"
+        "the scene's own setting; whether the scene's own error can be seen is not known"
     )
     rows = rows_with_front((1, 1e-9), (0.5, 1e-9))
     judgement = verdict(rows, [False, False], Quantity("seen", "", 1e-9))
     assert judgement.better == 1, "what nobody can see may as well be cheap"
     assert judgement.text == (
         "RK4 at 10 ms is better: it takes 0.5 of the time and errs no more, as far as the "
-        "reference resolves; its error cannot be seen: it is less than 1e-09 of what an eye can "
-        "tell"
+        "reference resolves; the scene's own error cannot be seen: it is less than 1e-09 of what "
+        "an eye can tell"
     )
 
 
