@@ -56,6 +56,8 @@ _LONGEST_ORBIT, _ORBIT_GRID = 200, 16
 """Steps in a period at the shortest timestep that is tried along it, and how many are tried."""
 _PERIODS, _ORBIT_STEPS, _ORBIT_STEP = 8, 1000, 1e-6
 """Periods and steps, at least, after which growth is compared, and the step of differences."""
+_ASTRAY = 1e6
+"""How far from its beginning, in units, a motion is lost: rounding hides the differences there."""
 
 
 class FixedState(Struct, frozen=True, eq=False):
@@ -349,6 +351,8 @@ def _grows(model: Any, orbit: FixedState, integrator: Integrator, timestep: floa
             ends.append(_state_of(data, period=orbit.period))
         way = _difference(variant, ends[1], ends[0]) / (2 * _ORBIT_STEP)
         state, length = ends[2], float(np.linalg.norm(way / units))
+        if not np.linalg.norm(_difference(variant, orbit, state) / units) < _ASTRAY:
+            return True
         if not 0 < length < math.inf:
             return length != 0
         size += math.log(length)

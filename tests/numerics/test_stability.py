@@ -315,6 +315,17 @@ def test_theory_along_a_period_is_where_a_pendulum_is_lost() -> None:
     assert falling is None, "upright it is unstable by itself"
 
 
+def test_theory_along_a_period_of_a_spring_is_that_at_rest() -> None:
+    """What diverges so far that no difference is left of two runs is unstable all the same."""
+    spring = mujoco.MjModel.from_xml_string(
+        '<mujoco><option gravity="0 0 0"/><worldbody><body><joint type="slide" stiffness="400"/>'
+        '<geom size="0.1" mass="1"/></body></worldbody></mujoco>'
+    )
+    theory = find_theory(spring, Scenario(2.0, 0.1, (0.1,), (0.0,)), None, smooth=True)
+    for integrator, limit in ((Integrator.EULER, 0.1), (Integrator.RK4, 0.1 * 2**0.5)):
+        assert theory.orbital(integrator) == pytest.approx(limit, rel=0.01), integrator
+
+
 def test_energy_that_cannot_be_is_instability() -> None:
     """Of all that a swinging chain has, 0.25 J, it had 300 J after 2,000 steps of 7.5 ms."""
     chain = with_energy_bound(all_problems()["chain-balls"])
