@@ -40,8 +40,8 @@ than contacts are deep."""
 _UNIT, _NEAR_UNIT = 1e-6, 1e-4
 """By how much a spectral radius may exceed 1 by rounding: a double eigenvalue 1 splits by the root
 of the rounding."""
-_WIDER = 10.0
-"""How much farther than runs theory looks for a limit, to both sides."""
+_SHORTER, _LONGER = 10.0, 100.0
+"""How much farther than runs theory looks for a limit: to timesteps of several whole scenarios."""
 AT_REST = "spectral radius of the step, linearized at rest"
 """The source of the theory of a scene."""
 MOST_STATES, _MOST_ORBIT_STATES = 120, 24
@@ -375,7 +375,7 @@ class Theory(Struct, frozen=True, eq=False):
         """The largest stable timestep at rest; `None` where there is no such theory."""
         limit = self.formula(integrator) if self.formula is not None else None
         if limit is None and self.rest is not None:
-            wide = search[0] / _WIDER, search[1] * _WIDER
+            wide = search[0] / _SHORTER, search[1] * _LONGER
             limit = Limit(rest_limit(self.model, self.rest, integrator, wide), AT_REST)
         return limit
 

@@ -324,6 +324,8 @@ def test_theory_along_a_period_of_a_spring_is_that_at_rest() -> None:
     theory = find_theory(spring, Scenario(2.0, 0.1, (0.1,), (0.0,)), None, smooth=True)
     for integrator, limit in ((Integrator.EULER, 0.1), (Integrator.RK4, 0.1 * 2**0.5)):
         assert theory.orbital(integrator) == pytest.approx(limit, rel=0.01), integrator
+        at_rest = theory.limit(integrator, (1e-4, 0.005))  # far beyond what runs are tried with
+        assert at_rest is not None and at_rest.timestep == pytest.approx(limit, rel=1e-5)
 
 
 def test_energy_that_cannot_be_is_instability() -> None:
