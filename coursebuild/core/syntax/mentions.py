@@ -257,9 +257,11 @@ def _pattern(*, is_alone: bool) -> re.Pattern[str]:
 
 
 _HINT = re.compile(
-    r"[\d.][.,;>/⁺⁻ ]|[eE][-+\u2212eE]|\d[oOl]|[Ool]\.\d|0\d|\d[-\u2212][eE]|[-\u2212]{2}\d"
+    r"\d(?:[oOl]|,[\d.,]|[;>/]\d|[\u207a\u207b]{2}|\.(?:[.,oOl]|\d+(?:\.[\d ]|[oOl]))|\. \d| \.\d"
+    r"|[.\d]*[-\u2212]?[eE]| [a-zA-Z]{3,4}(?!\w)|(?<=[Ool]\.\d)|(?<=[-\u2212]{2}\d)"
+    r"|(?<=(?<!\w)\.\d)|(?<=(?<![\w.,])0\d))"
 )
-"""What all of them have somewhere, so that most texts are passed over quickly."""
+"""What all of them have at one of their digits, so that most texts are passed over quickly."""
 
 
 def check_numerals(
@@ -267,7 +269,7 @@ def check_numerals(
 ) -> Iterator[Diagnostic]:
     """Report numbers of texts, each with its offset in the content, that cannot be read."""
     for at, text in texts:
-        if _HINT.search(text) is None:
+        if not is_alone and _HINT.search(text) is None:
             continue
         for match in _pattern(is_alone=is_alone).finditer(text):
             first, last, number = match["first"], match["last"], match[0]

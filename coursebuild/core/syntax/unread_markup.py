@@ -48,10 +48,12 @@ _SIGN = re.compile(
 )
 _FIRST_SIGN = re.compile(
     r"\d{1,2}[.,;)][^\d\s]|\d{1,2}[,;] |-[A-Z]|[0=_.)] |h\d\. |[A-Z?!]> |1 |import "
-    r"|_[_.,;:)]?(?:\Z| )|: +\w|[•‣◦▪●]|-- "
+    r"|: +\w|[•‣◦▪●]|-- "
 )
-"""What all unread markup has at least once, in a text or where a line of it begins, so that most
-texts are passed over quickly; or it mentions a lesson, or is a letter directly after a formula."""
+_AFTER_CODE = re.compile(r"_[_.,;:)]?(?:\Z| )")
+"""What all unread markup has at least once, in a text, where a line begins or directly after code,
+so that most texts are passed over quickly; or it mentions a lesson, or is a letter directly after a
+formula."""
 _MENTION = re.compile(BROKEN["mention"].pattern)
 _LETTER = re.compile(r"[a-rt-z](?!\w)")
 _DOLLAR = re.compile(r"\$(?!\d[\d.,]*(?![\w\\^{]))")
@@ -118,9 +120,12 @@ def check_unread_markup(
 
 
 def _may_be_unread(whole: str, at: int, text: str) -> bool:
+    first, *lines = text.split("\n")
+    begins_line = at == 0 or whole[at - 1] == "\n"
     return (
         _SIGN.search(text) is not None
-        or any(map(_FIRST_SIGN.match, text.split("\n")))
+        or any(map(_FIRST_SIGN.match, [first, *lines] if begins_line else lines))
+        or _AFTER_CODE.match(first) is not None
         or ("Lesson " in text and _MENTION.search(text) is not None)
         or (at > 0 and whole[at - 1] == "$" and _LETTER.match(text) is not None)
         or (at > 0 and whole[at - 1] == text[:1] == ")")
