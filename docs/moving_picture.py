@@ -17,6 +17,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import textwrap
 from html import escape
 from pathlib import Path
 from typing import NamedTuple
@@ -25,7 +26,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "images" / "refused.svg"
 RIGHT, WRONG = "4.9148", "4.8148"
 FENCE = re.compile(r"^(`{3,})\S.*? file=(\S+)\n(.*?)^\1$", re.MULTILINE | re.DOTALL)
-WIDTH, LINE, LEFT, SIZE = 940, 21, 24, 13
+WIDTH, LINE, LEFT, SIZE = 500, 20, 18, 13
+COLUMNS = 59
+"""Characters of a line. All is drawn as in a narrow window, so that it can be read on a phone."""
 TITLE = (
     "A digit of a recorded output is changed; coursebuild check points at it; put back, all holds"
 )
@@ -50,7 +53,17 @@ def printed(course: Path, command: str) -> list[str]:
     arguments = [sys.executable, "-m", "coursebuild", "-C", course, command]
     result = subprocess.run(arguments, capture_output=True, text=True)
     lines = (line for line in result.stdout.splitlines() if not line.startswith("ok "))
-    return "\n".join(lines).strip().splitlines()
+    return _wrap("\n".join(lines).strip().splitlines())
+
+
+def _wrap(lines: list[str]) -> list[str]:
+    """Lines as a narrow window shows them."""
+    indent = " " * 8
+    return [
+        part
+        for line in lines
+        for part in textwrap.wrap(line, COLUMNS, subsequent_indent=indent) or [""]
+    ]
 
 
 class Scene(NamedTuple):
@@ -80,7 +93,14 @@ def play() -> list[Scene]:
         lesson.write_text(right, encoding="utf-8")
         mended = printed(course, "check")
     ask = ["$ coursebuild check"]
-    end, end_with_mistake = (text.rstrip().splitlines()[-6:] for text in (right, mistaken_text))
+    end, end_with_mistake = (
+        [
+            part
+            for line in text.rstrip().splitlines()[-5:]
+            for part in textwrap.wrap(line, COLUMNS) or [""]
+        ]
+        for text in (right, mistaken_text)
+    )
     return [
         Scene(end, "", ["$"]),
         Scene(end_with_mistake, WRONG, ask),
@@ -110,7 +130,8 @@ def draw(scenes: list[Scene]) -> str:
     style = STYLE % (SIZE, whole, "\n".join(rules))
     head = _text(LEFT, 24, "content/lessons/1.1-free-fall.md", "soft")
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" role="img">'
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" '
+        f'viewBox="0 0 {WIDTH} {height}" role="img">'
         f"<title>{TITLE}</title><style>{style}</style>"
         f'<rect class="paper" width="{WIDTH}" height="{height}" rx="8"/>{head}'
         f'<path class="rule" d="M0 {fold}H{WIDTH}" fill="none"/>{"".join(groups)}</svg>\n'
