@@ -108,7 +108,10 @@ def measure(arguments: argparse.Namespace, places: Places, work: Path) -> str:
         report.add_sites(sites, size)
         keep(arguments, report.as_json())
     if "scripts" in parts:
-        report.add_scripts(measure_scripts(arguments.scripts, rounds[0], work, places, say))
+        try:
+            report.add_scripts(measure_scripts(arguments.scripts, rounds[0], work, places, say))
+        except CommandError as error:  # the tables of the other parts are still worth printing
+            say(f"scripts are not measured: {error}")
     keep(arguments, report.as_json())
     return markdown(report)
 

@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.courses import FLAVORS, names_of, write_course
 from benchmarks.measure.building import make_site, remove
+from benchmarks.measure.running import measure_scripts
 from benchmarks.measure.tools import Places, all_tools
 from benchmarks.mistakes import describe, run, table
 from benchmarks.slips.changes import KINDS
@@ -49,6 +50,13 @@ def test_so_are_those_of_scripts_with_mujoco(tmp_path: Path) -> None:
     result = Folder(folder).main("check")
     assert result.status == 0, result.out + result.err
     assert "2 lessons, 2 scripts run: everything holds" in result.out
+
+
+@pytest.mark.site
+def test_scripts_are_run_in_all_ways(tmp_path: Path) -> None:
+    scripts = measure_scripts(1, 1, tmp_path, Places(None, None), lambda text: None)
+    assert len(scripts.figures) == 6
+    assert all(ratio > 0 for way in scripts.figures for ratio in scripts.ratios(way))
 
 
 def test_two_runs_write_the_same_bytes(tmp_path: Path) -> None:
