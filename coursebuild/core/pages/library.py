@@ -229,10 +229,9 @@ def links(course: model.Course, document: model.Document) -> Iterator[model.Targ
         yield model.resolve(link.target, course, document.source.path)
 
 
-_MODEL_NAMED = re.compile(
-    r"""model_path\(\s*[rR]?(["'])(?P<name>.+?)\1|(?<![\w./-])(?P<file>[\w./-]+)\.xml\b"""
-    r"""|(["'])(?P<word>[A-Za-z_][\w/-]{0,80})\4"""
-)
+_MODEL_PATH = re.compile(r"""model_path\(\s*[rR]?(["'])(.+?)\1""")
+_QUOTED_WORD = re.compile(r"""(["'])([A-Za-z_][\w/-]{0,80})\1""")
+_FILE_STEM = re.compile(r"[\w./-]+\Z")
 
 
 def models_named(script: model.Script) -> frozenset[str]:
@@ -240,11 +239,14 @@ def models_named(script: model.Script) -> frozenset[str]:
 
     A function of the script may pass such a word on to `model_path`.
     """
-    names: set[str] = set()
-    for match in _MODEL_NAMED.finditer(script.code.text):
-        name = (match["name"] or match["file"] or match["word"]).removesuffix(".xml")
-        names.add(name.removeprefix("models/"))
-    return frozenset(names)
+    text = script.code.text
+    names = [name for pattern in (_MODEL_PATH, _QUOTED_WORD) for _, name in pattern.findall(text)]
+    before, *rest = re.split(r"\.xml\b", text)
+    for after in rest:
+        if stem := _FILE_STEM.search(before[-200:]):
+            names.append(stem[0])
+        before = after
+    return frozenset(name.removesuffix(".xml").removeprefix("models/") for name in names)
 
 
 def _named_models(document: model.Document) -> Mapping[str, tuple[str, ...]]:

@@ -219,7 +219,10 @@ def _analyse(code: str) -> tuple[tuple[Part, ...], frozenset[str]]:
 
 @functools.lru_cache(maxsize=8)
 def python_nodes(code: str) -> tuple[ast.AST, ...]:
-    """All nodes of a Python text, the module first, level by level; none if it does not parse."""
+    """All nodes of a Python text, the module first, level by level; none if it does not parse.
+
+    Those without fields, as `ast.Load`, are left out where they are not a statement.
+    """
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -231,7 +234,7 @@ def python_nodes(code: str) -> tuple[ast.AST, ...]:
             part = getattr(node, name, None)
             if type(part) is list:
                 nodes += [item for item in part if isinstance(item, ast.AST)]
-            elif isinstance(part, ast.AST):
+            elif isinstance(part, ast.AST) and part._fields:
                 nodes.append(part)
     return tuple(nodes)
 

@@ -94,6 +94,7 @@ ENDINGS = {
 _MOST_PLAIN = 3
 """How many uses of a plain word are kept of a document: what is used again is no slip."""
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
+_DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 GUESSES = frozenset("value plain token torn half".split())
 """Kinds of claims that are none where nothing is called like them."""
 
@@ -211,26 +212,26 @@ def _read_script(script: model.Script, names: CodeNames) -> None:
     members: dict[str, set[str]] = {}
     for node in python_nodes(script.code.text.rstrip("\n")):
         definition = ""
-        if isinstance(node, ast.Name):
-            definition = node.id if isinstance(node.ctx, ast.Store) else ""
-        elif isinstance(node, ast.Attribute):
-            if isinstance(node.value, ast.Name):
+        if type(node) is ast.Name:
+            definition = node.id if type(node.ctx) is ast.Store else ""
+        elif type(node) is ast.Attribute:
+            if type(node.value) is ast.Name:
                 members.setdefault(node.value.id, set()).add(node.attr)
-        elif isinstance(node, ast.arg):
+        elif type(node) is ast.arg:
             definition = node.arg
-        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        elif isinstance(node, _DEFINITIONS):
             definition = node.name
-        elif isinstance(node, ast.Import):
+        elif type(node) is ast.Import:
             for alias in node.names:
                 name = alias.asname or alias.name.partition(".")[0]
                 names.imports[name] = alias.name if alias.asname else name
-        elif isinstance(node, ast.ImportFrom):
+        elif type(node) is ast.ImportFrom:
             if node.module and not node.level:
                 for alias in node.names:
                     names.imports[alias.asname or alias.name] = f"{node.module}.{alias.name}"
-        elif isinstance(node, ast.Assign) and isinstance(node.value, ast.Call):
+        elif type(node) is ast.Assign and type(node.value) is ast.Call:
             target, class_name = node.targets[0], _find_structure(node.value.func)
-            if class_name and isinstance(target, ast.Name) and len(node.targets) == 1:
+            if class_name and type(target) is ast.Name and len(node.targets) == 1:
                 names.variables[target.id] = class_name
         if definition:
             line = getattr(node, "lineno", 1)
