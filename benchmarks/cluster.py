@@ -108,16 +108,22 @@ def record(root: Path) -> None:
 def run(root: Path, *arguments: str) -> tuple[str, float]:
     """What a command prints, and the seconds that it takes."""
     began = time.monotonic()
-    process = begin(root, *arguments)
-    out, _ = process.communicate()
-    return out, time.monotonic() - began
+    return finish(begin(root, *arguments)), time.monotonic() - began
+
+
+def finish(process: subprocess.Popen[str]) -> str:
+    """What a command prints; the comparison ends here where it could not do its work."""
+    out, errors = process.communicate()
+    if process.returncode not in (0, 1):  # 1: an output or a figure differs from what is recorded
+        sys.exit(errors.strip() or f"a command ended with status {process.returncode}")
+    return out
 
 
 def begin(root: Path, *arguments: str) -> subprocess.Popen[str]:
     """Begin a command."""
     command = [sys.executable, "-m", "coursebuild", "-C", str(root), *arguments]
     pipe = subprocess.PIPE
-    return subprocess.Popen(command, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True)
 
 
 def run_and_kill(cluster: LocalCluster, root: Path, *arguments: str, events: int) -> str:
@@ -131,8 +137,7 @@ def run_and_kill(cluster: LocalCluster, root: Path, *arguments: str, events: int
     if process.poll() is None:
         os.kill(victim, signal.SIGKILL)
         print(f"  worker {victim} was killed midway")
-    out, _ = process.communicate()
-    return out
+    return finish(process)
 
 
 def start(count: int) -> LocalCluster:

@@ -231,7 +231,8 @@ def links(course: model.Course, document: model.Document) -> Iterator[model.Targ
 
 _MODEL_PATH = re.compile(r"""model_path\(\s*[rR]?(["'])(.+?)\1""")
 _QUOTED_WORD = re.compile(r"""(["'])([A-Za-z_][\w/-]{0,80})\1""")
-_FILE_STEM = re.compile(r"[\w./-]+\Z")
+_REVERSED_FILE = re.compile(r"lmx(?<!\wlmx)\.([\w./-]+)")
+"""A file's name from its end on: so each is read once."""
 
 
 def models_named(script: model.Script) -> frozenset[str]:
@@ -241,11 +242,7 @@ def models_named(script: model.Script) -> frozenset[str]:
     """
     text = script.code.text
     names = [name for pattern in (_MODEL_PATH, _QUOTED_WORD) for _, name in pattern.findall(text)]
-    before, *rest = re.split(r"\.xml\b", text)
-    for after in rest:
-        if stem := _FILE_STEM.search(before[-200:]):
-            names.append(stem[0])
-        before = after
+    names += [name[::-1] for name in _REVERSED_FILE.findall(text[::-1])]
     return frozenset(name.removesuffix(".xml").removeprefix("models/") for name in names)
 
 

@@ -221,7 +221,7 @@ def _analyse(code: str) -> tuple[tuple[Part, ...], frozenset[str]]:
 def python_nodes(code: str) -> tuple[ast.AST, ...]:
     """All nodes of a Python text, the module first, level by level; none if it does not parse.
 
-    Those without fields, as `ast.Load`, are left out where they are not a statement.
+    Parts that hold nothing, such as `ast.Load`, are left out.
     """
     try:
         with warnings.catch_warnings():
