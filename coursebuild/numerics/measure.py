@@ -394,11 +394,11 @@ def surface_speeds(model: Any, scene: Scene, states: EngineStates) -> list[dict[
 
 
 def touching_contacts(data: Any) -> list[Any]:
-    """Contacts of geoms that touch; not those of a flex, or where only the margins do."""
+    """Contacts of geoms that push each other; not those of a flex."""
     return [
         contact
         for contact in data.contact[: data.ncon]
-        if min(contact.geom) >= 0 and contact.dist <= 0
+        if min(contact.geom) >= 0 and contact.dist <= contact.includemargin
     ]
 
 

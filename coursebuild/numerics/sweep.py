@@ -2,7 +2,8 @@
 
 1. A parameter is a field of the model's elements as `mujoco.MjSpec` names it, so that all that
    follows from it is compiled anew. One is changed at a time.
-2. Every step of a run is looked at: a hit is over before the next sample.
+2. Every step of a run is looked at: a hit is over before the next sample. A slide goes on where two
+   geoms touch again within a sample: what rolls or slides over a stiff surface hops on it.
 3. The parameter `threads` is that of `mujoco.rollout`, which runs copies of the scenario.
 """
 
@@ -201,10 +202,19 @@ class _Hit(Struct):
     """The latest one."""
     parting: float = 0.0
     """Speed with which they part at the end, m/s; 0 if they stay together."""
-    distance: float = 0.0
-    """Distance slid, m."""
     depth: float = 0.0
     """Deepest contact, m."""
+
+
+class _Slide(Struct):
+    """Two geoms that slide on each other."""
+
+    time: float
+    """When they last touched, s."""
+    speed: float
+    """Of the one along the other then, m/s."""
+    distance: float
+    """Distance slid, m."""
 
 
 def with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
@@ -216,8 +226,10 @@ def with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
     data, scratch = initial_data(scenario, model_copy), initial_data(scenario, model_copy)
     current: dict[Pair, _Hit] = {}
     hits: list[_Hit] = []
+    slides: dict[Pair, _Slide] = {}
+    longest: float | None = None
     residual = force = iterations = 0.0
-    for command in scenario.commands(step):
+    for number, command in enumerate(scenario.commands(step), 1):
         if command:
             data.ctrl[:] = command
         advance(model_copy, data)
@@ -227,13 +239,22 @@ def with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
         scratch.qpos[:], scratch.qvel[:] = data.qpos, data.qvel
         mujoco.mj_fwdPosition(model_copy, scratch)
         mujoco.mj_fwdVelocity(model_copy, scratch)
-        current = _follow_hits(model_copy, scratch, step, current, hits)
+        current = _follow_hits(model_copy, scratch, current, hits)
+        for pair, hit in current.items():
+            time, speed = number * step, contact_speeds(model_copy, scratch, hit.contact)[1]
+            slide = slides.get(pair)
+            if slide is None or time - slide.time > scenario.sample * (1 + 1e-9):
+                slides[pair] = slide = _Slide(time, speed, speed * step)
+            else:
+                slide.distance += (time - slide.time) * (slide.speed + speed) / 2
+                slide.time, slide.speed = time, speed
+            longest = max(longest or 0.0, slide.distance)
     closing = (hit for hit in hits if hit.closing > 0)
     hardest = max(closing, key=lambda hit: hit.closing, default=None)
     return replace(
         row,
         penetration=max((hit.depth for hit in hits), default=None),
-        slip=max((hit.distance for hit in hits), default=None),
+        slip=longest,
         restitution=hardest.parting / hardest.closing if hardest is not None else None,
         residual=residual / force if force else None,
         iterations=iterations / steps if force else None,
@@ -241,19 +262,16 @@ def with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
 
 
 def _follow_hits(
-    model: Any, data: Any, step: float, previous: dict[Pair, _Hit], hits: list[_Hit]
+    model: Any, data: Any, previous: dict[Pair, _Hit], hits: list[_Hit]
 ) -> dict[Pair, _Hit]:
     """Note what happened to hits in a step, and add new ones; the pairs that touch now."""
     current: dict[Pair, _Hit] = {}
     for contact in touching_contacts(data):
         pair = (int(contact.geom[0]), int(contact.geom[1]))
-        parting_speed, sliding = contact_speeds(model, data, contact)
         hit = previous.get(pair) or current.get(pair)
         if hit is None:
-            hit = _Hit(-parting_speed, contact)
+            hit = _Hit(-contact_speeds(model, data, contact)[0], contact)
             hits.append(hit)
-        if pair not in current:
-            hit.distance += sliding * step
         current[pair], hit.contact = hit, copy.copy(contact)
         hit.depth = max(hit.depth, -float(contact.dist))
     for pair in previous.keys() - current.keys():
@@ -338,16 +356,23 @@ def _reading_figures(scene: Scene, model: Any) -> dict[str, float]:
     run = simulate(Setup(scenario=every_step), model, thickness(model))
     if not run.judgement.ok:
         return {}
-    readings = quantity_values(model, replace(scene, scenario=every_step), run.states)[:, 0]
+    scene, data = replace(scene, scenario=every_step), initial_data(scene.scenario, model)
+    start = EngineStates(np.zeros(1), data.qpos[None], data.qvel[None], data.act[None])
+    readings = np.concatenate(
+        [quantity_values(model, scene, states)[:, 0] for states in (start, run.states)]
+    )
+    times = np.concatenate([start.times, run.states.times])
     figures = {
         "last": float(readings[-1]),
         "largest": float(readings.max()),
         "smallest": float(readings.min()),
     }
-    changes = np.flatnonzero(readings[:-1] * readings[1:] < 0)
+    signed = np.flatnonzero(readings)  # it may be exactly 0 on its way
+    changes = np.flatnonzero(np.diff(np.sign(readings[signed])))
     if changes.size:
-        part = slice(max(0, int(changes[0]) - 3), int(changes[0]) + 5)
-        times = run.states.times[part]
-        roots = CubicSpline(times, readings[part]).roots(extrapolate=False)
-        figures["crossing"] = float(roots[np.argmin(np.abs(roots - run.states.times[changes[0]]))])
+        before, after = signed[changes[0]], signed[changes[0] + 1]
+        part = slice(max(0, before - 3), after + 4)
+        roots = CubicSpline(times[part], readings[part]).roots(extrapolate=False)
+        middle = (times[before] + times[after]) / 2
+        figures["crossing"] = float(roots[np.nanargmin(np.abs(roots - middle))])
     return figures

@@ -103,6 +103,21 @@ def test_a_block_without_friction_slides_as_far_as_it_goes() -> None:
     assert row.slip == pytest.approx(0.4, rel=0.02)
 
 
+def test_a_cylinder_that_hops_as_it_rolls_slides_all_the_way() -> None:
+    """Down a slope of 0.5 rad, µ = 0.12 < tan(0.5)/3: it slides at g (sin a − 3 µ cos a) t²/2."""
+    slope = '<worldbody><geom type="plane" size="9 9 1" friction="0.12" euler="0 0.5 0"/>'
+    cylinder = """<body pos="0.04794 0 0.08776" euler="0 0.5 0"><joint type="slide" axis="1 0 0"/>
+    <joint type="slide" axis="0 0 1"/><joint type="hinge" axis="0 1 0"/>
+    <geom type="cylinder" size="0.1" fromto="0 -0.1 0 0 0.1 0" friction="0.12"/></body>"""
+    toml = TOML.replace("qvel = [-1]\n", "").replace('measure = "body:ball"\n', "")
+    vary = 'vary = { "geom.margin" = [0, 0.005], "option.timestep" = [0.002] }'
+    option = '<compiler angle="radian"/><option timestep="0.001" cone="elliptic"/>'
+    rows = run_sweep(vary, f"<mujoco>{option}{slope}{cylinder}</worldbody></mujoco>", toml=toml).rows
+    distance = 9.81 * (math.sin(0.5) - 3 * 0.12 * math.cos(0.5)) * 0.4**2 / 2
+    for row in rows:
+        assert row.slip == pytest.approx(distance, rel=0.05), row.value
+
+
 @pytest.mark.parametrize(
     ("vary", "message"),
     [
