@@ -46,6 +46,8 @@ _BEYOND = 2.0
 """How many times the last change of slopes their limit may be beyond the last slope."""
 _UNCERTAIN, _BENT = 0.25, 0.25
 """The widest half interval of an order, and the largest bend, with which it is given."""
+_LEAST_ORDER = 0.5
+"""Errors that fall more slowly are those of a motion that is lost in a fast part of the whole."""
 
 _ZERO_SIZES, _UNIT_SIZES = Sizes(0.0, 0.0, 0.0), Sizes(1.0, 1.0, 1.0)
 
@@ -112,7 +114,8 @@ def fit_order(
     if (finer - finest) * (fine - finer) > 0:  # not noise: they tend to a slope beyond the finest
         uncertainty = max(uncertainty, abs(slope - finest) + _BEYOND * abs(finer - finest))
     fit = scene_report.FittedOrder(slope, uncertainty, float(np.ptp(slopes)))
-    return fit if fit.uncertainty <= _UNCERTAIN and fit.bend <= _BENT else None
+    is_line = fit.uncertainty <= _UNCERTAIN and fit.bend <= _BENT
+    return fit if is_line and fit.value > _LEAST_ORDER else None
 
 
 def fit_orders(

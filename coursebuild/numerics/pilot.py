@@ -50,6 +50,7 @@ class Pilot(Struct, frozen=True):
     """The results of a scene's first run."""
 
     scene: Scene
+    peaks: Peaks
     setup: Setup
     """The scenario, with bounds of its states."""
     contact: bool
@@ -127,6 +128,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
             growth_rates.append(math.log(float(gap[end]) / size) / float(times[end]))
     return Pilot(
         scene=scene,
+        peaks=peaks,
         setup=_bounds(variant, scene, peaks),
         contact=look.contact,
         constrained=look.constrained,
@@ -255,6 +257,29 @@ def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
     return replace(
         setup, energy_bound=peaks.energy + room * kinetic, energy=peaks.energy, kinetic=kinetic
     )
+
+
+def longer_setup(model: Any, pilot: Pilot, span: float) -> Setup:
+    """The setup for a longer span (s), where a motion may fall farther, or go on to grow."""
+    scene = pilot.scene
+    duration = math.ceil(span / scene.scenario.sample * (1 - 1e-12)) * scene.scenario.sample
+    longer_scene = replace(scene, scenario=replace(scene.scenario, duration=duration))
+    for integrator in (Integrator.RK4, simulation.integrator_of(model)):
+        variant = simulation.with_integrator(model, integrator, min(scene.timesteps))
+        run = simulation.simulate(Setup(scenario=longer_scene.scenario), variant)
+        position, velocity, kinetic = (
+            float(np.abs(values).max(initial=0.0))
+            for values in (run.states.qpos, run.states.qvel, run.energy[:, 1])
+        )
+        if math.isfinite(position + velocity + kinetic):
+            peaks = replace(
+                pilot.peaks,
+                position=max(position, pilot.peaks.position),
+                velocity=max(velocity, pilot.peaks.velocity),
+                kinetic=max(kinetic, pilot.peaks.kinetic),
+            )
+            return _bounds(model, longer_scene, peaks)
+    return pilot.setup
 
 
 _SOLVERS = {

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import mujoco
@@ -34,7 +34,7 @@ from coursebuild.numerics.detector import (
     update_peaks,
 )
 from coursebuild.numerics.linearization import Theory, find_theory
-from coursebuild.numerics.pilot import Pilot, nudges
+from coursebuild.numerics.pilot import Pilot, longer_setup, nudges
 from coursebuild.numerics.problem import (
     STANDARD,
     Array,
@@ -416,6 +416,7 @@ def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[Stabl
     duration = scene.declaration.stable_for or scene.scenario.duration
     low, high = sorted(scene.declaration.search or [part * scene.timestep for part in _SEARCH])
     limits = scene.declaration.limits
+    setup_over = cache(partial(longer_setup, model, pilot))
 
     def declared_limit(integrator: Integrator) -> Limit | None:
         step = limits.get(integrator.value)  # type: ignore[call-overload]
@@ -427,12 +428,9 @@ def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[Stabl
 
     def row(integrator: Integrator) -> StableRow | None:
         def run(start: int, step: float, span: float) -> StabilityTrial:
-            variant, setup = with_integrator(model, integrator, step), pilot.setup
-            longer = 1.0 if pilot.settles else max(1.0, span / scene.scenario.duration)
-            # What falls is four times as far, and twice as fast, in twice the time.
-            farther = setup.position_bound * longer**2
-            faster = setup.velocity_bound * max(1.0, longer / 2)
-            setup = replace(setup, position_bound=farther, velocity_bound=faster)
+            is_longer = span > scene.scenario.duration and not pilot.settles
+            setup = setup_over(span) if is_longer else pilot.setup
+            variant = with_integrator(model, integrator, step)
             return run_trial(setup, variant, span, half_thickness, start=start)
 
         span, limit = duration, theory.limit(integrator, (low, high))

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from coursebuild.core.model.scenarios import Declarations, DeclaredScenario
 from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.measurement import english
-from coursebuild.features.bench.scenario_view import missed_islands, stable_cells
+from coursebuild.features.bench.scenario_view import missed_islands, stable_cells, stable_title
 from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.linearization import Theory, find_rest, find_theory
 from coursebuild.numerics.pilot import run_pilot
@@ -184,10 +184,22 @@ def test_what_the_gaps_between_timesteps_may_hide_is_said() -> None:
     assert missed_islands(english(), [replace(row, tries=())]) == []
 
 
-def test_what_falls_farther_in_a_longer_time_is_not_lost() -> None:
+def test_a_table_says_all_times_over_which_its_timesteps_are_stable() -> None:
+    row = search(lambda _, step, __: step > 25.4, (1.0, 1000.0))
+    rows = [replace(row, duration=time, energy=None) for time in (4.0, 2785.2, 4.0)]
+    assert stable_title(english(), rows) == "Largest stable timesteps over 4 s – 2790 s"
+
+
+def test_what_grows_or_falls_farther_in_a_longer_time_is_not_lost() -> None:
     ball = """<mujoco><worldbody><body pos="0 0 10"><joint type="slide" axis="0 0 1"/>
     <geom size="0.1" mass="1"/></body></worldbody></mujoco>"""
-    for row in rows_of(ball, stable_for=6.0).values():
+    # It doubles every 1.4 s, under any method: twice the duration shows 148 times as much.
+    excited = """<mujoco><option timestep="0.005" gravity="0 0 0"/><worldbody><body>
+    <joint type="slide" stiffness="25" damping="-1"/><geom size="0.1" mass="1"/></body>
+    </worldbody></mujoco>"""
+    rows = [*rows_of(ball, stable_for=6.0).values()]
+    rows += rows_of(excited, qpos=(0.1,), stable_for=10.0, search=(0.001, 0.02)).values()
+    for row in rows:
         assert (row.largest, row.bracket) == (None, None), row.integrator
 
 

@@ -108,7 +108,7 @@ def scenario_view(
             remark = words("measured.stable_short", steps=FEWEST_STEPS)
         rows.append((row.integrator, (*stable_cells(words, row), remark)))
     notes += missed_islands(words, report.stable)
-    label = stable_title(words, report.stable[0]) if rows else ""
+    label = stable_title(words, report.stable) if rows else ""
     return ScenarioView(
         anchor=anchor,
         title=report.title or report.name,
@@ -260,12 +260,14 @@ STABLE = (
 """Keys of the titles of `stable_cells`."""
 
 
-def stable_title(words: Strings, row: StableRow) -> str:
+def stable_title(words: Strings, rows: Sequence[StableRow]) -> str:
     """Title a table of largest stable timesteps: it says which runs count as stable."""
-    time = seconds_text(row.duration)
-    if row.energy is None:
+    durations = sorted(row.duration for row in rows)
+    times = (seconds_text(float(f"{time:.3g}")) for time in (durations[0], durations[-1]))
+    time, energy = " – ".join(dict.fromkeys(times)), rows[0].energy
+    if energy is None:
         return words("measured.stable", time=time)
-    return words("measured.stable_energy", time=time, energy=f"{row.energy:.3g}")
+    return words("measured.stable_energy", time=time, energy=f"{energy:.3g}")
 
 
 def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:

@@ -142,9 +142,8 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
         )
         for line in report.boundaries
     ]
-    label = (
-        f"{report.title}: {scenario_view.stable_title(words, report.boundaries[0])}" if rows else ""
-    )
+    title = scenario_view.stable_title(words, report.boundaries) if rows else ""
+    label = f"{report.title}: {title}"
     boundaries = scenario_view.integrator_table(words, label, _BOUNDARY, rows, merge=True)
     tables = (boundaries, _figures(words, report), orders)
     quantities = case_quantities(report)
