@@ -84,6 +84,13 @@ def load(
     return Parsed(course, tuple(loader.diagnostics))
 
 
+def package_files(root: Path, course: Course) -> Iterator[str]:
+    """Yield the files of Python in folders that scripts import from, relative to the root."""
+    for package in course.packages:
+        files = (root / package.path).glob("*.py" if package.path == "." else "**/*.py")
+        yield from (file.relative_to(root).as_posix() for file in files)
+
+
 def load_course(root: Path, *, code: Code = "known") -> Course:
     """The course below `root`, whatever is wrong in its lessons, for commands that only look.
 
@@ -220,10 +227,7 @@ class _Loader:
             paths |= {*shown_files(course), *(feature.path for feature in course.features)}
             paths |= {file.path for file in course.theme.css}
             sources += course.theme.templates
-            for package in course.packages:
-                folder = self.root / package.path
-                files = folder.glob("*.py" if package.path == "." else "**/*.py")
-                paths |= {file.relative_to(self.root).as_posix() for file in files}
+            paths |= set(package_files(self.root, course))
         paths -= {source.path for source in (*sources, *self.files.lessons, *self.files.pages)}
         paths -= {document.source.path for document in ([] if course is None else course.documents)}
         for path in sorted(path for path in paths if path.endswith(_TEXTS)):

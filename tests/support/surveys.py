@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import mujoco
 
@@ -78,7 +78,7 @@ def run_survey(
     *,
     lesson: str = "",
     keeps: Mapping[str, str] | None = None,
-    has_commands: bool = False,
+    numbered_kinds: Collection[str] = (),
     declarations: Declarations = NO_DECLARATIONS,
     quick: bool = True,
     clock: Clock | None = None,
@@ -96,7 +96,7 @@ def run_survey(
         readers=(read_code("examples/a.py", lesson),) if lesson else (),
         keeps={key: Keep(key, reason, finding_span=place) for key, reason in (keeps or {}).items()},
         locked={},
-        has_commands=has_commands,
+        numbered_kinds=numbered_kinds,
         clock=clock,
         quick=quick,
         tell=lambda _: None,

@@ -52,6 +52,8 @@ class FindingKind(Struct, frozen=True):
     """Why such a thing changes no motion, in any state; empty where only runs speak for it."""
     fields: str = ""
     """Fields of the compiled model that differ without it, beside those of its view."""
+    numbered: str = ""
+    """Why such things stay where scenarios give them by number."""
 
 
 _UNUSED = "no motion is computed of it, nothing refers to it, and no code can notice"
@@ -79,6 +81,7 @@ KINDS = {
         "Actuator",
         "its force is a multiple of a command that is always 0",
         "key_ctrl nu nout nJmom tree_sleep_policy",
+        "scenarios give commands by number: their rows would have to be shortened",
     ),
     "tendon-idle": FindingKind(
         "nothing acts along the {}",
@@ -87,7 +90,13 @@ KINDS = {
         "it has no force, inertia or limit of its own, and nothing refers to it",
         "wrap_type wrap_prm nwrap nJten ten_J_rownnz ten_J_rowadr ten_J_colind",
     ),
-    "unused-keyframe": FindingKind("nothing begins at the {}", "keyframe", "Keyframe", _UNUSED),
+    "unused-keyframe": FindingKind(
+        "nothing begins at the {}",
+        "keyframe",
+        "Keyframe",
+        _UNUSED,
+        numbered="scenarios give keyframes by number: another would have the number",
+    ),
     "unused-site": FindingKind("nothing uses the {}", "site", "Site", _UNUSED),
     "unused-material": FindingKind("nothing uses the {}", "material", "Material", _UNUSED),
     "unused-texture": FindingKind("nothing uses the {}", "texture", "Texture", _UNUSED),

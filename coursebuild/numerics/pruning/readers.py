@@ -218,8 +218,8 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Mod
     if _INCLUDE.search(text):
         reasons.append("it assembles models from files")
     if is_python:
-        modules = (name for match in _IMPORT.findall(text) for name in _modules(*match))
         harmless = _LEAVE_MODELS_ALONE.union(course_modules)
+        modules = imported_modules(text)
         reasons += [f"it imports {name}" for name in modules if name not in harmless]
         reasons += ["it matches patterns by position"] if _POSITIONAL.search(text) else []
         reasons += ["it uses `bind`"] if "bind" in members else []  # to any element of a spec
@@ -257,7 +257,7 @@ def _may_do_anything(word: str) -> bool:
     return word in _OPAQUE or hidden or (bool(_FUNCTION.match(word)) and word not in _SIMULATION)
 
 
-def _modules(source: str, imports: str) -> list[str]:
-    return [
-        name.split()[0].split(".")[0] for name in (source or imports).split(",") if name.split()
-    ]
+def imported_modules(text: str) -> list[str]:
+    """The modules that Python imports, each by the first part of its name."""
+    names = (name for match in _IMPORT.findall(text) for name in (match[0] or match[1]).split(","))
+    return [name.split()[0].partition(".")[0] for name in names if name.split()]

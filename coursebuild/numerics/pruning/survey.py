@@ -100,8 +100,8 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     """By the finding: `KIND`, or `KIND NAME`."""
     locked: Mapping[str, str]
     """Files that are not to be changed, and why."""
-    has_commands: bool
-    """Whether scenarios give commands, by the number of their actuator."""
+    numbered_kinds: Collection[str]
+    """Kinds of findings about things that scenarios give by their number."""
     clock: Clock | None
     """`None`: nothing is timed."""
     quick: bool
@@ -390,8 +390,8 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             return "it is kept"
         if label != PROVED_LABEL:
             return f"only what is {PROVED_LABEL} is changed"
-        if kind == "actuator-idle" and self.has_commands:
-            return "scenarios give commands by number: their rows would have to be shortened"
+        if kind in self.numbered_kinds:
+            return KINDS[kind].numbered
         locked = (self.locked.get(edit.path, "") for edit in edits)
         return next(filter(None, locked), "")
 

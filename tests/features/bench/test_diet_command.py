@@ -148,8 +148,24 @@ def test_sensor_that_a_lesson_reads_is_no_finding(course: Path, capsys: Capture)
     lesson.write_text(LESSON.replace("SCRIPT", 'model_path("swing")'))
     assert run(course) == 1
     (course / "content" / "labs").mkdir()
-    (course / "content" / "labs" / "twin.js").write_text("data.sensordata[0]")
+    twin = course / "content" / "labs" / "twin.js"
+    twin.write_text("data.sensordata[0]")
     assert run(course) == 0
+    # What a script imports may load the model for it, and what it hands on to may read.
+    twin.unlink()
+    (course / "content" / "course.toml").write_text(
+        course_map(1).replace("[course]", '[course]\npackages = ["lib"]')
+    )
+    (course / "lib").mkdir()
+    (course / "lib" / "swings.py").write_text('model_path("swing")\n')
+    shows = course / "lib" / "shows.py"
+    shows.write_text("def show(data):\n    print(data.sensordata)\n")
+    lesson.write_text(LESSON.replace("SCRIPT", "import swings\nprint(data.sensordata)"))
+    assert run(course) == 0
+    lesson.write_text(LESSON.replace("SCRIPT", "import swings, shows"))
+    assert run(course) == 0
+    shows.write_text("def show(data):\n    print(data.qpos)\n")
+    assert run(course) == 1
 
 
 def test_a_part_without_which_a_script_prints_something_else_is_no_finding(
@@ -184,6 +200,16 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
     findings = {finding["kind"]: finding for finding in value["models"][0]["findings"]}
     assert set(findings) == {"unused-keyframe", "sensor-unread"}
     assert [place["name"] for place in findings["unused-keyframe"]["places"]] == ["go"]
+    assert findings["unused-keyframe"]["unfixed"].startswith("scenarios give keyframes by number")
+    sweep = '[[sweep]]\nname = "noise"\nvary = { "sensor:time.cutoff" = [1], "VARIED" = [1] }\n'
+    # A ball of this size would hit the wall that the pendulum's cannot reach.
+    wall = '<worldbody><geom size=".1" pos="2 0 1"/>'
+    (course / "models" / "swing.xml").write_text(MODEL.replace("<worldbody>", wall))
+    for varied, kinds in (("joint.damping", {"contact-off"}), ("geom.size[0]", set())):
+        declarations.write_text(sweep.replace("VARIED", varied))
+        status, value = values(course, capsys)
+        findings = value["models"][0]["findings"]
+        assert {finding["kind"] for finding in findings if finding["fixable"]} == kinds
 
 
 SHARED_PART = (

@@ -52,7 +52,7 @@ from coursebuild.numerics.reports.diet_report import (
 )
 from coursebuild.numerics.reports.records import DIET, ReportFailure
 from coursebuild.numerics.simulation import silent
-from coursebuild.pipeline.load import load
+from coursebuild.pipeline.load import load, package_files
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
@@ -238,7 +238,8 @@ class _DietRun(MeasuringRun):
         parts += model.locked.items()
         if model.readers and self.course is not None:
             parts += [(d.source.path, d.source.text) for d in self.course.documents]
-            parts += [(path, _file_state(self.options.root / path)) for path in self.files.files]
+            paths = (*self.files.files, *package_files(self.options.root, self.course))
+            parts += [(path, _file_state(self.options.root / path)) for path in paths]
         return tuple(parts)
 
     def load(self, kind: str, parts: tuple[object, ...], report_type: type[_T]) -> _T | None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import re
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from coursebuild.core.files.read import CourseFiles, read_bytes
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model import Course, FeatureBlock, MjcfModel, find_blocks
 from coursebuild.core.model.results import Machine
+from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.core.run.mjcf import TEXT_PATH, model_files
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import diagnose
@@ -38,10 +39,10 @@ from coursebuild.features.bench.commands.measuring import report_errors
 from coursebuild.features.lab.model import Lab
 from coursebuild.numerics.pruning.comparison import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelTextError, model_bytes, open_model
-from coursebuild.numerics.pruning.readers import VIEWS, ModelReader, read_code
+from coursebuild.numerics.pruning.readers import VIEWS, ModelReader, imported_modules, read_code
 from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
 from coursebuild.numerics.pruning.xml_edits import MarkupError
-from coursebuild.pipeline.load import load
+from coursebuild.pipeline.load import load, package_files
 from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.scenes import CourseScene, scene_digest
 from coursebuild.pipeline.verify import verify
@@ -49,6 +50,8 @@ from coursebuild.pipeline.verify import verify
 _CODE = (".py", ".js", ".mjs", ".ts")
 _NOT_DRAWN = frozenset(("Sensor", "Actuator", "Keyframe", "Numeric", "Tuple"))
 """Kinds that the picture of a lab does not show."""
+_SHAPES = ("alt", "fromto", "scale")
+"""Fields of a specification that give places or sizes, and that a model does not have."""
 _COPIED_FOLDERS = ("content", "models")
 
 
@@ -58,16 +61,48 @@ def readers_of(
     """List everything in the course that may use a model."""
     if course is None:
         return (ModelReader("content/course.toml", opaque="the course cannot be read"),)
-    modules = {Path(path).stem for path in files.files if path.endswith(".py")}
-    scripts = [
-        read_code(script.path, script.text, modules)
-        for script in extract(course).value
-        if _may_use(script.text, scene.name)
-    ]
-    blocks = list(_block_readers(course, scene.name))
-    if not scripts and not blocks:
+    paths = [path for path in files.files if path.endswith(_CODE)]
+    texts = {path: _read_text(root, path) for path in (*paths, *package_files(root, course))}
+    texts |= {script.path: script.text for script in extract(course).value}
+    modules = {name for path in texts for name in _module_names(path)}
+    users = _find_users({path: text or "" for path, text in texts.items()}, scene.name)
+    blocks = tuple(_block_readers(course, scene.name))
+    if not users and not blocks:
         return ()
-    return (*scripts, *blocks, *_code_readers(root, files, modules))
+    return blocks + tuple(
+        ModelReader(path, opaque="it cannot be read")
+        if text is None
+        else read_code(path, text, modules)
+        for path, text in texts.items()
+        if path in users or path in files.files
+    )
+
+
+def _read_text(root: Path, path: str) -> str | None:
+    """The text of a file; `None` if it cannot be read."""
+    try:
+        return read_bytes(root, path).decode("utf-8", "replace")
+    except EffectError:
+        return None
+
+
+def _module_names(path: str) -> frozenset[str]:
+    """The words with which an import of a file of Python may begin."""
+    file = Path(path)
+    return frozenset((file.stem, *file.parent.parts)) if file.suffix == ".py" else frozenset()
+
+
+def _find_users(texts: Mapping[str, str], model: str) -> frozenset[str]:
+    """Find the Python that may use a model, what imports that, and what all of it imports."""
+    names = {path: _module_names(path) for path in texts if path.endswith(".py")}
+    imports = {path: frozenset(imported_modules(texts[path])) for path in names}
+    users = {path for path in names if _may_use(texts[path], model)}
+    for words, targets in ((imports, names), (names, imports)):
+        count = -1
+        while len(users) > count:
+            count, reach = len(users), {name for path in users for name in targets[path]}
+            users |= {path for path in names if not words[path].isdisjoint(reach)}
+    return frozenset(users)
 
 
 def _may_use(text: str, model: str) -> bool:
@@ -95,17 +130,6 @@ def _block_readers(course: Course, model: str) -> Iterator[ModelReader]:
             if re.search(r"\"key(frame)?\"\s*:\s*\d", block.config):
                 kinds |= {"Keyframe"}
             yield replace(code, names=code.names | names, kinds=code.kinds | kinds)
-
-
-def _code_readers(root: Path, files: CourseFiles, modules: set[str]) -> Iterator[ModelReader]:
-    for path in files.files:
-        if path.endswith(_CODE):
-            try:
-                text = read_bytes(root, path).decode("utf-8", "replace")
-            except EffectError:
-                yield ModelReader(path, opaque="it cannot be read")
-            else:
-                yield read_code(path, text, modules)
 
 
 class Reruns:
@@ -252,7 +276,7 @@ class DietModel:
                 readers=self.readers,
                 keeps=self.keeps,
                 locked=self.locked,
-                has_commands=any(scenario.controls for scenario in declarations.scenarios),
+                numbered_kinds=frozenset(_find_numbered_kinds(declarations.scenarios)),
                 clock=time.thread_time_ns,
                 quick=quick,
                 tell=tell,
@@ -304,16 +328,32 @@ def _find_locked_files(root: Path, files: CourseFiles, path: str, text: str) -> 
     return reasons
 
 
+def _find_numbered_kinds(scenarios: Iterable[DeclaredScenario]) -> Iterator[str]:
+    """Yield the kinds of findings about things that scenarios give by number."""
+    for scenario in scenarios:
+        if scenario.controls:
+            yield "actuator-idle"
+        if isinstance(scenario.keyframe, int):
+            yield "unused-keyframe"
+
+
 def _find_readers(
     root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
 ) -> tuple[ModelReader, ...]:
-    """List everything in the course that may read a model, its observables included."""
-    readers = list(readers_of(course, root, files, scene))
+    """List everything in the course that may read a model, its declarations included."""
     scenarios = scene.declarations.scenarios
-    names = frozenset(s.observable.name for s in scenarios if s.observable is not None)
+    names = {s.observable.name for s in scenarios if s.observable is not None}
     fields = {"energy"} if any("energy" in (s.conserved or ()) for s in scenarios) else set()
-    if names or fields:
-        readers.append(
-            ModelReader(scene.declarations.source.path, names=names, words=frozenset(fields))
-        )
-    return tuple(readers)
+    kinds: set[str] = set()
+    for part in (part for sweep in scene.declarations.sweeps for part in sweep.variations):
+        things, _, field = part.parameter.rpartition(".")
+        kind, _, name = things.partition(":")
+        names |= {name} - {""}
+        kinds |= set() if name else {VIEWS.get(kind, kind)}
+        field = field.partition("[")[0]
+        fields |= {field, "pos"} if field in _SHAPES else {field}
+    words = frozenset(fields)
+    path = scene.declarations.source.path
+    toml_reader = ModelReader(path, frozenset(names), words, words, kinds=frozenset(kinds))
+    readers = readers_of(course, root, files, scene)
+    return (*readers, toml_reader) if names or fields else readers
