@@ -142,8 +142,9 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
         )
         for line in report.boundaries
     ]
-    title = scenario_view.stable_title(words, report.boundaries) if rows else ""
-    label = f"{report.title}: {title}"
+    label = (
+        f"{report.title}: {scenario_view.stable_title(words, report.boundaries)}" if rows else ""
+    )
     boundaries = scenario_view.integrator_table(words, label, _BOUNDARY, rows, merge=True)
     tables = (boundaries, _figures(words, report), orders)
     quantities = case_quantities(report)
