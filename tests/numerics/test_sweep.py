@@ -112,7 +112,8 @@ def test_a_cylinder_that_hops_as_it_rolls_slides_all_the_way() -> None:
     toml = TOML.replace("qvel = [-1]\n", "").replace('measure = "body:ball"\n', "")
     vary = 'vary = { "geom.margin" = [0, 0.005], "option.timestep" = [0.002] }'
     option = '<compiler angle="radian"/><option timestep="0.001" cone="elliptic"/>'
-    rows = run_sweep(vary, f"<mujoco>{option}{slope}{cylinder}</worldbody></mujoco>", toml=toml).rows
+    mjcf = f"<mujoco>{option}{slope}{cylinder}</worldbody></mujoco>"
+    rows = run_sweep(vary, mjcf, toml=toml).rows
     distance = 9.81 * (math.sin(0.5) - 3 * 0.12 * math.cos(0.5)) * 0.4**2 / 2
     for row in rows:
         assert row.slip == pytest.approx(distance, rel=0.05), row.value
