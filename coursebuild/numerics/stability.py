@@ -26,10 +26,10 @@ from msgspec import Struct, field
 from msgspec.structs import asdict, replace
 
 from coursebuild.numerics.detector import (
-    BAD_STATES,
     Peaks,
     RunStatus,
     driving_force,
+    has_bad_state,
     judge,
     update_peaks,
 )
@@ -376,14 +376,13 @@ def run_trial(
             most = max(limits.energy_bound, now.energy)
             limits = replace(limits, velocity_bound=fastest, energy_bound=most)
         excess_end = excess_end if now.is_within(setup) else count * timestep
-        is_lost = not now.is_within(limits) or any(data.warning[n].number for n in BAD_STATES)
+        is_lost = not now.is_within(limits) or has_bad_state(data)
         if is_lost or (count > max(commands) and now.velocity < _AT_REST * peak_speed):
             break
         peak_speed = max(peak_speed, now.velocity)
         if commands.get(stop):
             data.ctrl[:] = commands[stop]
-        with np.errstate(over="ignore"):
-            sizes.append((count, float(np.linalg.norm(data.qvel))))
+        sizes.append((count, math.hypot(*data.qvel.tolist())))
     is_lost = is_lost or excess_end > _DECAY * span  # it shot up, and has not come down
     status = judge(model, data, count * timestep, now, setup if is_lost else limits).status
     if is_lost and status is RunStatus.OK:
