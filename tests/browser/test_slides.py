@@ -58,9 +58,9 @@ def test_play_moves_the_body_of_a_lab_in_a_page_from_disk(
     play.click()
     expect(clock).not_to_have_text("0.00 s")
     expect(lab.locator(".lab-live dd").first).not_to_have_text(first)
-    for following in page.locator(".lab").all()[
-        1:
-    ]:  # a course's own kind of lab, and one with an editor
+    lab.get_by_role("button", name="Pause").click()
+    # A course's own kind of lab, and one with an editor.
+    for following in page.locator(".lab").all()[1:]:
         following.scroll_into_view_if_needed()
         expect(following).to_have_class(re.compile("lab-on"))
     expect(page.locator(".lab-message:visible")).to_have_count(0)
@@ -77,6 +77,8 @@ def test_keys_and_addresses_lead_from_slide_to_slide(
         ("ArrowRight", 2), (" ", 3), ("Shift+Space", 2), ("Home", 1), ("End", 3), ("ArrowLeft", 2)
     ):  # fmt: skip
         if key == " ":
+            # A lab that has come grows no more.
+            expect(page.locator(".lab").first).to_have_class(re.compile("lab-on"))
             page.evaluate("scrollTo(0, 1e6)")
         page.keyboard.press(key)
         expect(counter).to_have_text(f"{number} / 3")
