@@ -40,12 +40,14 @@ from coursebuild.numerics.measure import (
     friction_holds,
     largest_errors,
     momentum_drift,
+    quantity_errors,
+    quantity_name,
     visible_error,
 )
 from coursebuild.numerics.pilot import CONES, NUDGE, Pilot, horizon_errors, position_distances
 from coursebuild.numerics.problem import ROUNDING, Integrator, Setup, Sizes
 from coursebuild.numerics.reports.scene_report import FLOORS
-from coursebuild.numerics.scene import ExactMotion, SceneError
+from coursebuild.numerics.scene import ExactMotion, Scene, SceneError
 from coursebuild.numerics.simulation import (
     EngineStates,
     initial_data,
@@ -352,6 +354,24 @@ def _with_closed_form(
         agreement=gap.largest,
         note="",
     )
+
+
+def least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[float, float]:
+    """Below which a reference knows nothing of what is seen, and of the declared quantity.
+
+    It is as much of what its two motions differ by there as it may be off in itself: a formula that
+    was checked is far nearer to the truth than to the engine, whose friction and contacts are soft.
+    """
+    states, second_states, floor = reference.states, reference.second_states, reference.floor
+    gap = _gap(model, states, second_states)
+    sizes = ((floor.place, gap.place), (floor.velocity, gap.velocity))
+    part = max((least / apart for least, apart in sizes if apart > 0), default=1.0)
+    scale = FLOORS * min(1.0, part)
+    least_seen = scale * visible_error(model, scene, states, second_states)
+    if not quantity_name(model, scene):
+        return least_seen, 0.0
+    distances = quantity_errors(model, scene, states, second_states)
+    return least_seen, scale * float(distances.max())
 
 
 class Cone(Struct, frozen=True):

@@ -301,18 +301,6 @@ def quantity_errors(model: Any, scene: Scene, states: EngineStates, exact: Engin
     return distances
 
 
-def least_known(
-    model: Any, scene: Scene, states: EngineStates, second_states: EngineStates
-) -> tuple[float, float]:
-    """Below which two references know nothing of what is seen, and of the declared quantity."""
-    least_seen = scene_report.FLOORS * visible_error(model, scene, states, second_states)
-    if not quantity_name(model, scene):
-        return least_seen, 0.0
-    return least_seen, scene_report.FLOORS * float(
-        quantity_errors(model, scene, states, second_states).max()
-    )
-
-
 Pair: TypeAlias = tuple[int, int]
 """Two geoms, by number."""
 Sticks: TypeAlias = tuple[frozenset[Pair], ...]

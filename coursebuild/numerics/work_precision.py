@@ -95,10 +95,7 @@ def measure_scenario(
     conserved = known_motion.find_conserved(model, pilot, reference)
     late_energy = measure.mean_late_energy(model, pilot, reference.horizon)
     leasts = zip(
-        *(
-            measure.least_known(model, scene, cone.reference.states, cone.reference.second_states)
-            for cone in cones.values()
-        ),
+        *(known_motion.least_known(model, scene, cone.reference) for cone in cones.values()),
         strict=True,
     )
     basis = Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
