@@ -210,6 +210,7 @@ def mark_luck(
     """
     own_row = next(row for row in rows if row.own)
     least = max(quantity.least, _NEGLIGIBLE * (quantity.value_of(own_row) or 0.0))
+    slack = 1 + ERROR_SLACK
     marked_rows = []
     for row in rows:
         setting, place = row.setting, quantity.value_of(row)
@@ -225,9 +226,12 @@ def mark_luck(
                 work = "shorter timesteps" if dear.timestep < setting.timestep else ""
             elif dear == replace(setting, iterations=dear.iterations):
                 work = "more iterations" if dear.iterations > setting.iterations else ""
-            if luck or not work or place is None or error is None:
+            if luck or not work or row.status != "ok":
                 continue
-            if error > max(place * (1 + ERROR_SLACK), least):
+            known_until = math.inf if row.parted is None else (1 - _WORTH_SAYING) * row.parted
+            if rival.parted is not None and rival.parted < known_until:
+                luck = f"with {work} it is off sooner"
+            elif place is not None and error is not None and error > max(place * slack, least):
                 luck = f"its error rises with {work}"
         marked_rows.append(replace(row, lucky=luck))
     return tuple(marked_rows)
@@ -308,14 +312,14 @@ def _describe_lucky(rows: Rows, own_place: FrontPoint, quantity: Quantity) -> st
 
 def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
     text = f"the motion is chaotic: it is {error} from the exact one at {row.parted:.3g} s"
-    parted = [(r.parted, n) for n, r in enumerate(rows) if r.parted is not None]
-    whole = [r for r in rows if r.status == "ok" and r.parted is None and r.seen is not None]
+    usable = [r for r in rows if r.status == "ok" and not r.lucky]
+    whole = [r for r in usable if r.parted is None and r.seen is not None]
     if whole:
         cheapest = min(whole, key=lambda r: r.cost.value if r.cost else float(r.evaluations))
         return f"{text}; under {setting_text(cheapest.setting)} not before the horizon"
-    longest, n = max(parted)
-    if longest > row.parted:  # type: ignore[operator]
-        text += f", under {setting_text(rows[n].setting)} at {longest:.3g} s"
+    best = max(usable, key=lambda r: r.parted or 0.0, default=row)
+    if (best.parted or 0.0) > (row.parted or 0.0):
+        text += f", under {setting_text(best.setting)} at {best.parted:.3g} s"
     return text
 
 
@@ -357,7 +361,7 @@ def _describe_error(
         size = f"{'less than ' if 0 < error <= least else ''}{error:.2g}"
         return f"; the scene's own error cannot be seen: it is {size} of what an eye can tell"
     text = f"; the scene's own error can be seen: it is {error:.2g} times what an eye can tell"
-    unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost is not None]
+    unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost and not r.lucky]
     if own_row.cost is None:
         return text
     if unseen:

@@ -347,3 +347,23 @@ def test_chaotic_scene_is_judged_by_how_long_runs_last() -> None:
     assert text == (
         "the motion is chaotic: it is 2 mm from the exact one at 2.4 s, under RK4 at 2 ms at 12.4 s"
     )
+    lucky_row = row("Euler", 0.004, cost=0.5, seen=None, parted=20.0)
+    text = verdict(mark_luck((*rows, lucky_row), {}), [True] * 3).text
+    assert text.endswith(" at 2.4 s, under RK4 at 2 ms at 12.4 s"), "shorter timesteps are worse"
+    whole_row = row("Euler", 0.004, cost=0.5, seen=0.1)
+    marked_rows = mark_luck((*rows, whole_row), {})
+    assert [r.lucky for r in marked_rows] == ["", "", "with shorter timesteps it is off sooner"]
+    assert verdict(marked_rows, [True, True, False]).text.endswith(" at 12.4 s")
+
+
+def test_what_cannot_be_seen_only_by_luck_is_no_advice() -> None:
+    rows = mark_luck(
+        (
+            row("Euler", 0.004, cost=0.5, seen=0.5),
+            row("Euler", 0.002, cost=1.0, seen=2.5, own=True),
+            row("RK4", 0.002, cost=4.0, seen=0.1),
+        ),
+        {},
+    )
+    text = verdict(rows, [False, True, False]).text
+    assert "the cheapest without one that is seen is RK4 at 2 ms, at 4 times its cost" in text

@@ -151,8 +151,8 @@ def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(course: P
     toml = '[[scenario]]\nname = "slide"\nqvel = [1, 0]\nduration = 0.4\nsample = 0.02\n'
     scenario = report(course, SLIDE.format(friction=0.5, height=0), toml)
     assert scenario.reference == "closed" and scenario.figures == ()
-    (own,) = (row for row in scenario.rows if row.own)
-    assert own.seen is not None and own.seen > 3 * scenario.least_seen, "the formula resolves it"
+    (own_row,) = (row for row in scenario.rows if row.own)
+    assert own_row.seen is not None and own_row.seen > 3 * scenario.least_seen, "resolved"
     toml_with_figures = toml + "expected = { penetration = 1e-4 }\nlimits = { Euler = 0.01 }\n"
     scenario = report(course, SLIDE.format(friction=0.5, height=0), toml_with_figures)
     depths = {line.integrator: (line.measured, line.exact) for line in scenario.figures}
