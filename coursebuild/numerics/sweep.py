@@ -113,7 +113,7 @@ def _variant(
         scenario.steps(float(model.opt.timestep))
     except ValueError as error:
         message = (
-            f"`{part.parameter}` cannot be {_value_text(value)}: {' '.join(str(error).split())}"
+            f"`{part.parameter}` cannot be `{_value_text(value)}`: {' '.join(str(error).split())}"
         )
         raise SceneError(message, part.span) from None
     text = f"{100 * (float(value) - 1):+g} %" if part.relative else _value_text(value)  # type: ignore[arg-type]
@@ -150,7 +150,7 @@ def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], l
             else:
                 setattr(element, field, type(old)(old * new if part.relative else new))
         except (TypeError, ValueError, KeyError, IndexError):
-            message = f"`{part.parameter}` cannot be {_value_text(value)}"
+            message = f"`{part.parameter}` cannot be `{_value_text(value)}`"
             raise SceneError(message, part.span) from None
         after.append(np.array(getattr(element, field), copy=True))
         if part.relative and not np.isfinite(after[-1]).all():

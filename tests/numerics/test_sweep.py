@@ -124,9 +124,9 @@ def test_a_cylinder_that_hops_as_it_rolls_slides_all_the_way() -> None:
     [
         ('{ "geom:bell.solref" = [[1, 1]] }', "the model has no parameter `geom:bell.solref`"),
         ('{ "geom.solrof" = [1] }', "the model has no parameter `geom.solrof`"),
-        ('{ "option.cone" = ["round"] }', "`option.cone` cannot be round"),
-        ('{ "geom.solref[7]" = [1] }', "`geom.solref[7]` cannot be 1"),
-        ('{ "geom:ball.size[0]" = [-1] }', "`geom:ball.size[0]` cannot be -1"),
+        ('{ "option.cone" = ["round"] }', "`option.cone` cannot be `round`"),
+        ('{ "geom.solref[7]" = [1] }', "`geom.solref[7]` cannot be `1`"),
+        ('{ "geom:ball.size[0]" = [-1] }', "`geom:ball.size[0]` cannot be `-1`: "),
         ('{ "geom:wall.mass" = "±1 %" }', "`geom:wall.mass` is not given in the MJCF"),
         ('{ "option.timestep" = [0.003] }', "the sampling interval (0.02 s) is not a multiple of"),
     ],

@@ -195,8 +195,12 @@ SweepFigure: TypeAlias = Literal[
     "change", "figure", "penetration", "slip", "restitution",
     "residual", "iterations", "cost", "throughput"
 ]  # fmt: skip
-_SHARE = r"±\s*(\d+(?:\.\d+)?)\s*%"
+_SHARE = r"^±\s*(?!0+(?:\.0+)?\s*%)\d+(?:\.\d+)?\s*%$"
 """How a sweep names a share of the model's own value."""
+_WORD: TypeAlias = Annotated[
+    str, matching(r"^[^±%]*$", "a number or a word of MuJoCo's; a share stands alone: `±1 %`")
+]
+_NUMBERS: TypeAlias = Annotated[tuple[float, ...], Meta(min_length=1)]
 
 
 class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -206,7 +210,7 @@ class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
     vary: Annotated[
         dict[
             str,
-            tuple[float | str | tuple[float, ...], ...]
+            Annotated[tuple[float | _WORD | _NUMBERS, ...], Meta(min_length=1)]
             | Annotated[str, matching(_SHARE, "values, or a share: `±1 %`")],
         ],
         describe("values by parameter, such as `geom.solref[0]`, `option.cone`, `threads`"),

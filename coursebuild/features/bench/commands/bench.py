@@ -249,6 +249,16 @@ class SceneRun(MeasuringRun):
             self.progress.describe(name, text)
 
         settings = {"quick": self.quick, "timed": timed, "tell": tell}
+        # First, since a value that the model cannot have is told at once.
+        sweeps = tuple(
+            self._load_or_measure_part(
+                "bench-sweeps",
+                (*parts, sweep.name),
+                SweepReport,
+                partial(self._measure_sweep, scene, compiled_scene, sweep, settings),
+            )
+            for sweep in scene.declarations.sweeps
+        )
         report = SceneReport(
             model=name,
             digest=scene.digest,
@@ -263,15 +273,7 @@ class SceneRun(MeasuringRun):
                 )
                 for n in range(len(compiled_scene.scenarios))
             ),
-            sweeps=tuple(
-                self._load_or_measure_part(
-                    "bench-sweeps",
-                    (*parts, sweep.name),
-                    SweepReport,
-                    partial(self._measure_sweep, scene, compiled_scene, sweep, settings),
-                )
-                for sweep in scene.declarations.sweeps
-            ),
+            sweeps=sweeps,
         )
         if self.cards and report.scenarios:
             tell("what it is made of")
