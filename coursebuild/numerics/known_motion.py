@@ -364,14 +364,13 @@ def least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[float
     """
     states, second_states, floor = reference.states, reference.second_states, reference.floor
     gap = _gap(model, states, second_states)
-    sizes = ((floor.place, gap.place), (floor.velocity, gap.velocity))
-    part = max((least / apart for least, apart in sizes if apart > 0), default=1.0)
-    scale = FLOORS * min(1.0, part)
-    least_seen = scale * visible_error(model, scene, states, second_states)
+    share = min(1.0, floor.place / (gap.place or 1.0))
+    least_seen = FLOORS * share * visible_error(model, scene, states, second_states)
     if not quantity_name(model, scene):
         return least_seen, 0.0
+    share = max(share, min(1.0, floor.velocity / (gap.velocity or 1.0)))
     distances = quantity_errors(model, scene, states, second_states)
-    return least_seen, scale * float(distances.max())
+    return least_seen, FLOORS * share * float(distances.max())
 
 
 class Cone(Struct, frozen=True):
