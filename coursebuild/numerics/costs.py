@@ -221,6 +221,7 @@ def mark_luck(
                 luck = f"it is beyond its largest stable timestep, {seconds_text(limit, 3)}"
         for rival in rows:
             dear, error, work = rival.setting, quantity.value_of(rival), ""
+            error = error if rival.parted is None else math.inf
             if dear == replace(setting, timestep=dear.timestep):
                 work = "shorter timesteps" if dear.timestep < setting.timestep else ""
             elif dear == replace(setting, iterations=dear.iterations):
@@ -309,7 +310,7 @@ def _describe_lucky(rows: Rows, own_place: FrontPoint, quantity: Quantity) -> st
 def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
     text = f"the motion is chaotic: it is {error} from the exact one at {row.parted:.3g} s"
     parted = [(r.parted, n) for n, r in enumerate(rows) if r.parted is not None]
-    whole = [r for r in rows if r.status == "ok" and r.parted is None and r.seen is not None]
+    whole = [r for r in rows if r.parted is None and r.seen is not None and not r.lucky]
     if whole:
         cheapest = min(whole, key=lambda r: r.cost.value if r.cost else float(r.evaluations))
         return f"{text}; under {setting_text(cheapest.setting)} not before the horizon"
@@ -357,12 +358,13 @@ def _describe_error(
         size = f"{'less than ' if 0 < error <= least else ''}{error:.2g}"
         return f"; the scene's own error cannot be seen: it is {size} of what an eye can tell"
     text = f"; the scene's own error can be seen: it is {error:.2g} times what an eye can tell"
-    unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost is not None]
     if own_row.cost is None:
         return text
+    sure = [r for r in rows if r.seen is not None and not r.lucky]
+    unseen = [(r.cost.value, n) for n, r in enumerate(sure) if (r.seen or 0.0) < 1 and r.cost]
     if unseen:
-        cost, first = min((r.cost.value, n) for n, r in enumerate(unseen) if r.cost)
-        name, times = setting_text(unseen[first].setting), f"{cost / own_row.cost.value:.2g}"
+        cost, first = min(unseen)
+        name, times = setting_text(sure[first].setting), f"{cost / own_row.cost.value:.2g}"
         text += f"; the cheapest without one that is seen is {name}, at {times} times its cost"
     elif all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None):
         text += ", and that of every other setting too"

@@ -280,6 +280,18 @@ def test_errors_that_do_not_fall_or_belong_to_no_stable_run_are_luck() -> None:
     assert [bool(row.lucky) for row in ladder(8e-3, 1e-7, 1e-6)] == [True, False, False]
 
 
+def test_an_error_that_is_small_by_luck_recommends_nothing() -> None:
+    rows = ladder(9.0, 0.5, 8.0, 4.0, 0.9, own_number=3)
+    text = verdict(front(rows), [True, False, True, True, False]).text
+    assert text.endswith("without one that is seen is Euler at 250 µs, at 2 times its cost")
+    text = verdict(front(rows[:4]), [True, False, True, True]).text
+    assert text.endswith("it is 4 times what an eye can tell")
+    lasting = row("Euler", 0.004, cost=0.5, seen=0.1)
+    rows = mark_luck((row("Euler", 0.002, cost=1.0, own=True, parted=2.4), lasting), {})
+    assert rows[1].lucky == "its error rises with shorter timesteps"
+    assert verdict(rows, [True, False]).text.endswith("it is 0.1 from the exact one at 2.4 s")
+
+
 def test_fewer_iterations_that_err_less_are_luck() -> None:
     solving = {"solver": "Newton", "cone": "elliptic"}
     few, many = (
