@@ -302,15 +302,21 @@ def quantity_errors(model: Any, scene: Scene, states: EngineStates, exact: Engin
 
 
 def least_known(
-    model: Any, scene: Scene, states: EngineStates, second_states: EngineStates
+    model: Any, scene: Scene, states: EngineStates, second_states: EngineStates, floor: Sizes
 ) -> tuple[float, float]:
-    """Below which two references know nothing of what is seen, and of the declared quantity."""
+    """Below which a reference knows nothing of what is seen, and of the declared quantity.
+
+    Of its difference from the second one counts the share by which the floor says it may be off:
+    the engine may tend elsewhere than a closed form, which is known far better.
+    """
+    gap = largest_errors(errors(motion_of(model, states), motion_of(model, second_states)))
+    share = min(1.0, floor.place / (gap.place or 1.0))
     least_seen = scene_report.FLOORS * visible_error(model, scene, states, second_states)
     if not quantity_name(model, scene):
-        return least_seen, 0.0
-    return least_seen, scene_report.FLOORS * float(
-        quantity_errors(model, scene, states, second_states).max()
-    )
+        return share * least_seen, 0.0
+    figure_share = max(share, min(1.0, floor.velocity / (gap.velocity or 1.0)))
+    least_figure = float(quantity_errors(model, scene, states, second_states).max())
+    return share * least_seen, figure_share * scene_report.FLOORS * least_figure
 
 
 Pair: TypeAlias = tuple[int, int]

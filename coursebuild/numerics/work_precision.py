@@ -96,8 +96,8 @@ def measure_scenario(
     late_energy = measure.mean_late_energy(model, pilot, reference.horizon)
     leasts = zip(
         *(
-            measure.least_known(model, scene, cone.reference.states, cone.reference.second_states)
-            for cone in cones.values()
+            measure.least_known(model, scene, motion.states, motion.second_states, motion.floor)
+            for motion in (cone.reference for cone in cones.values())
         ),
         strict=True,
     )
