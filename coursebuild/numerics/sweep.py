@@ -150,8 +150,10 @@ def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], l
             else:
                 setattr(element, field, type(old)(old * new if part.relative else new))
         except (TypeError, ValueError, KeyError, IndexError):
-            message = f"`{part.parameter}` cannot be {_value_text(value)}"
-            raise SceneError(message, part.span) from None
+            text = _value_text(value)
+            message = f"`{part.parameter}` cannot be {text}"
+            help = f'a share stands alone, without brackets: `"{part.parameter}" = "±1 %"`'
+            raise SceneError(message, part.span, help if "±" in text else "") from None
         after.append(np.array(getattr(element, field), copy=True))
         if part.relative and not np.isfinite(after[-1]).all():
             message = f"`{part.parameter}` is not given in the MJCF, so it cannot be scaled"

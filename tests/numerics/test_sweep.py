@@ -127,6 +127,7 @@ def test_a_cylinder_that_hops_as_it_rolls_slides_all_the_way() -> None:
         ('{ "option.cone" = ["round"] }', "`option.cone` cannot be round"),
         ('{ "geom.solref[7]" = [1] }', "`geom.solref[7]` cannot be 1"),
         ('{ "geom:ball.size[0]" = [-1] }', "`geom:ball.size[0]` cannot be -1"),
+        ('{ "geom.margin" = ["±1 %", 3] }', "`geom.margin` cannot be ±1 %"),
         ('{ "geom:wall.mass" = "±1 %" }', "`geom:wall.mass` is not given in the MJCF"),
         ('{ "option.timestep" = [0.003] }', "the sampling interval (0.02 s) is not a multiple of"),
     ],
@@ -136,6 +137,7 @@ def test_what_is_no_parameter_is_told(vary: str, message: str) -> None:
         run_sweep(f"vary = {vary}")
     assert message in caught.value.message
     assert caught.value.span is not None and caught.value.span.path == "models/a.toml"
+    assert ("a share stands alone" in caught.value.help) == ('["±' in vary)
 
 
 def test_costs_and_threads_have_intervals() -> None:
