@@ -36,6 +36,12 @@ _POINTERS = frozenset(("model", "pbase", "parena", "pstack", "signature", "threa
 """Fields in which two equal states may differ."""
 _LISTS = re.compile(r"n?names(_map)?|n?paths|nbuffer|narena|name_\w+adr|n?bvh.*")
 """Fields that list the names, paths and boxes of all things, or give sizes of memory."""
+_COMPUTED_IF = {
+    "flg_rnepost": ("cacc", "cfrc_ext", "cfrc_int"),
+    "flg_subtreevel": ("subtree_angmom", "subtree_linvel"),
+}
+"""Fields that are only computed where something needs them, by what says whether they are: they
+may be zero in all states that are compared, as forces without a contact."""
 
 
 def unrelated_fields(fields: frozenset[str], kinds: frozenset[str]) -> frozenset[str]:
@@ -63,11 +69,12 @@ def _prefixes() -> tuple[tuple[str, str, str], ...]:
 def difference(whole: Any, variant: Any) -> frozenset[str]:
     """The fields that differ between two models, or two states."""
     rest = dict(_leaves(variant))
-    return frozenset(
+    fields = {
         name.rpartition(".")[2]
         for name, value in _leaves(whole)
         if not _are_same(value, rest.get(name))
-    )
+    }
+    return frozenset(fields.union(*(_COMPUTED_IF.get(field, ()) for field in fields)))
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -128,6 +135,14 @@ _OPAQUE = frozenset(
 )
 _THING = re.compile(r"""\w+\s*\.\s*(\w+)\(\s*(?:"[^"\\]*"|'[^'\\]*')\s*\)(?:\s*\.\s*(\w+))?""")
 """An access to one thing by its complete name, and the attribute that is read from it."""
+_WHOLE = re.compile(
+    r"""(?:\b(\w+)\s*=\s*)?\b\w+\s*\.\s*(?:(opt|stat)\b(?!\s*\.)"""
+    r"""|(\w+)\(\s*(?:"[^"\\]*"|'[^'\\]*')\s*\)(?!\s*\.))"""
+)
+"""A structure, or one thing, with nothing read from it there, and the name that it is given."""
+_DRIVEN = frozenset(("Body", "Joint", "Site", "Tendon"))
+"""What an actuator names by its number, so that another number is noticed where it is whole."""
+_STRUCTURES = {"opt": mujoco.MjOption, "stat": mujoco.MjStatistic}
 _RESET = re.compile(r"""mj_resetDataKeyframe\(\w+, \w+, \w+\.key\(("[^"\\]*"|'[^'\\]*')\)\.id\)""")
 """A reset to a keyframe that is given by its complete name."""
 _TEXT = re.compile(r""""((?:[^"\\\n]|\\.)*)"|'((?:[^'\\\n]|\\.)*)'|`([^`]*)`""")
@@ -226,9 +241,38 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Mod
     elif match := _SCRIPT.search(code):
         reasons.append(f"it lists what exists: `{match[0]}`")
     kinds = {VIEWS[word] for word in members if word in VIEWS}
+    for word in _whole_parts(text, code):
+        words |= _fields_of(word) - {"actuator_trnid"}
+        kinds |= {VIEWS[word]} if word in VIEWS else set()
+        kinds |= _DRIVEN if VIEWS.get(word) == "Actuator" else set()
     kinds |= {"Keyframe"} if "mj_resetDataKeyframe" in words else set()
     reason = next(iter(reasons), "")
     return ModelReader(path, names, words, members, frozenset(parts), frozenset(kinds), reason)
+
+
+def _whole_parts(text: str, code: str) -> Iterator[str]:
+    """The words for things and structures that code may print whole, or hand on.
+
+    One that only has a name is looked at by its attributes, which are words themselves.
+    """
+    for name, structure, view in _WHOLE.findall(text):
+        is_handed_on = not name or re.search(rf"\b{name}\b(?!\s*(?:\.|=\s*[^=}}!:]))", code)
+        if is_handed_on and (structure or view in VIEWS):
+            yield structure or view
+
+
+@functools.cache
+def _fields_of(word: str) -> frozenset[str]:
+    """The fields of a model and its state that a structure, or one thing, has."""
+    if word in _STRUCTURES:
+        return frozenset(_names(_STRUCTURES[word]))
+    prefixes = [prefix for prefix, _, kind in _prefixes() if kind == VIEWS[word]]
+    model_view, state_view = (
+        getattr(mujoco._structs, f"_{structure}{VIEWS[word]}Views", object)
+        for structure in ("MjModel", "MjData")
+    )
+    fields = {f"{prefix}_{name}" for prefix in prefixes for name in _names(model_view)}
+    return frozenset(fields.union(_names(state_view))) - {"id", "name"}
 
 
 def _python_code(text: str) -> str:

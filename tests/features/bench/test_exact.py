@@ -146,6 +146,13 @@ def motion(time, qpos, qvel):
 """
 
 
+FRICTION = """\
+def motion(time, qpos, qvel):
+    stop = min(time, qvel[0] / 9)
+    return qpos + qvel * stop - 9 / 2 * stop**2, qvel - 9 * stop
+"""
+
+
 def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(course: Path) -> None:
     write(course / "models" / "ball.xml", BOUNCE)
     toml = '[[scenario]]\nname = "slide"\nqvel = [1, 0]\nduration = 0.4\nsample = 0.02\n'
@@ -162,6 +169,18 @@ def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(course: P
         diagnostic = mistake(course, SLIDE.format(**values), toml)
         assert "is not this scene's motion" in diagnostic.message, values
         assert "contacts as they are" in diagnostic.help, values
+
+
+def test_errors_are_resolved_down_to_the_floor_of_an_exact_motion_with_friction(
+    course: Path,
+) -> None:
+    model = BALL.replace('axis="0 0 1"', 'axis="1 0 0" frictionloss="9"')
+    write(course / "models" / "ball.xml", model.replace('size="0.1"', 'size="0.1" mass="1"'))
+    scenario = report(course, FRICTION, TOML.replace("duration = 0.4", "duration = 0.5"))
+    own_row = next(row for row in scenario.rows if row.own)
+    assert own_row.figure == pytest.approx(own_row.position) and own_row.seen
+    assert own_row.figure[0] > scenario.least_figure and own_row.seen > scenario.least_seen
+    assert "resolves no error" not in scenario.verdict.text
 
 
 def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:

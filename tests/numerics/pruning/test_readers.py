@@ -17,6 +17,7 @@ MODEL = scene(
     <mesh name="cube" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>""",
     rest="""<sensor><jointpos name="hip_l" joint="hip"/><jointvel name="hip_r" joint="hip"/>
     <subtreeangmom name="spin" body="leg"/><framepos name="at" objtype="site" objname="tip_l"/>
+    <force name="felt" site="tip_l"/>
   </sensor>
   <actuator><motor name="push" joint="hip"/></actuator>
   <tendon><fixed name="cord"><joint joint="hip" coef="1"/></fixed></tendon>
@@ -54,6 +55,10 @@ HOSTILE = {
         "sensor spin",
         "mujoco.mj_step(model, data)\nprint(data.subtree_angmom)",
     ),
+    "forces at a later contact": ("sensor felt", "print(data.cfrc_ext)"),
+    "body as a whole": ("sensor felt", 'print(data.body("leg"))'),
+    "geom as a whole": ("material", 'w = model.geom("wall")\nprint(w.pos, w)'),
+    "options": ("energy", "print(model.opt)"),
     "spec": ("sensor", "spec = mujoco.MjSpec.from_file('x')\nprint(len(spec.sensors))"),
     "bound element": ("sensor", "def read(part):\n    return data.bind(part).data\nprint(read)"),
     "zip": ("sensor", "spec = mujoco.from_zip('x')\nprint(len(spec.sensors))"),
@@ -104,6 +109,8 @@ def test_what_a_script_names_stays_and_the_rest_goes() -> None:
             mujoco.mj_step(model, data)
         print(data.time, data.joint("hip").qpos[0], data.body("leg").xpos, data.qpos[0])
         print(data.sensor("hip_l").data, data.site("tip_r").xpos)
+        hinge = data.joint("hip")
+        print(hinge.qpos[0])
         mujoco.mj_resetDataKeyframe(model, data, model.key("down").id)
         print("the spare cube and spin are in the prose only")
     """)
@@ -114,7 +121,7 @@ def test_what_a_script_names_stays_and_the_rest_goes() -> None:
     assert names_by_kind.pop("contact-off") == []
     assert names_by_kind == {
         "energy-flag": ["energy"],
-        "sensor-unread": ["hip_r", "spin", "at"],
+        "sensor-unread": ["hip_r", "spin", "at", "felt"],
         "actuator-idle": ["push"],
         "tendon-idle": ["cord"],
         "unused-site": ["tip_l"],
