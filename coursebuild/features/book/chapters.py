@@ -303,6 +303,7 @@ _SECONDS = 600
 """How long printing may take."""
 _ENTRY = re.compile(r'(<span class="book-page" data-at="([^"]*)">)(</span>)')
 _TIMES = re.compile(rb"/CreationDate \([^()]*\)\s*/ModDate \([^()]*\)")
+_NODE = re.compile(rb"\(node\d{8}\)")
 _DESTINATION = re.compile(rb"/([^\s/\[\]()<>]+) \[(\d+) 0 R /XYZ")
 _OBJECT = re.compile(rb"(?:^|\n)(\d+) 0 obj\n(<<.*?)\nendobj", re.DOTALL)
 _KIDS = re.compile(rb"/Kids \[([^\]]*)\]")
@@ -333,6 +334,9 @@ def pdf_file(context: ExportContext) -> OutputFile:
     if times is not None:
         note = f"{PDF_MARK})".encode().ljust(len(times[0]))
         data = data[: times.start()] + note + data[times.end() :]
+    # Chromium's numbers of nodes depend on what it did before; their order, its key, stays.
+    numbers = {node: number for number, node in enumerate(sorted(set(_NODE.findall(data))))}
+    data = _NODE.sub(lambda match: b"(node%08d)" % numbers[match[0]], data)
     return OutputFile("course.pdf", data)
 
 
