@@ -168,7 +168,7 @@ FOREIGN = {
 BROKEN = {
     "binding": MarkupKind(
         rf"(?:`{_NUMBER}[^`{{}}\n\0]{{0,20}}|(?:{_NUMBER})?`?)"
-        r"\{[ \t]*(?:out|given)\b[^{}\n\0]*\}?"
+        r"[{\uff5b][ \t]*(?:out|given)\b[^{}\uff5d\n\0]*[}\uff5d]?"
         r"|(?<=\0)[A-Za-z]{1,3}\{[A-Za-z]{1,6}\}|(?<=\0)[^\s\0]{0,2}(?:out|given)[)}\]]"
         r"|(?<=\0)\{\{(?:out|given)[^{}\n\0]*\}+|(?<=\0)(?:[^\s\0{}\"]|\"[^\"\n\0]*\")*\}",
         "only a number in backticks is bound, by braces directly after it",
@@ -176,7 +176,7 @@ BROKEN = {
         "binding-attribute",
     ),
     "mark": MarkupKind(
-        r"\{[ \t]*(?:term|symbol|further)\b[^{}\n\0]*\}"
+        r"[{\uff5b][ \t]*(?:term|symbol|further)\b[^{}\uff5d\n\0]*[}\uff5d]"
         r"|(?<=\])term\b[^\s{}\0]*\}|(?<=\0)(?:symbol|unit|value)=\"[^{}\0]*\}",
         "braces stand directly after what they mark",
         'write `[word]{term}`, `$x${symbol="meaning"}`, `## Heading {.further}`',
@@ -228,7 +228,7 @@ BROKEN = {
         "a footnote is `[^name]`, its name without blanks, with a paragraph `[^name]: …`",
     ),
     "conflict": MarkupKind(
-        r"^={7}$",
+        r"^(?:={7}|\|{7}(?: [\w./-]+)?)$",
         "a merge conflict may have left it behind",
         "delete it; a line between two parts is `---`",
     ),
