@@ -210,12 +210,20 @@ def momentum_drift(momentum: Array) -> float | None:
 
 def visible_error(model: Any, scene: Scene, states: EngineStates, exact: EngineStates) -> float:
     """The largest displacement or turn of a body in a picture, where 1 is just visible."""
+    return float(visible_errors(model, scene, states, exact).max(initial=0.0))
+
+
+def visible_errors(model: Any, scene: Scene, states: EngineStates, exact: EngineStates) -> Array:
+    """The same at every sample: (n,)."""
     place, turn = _picture(model, states)
     exact_place, exact_turn = _picture(model, exact)
-    displacement = float(np.linalg.norm(place - exact_place, axis=2).max(initial=0.0))
-    angle = float(angular_distance(exact_turn, turn).max(initial=0.0))
+    displacements = np.linalg.norm(place - exact_place, axis=2).max(axis=1, initial=0.0)
+    angles = angular_distance(exact_turn, turn).max(axis=1, initial=0.0)
     length = scene.bench.visible * max(float(model.stat.extent), 1e-15)
-    return max(displacement / length, angle / math.radians(scene.bench.visible_angle))
+    sizes: Array = np.maximum(
+        displacements / length, angles / math.radians(scene.bench.visible_angle)
+    )
+    return sizes
 
 
 def _picture(model: Any, states: EngineStates) -> tuple[Array, Array]:

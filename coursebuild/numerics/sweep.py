@@ -4,7 +4,9 @@
    follows from it is compiled anew. One is changed at a time.
 2. Every step of a run is looked at: a hit is over before the next sample. A slide goes on where two
    geoms touch again within a sample: what rolls or slides over a stiff surface hops on it.
-3. The parameter `threads` is that of `mujoco.rollout`, which runs copies of the scenario.
+3. In chaos the size of a change says nothing of the parameter once it is visible: two runs whose
+   beginnings differ by 1e-10 are as far apart later. When it becomes visible is told instead.
+4. The parameter `threads` is that of `mujoco.rollout`, which runs copies of the scenario.
 """
 
 from __future__ import annotations
@@ -30,8 +32,9 @@ from coursebuild.numerics.measure import (
     quantity_values,
     touching_contacts,
     visible_error,
+    visible_errors,
 )
-from coursebuild.numerics.pilot import with_setting
+from coursebuild.numerics.pilot import NUDGE, nudges, with_setting
 from coursebuild.numerics.problem import STANDARD, Scenario, Setup
 from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.scene_report import (
@@ -86,7 +89,8 @@ def measure_sweep(
     variants = [_variant(spec, scene.scenario, part, value) for part, value in values]
     base_run = simulate(Setup(scenario=scene.scenario), base, thickness(base))
     states = base_run.states if base_run.judgement.ok else None
-    rows = [_measure_variant(scene, base, states, row, model) for row, model in variants]
+    chaotic = states is not None and _is_chaotic(scene, base, states)
+    rows = [_measure_variant(scene, base, states, chaotic, row, model) for row, model in variants]
     if clocks is not None:
         with silent():
             usable = [n for n, row in enumerate(rows) if row.status == "ok"]
@@ -99,7 +103,21 @@ def measure_sweep(
                 rows[n] = replace(rows[n], cost=timing.ratio)
             for part in threads:
                 rows += _rollouts(scene.scenario, base, part, clocks[1], quick=quick)
-    return SweepReport(sweep.name, sweep.title or sweep.name, scene.name, sweep.show, tuple(rows))
+    show = tuple("parted" if chaotic and name == "change" else name for name in sweep.show)
+    return SweepReport(sweep.name, sweep.title or sweep.name, scene.name, show, tuple(rows))
+
+
+def _is_chaotic(scene: Scene, model: Any, states: EngineStates) -> bool:
+    """Whether a run whose beginning is off by 1e-10 comes to be visibly elsewhere."""
+    data = initial_data(scene.scenario, model)
+    for position, velocity in nudges(model, 2, NUDGE):
+        qpos = data.qpos.copy()
+        mujoco.mj_integratePos(model, qpos, position, 1.0)
+        twin = replace(scene.scenario, qpos=tuple(qpos), qvel=tuple(data.qvel + velocity))
+        run = simulate(Setup(scenario=twin), model, thickness(model))
+        if run.judgement.ok and visible_error(model, scene, run.states, states) >= 1:
+            return True
+    return False
 
 
 def _variant(
@@ -171,7 +189,12 @@ def _runnable(model: Any) -> Any:
 
 
 def _measure_variant(
-    scene: Scene, base: Any, base_states: EngineStates | None, row: SweepRow, model: Any
+    scene: Scene,
+    base: Any,
+    base_states: EngineStates | None,
+    chaotic: bool,
+    row: SweepRow,
+    model: Any,
 ) -> SweepRow:
     """Run a model and fill its row; `base_states` is `None` where the model as it is was lost."""
     try:
@@ -185,7 +208,10 @@ def _measure_variant(
     row = with_contacts(scene.scenario, model, row)
     if base_states is None:
         return row
-    row = replace(row, change=visible_error(base, scene, run.states, base_states))
+    changes = visible_errors(base, scene, run.states, base_states)
+    if chaotic and changes.max() >= 1:
+        return replace(row, parted=float(run.states.times[np.argmax(changes >= 1)]))
+    row = replace(row, change=float(changes.max()))
     if quantity_name(base, scene):
         values = quantity_values(model, scene, run.states)
         distances = np.linalg.norm(values - quantity_values(base, scene, base_states), axis=1)

@@ -77,6 +77,39 @@ def test_one_element_an_enumeration_and_a_share() -> None:
     assert heavier.figure is not None and cone.figure == pytest.approx(0, abs=1e-12)
 
 
+PENDULUMS = """
+<mujoco>
+  <option timestep="0.002" integrator="RK4"/>
+  <worldbody>
+    <body>
+      <joint name="upper" axis="0 1 0"/>
+      <geom type="capsule" size=".02" fromto="0 0 0 0 0 -.3"/>
+      <body pos="0 0 -.3">
+        <joint axis="0 1 0"/>
+        <geom type="capsule" size=".02" fromto="0 0 0 0 0 -.3"/>
+      </body>
+    </body>
+  </worldbody>
+  <keyframe><key qpos="{start} 0"/></keyframe>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize(("start", "is_chaotic"), [("3", True), ("0.3", False)])
+def test_in_chaos_a_change_has_a_time_and_no_size(start: str, is_chaotic: bool) -> None:
+    """Pendulums that turn over forget their beginning; where they swing little, they do not."""
+    toml = '[[scenario]]\nname = "swing"\nkeyframe = 0\nduration = 10\nsample = 0.02\n'
+    lines = 'vary = { "geom.density" = [1000], "joint:upper.damping" = [1e-3] }\nshow = ["change"]'
+    report = run_sweep(lines, PENDULUMS.format(start=start), toml=toml)
+    undamped, damped = report.rows
+    assert (undamped.change, undamped.parted) == (0.0, None)
+    if is_chaotic:
+        assert damped.change is None and damped.parted is not None and 0.2 < damped.parted < 9
+        assert "1: just visible" not in sweep_svg(report, name="s")
+    else:
+        assert damped.parted is None and damped.change is not None and damped.change > 1
+
+
 def test_a_solver_with_little_time_leaves_more() -> None:
     """Boxes on each other: the residual falls with the iterations, and the tolerance stops it."""
     boxes = "".join(

@@ -244,7 +244,7 @@ def scene_departures(
             table: _Table = {("", "sweep"): {}}
             for row in sweep.rows:
                 parts = {"status": _Figure(status_text(row.status))}
-                for name in ("change", "penetration", "slip", "restitution"):
+                for name in ("change", "parted", "penetration", "slip", "restitution"):
                     parts[name] = _Figure(getattr(row, name), bench.band, _INVISIBLE)
                 if row.parameter != "threads":
                     table[f"{row.parameter} {row.value}", "value"] = parts

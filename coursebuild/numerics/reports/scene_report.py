@@ -10,6 +10,7 @@ from coursebuild.numerics.reports import Interval, Record
 
 FIGURES = {
     "change": "change (1: just visible)",
+    "parted": "change seen after (s)",
     "figure": "change of what is measured",
     "penetration": "depth (m)",
     "slip": "slip (m)",
@@ -34,9 +35,12 @@ class SweepRow(Record, frozen=True):
     """`ok`, `slow-growth`, `diverged` or `reset`, as of a setting."""
     reasons: tuple[str, ...] = ()
     change: float | None = None
-    """How far the motion is from that of the model as it is, in a picture: 1 is just visible."""
+    """How far the motion is from that of the model as it is, in a picture: 1 is just visible.
+    `None` in chaos where it becomes visible, since its size then says nothing of the parameter."""
+    parted: float | None = None
+    """When it becomes visible there, s."""
     figure: float | None = None
-    """The same of what the scenario declares to be measured, in its unit."""
+    """As `change`, of what the scenario declares to be measured, in its unit."""
     penetration: float | None = None
     """Deepest contact, m."""
     slip: float | None = None
