@@ -13,7 +13,7 @@ import contextlib
 import hashlib
 import os
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Set
 from pathlib import Path, PurePosixPath
 
 from msgspec import Struct
@@ -65,9 +65,10 @@ class CourseReader:
         files: list[CopiedFile] = []
         pending = [""]
         while pending:
-            with contextlib.suppress(OSError), os.scandir(self.root / pending.pop()) as entries:
+            folder = pending.pop()
+            with contextlib.suppress(OSError), os.scandir(self.root / folder) as entries:
                 for entry in sorted(entries, key=lambda entry: entry.name):
-                    path = os.path.relpath(entry.path, self.root)
+                    path = folder + entry.name
                     if is_dropping(entry.name) or entry.name in _NOT_COPIED:
                         continue
                     if entry.is_symlink():
@@ -75,7 +76,7 @@ class CourseReader:
                     elif entry.is_dir():
                         if not Path(entry.path, "pyvenv.cfg").exists():
                             folders.append(path)
-                            pending.append(path)
+                            pending.append(f"{path}/")
                     elif entry.is_file() and len(digest := file_state(entry.path)) == 64:
                         is_program = bool(entry.stat().st_mode & 0o100)
                         files.append(CopiedFile(path, digest, is_program))
@@ -167,33 +168,36 @@ class CourseFolder:
 
     def __init__(self, folder: Path, blobs: BlobStore) -> None:
         self._folder, self._blobs = folder, blobs
+        self._digest, self._copy = "", CourseCopy("", (), ())
         self._states: dict[str, tuple[CopiedFile, tuple[int, ...]]] = {}
         """Each file as it was written, and its state then."""
         self.root = folder
 
-    def bring_to(self, digest: str) -> CourseCopy:
+    def bring_to(self, digest: str) -> None:
         """Let the copy be as a course that is named by its digest, whatever has been done in it.
 
         Raises:
             OSError: there is no room for it, or a part of it is not here.
             ValueError: it would not stay in its folder.
         """
-        copy = unpack(self._blobs.get(digest), CourseCopy)
-        paths = [copy.name, *copy.folders, *(file.path for file in copy.files)]
-        if any(Path(path).is_absolute() or ".." in PurePosixPath(path).parts for path in paths):
-            raise ValueError("a path leads out of the course")
+        if digest != self._digest:
+            copy = unpack(self._blobs.get(digest), CourseCopy)
+            paths = [copy.name, *copy.folders, *(file.path for file in copy.files)]
+            if any(Path(path).is_absolute() or ".." in PurePosixPath(path).parts for path in paths):
+                raise ValueError("a path leads out of the course")
+            self._digest, self._copy = digest, copy
+        copy = self._copy
         self.root = self._folder / copy.name
         self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
         files = {file.path: file for file in copy.files}
-        self._remove_others(files, set(copy.folders))
+        present = self._remove_others(files.keys(), set(copy.folders))
         for folder in sorted(copy.folders):
-            (self.root / folder).mkdir(exist_ok=True)
+            if folder not in present:
+                (self.root / folder).mkdir()
         for path, file in files.items():
-            entry = self._states.get(path)
-            if entry is None or entry != (file, _state(self.root / path)):
+            if self._states.get(path) != (file, present.get(path, ())):
                 self._write(file)
-                self._states[path] = file, _state(self.root / path)
-        return copy
+                self._states[path] = file, _state((self.root / path).lstat())
 
     def changes(self, folders: Iterable[str]) -> Iterator[tuple[str, bytes]]:
         """Files in these folders that are not as they were copied."""
@@ -205,23 +209,27 @@ class CourseFolder:
                     entry = self._states.get(path)
                     if file.is_symlink() or not file.is_file() or is_dropping(name):
                         continue
-                    if entry is None or entry[1] != _state(file):
+                    if entry is None or entry[1] != _state(file.lstat()):
                         yield path, file.read_bytes()
 
-    def _remove_others(self, files: Iterable[str], folders: set[str]) -> None:
-        paths = set(files)
-        for place, names, file_names in os.walk(self.root):
-            for name in [*names, *file_names]:
-                path = Path(place, name)
-                relative = path.relative_to(self.root).as_posix()
-                is_folder = path.is_dir() and not path.is_symlink()
-                if relative not in (folders if is_folder else paths):
-                    self._states.pop(relative, None)
-                    if is_folder:
-                        shutil.rmtree(path)
+    def _remove_others(self, files: Set[str], folders: Set[str]) -> dict[str, tuple[int, ...]]:
+        """Remove what is not to be there; the states of all the rest."""
+        present: dict[str, tuple[int, ...]] = {}
+        pending = [""]
+        while pending:
+            folder = pending.pop()
+            with os.scandir(self.root / folder) as entries:
+                for entry in list(entries):
+                    path, is_folder = folder + entry.name, entry.is_dir(follow_symlinks=False)
+                    if path in (folders if is_folder else files):
+                        present[path] = _state(entry.stat(follow_symlinks=False))
+                        if is_folder:
+                            pending.append(f"{path}/")
+                    elif is_folder:
+                        shutil.rmtree(entry.path)
                     else:
-                        path.unlink()
-            names[:] = [name for name in names if Path(place, name).is_dir()]
+                        os.unlink(entry.path)  # noqa: PTH108
+        return present
 
     def _write(self, file: CopiedFile) -> None:
         target = self.root / file.path
@@ -234,10 +242,6 @@ class CourseFolder:
         target.chmod(0o755 if file.is_program else 0o644)
 
 
-def _state(path: Path) -> tuple[int, ...]:
-    """What changes when a file does; empty where there is none."""
-    try:
-        status = path.lstat()
-    except OSError:
-        return ()
+def _state(status: os.stat_result) -> tuple[int, ...]:
+    """What changes when a file does."""
     return status.st_mtime_ns, status.st_ctime_ns, status.st_size, status.st_ino, status.st_mode
