@@ -33,7 +33,7 @@ from coursebuild.core.run.run_store import States
 from coursebuild.core.run.sandbox import find_sandbox
 from coursebuild.core.run.script_server import ScriptServer
 from coursebuild_cluster.course_copy import BlobStore, CourseFolder
-from coursebuild_cluster.messages import Answer, Request, pack, unpack
+from coursebuild_cluster.messages import Answer, Request, Work, pack, unpack
 
 LENGTH = 8
 """Bytes before each message, which say how many follow."""
@@ -49,12 +49,8 @@ class Performer:
 
     def answer(self, data: bytes) -> bytes:
         """Answer a request; whatever goes wrong is an answer too."""
-        try:
-            return pack(self._answer(unpack(data, Request)))
-        except EffectError as error:
-            return pack(Answer(refusal=error.message, help=error.help))
-        except Exception:
-            return pack(Answer(bug=traceback.format_exc()))
+        request = unpack(data, Request)
+        return pack([self._answer(request, work) for work in request.works])
 
     def close(self) -> None:
         """End what runs, and remove the copy."""
@@ -62,20 +58,28 @@ class Performer:
             server.close()
         shutil.rmtree(self._copy.root.parent, ignore_errors=True)
 
-    def _answer(self, request: Request) -> Answer:
+    def _answer(self, request: Request, work: Work) -> Answer:
+        try:
+            return self._do(request, work)
+        except EffectError as error:
+            return Answer(refusal=error.message, help=error.help)
+        except Exception:
+            return Answer(bug=traceback.format_exc())
+
+    def _do(self, request: Request, work: Work) -> Answer:
         for name in DECISIVE:
             os.environ.pop(name, None)
         os.environ.update(request.environment)
         self._copy.bring_to(request.course)
-        if request.job is not None:
-            return self._run(request.job, sandbox=request.sandbox)
+        if work.job is not None:
+            return self._run(work.job, sandbox=work.sandbox)
         # Functions of the tool alone: a name is all that tells which.
-        if not re.fullmatch(r"coursebuild(\.\w+)+:\w+", request.function):
-            raise ValueError(f"{request.function} is not a function of coursebuild")
-        module, _, name = request.function.partition(":")
+        if not re.fullmatch(r"coursebuild(\.\w+)+:\w+", work.function):
+            raise ValueError(f"{work.function} is not a function of coursebuild")
+        module, _, name = work.function.partition(":")
         with own_processor():
             function = getattr(importlib.import_module(module), name)
-            return Answer(result=function(self._copy.root, request.task))
+            return Answer(result=function(self._copy.root, work.task))
 
     def _run(self, job: ScriptJob, *, sandbox: bool) -> Answer:
         root = self._copy.root

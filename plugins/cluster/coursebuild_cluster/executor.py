@@ -3,9 +3,10 @@
 Entry point: `start`, which makes a `Cluster`.
 
 1. A worker is used after it was compared: another version of what decides results refuses it.
-2. A worker gets a task for each of its threads, never more, and first those of the course's files
-   that it has not. So the death of a worker costs the tasks that it was doing. They are done again,
-   each alone on a worker, and one whose worker dies again and again is told as such.
+2. Each thread of a worker gets a task, or as many short ones as are worth a message, and before
+   it those of the course's files that the worker has not. So its death costs the tasks that it was
+   doing. They are done again, each alone on a worker, and one whose worker dies again and again is
+   told as such.
 3. A script's result counts if all that it looked at is the same here. Where it is not (a hidden
    file, another version of a package, a file of the worker's system) the script runs here.
 4. What a script printed of its worker's folders is replaced by the folders of here.
@@ -24,7 +25,6 @@ from pathlib import Path
 from typing import Any
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.course_root import DECISIVE
@@ -44,13 +44,15 @@ from coursebuild.core.run.script_server import (
 from coursebuild_cluster import worker
 from coursebuild_cluster.connection import connect
 from coursebuild_cluster.course_copy import CourseReader
-from coursebuild_cluster.messages import Answer, Request, WorkerFacts, pack, unpack
+from coursebuild_cluster.messages import Answer, Request, Work, WorkerFacts, pack, unpack
 from coursebuild_cluster.results import lost_run, run_as_here, would_differ, write_output
 
 MOST_DEATHS = 3
 """How often the worker of a task may die."""
 _INTERVAL = 0.2
 """Seconds between two looks at what is wanted, and at the workers."""
+_WORTH = 0.5
+"""Seconds of work that a message to a worker should hold: each costs some 0.04 s of processors."""
 _MOST_SENDINGS = 3
 """How often files are sent that change all the time."""
 
@@ -71,17 +73,18 @@ class _Task(Struct, eq=False):
     """Something to be done by a worker."""
 
     number: int
-    request: Request
-    """Without the course, which is read when it begins."""
+    work: Work
     deaths: int = 0
 
 
 class _Assignment(Struct, eq=False):
-    """A task that a worker does."""
+    """Tasks that a worker does, one after the other."""
 
-    task: _Task
+    tasks: list[_Task]
     worker: str
     """Its address."""
+    began: float
+    """By the monotonic clock, s."""
 
 
 class Cluster:
@@ -108,6 +111,8 @@ class Cluster:
         self._sent: dict[str, str] = {}
         """The digest of the course that each worker has."""
         self._looked = 0.0
+        self._took = _WORTH
+        """Seconds for a task, of those that were done last."""
         self._is_waiting = False
         self._running: dict[Any, _Assignment] = {}
         """By their futures."""
@@ -127,14 +132,13 @@ class Cluster:
 
     def map(self, function: str, root: Path, tasks: Sequence[bytes]) -> Iterator[bytes]:
         """Apply a function to tasks; a task that ends its workers is left to this process."""
-        requests = iter([Request("", {}, function=function, task=task) for task in tasks])
-        numbers = iter(range(len(tasks)))
+        pending = [_Task(n, Work(function=function, task=task)) for n, task in enumerate(tasks)]
+        pending.reverse()
         results: dict[int, bytes] = {}
         yielded = 0
         try:
             for task, answer in self._answers(
-                lambda: next((_Task(n, request) for n, request in zip(numbers, requests)), None),  # noqa: B905
-                lambda: False,
+                lambda: pending.pop() if pending else None, lambda: len(pending)
             ):
                 results[task.number] = answer.result
                 while yielded in results:
@@ -172,19 +176,21 @@ class Cluster:
                 pending.remove(index)
                 if answer is True:
                     on_start(jobs[index].path)
-                    return _Task(index, Request("", {}, self._sandbox, jobs[index]))
+                    return _Task(index, Work(self._sandbox, jobs[index]))
                 runs[index] = answer
             return None
 
         def is_wanted() -> None:
             running = frozenset(
-                jobs[assignment.task.number].path for assignment in self._running.values()
+                jobs[task.number].path
+                for assignment in self._running.values()
+                for task in assignment.tasks
             )
             if is_unwanted is not None and is_unwanted(running):
                 raise RunStoppedError
 
         try:
-            for task, answer in self._answers(take, lambda: bool(pending), is_wanted):
+            for task, answer in self._answers(take, lambda: len(pending), is_wanted):
                 job = jobs[task.number]
                 run = (
                     lost_run(job, task.deaths)
@@ -220,13 +226,13 @@ class Cluster:
     def _answers(
         self,
         take: Callable[[], _Task | None],
-        is_more_to_come: Callable[[], bool],
+        count: Callable[[], int],
         look: Callable[[], None] = lambda: None,
     ) -> Iterator[tuple[_Task, Answer]]:
         """Have tasks done as workers are free; yield the answers as they come.
 
-        `take` gives a task that may begin now. A task whose worker died waits for a worker that
-        does nothing else, and has it for itself.
+        `take` gives a task that may begin now, `count` says how many are left. A task whose worker
+        died waits for a worker that does nothing else, and has it for itself.
         """
         suspects: list[_Task] = []
         is_empty = False
@@ -235,13 +241,13 @@ class Cluster:
             self._look_at_workers()
             for address in self._free_workers():
                 is_idle = all(assignment.worker != address for assignment in self._running.values())
-                task = None if is_empty else take()
-                if task is None and suspects and is_idle:
-                    task = suspects.pop()
-                if task is None:
-                    is_empty = not is_more_to_come()
-                    continue
-                self._begin(task, address)
+                tasks = [] if is_empty else self._take_some(take, count())
+                if not tasks and suspects and is_idle:
+                    tasks = [suspects.pop()]
+                if tasks:
+                    self._begin(tasks, address)
+                else:
+                    is_empty = not count()
             if is_empty and not self._running and not suspects:
                 return
             for task, answer in self._collect():
@@ -254,30 +260,35 @@ class Cluster:
                 else:
                     suspects.append(task)
 
+    def _take_some(self, take: Callable[[], _Task | None], left: int) -> list[_Task]:
+        """As many tasks as are worth a message, but at the end not more than a fair share."""
+        threads = sum(self._threads.values())
+        most = min(_WORTH // max(self._took, _WORTH / 100), left // (2 * threads))
+        tasks: list[_Task] = []
+        while len(tasks) < max(1, most) and (task := take()) is not None:
+            tasks.append(task)
+        return tasks
+
     def _free_workers(self) -> list[str]:
         """Each worker as often as it has free threads, but none that does a suspect alone."""
         free: list[str] = []
         for address, threads in self._threads.items():
-            tasks = [
-                assignment.task
-                for assignment in self._running.values()
-                if assignment.worker == address
-            ]
-            if not any(task.deaths for task in tasks):
-                free += [address] * (threads - len(tasks))
+            assignments = [a for a in self._running.values() if a.worker == address]
+            if not any(task.deaths for assignment in assignments for task in assignment.tasks):
+                free += [address] * (threads - len(assignments))
         return free
 
-    def _begin(self, task: _Task, address: str) -> None:
-        """Give a task to a worker, with the course as it is now."""
+    def _begin(self, tasks: list[_Task], address: str) -> None:
+        """Give tasks to a worker, with the course as it is now."""
         environment = {name: os.environ[name] for name in DECISIVE if name in os.environ}
         try:
             course = self._send_course(address)
         except _WorkerLostError:
             self._threads.pop(address, None)
             self._done.put(None)
-            self._running[object()] = _Assignment(task, "")  # found to be lost by `_collect`
+            self._running[object()] = _Assignment(tasks, "", 0.0)  # found to be lost by `_collect`
             return
-        request = replace(task.request, course=course, environment=environment)
+        request = Request(course, environment, tuple(task.work for task in tasks))
         self._count += 1
         future = self._client.submit(
             worker.perform,
@@ -287,7 +298,7 @@ class Cluster:
             allow_other_workers=False,
             pure=False,
         )
-        self._running[future] = _Assignment(task, address)
+        self._running[future] = _Assignment(tasks, address, time.monotonic())
         future.add_done_callback(self._done.put)
 
     def _collect(self) -> list[tuple[_Task, Answer]]:
@@ -302,31 +313,36 @@ class Cluster:
         for future in futures:
             assignment = self._running.pop(future, None)
             if assignment is not None:
-                answers.append((assignment.task, self._answer_of(future, assignment)))
+                answers += zip(assignment.tasks, self._read(future, assignment), strict=True)
         for future, assignment in list(self._running.items()):
             if assignment.worker not in self._threads:
                 del self._running[future]
                 if assignment.worker:
                     future.cancel()
-                answers.append((assignment.task, Answer(is_lost=True)))
+                answers += [(task, Answer(is_lost=True)) for task in assignment.tasks]
         return answers
 
-    def _answer_of(self, future: Any, assignment: _Assignment) -> Answer:
+    def _read(self, future: Any, assignment: _Assignment) -> list[Answer]:
         from distributed import KilledWorker
 
         if future.status == "error":
             error = future.exception()
             if isinstance(error, KilledWorker):
-                return Answer(is_lost=True)
+                return [Answer(is_lost=True)] * len(assignment.tasks)
             raise EffectError(f"--cluster: {assignment.worker} cannot do anything: {error}")
         if future.status != "finished":
             raise EffectError(f"--cluster: the scheduler at `{self._address}` is gone")
-        answer = unpack(future.result(), Answer)
-        if answer.refusal:
-            raise EffectError(f"--cluster: {assignment.worker}: {answer.refusal}", help=answer.help)
-        if answer.bug:
-            raise RuntimeError(f"on the worker {assignment.worker}:\n{answer.bug}")
-        return answer
+        answers = unpack(future.result(), list[Answer])
+        for answer in answers:
+            if answer.refusal:
+                message = f"--cluster: {assignment.worker}: {answer.refusal}"
+                raise EffectError(message, help=answer.help)
+            if answer.bug:
+                raise RuntimeError(f"on the worker {assignment.worker}:\n{answer.bug}")
+        if answers[0].is_lost:
+            return answers * len(assignment.tasks)
+        self._took = (time.monotonic() - assignment.began) / len(answers)
+        return answers
 
     def _cancel(self) -> None:
         """Cancel what runs."""

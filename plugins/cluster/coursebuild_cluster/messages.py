@@ -1,7 +1,7 @@
 """What travels between the command and its workers, as bytes of msgspec.
 
-Entry points: `pack`, `unpack`; `Request` and `Answer`, `WorkerFacts`, `Piece`. Decoding makes
-values of the declared types only and runs no code.
+Entry points: `pack`, `unpack`; `Request`, which a list of `Answer` answers; `WorkerFacts`,
+`Piece`. Decoding makes values of the declared types only and runs no code.
 """
 
 from __future__ import annotations
@@ -34,21 +34,27 @@ class Piece(Struct, frozen=True):
     is_last: bool
 
 
-class Request(Struct, frozen=True):
+class Work(Struct, frozen=True):
     """A script to run, or a function to call with a task."""
 
-    course: str
-    """The digest of a packed `CourseCopy`, which the worker has."""
-    environment: dict[str, str]
-    """The variables that decide results, as they are here."""
     sandbox: bool = False
     job: ScriptJob | None = None
     function: str = ""
     task: bytes = b""
 
 
+class Request(Struct, frozen=True):
+    """Work that is done one after the other, each in the course as it was."""
+
+    course: str
+    """The digest of a packed `CourseCopy`, which the worker has."""
+    environment: dict[str, str]
+    """The variables that decide results, as they are here."""
+    works: tuple[Work, ...]
+
+
 class Answer(Struct, frozen=True):
-    """What became of a request."""
+    """What became of a work."""
 
     run: ScriptRun | None = None
     dependencies: tuple[Dependency, ...] = ()

@@ -78,7 +78,7 @@ def perform(request: bytes) -> bytes:
     answer = child.ask(request, is_unwanted)
     if answer is None:
         child.end()
-        return pack(Answer(is_lost=True))
+        return pack([Answer(is_lost=True)])
     with _lock:
         _idle.append(child)
     return answer
