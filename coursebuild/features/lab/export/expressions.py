@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import functools
 import keyword
+import re
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any, Literal, TypeAlias
 
@@ -226,8 +227,8 @@ class Expressions:
         path = js.dotted_name(function)
         if ".".join(path) in _FUNCTIONS:
             return _FUNCTIONS[".".join(path)].replace("...", self.all(values))
-        if path[:1] == ("mj",) and hasattr(_mujoco(), path[-1]):
-            return f"mujoco.{path[-1]}({self.all(values)})"
+        if path[:1] == ("mj",) and len(path) == 2 and _computes(path[1]):
+            return f"mujoco.{path[1]}({self.all(values)})"
         match js.text_of(js.field(function, "property")) if "member" in function.type else "":
             case "slice" | "subarray" as method if len(values) < 3:
                 part = f"{self.part(function, 'object')}[{self.bounds(values) or ':'}]"
@@ -266,6 +267,21 @@ def _mujoco() -> Any:
     import mujoco  # late: only a lab that has changed is translated
 
     return mujoco
+
+
+def _computes(name: str) -> bool:
+    """Whether a function of MuJoCo does nothing but compute: the script of a lab is run untrusted.
+
+    What reads and writes files, loads libraries, or changes what is common to all models takes a
+    text, or nothing.
+    """
+    if name in ("mj_name2id", "mju_euler2Quat"):  # a name, the order of axes
+        return True
+    if not re.fullmatch(r"(mj|mju|mjd)_\w+", name) or name == "mju_threadpool":
+        return False
+    signature = getattr(getattr(_mujoco(), name, None), "__doc__", None) or ""
+    parameters = signature.partition("(")[2].partition(") -> ")[0]
+    return bool(parameters) and re.search(r"\b(?:str|args)\b", parameters) is None
 
 
 def python_name(name: str) -> str:
