@@ -126,6 +126,10 @@ class _Compiler(JsonChild):
     def _try(self, path: str, texts: Mapping[str, str]) -> CompileResult:
         """Compile the model at a path, with these texts in place of files."""
         text = texts[path]
+        for name, content in texts.items():
+            if file := _outer_file(self.root, name, content):
+                # Its content, or that it exists, is nothing for those who wrote the course.
+                return CompileResult(f"'{file}' leads out of the course", _line_of(file, text))
         files = {f for name in texts for f in model_files(self.root, name, texts[name])}
         for file in sorted(files):
             if file_state(str(self.root / file)) == SPECIAL:  # to read it may take for ever
@@ -212,13 +216,37 @@ def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
     Those that are not there are among them: it would compile something else if they were. The paths
     are relative to the course's folder, or absolute where they lie outside, and sorted.
     """
-    names: set[str] = set()
-    ModelFiles(names.add).scan_text(text, folder=os.path.dirname(root / path))  # noqa: PTH120
-    paths = [Path(os.path.normpath(name)) for name in names]
+    paths = [Path(os.path.normpath(name)) for name in _sought_paths(root, path, text)]
     files = {(p.relative_to(root) if p.is_relative_to(root) else p).as_posix() for p in paths}
     # MuJoCo joins an absolute path to another one; nothing is there, on any machine.
     nowhere = f"{root}/".lstrip("/")
     return tuple(sorted(file for file in files if file != path and nowhere not in file[1:]))
+
+
+def _sought_paths(root: Path, path: str, text: str) -> set[str]:
+    """The paths that MuJoCo opens for a text, as it names them."""
+    paths: set[str] = set()
+    ModelFiles(paths.add).scan_text(text, folder=os.path.dirname(root / path))  # noqa: PTH120
+    return paths
+
+
+def _outer_file(root: Path, path: str, text: str) -> str:
+    """A file outside the course that MuJoCo would open for a text; empty if there is none."""
+    own_root = os.path.realpath(root)
+    for sought_path in sorted(_sought_paths(root, path, text)):
+        target = os.path.realpath(root / sought_path)
+        if os.path.lexists(target) and not Path(target).is_relative_to(own_root):
+            is_relative = sought_path.startswith(f"{root}/")
+            return os.path.relpath(sought_path, root) if is_relative else sought_path
+    return ""
+
+
+def _line_of(file: str, text: str) -> int | None:
+    """The line of a text on which an element names a file, from 1; `None` if none does."""
+    for tag in read_tags(text):
+        if any(Path(value).name == Path(file).name for _, _, value, _ in tag.attributes if value):
+            return tag.line
+    return None
 
 
 def existing_files(root: Path, path: str, text: str) -> tuple[str, ...]:

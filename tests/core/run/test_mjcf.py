@@ -97,17 +97,16 @@ def test_everything_that_a_model_or_a_text_pulls_in(root: Path) -> None:
     assert (names(root), names(root / "models")) == (["models"], ["child.xml", "parts"])
 
 
-def test_what_is_pulled_in_from_elsewhere_or_by_a_link(root: Path, tmp_path: Path) -> None:
-    """From next to `models/`, by an absolute path, from outside; a link has its own name."""
-    part = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
+def test_what_is_pulled_in_from_elsewhere_or_by_a_link(root: Path) -> None:
+    """From next to `models/`, by an absolute path; a link has its own name."""
     (root / "beside").mkdir()
-    for path in (root / "beside/part.xml", tmp_path / "far.xml", tmp_path / "above.xml"):
-        path.write_text(part)
+    (root / "beside/part.xml").write_text(
+        "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
+    )
     (root / "models/link.xml").symlink_to("child.xml")
     paths_by_name = {
         "../beside/part.xml": "beside/part.xml",
-        str(tmp_path / "far.xml"): str(tmp_path / "far.xml"),
-        "../../above.xml": str(tmp_path / "above.xml"),
+        str(root / "beside/part.xml"): "beside/part.xml",
         "link.xml": "models/link.xml",
     }
     xmls = [f'<mujoco><include file="{name}"/></mujoco>' for name in paths_by_name]
@@ -185,10 +184,37 @@ def test_what_is_no_regular_file_is_not_read(root: Path) -> None:
     xmls = [INCLUDE.format("pipe"), INCLUDE.format("zero"), mesh, "<mujoco/>"]
     assert [result.error for result in texts(root, xmls)] == [
         "'models/pipe.xml' is a device or a pipe",
-        "'models/zero.xml' is a device or a pipe",
+        "'models/zero.xml' leads out of the course",
         "'models/pipe.xml' is a device or a pipe",
         "",
     ]
+
+
+@pytest.mark.parametrize(
+    ("element", "file"),
+    [
+        ('<include file="../../secret.xml"/>', "../secret.xml"),
+        ('<include file="{}/secret.xml"/>', "{}/secret.xml"),
+        ('<include file="link.xml"/>', "models/link.xml"),
+        ('<include file="folder/secret.xml"/>', "models/folder/secret.xml"),
+        ('<include file="folder/../secret.xml"/>', "models/secret.xml"),
+        ('<asset><mesh file="../../secret.xml"/></asset>', "../secret.xml"),
+        ('<asset><texture type="2d" file="../../secret.xml"/></asset>', "../secret.xml"),
+        ('<asset><hfield size="1 1 1 1" file="../../secret.xml"/></asset>', "../secret.xml"),
+        ('<asset><model name="m" file="../../secret.xml"/></asset>', "../secret.xml"),
+        ('<asset><mesh file="secret.xml"/></asset><compiler meshdir="../.."/>', "../secret.xml"),
+    ],
+)
+def test_no_file_outside_the_course_is_read(root: Path, element: str, file: str) -> None:
+    """By its path, or by a link to it or to a folder above it."""
+    (root.parent / "outside").mkdir()
+    for secret in (root.parent / "secret.xml", root.parent / "outside/secret.xml"):
+        secret.write_text("<mujocoinclude/>")
+    (root / "models/link.xml").symlink_to("../../secret.xml")
+    (root / "models/folder").symlink_to("../../outside")
+    (result,) = texts(root, [f"<mujoco>\n{element.format(root.parent)}</mujoco>"])
+    message = f"'{file.format(root.parent)}' leads out of the course"
+    assert (result.error, result.line) == (message, 2)
 
 
 @pytest.mark.parametrize(
