@@ -92,5 +92,6 @@ def open_course(folder: Folder, stores: Path) -> Iterator[Editor]:
     editor.save(FIRST_LESSON)  # from now on scripts run
     wait_for_results(editor)
     yield editor
-    assert editor.close() == 0
+    status = editor.close()
+    assert status == 0, status
     wait_until_alone(folder)

@@ -37,7 +37,9 @@ _COMPARISON_RULES = (
 
 def current_diagnostics(session: Session) -> tuple[Diagnostic, ...]:
     """Return all diagnostics that are not silenced, for the texts as they are."""
-    return _diagnose(session, session.version)
+    with session.condition:  # while it is held, the course may be newer than the version
+        version = session.version
+    return _diagnose(session, version)
 
 
 @lru_cache(maxsize=1)
