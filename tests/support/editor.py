@@ -50,11 +50,18 @@ class Editor:
         server = self.client._server
         assert server is not None and server.stdin is not None
         self._loop.call_soon_threadsafe(server.stdin.close)
-        self.ask(self.client.stop())
+        self.ask(self._wait_for_end())
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
         return server.returncode
+
+    async def _wait_for_end(self) -> None:
+        """Read all that the server says until it ends: it may not wait for that."""
+        server = self.client._server
+        assert server is not None and server.stderr is not None
+        await asyncio.gather(server.wait(), server.stderr.read())
+        await self.client.stop()
 
     # --- texts
 
