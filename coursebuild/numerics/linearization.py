@@ -245,13 +245,15 @@ def rest_limit(
     `search`: the timesteps (s) between which it is looked for.
     """
     unit = 1 + (_NEAR_UNIT if rest.touches else _UNIT)
+    low, high = search
+    variant = _converged(model, integrator, low)
+    data = mujoco.MjData(variant)
 
     def is_lost(timestep: float) -> bool:
-        variant = _converged(model, integrator, timestep)
-        matrix, _ = _step_derivative(variant, mujoco.MjData(variant), rest)
+        variant.opt.timestep = timestep
+        matrix, _ = _step_derivative(variant, data, rest)
         return not _spectral_radius(matrix) <= unit
 
-    low, high = search
     count = max(2, round(_GRID * math.log10(high / low)) + 1)
     before = 0.0
     for step in np.geomspace(low, high, count).tolist():
