@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from coursebuild.features.lab.picture.draw import FreeCamera, Solid, draw
-from coursebuild.features.lab.picture.raster import Floor, TextureMapping, texture_of
+from coursebuild.features.lab.picture.draw import Floor, FreeCamera, Solid, draw
+from coursebuild.features.lab.picture.raster import TextureMapping, texture_of
 from coursebuild.features.lab.picture.shapes import (
     Kind,
     flat_surface,

@@ -12,6 +12,7 @@ The same input gives the same bytes: no clock, no threads, colours rounded at th
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from msgspec import Struct
@@ -19,7 +20,17 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from coursebuild.features.lab.picture import raster
-from coursebuild.features.lab.picture.shapes import Array, Light, Material, Surface, shade, studio
+from coursebuild.features.lab.picture.shapes import (
+    LAMP,
+    Array,
+    Light,
+    Material,
+    Surface,
+    dot,
+    join_surfaces,
+    shade,
+    studio,
+)
 
 _SAMPLES = 2
 _NEAR_SHARE = 0.01
@@ -33,7 +44,7 @@ _STEPS = 127
 """Shades from black to white: nobody can see more, and the file is a quarter smaller."""
 _PLAIN = Material()
 
-Samples = tuple[NDArray[np.int64], NDArray[np.int64]]
+Samples: TypeAlias = tuple[NDArray[np.intp], ...]
 """Rows and columns."""
 _SHARPER = 4.0
 """How much longer than wide a sample may be on a surface before the texture is blurred."""
@@ -131,7 +142,7 @@ def draw(
     size: tuple[int, int],
     light: Light | None = None,
     background: raster.Texture | None = None,
-    floor: raster.Floor | None = None,
+    floor: Floor | None = None,
 ) -> NDArray[np.uint8]:
     """Draw a picture: (height, width, 4) bytes, RGBA, transparent where there is nothing.
 
@@ -152,7 +163,8 @@ def draw(
     canvas.paint(scene, mirror, reflection, floor, lines=True)
     if background is not None:
         canvas.put_behind(background)
-    mean = canvas.colour.reshape(height, _SAMPLES, width, _SAMPLES, 4).mean(axis=(1, 3))
+    samples = canvas.colour.reshape(height, _SAMPLES, width, _SAMPLES, 4)
+    mean = samples.sum(axis=1).sum(axis=2) / _SAMPLES**2
     # The colours are premultiplied with their coverage.
     mean[..., :3] /= np.where(mean[..., 3:] > 0, mean[..., 3:], 1.0)
     steps = np.rint(_STEPS * np.clip(mean, 0.0, 1.0))
@@ -173,7 +185,7 @@ class _Canvas:
         solids: Sequence[Solid],
         mirror: Solid | None,
         reflection: _Canvas | None,
-        floor: raster.Floor | None = None,
+        floor: Floor | None = None,
         *,
         lines: bool = False,
     ) -> None:
@@ -182,9 +194,7 @@ class _Canvas:
         opaque = [solid for solid in solids if solid.opaque and not solid.front]
         self._paint_opaque(buffer, opaque, mirror, reflection)
         if lines and opaque:
-            raster.draw_edges(
-                self.colour, buffer, np.array([solid.body for solid in opaque], dtype=bool)
-            )
+            draw_edges(self.colour, buffer, np.array([solid.body for solid in opaque], dtype=bool))
         if floor is not None:
             floor.paint(
                 self.colour, buffer, [solid.world_surface() for solid in solids if solid.body]
@@ -246,7 +256,11 @@ class _Canvas:
             self.colour[y, x] = alpha * opaque_colour + (1 - alpha) * self.colour[y, x]
 
     def _shade(
-        self, buffer: raster.GBuffer, solid: Solid, reflection: _Canvas | None, samples: Samples
+        self,
+        buffer: raster.GBuffer,
+        solid: Solid,
+        reflection: _Canvas | None,
+        samples: Samples,
     ) -> Array:
         attributes = buffer.attributes[samples].astype(float)
         places, local_normals = attributes[:, raster.POSITION], attributes[:, raster.NORMAL]
@@ -255,7 +269,7 @@ class _Canvas:
         normals = raster.rotate(local_normals, solid.rotation)
         view = self.eye.position - points
         toward_eye = view / _lengths(view)
-        facing = (normals * toward_eye).sum(axis=1)
+        facing = dot(normals, toward_eye)
         if not solid.plane:
             normals[facing < 0] *= -1
         texel = np.ones((1, 3))
@@ -274,10 +288,119 @@ class _Canvas:
 
 def _lengths(vectors: Array) -> Array:
     """Return the lengths (n, 1) of vectors (n, 3), at least 1e-12."""
-    return np.asarray(np.linalg.norm(vectors, axis=1).clip(1e-12)[:, None])
+    return np.sqrt(dot(vectors, vectors)).clip(1e-12)[:, None]
 
 
 def _batches(samples: NDArray[np.int64], width: int) -> Iterator[Samples]:
     """Yield samples, counted row by row, not too many at once."""
     for start in range(0, len(samples), _AT_ONCE):
         yield np.divmod(samples[start : start + _AT_ONCE], width)
+
+
+_CELLS, _REACH, _LIFT = 10, 2.2, 0.0005
+_GREY, _EDGE_GREY = 0.5, 0.42
+_SHADOW, _POINTS, _WIDTH = 0.32, 10, 0.08
+_GOLDEN = np.pi * (3 - np.sqrt(5))
+"""Points at multiples of this angle lie evenly on a disc."""
+_EDGE_SAMPLES = 2
+_DEPTH_TOLERANCE = 1e-3
+
+
+class Floor(Struct, frozen=True):
+    """A level floor, as the live view draws it (`studio.js` of the page); so are the edges."""
+
+    height: float
+    """m."""
+    distance: float
+    """Distance of the camera from its target, m."""
+    target: tuple[float, float, float]
+
+    def paint(self, colour: Array, buffer: raster.GBuffer, bodies: Sequence[Surface]) -> None:
+        """Mix it into colours (rows, columns, RGB and alpha) where nothing covers it."""
+        eye, height = buffer.eye, self.height + self._lift / 2
+        (width, rows), (right, up, forward) = eye.size, eye.axes
+        x, y = np.arange(width) + 0.5 - width / 2, (rows / 2 - np.arange(rows) - 0.5)[:, None]
+        with np.errstate(divide="ignore"):
+            far = (height - eye.position[2]) / (right[2] * x + up[2] * y + forward[2] * eye.focal)
+        is_seen = (far > 0) & (far * eye.focal < buffer.depth * (1 + _DEPTH_TOLERANCE))
+        row, column = np.nonzero(is_seen & (far < raster.FAR_AWAY))
+        x, y, far = x[column], y[row, 0], far[row, column]
+        # In each direction: the place, and how far it is to those of the next column and row.
+        place, step = np.empty((2, len(far))), np.empty((2, len(far)))
+        offset = np.zeros(len(far))
+        for i in (0, 1):
+            way = far * (right[i] * x + up[i] * y + forward[i] * eye.focal)
+            place[i] = eye.position[i] + way
+            step[i] = np.abs(far * (right[i] - way / (height - eye.position[2]) * right[2]))
+            step[i] += np.abs(far * (up[i] - way / (height - eye.position[2]) * up[2]))
+            offset += ((place[i] - self.target[i]) / (_REACH * self.distance)) ** 2
+        fade = np.clip(1 - np.sqrt(offset), 0, None) ** 2
+        cell = round_length(0.8 * self.distance / _CELLS)
+        line = np.maximum(0.55 * _lines(place, step, cell), _lines(place, step, 5 * cell))
+        _mix(colour, _GREY, (row, column), fade * (0.06 + 0.5 * line))
+        if bodies:
+            shade = self._shade(eye, bodies, buffer.depth)
+            at = np.nonzero(shade)
+            _mix(colour, 0.0, at, 1 - (1 - _SHADOW) ** shade[at])
+
+    @property
+    def _lift(self) -> float:
+        return _LIFT * self.distance
+
+    def _shade(self, eye: raster.Eye, bodies: Sequence[Surface], depth: Array) -> Array:
+        """Return the part of the light that does not reach each sample."""
+        joined_surface = join_surfaces(bodies)
+        height = self.height + self._lift
+        elevation = joined_surface.vertices[:, 2:] - height
+        shade = np.zeros_like(depth)
+        for i in range(_POINTS):
+            angle, radius = _GOLDEN * i, _WIDTH * np.sqrt((i + 0.5) / _POINTS)
+            slope = radius * np.array((np.cos(angle), np.sin(angle))) + LAMP[:2]
+            flat = joined_surface.vertices[:, :2] - elevation * slope / LAMP[2]
+            vertices = np.column_stack((flat, np.full(len(flat), height)))
+            with np.errstate(over="ignore", invalid="ignore"):
+                in_view = raster.rotate(vertices - eye.position, eye.axes)
+            shadow = np.full_like(depth, np.inf)
+            fragments = raster.fragments(eye, in_view, joined_surface.faces, front=False)
+            for triangles, numbers, shares, x, y in fragments:
+                weights = shares / triangles[:, :, 2][numbers]
+                depths = 1.0 / (weights[:, 0] + weights[:, 1] + weights[:, 2])
+                np.minimum.at(shadow, (y, x), depths)
+            shade += shadow < depth * (1 + _DEPTH_TOLERANCE)
+        return shade / _POINTS
+
+
+def draw_edges(colour: Array, buffer: raster.GBuffer, bodies: NDArray[np.bool_]) -> None:
+    """Draw lines around bodies, on what is behind them; `bodies` says which solids are bodies."""
+    edge = np.zeros(buffer.solid.shape, bool)
+    body = np.where(buffer.solid >= 0, bodies[buffer.solid], False)
+    reach = range(-_EDGE_SAMPLES, _EDGE_SAMPLES + 1)
+    for dy, dx in ((dy, dx) for dy in reach for dx in reach if dx * dx + dy * dy <= 4):
+        is_body = np.roll(body, (dy, dx), axis=(0, 1))
+        differs = np.roll(buffer.solid, (dy, dx), axis=(0, 1)) != buffer.solid
+        is_nearer = np.roll(buffer.depth, (dy, dx), axis=(0, 1)) < buffer.depth
+        edge |= is_body & differs & is_nearer
+    at = np.nonzero(edge)
+    _mix(colour, _EDGE_GREY, at, np.ones(len(at[0])))
+
+
+def round_length(length: float) -> float:
+    """Round a length down to 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(power * next(n for n in (5, 2, 1) if n * power <= length))
+
+
+def _lines(places: Array, steps: Array, cell: float) -> Array:
+    """Return how strong the lines of a grid are at places (2, n), with steps to the next."""
+    strength = np.zeros(places.shape[1])
+    for place, step in zip(places / cell, np.maximum(steps / cell, 1e-6), strict=True):
+        distance = np.abs((place - 0.5) % 1 - 0.5) / step
+        line = np.clip(1 - distance, 0, 1) * np.clip(0.5 / step - 0.5, 0, 1)
+        strength = np.maximum(strength, line)
+    return strength
+
+
+def _mix(colour: Array, grey: float, at: Samples, alpha: Array) -> None:
+    """Mix a grey into colours (rows, columns, RGB and alpha) at some rows and columns."""
+    cover = alpha[:, None]
+    colour[at] = cover * np.array((grey, grey, grey, 1.0)) + (1 - cover) * colour[at]

@@ -1,21 +1,21 @@
 """Rasterizes triangles: finds the nearest surface at each sample, and its attributes there.
 
-Floor and edges match the live view (`studio.js` of the page), and so do texture coordinates
-(`geometry.js` and `materials.js`), but computed at every point that is drawn.
+Texture coordinates match the live view (`geometry.js` and `materials.js` of the page), but are
+computed at every point that is drawn.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any, TypeAlias
 
 import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from coursebuild.features.lab.picture.shapes import LAMP, Array, Kind, Surface, join_surfaces
+from coursebuild.features.lab.picture.shapes import Array, Kind, Surface
 
-_FAR_AWAY = 1e12
+FAR_AWAY = 1e12
 """m; vertices beyond, or not finite, are not drawn: a diverged simulation throws things out."""
 _AT_ONCE = 1 << 18
 """Samples that are processed together, unless a single triangle has more."""
@@ -62,13 +62,16 @@ class GBuffer:
         uv = np.zeros((len(in_view), 2)) if surface.uv is None else surface.uv
         # One row for each vertex: its place in the camera's frame, and its attributes.
         vertices = np.column_stack((in_view, surface.vertices, surface.normals, uv))
-        for part, shares, x, y in _fragments(eye, vertices, surface.faces, front=front):
+        for triangles, numbers, shares, x, y in fragments(
+            eye, vertices, surface.faces, front=front
+        ):
             # What is linear on the surface is linear in 1/z on the screen.
-            weights = shares / part[..., 2]
-            depth = 1.0 / weights.sum(axis=1)
+            weights = shares / triangles[:, :, 2][numbers]
+            depth = 1.0 / (weights[:, 0] + weights[:, 1] + weights[:, 2])
             nearest = np.flatnonzero(depth < self.depth[y, x])
             weights, depth, x, y = weights[nearest], depth[nearest], x[nearest], y[nearest]
-            attributes = np.einsum("sk,skc->sc", weights, part[nearest, :, 3:]) * depth[:, None]
+            corners = triangles[:, :, 3:][numbers[nearest]]
+            attributes = np.einsum("sk,skc->sc", weights, corners) * depth[:, None]
             if eye.mirror is not None:
                 normal, offset = eye.mirror
                 height = attributes[:, POSITION] @ (rotation.T @ normal) + position @ normal
@@ -83,14 +86,16 @@ class GBuffer:
             self.attributes[at] = attributes[order]
 
 
-Fragments: TypeAlias = Iterator[tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]]
-"""Samples that triangles cover, each with its triangle, the shares of the triangle's corners in it,
-its column and its row."""
+Fragments: TypeAlias = Iterator[
+    tuple[Array, NDArray[np.int64], Array, NDArray[np.int64], NDArray[np.int64]]
+]
+"""Triangles (t, 3, columns), and the samples that they cover: of each the number of its triangle,
+the shares of the triangle's corners in it (n, 3), its column and its row."""
 
 
-def _fragments(eye: Eye, vertices: Array, faces: NDArray[np.int64], *, front: bool) -> Fragments:
+def fragments(eye: Eye, vertices: Array, faces: NDArray[np.int64], *, front: bool) -> Fragments:
     """Yield the samples that faces cover; the first columns of `vertices` are places in view."""
-    is_finite = np.all(np.abs(np.nan_to_num(vertices, nan=np.inf)) < _FAR_AWAY, axis=1)
+    is_finite = np.all(np.abs(np.nan_to_num(vertices, nan=np.inf)) < FAR_AWAY, axis=1)
     faces = faces[np.all(is_finite[faces], axis=1)]
     for start in range(0, len(faces), _FACES_AT_ONCE):
         triangles = vertices[faces[start : start + _FACES_AT_ONCE]]
@@ -120,158 +125,78 @@ def _clip(triangles: Array, near: float) -> Array:
 
 
 def _project(eye: Eye, triangles: Array) -> Fragments:
+    """Go through triangles row by row.
+
+    A sample on the edge between two triangles belongs to only one of them: otherwise a transparent
+    surface would have seams.
+    """
     width, height = eye.size
     scale = eye.focal / triangles[..., 2]
     px = width / 2 + scale * triangles[..., 0]
     py = height / 2 - scale * triangles[..., 1]
-    left, right = _span(px, width)
-    top, bottom = _span(py, height)
-    columns = right - left
-    counts = np.maximum(columns, 0) * np.maximum(bottom - top, 0)
-    ends = np.cumsum(counts)
+    top, bottom = _first(py.min(axis=1), height), _first(py.max(axis=1), height)
+    columns = _first(px.max(axis=1), width) - _first(px.min(axis=1), width)
+    most_samples = np.cumsum((bottom - top) * np.maximum(columns, 0))
     start = 0
-    while start < len(counts):
-        offset = ends[start - 1] if start else 0
-        end = max(int(np.searchsorted(ends, offset + _AT_ONCE, side="right")), start + 1)
-        index = np.repeat(np.arange(start, end), counts[start:end])
-        place = np.arange(len(index)) - (ends - counts - offset)[index]
-        x, y = left[index] + place % columns[index], top[index] + place // columns[index]
-        shares, inside = _cover(px[index].T, py[index].T, x + 0.5, y + 0.5)
-        yield triangles[index[inside]], shares.T[inside], x[inside], y[inside]
-        start = end
+    while start < len(triangles):
+        offset = most_samples[start - 1] if start else 0
+        end = int(np.searchsorted(most_samples, offset + _AT_ONCE, side="right"))
+        part = slice(start, max(end, start + 1))
+        yield triangles[part], *_samples(px[part], py[part], top[part], bottom[part], width)
+        start = part.stop
 
 
-def _span(places: Array, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the range of samples of a row or column whose middle triangles reach."""
-    low = np.clip(np.ceil(places.min(axis=1) - 0.5), 0, size)
-    high = np.clip(np.floor(places.max(axis=1) - 0.5) + 1, 0, size)
-    return low.astype(np.int64), high.astype(np.int64)
+def _samples(
+    px: Array, py: Array, top: NDArray[np.int64], bottom: NDArray[np.int64], width: int
+) -> tuple[NDArray[np.int64], Array, NDArray[np.int64], NDArray[np.int64]]:
+    """The samples of triangles with these corners (t, 3) on the screen, in these rows."""
+    triangle, row = _count_up(top, bottom)
+    left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
+    middle = row + 0.5
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        # Both triangles at an edge follow it downwards, and so get the same places.
+        is_down = py[:, a] <= py[:, b]
+        xa, ya = (np.where(is_down, p[:, a], p[:, b])[triangle] for p in (px, py))
+        xb, yb = (np.where(is_down, p[:, b], p[:, a])[triangle] for p in (px, py))
+        is_crossed = (ya <= middle) & (middle < yb)
+        place = xa + (middle - ya) * ((xb - xa) / np.where(is_crossed, yb - ya, 1.0))
+        left = np.where(is_crossed, np.minimum(left, place), left)
+        right = np.where(is_crossed, np.maximum(right, place), right)
+    line, column = _count_up(_first(left, width), _first(right, width))
+    numbers = triangle[line]
+    # The shares are linear along a row.
+    (x0, x1, x2), (y0, y1, y2) = px.T, py.T
+    area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+    area = np.where(area == 0, 1.0, area)
+    shares = np.empty((len(column), 3))
+    x = column + 0.5
+    for k, (xa, ya, xb, yb) in enumerate(((x1, y1, x2, y2), (x2, y2, x0, y0))):
+        slope, rise = (ya - yb) / area, (xb - xa) / area
+        at_zero = (rise[triangle] * (middle - ya[triangle])) - slope[triangle] * xa[triangle]
+        shares[:, k] = at_zero[line] + slope[numbers] * x
+    shares[:, 2] = 1 - shares[:, 0] - shares[:, 1]
+    return numbers, shares, column, row[line]
+
+
+def _first(places: Array, size: int) -> NDArray[np.int64]:
+    """The first samples of a row or column whose middles are at places or beyond."""
+    return np.clip(np.ceil(places - 0.5), 0, size).astype(np.int64)
+
+
+def _count_up(
+    first: NDArray[np.int64], end: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """All whole numbers from each first one to before its end, with the index of these two."""
+    counts = np.maximum(end - first, 0)
+    index = np.repeat(np.arange(len(counts)), counts)
+    starts = first - (np.cumsum(counts) - counts)
+    return index, np.arange(len(index)) + starts[index]
 
 
 def rotate(vectors: Array, matrix: Array) -> Array:
     """Multiply vectors by a matrix, without a linear algebra library, whose bits may vary."""
     products: Array = np.einsum("ij,kj->ik", vectors, matrix)
     return products
-
-
-def _cover(px: Array, py: Array, gx: Array, gy: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the shares of a triangle's three corners in samples, and whether these are inside.
-
-    A sample on the edge between two triangles belongs to only one of them: otherwise a transparent
-    surface would have seams.
-    """
-    area = (px[1] - px[0]) * (py[2] - py[0]) - (px[2] - px[0]) * (py[1] - py[0])
-    turn = np.sign(area)
-    inside = turn != 0
-    shares = []
-    for a, b in ((1, 2), (2, 0), (0, 1)):
-        edge = turn * ((px[a] - gx) * (py[b] - gy) - (px[b] - gx) * (py[a] - gy))
-        right, down = turn * (px[b] - px[a]), turn * (py[b] - py[a])
-        owns_edge = (down > 0) | ((down == 0) & (right > 0))
-        inside &= (edge > 0) | ((edge == 0) & owns_edge)
-        shares.append(edge / np.where(turn == 0, 1.0, np.abs(area)))
-    return np.stack(shares), inside
-
-
-_CELLS, _REACH, _LIFT = 10, 2.2, 0.0005
-_GREY, _EDGE_GREY = 0.5, 0.42
-_SHADOW, _POINTS, _WIDTH = 0.32, 10, 0.08
-_GOLDEN = np.pi * (3 - np.sqrt(5))
-"""Points at multiples of this angle lie evenly on a disc."""
-_EDGE_SAMPLES = 2
-_DEPTH_TOLERANCE = 1e-3
-
-
-class Floor(Struct, frozen=True):
-    """A level floor."""
-
-    height: float
-    """m."""
-    distance: float
-    """Distance of the camera from its target, m."""
-    target: tuple[float, float, float]
-
-    def paint(self, colour: Array, buffer: GBuffer, bodies: Sequence[Surface]) -> None:
-        """Mix it into colours (rows, columns, RGB and alpha) where nothing covers it."""
-        eye, height = buffer.eye, self.height + self._lift / 2
-        width, rows = eye.size
-        x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, rows / 2 - np.arange(rows) - 0.5)
-        sight = np.column_stack((x.ravel(), y.ravel(), np.full(x.size, eye.focal)))
-        rays = rotate(sight, eye.axes.T).reshape(rows, width, 3)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            far = (height - eye.position[2]) / rays[..., 2]
-            place = eye.position[:2] + far[..., None] * rays[..., :2]
-        depth = far * eye.focal
-        visible = (
-            (far > 0)
-            & (depth < buffer.depth * (1 + _DEPTH_TOLERANCE))
-            & np.isfinite(place).all(axis=2)
-        )
-        place = np.where(visible[..., None], place, 0.0)
-        offset = np.linalg.norm((place - self.target[:2]) / (_REACH * self.distance), axis=2)
-        fade = np.clip(1 - offset, 0, None) ** 2
-        cell = round_length(0.8 * self.distance / _CELLS)
-        line = np.maximum(0.55 * _lines(place / cell), _lines(place / (5 * cell)))
-        _mix(colour, _GREY, visible * fade * (0.06 + 0.5 * line))
-        if bodies:
-            _mix(colour, 0.0, 1 - (1 - _SHADOW) ** self._shade(eye, bodies, buffer.depth))
-
-    @property
-    def _lift(self) -> float:
-        return _LIFT * self.distance
-
-    def _shade(self, eye: Eye, bodies: Sequence[Surface], depth: Array) -> Array:
-        """Return the part of the light that does not reach each sample."""
-        joined_surface = join_surfaces(bodies)
-        height = self.height + self._lift
-        elevation = joined_surface.vertices[:, 2:] - height
-        shade = np.zeros_like(depth)
-        for i in range(_POINTS):
-            angle, radius = _GOLDEN * i, _WIDTH * np.sqrt((i + 0.5) / _POINTS)
-            slope = radius * np.array((np.cos(angle), np.sin(angle))) + LAMP[:2]
-            flat = joined_surface.vertices[:, :2] - elevation * slope / LAMP[2]
-            vertices = np.column_stack((flat, np.full(len(flat), height)))
-            with np.errstate(over="ignore", invalid="ignore"):
-                in_view = rotate(vertices - eye.position, eye.axes)
-            shadow = np.full_like(depth, np.inf)
-            for part, shares, x, y in _fragments(eye, in_view, joined_surface.faces, front=False):
-                np.minimum.at(shadow, (y, x), 1.0 / (shares / part[..., 2]).sum(axis=1))
-            shade += shadow < depth * (1 + _DEPTH_TOLERANCE)
-        return shade / _POINTS
-
-
-def draw_edges(colour: Array, buffer: GBuffer, bodies: NDArray[np.bool_]) -> None:
-    """Draw lines around bodies, on what is behind them; `bodies` says which solids are bodies."""
-    edge = np.zeros(buffer.solid.shape, bool)
-    body = np.where(buffer.solid >= 0, bodies[buffer.solid], False)
-    reach = range(-_EDGE_SAMPLES, _EDGE_SAMPLES + 1)
-    for dy, dx in ((dy, dx) for dy in reach for dx in reach if dx * dx + dy * dy <= 4):
-        is_body = np.roll(body, (dy, dx), axis=(0, 1))
-        differs = np.roll(buffer.solid, (dy, dx), axis=(0, 1)) != buffer.solid
-        is_nearer = np.roll(buffer.depth, (dy, dx), axis=(0, 1)) < buffer.depth
-        edge |= is_body & differs & is_nearer
-    _mix(colour, _EDGE_GREY, edge.astype(float))
-
-
-def round_length(length: float) -> float:
-    """Round a length down to 1, 2 or 5 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(length))
-    return float(power * next(n for n in (5, 2, 1) if n * power <= length))
-
-
-def _lines(place: Array) -> Array:
-    """Return how strong the lines of a grid of cell size 1 are at places (rows, columns, 2)."""
-    width = sum(np.abs(np.gradient(place, axis=axis)) for axis in (0, 1))
-    width = np.maximum(width, 1e-6)
-    distance = np.abs((place - 0.5) % 1 - 0.5) / width
-    line = np.clip(1 - distance, 0, 1) * np.clip(0.5 / width - 0.5, 0, 1)
-    strength: Array = line.max(axis=2)
-    return strength
-
-
-def _mix(colour: Array, grey: float, alpha: Array) -> None:
-    cover = alpha[..., None]
-    colour[:] = cover * np.array((grey, grey, grey, 1.0)) + (1 - cover) * colour
 
 
 _CUBE, SKY = 1, 2

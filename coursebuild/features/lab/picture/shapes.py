@@ -317,10 +317,10 @@ def shade(
     total = glow + light.ambient * base + np.zeros((len(points), 1))
     for lamp in light.point_lights:
         back, strength = _rays(lamp, points)
-        facing = np.clip(_dot(normals, back), 0.0, None) * strength
+        facing = np.clip(dot(normals, back), 0.0, None) * strength
         half = unit(back + toward_eye)
-        fresnel = np.exp2((-5.55473 * (vh := np.clip(_dot(toward_eye, half), 0, 1)) - 6.98316) * vh)
-        peak = (exponent + 2) / 8 * np.clip(_dot(normals, half), 0.0, 1.0) ** exponent
+        fresnel = np.exp2((-5.55473 * (vh := np.clip(dot(toward_eye, half), 0, 1)) - 6.98316) * vh)
+        peak = (exponent + 2) / 8 * np.clip(dot(normals, half), 0.0, 1.0) ** exponent
         shine = (reflected_share * (1 - fresnel[:, None]) + fresnel[:, None]) * peak[:, None]
         total = total + lamp.colour * facing[:, None] * (base + shine)
     return total
@@ -337,6 +337,6 @@ def _rays(lamp: PointLight, points: Array) -> tuple[Array, Array]:
     return back, share * share * (3 - 2 * share)
 
 
-def _dot(a: Array, b: Array) -> Array:
-    product: Array = (a * b).sum(axis=-1)
-    return product
+def dot(a: Array, b: Array) -> Array:
+    """The scalar products (n,) of vectors (n, 3), or (1, 3)."""
+    return np.asarray(np.einsum("ij,ij->i", a, b))

@@ -22,8 +22,8 @@ from coursebuild.core.drawing.scales import Scale, separate_labels, typeset_numb
 from coursebuild.core.drawing.scales import markup_text as _text
 from coursebuild.features.lab.equations.reference import CurveRun
 from coursebuild.features.lab.model import ODE, Lab
-from coursebuild.features.lab.picture.draw import FreeCamera, draw
-from coursebuild.features.lab.picture.raster import SKY, Floor, round_length, texture_of
+from coursebuild.features.lab.picture.draw import Floor, FreeCamera, draw, round_length
+from coursebuild.features.lab.picture.raster import SKY, texture_of
 from coursebuild.features.lab.picture.scenery import scene_solids
 from coursebuild.features.lab.picture.shapes import light_of
 from coursebuild.features.lab.reply import LabRecord, MainRun, unpack_arrays
@@ -75,7 +75,7 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
     differences = np.diff(rows, axis=0, prepend=np.zeros_like(rows[:1]))
     filtered_rows = np.column_stack((np.full(height, 2, np.uint8), differences))
     header = struct.pack(">IIBBBBB", width, height, 8, 2 if opaque else 6, 0, 0, 0)
-    data = zlib.compress(filtered_rows.tobytes(), 9)
+    data = zlib.compress(filtered_rows.tobytes(), 8)  # 9 takes twice as long, for 4 % less
     file = b"\x89PNG\r\n\x1a\n"
     for chunk in (b"IHDR" + header, b"IDAT" + data, b"IEND"):
         file += struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
