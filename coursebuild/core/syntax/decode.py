@@ -123,7 +123,7 @@ class _Decoder:
                 help = did_you_mean(node.value, map(str, type.values))
                 return self.report("field-value", node.mark, message, help)
             case inspect.IntType() | inspect.FloatType(), NumberNode():
-                return self.decode_number(node, type, name)
+                return self.decode_number(node, type, name, remarks)
             case inspect.VarTupleType() | inspect.TupleType(), ArrayNode():
                 return self.decode_array(node, type, name)
             case inspect.DictType(), ObjectNode():
@@ -160,9 +160,13 @@ class _Decoder:
         return value
 
     def decode_number(
-        self, node: NumberNode, type: inspect.IntType | inspect.FloatType, name: str
+        self,
+        node: NumberNode,
+        type: inspect.IntType | inspect.FloatType,
+        name: str,
+        remarks: Mapping[str, str],
     ) -> object:
-        problem = ""
+        problem, help = "", ""
         try:
             double = float(node.value)
         except OverflowError:
@@ -178,9 +182,10 @@ class _Decoder:
             limit = getattr(type, attribute)
             if limit is not None and not holds(value, limit):
                 problem = f"must be {words} {limit:g}, not {node.raw}"
+                help = f"expected: {remarks['expects']}" if "expects" in remarks else ""
                 break
         if problem:
-            return self.report("field-value", node.mark, f"{format_name(name)} {problem}")
+            return self.report("field-value", node.mark, f"{format_name(name)} {problem}", help)
         return value
 
     # ------------------------------------------------------------------------------- containers

@@ -184,9 +184,11 @@ GROUPS: dict[str, dict[str, str]] = {
         "recording-caption": "A `text` block looks like a recorded output, but is not compared.",
         "recording-misspelt": "The caption of an output or a figure looks misspelt.",
         "recording-orphan": "A recorded output has no script above it.",
-        "recording-body": "Below `Output:` is neither an output block nor a table with rows.",
+        "recording-body": "Below `Output:` is neither an output block nor a table with rows, "
+        "or nothing of it is compared.",
         "recording-keys": "Keys of comparison contradict each other, or their block is not "
         "compared.",
+        "recording-loose": "With this `atol`, 0 would do for each number of an output.",
         "recorded-run": "The run of a script with `record=once` is missing or out of date.",
         "output-drift": "A recorded output differs from what the script prints.",
         "output-unmarked": "A text or table resembles what a script printed, but is not compared.",
@@ -245,7 +247,8 @@ _WARNINGS = frozenset(
     """
     draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
     symbol-repeated footnote-unused image-alt
-    recording-caption script-unrepeatable script-penetration script-writes script-connects
+    recording-caption recording-loose script-unrepeatable script-penetration script-writes
+    script-connects
     output-noise report-stale bench-unrecorded lab-penetration lab-far lab-reset package-reduced
     """.split()
 )
@@ -276,7 +279,7 @@ _NO_FIX = {
     "your code or model has to change": """
     figure-missing figure-window lab-diverged lab-endless lab-engine lab-expect lab-far lab-goal
     lab-parity lab-penetration lab-reset lab-shared lab-timeout lab-value lab-warning
-    mjcf-compiles mjcf-message model-timeout output-noise script-connects
+    mjcf-compiles mjcf-message model-timeout output-noise recording-loose script-connects
     script-diverged script-encoding script-killed script-output-limit script-penetration
     script-silent script-timeout script-unrepeatable script-writes
     """,
