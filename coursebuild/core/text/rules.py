@@ -183,7 +183,7 @@ GROUPS: dict[str, dict[str, str]] = {
     "Recorded outputs": {
         "recording-caption": "A `text` block looks like a recorded output, but is not compared.",
         "recording-misspelt": "The caption of an output or a figure looks misspelt.",
-        "recording-orphan": "A recorded output has no script above it.",
+        "recording-orphan": "A recorded output has no script above it, or code that nothing runs.",
         "recording-body": "Below `Output:` is neither an output block nor a table with rows, "
         "or nothing of it is compared.",
         "recording-keys": "Keys of comparison contradict each other, or their block is not "
@@ -216,7 +216,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "lab-model": "A lab names a model that is not in `models/`.",
         "lab-name": "A lab or its code uses a name that does not exist, as of a keyframe, a "
         "control or `data.qps`.",
-        "lab-code": "The code of a lab is not JavaScript, or an expression cannot be read.",
+        "lab-code": "A lab's code is not JavaScript, or an expression cannot be read or assigns.",
         "lab-throws": "The code of a lab throws an exception.",
         "lab-value": "The value of an expression is not a finite number.",
         "lab-warning": "MuJoCo raised a warning while a lab was tried.",
