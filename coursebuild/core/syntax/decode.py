@@ -50,6 +50,8 @@ T = TypeVar("T", bound=Struct)
 
 _NO_REMARKS: Mapping[str, str] = {}
 _INVALID = object()
+_REORDERS = re.compile("[\u202a-\u202e]")
+"""Isolates (U+2066 to U+2069) do what texts in Arabic may need, and are allowed."""
 
 
 class Decoding(Struct, Generic[S], frozen=True):
@@ -157,6 +159,9 @@ class _Decoder:
             return self.report("field-value", node.mark, message, help)
         if "text" in remarks:
             self.texts.append((node, remarks["text"]))
+        elif (character := _REORDERS.search(value)) is not None:
+            message = f"U+{ord(character[0]):04X} shows the text in another order than it is read"
+            return self.report("control-character", node.mark, message, "delete it")
         return value
 
     def decode_number(
