@@ -133,7 +133,8 @@ def add_format(parser: argparse.ArgumentParser, *formats: str) -> None:
 def print_report(report: Report, form: str, options: Options) -> int:
     """Write a report in one of its formats; return the status of the command."""
     options.store.close()
-    return write(report_text(report, form, options), CLEAN if report.ok else FAILURE)
+    status = CLEAN if report.ok else FAILURE
+    return write(report_text(report, form, options), status, commands=form == "github")
 
 
 def report_text(report: Report, form: str, options: Options) -> str:

@@ -14,7 +14,7 @@ from pathlib import Path
 from coursebuild.cli.commands import known_commands, parser_of
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.cli.unchanged import split_directory
-from coursebuild.core.files.course_root import MAP, find_course_root
+from coursebuild.core.files.course_root import MAP, find_course_root, read_regular
 from coursebuild.core.registry import features
 from coursebuild.core.syntax.course_schema import schema_roots
 from coursebuild.core.text.rules import RULES
@@ -100,7 +100,7 @@ def _argument_values(action: argparse.Action, directory: str | None) -> Iterable
 
 def _read_ids(root: Path) -> list[str]:
     try:
-        course = tomllib.loads((root / MAP).read_text("utf-8"))
+        course = tomllib.loads(read_regular(root / MAP).decode())
         lessons = [lesson["id"] for level in course["level"] for lesson in level["lesson"]]
         return [*lessons, *(page["id"] for page in course.get("page", ()))]
     except (OSError, ValueError, KeyError, TypeError):

@@ -17,18 +17,21 @@ def say(status: int, text: str) -> int:
     """Write a text to standard error; return the status."""
     if sys.stderr is not None:  # else `print` would write to standard output
         try:
-            print(text, file=sys.stderr, flush=True)
+            print(_without_commands(text), file=sys.stderr, flush=True)
         except OSError:  # nobody reads it; the status says it too
             return status
     return status
 
 
-def write(text: str, status: int) -> int:
-    """Write to standard output; return the status, or another if the text cannot be written."""
+def write(text: str, status: int, *, commands: bool = False) -> int:
+    """Write to standard output; return the status, or another if the text cannot be written.
+
+    `commands`: a CI service is meant to obey what it says.
+    """
     if sys.stdout is None:  # closed by whoever started us
         return status
     try:
-        sys.stdout.write(text)
+        sys.stdout.write(text if commands else _without_commands(text))
         sys.stdout.flush()
     except BrokenPipeError:  # the reader has seen enough; the status stays
         _discard_stdout()
@@ -38,6 +41,14 @@ def write(text: str, status: int) -> int:
         _discard_stdout()
         return fail(FAILURE, f"standard output cannot be written: {reason(error)}")
     return status
+
+
+def _without_commands(text: str) -> str:
+    if "::" not in text and "##" not in text:  # as nearly always
+        return text
+    from coursebuild.core.text.characters import without_commands
+
+    return without_commands(text)
 
 
 def _discard_stdout() -> None:

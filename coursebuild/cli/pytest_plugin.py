@@ -23,6 +23,7 @@ from xml.etree import ElementTree
 import pytest
 
 from coursebuild.core.files.course_root import MAP, find_course_root
+from coursebuild.core.text.characters import without_commands
 
 if TYPE_CHECKING:
     from coursebuild.core.model import Course
@@ -178,7 +179,7 @@ class CourseItem(pytest.Item):
     ) -> str:
         """Return the mistakes as `coursebuild check` prints them."""
         if isinstance(excinfo.value, CourseError):
-            return str(excinfo.value)
+            return without_commands(str(excinfo.value))
         return str(super().repr_failure(excinfo))
 
     def reportinfo(self) -> tuple[Path, int, str]:

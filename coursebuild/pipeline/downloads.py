@@ -94,7 +94,8 @@ def _find_surroundings(
         for path in library.course.files
         if path.startswith("models/")
     )
-    style = tuple(OutputFile(path.name, path.read_bytes()) for path in root.glob("matplotlibrc"))
+    styles = (path.name for path in root.glob("matplotlibrc"))
+    style = tuple(OutputFile(name, read_bytes(root, name)) for name in styles)
     surroundings = zips.Surroundings((), ours, meshes, style, imports)
     modules = zips.foreign_modules(library, surroundings)
     interpreter = course_environment(root, library.course).value

@@ -21,6 +21,7 @@ from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import check_output_folder, publish
 from coursebuild.core.features import Exporter
 from coursebuild.core.files.course_features import load_course_features
+from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, UsageError, reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes, read_sources
@@ -221,8 +222,7 @@ def _has_mark(place: Path, mark: str, *, archive: bool) -> bool:
         if archive:
             with zipfile.ZipFile(place) as entries:
                 return mark in entries.namelist()
-        with place.open("rb") as file:
-            return mark.encode() in file.read(1000)
+        return mark.encode() in read_regular(place)[:1000]
     except (OSError, zipfile.BadZipFile, ValueError):
         return False
 

@@ -20,6 +20,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.drawing.safe_svg import read_svg
 from coursebuild.core.engine.tool import step_key
+from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import write_atomic
@@ -127,7 +128,7 @@ def record_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], option
             continue
         file = options.root / path
         data = msgspec.json.format(msgspec.json.encode(recorded_run), indent=2) + b"\n"
-        expected = file.read_bytes() if file.exists() else None
+        expected = read_regular(file) if file.exists() else None
         write_atomic(options.root, path, data, expected=expected)
 
 
@@ -159,7 +160,7 @@ def _path(script: str) -> str:
 
 def _read_run(extraction: Extraction, options: Options) -> RecordedRun | None:
     try:
-        data = (options.root / _path(extraction.path)).read_bytes()
+        data = read_regular(options.root / _path(extraction.path))
         recorded_run = msgspec.json.decode(data, type=RecordedRun)
     except (OSError, msgspec.DecodeError):
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -84,6 +85,25 @@ def bring_store_link(root: Path, home: Path) -> None:
     (root / ".public.coursebuild-old").symlink_to(home / "victim/site")
 
 
+def bring_pipes(root: Path, home: Path) -> None:
+    """Pipes, for which a reader waits for ever, in the place of what a command reads."""
+    environment = root / ".venv/bin/python"
+    environment.parent.mkdir(parents=True)
+    environment.symlink_to(sys.executable)
+    course_map = root / "content/course.toml"
+    course_map.write_text(f'{course_map.read_text()}\n[verify]\npython = ".venv/bin/python"\n')
+    for path in (
+        f"public/{MARKER}",
+        "examples/.extracted.json",
+        "matplotlibrc",
+        "requirements.txt",
+        "runs/a.run.json",
+        ".venv/pyvenv.cfg",
+    ):
+        (root / path).parent.mkdir(exist_ok=True)
+        os.mkfifo(root / path)
+
+
 def bring_environment(root: Path, home: Path) -> None:
     """Programs where the tool might look for some."""
     program = f"#!/bin/sh\ntouch '{home}/owned'\nexec '{sys.executable}' \"$@\"\n"
@@ -103,7 +123,7 @@ def read_files(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize(
     "bring",
-    [bring_orders, bring_links, bring_store_link, bring_environment],
+    [bring_orders, bring_links, bring_store_link, bring_pipes, bring_environment],
     ids=lambda f: f.__name__,
 )
 def test_looking_at_what_a_branch_brings_does_nothing_else(
@@ -124,12 +144,32 @@ def test_looking_at_what_a_branch_brings_does_nothing_else(
         assert read_files(home / "victim") == victim, arguments
         assert read_files(root / ".git") == repository, arguments
         assert not (home / "owned").exists(), arguments
-        if bring is not bring_environment:
+        if bring not in (bring_pipes, bring_environment):
             assert not (root / ".venv").exists(), arguments
         if arguments != LOOKING[-1]:
             assert course.text(course.lesson()) == GOOD, arguments
     subprocess.run(["git", "status"], cwd=root, check=True, capture_output=True)
     assert not (home / "owned").exists()
+
+
+@pytest.mark.site
+def test_nothing_that_a_script_prints_commands_the_service_that_reads_the_log(make: Make) -> None:
+    code = 'import sys\nsys.exit("::add-mask::a\\n  ::error::b ##[error]c\\n##vso[task.d]e")'
+    course = make("## A\n\n" + block("a.py", code, "x"))
+    for form in ("text", "json", "junit", "sarif", "github"):
+        result = course.main("check", "--format", form)
+        assert result.status == 1 and "exited with status 1" in result.out, form
+        commands = [
+            line
+            for line in (result.out + result.err).splitlines()
+            if line.lstrip().startswith("::") or "##[" in line or "##vso[" in line
+        ]
+        if form == "github":
+            assert [line.partition(" ")[0] for line in commands] == ["::error"]
+        else:
+            assert commands == [], form
+        if form == "json":
+            assert "##[error]c\n##vso[task.d]e" in str(json.loads(result.out)).replace("\\n", "\n")
 
 
 TOUCH = "from pathlib import Path\nPath({!r}).touch()\n"

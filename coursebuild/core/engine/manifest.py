@@ -17,6 +17,7 @@ from pathlib import Path
 from msgspec import Struct
 
 from coursebuild.core.engine.store import Store
+from coursebuild.core.files.course_root import read_regular
 
 KIND = "published"
 """The kind of a manifest's entry."""
@@ -109,8 +110,8 @@ def foreign_files(place: Path) -> list[str]:
     if not os.path.lexists(place):
         return []
     own_paths: list[str] = []
-    with contextlib.suppress(FileNotFoundError, IsADirectoryError, UnicodeDecodeError):
-        header, *own_paths = (place / MARKER).read_text(encoding="utf-8").split("\n")
+    with contextlib.suppress(OSError, UnicodeDecodeError):
+        header, *own_paths = read_regular(place / MARKER).decode().split("\n")
         own_paths = [MARKER, *own_paths] if header == _HEADER else []
     return sorted(set(_files(place)).difference(own_paths))
 

@@ -32,6 +32,7 @@ from pathlib import Path
 from coursebuild.core.engine import manifest
 from coursebuild.core.engine.manifest import MARKER, Manifest, ManifestEntry
 from coursebuild.core.engine.page_pool import Workers, can_fork
+from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, reason
 from coursebuild.core.files.locks import folder_lock
 from coursebuild.core.files.trust import find_store
@@ -231,7 +232,7 @@ class _NewSite:
             return (
                 all(self.old.is_whole(path, key) for path, key in self.keys.items())
                 and manifest.holds(place, self.keys)
-                and (place / MARKER).read_bytes() == manifest.marker(self.keys)
+                and read_regular(place / MARKER) == manifest.marker(self.keys)
             )
         except OSError:
             return False

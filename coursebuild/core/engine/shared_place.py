@@ -8,6 +8,7 @@ from urllib.parse import unquote, urlsplit
 
 from msgspec import Struct
 
+from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError, reason, require
 from coursebuild.core.files.trust import replace_file
 
@@ -33,7 +34,7 @@ class FolderFiles:
     def read(self, path: str) -> bytes | None:
         """A file's bytes; `None` if there is none."""
         try:
-            return (self.folder / path).read_bytes()
+            return read_regular(self.folder / path)
         except (FileNotFoundError, NotADirectoryError):
             if not self.folder.is_dir():
                 self.folder.mkdir()  # or raise the reason; its parent must exist

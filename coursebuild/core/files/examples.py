@@ -23,6 +23,7 @@ import msgspec
 from msgspec import Struct
 
 from coursebuild.core.files import errors
+from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError, FileChangedError, OutsideProjectError
 from coursebuild.core.files.write import remove_leftovers, resolve_inside, write_atomic
 
@@ -230,7 +231,7 @@ class _Manifest(Struct, frozen=True):
 def _load_manifest(root: Path) -> dict[str, tuple[str, ...]]:
     """The hashes that each extracted file may have; empty if the manifest is missing or damaged."""
     try:
-        files = msgspec.json.decode((root / MANIFEST).read_bytes(), type=_Manifest).files
+        files = msgspec.json.decode(read_regular(root / MANIFEST), type=_Manifest).files
     except OSError as error:
         # An empty manifest would make all files look edited, now and later.
         if errors.lacking(error):
@@ -248,9 +249,11 @@ def _save_manifest(root: Path, manifest: Mapping[str, tuple[str, ...]]) -> None:
     path = root / MANIFEST
     while True:
         try:
-            current: bytes | None = path.read_bytes()
+            current: bytes | None = read_regular(path)
         except FileNotFoundError:
             current = None
+        except OSError as error:
+            raise errors.EffectError(f"{MANIFEST} cannot be read: {errors.reason(error)}") from None
         if current == data:
             return
         with contextlib.suppress(FileChangedError):  # by another run, where there are no locks

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.files.course_root import MAP, find_course_root, is_dropping
+from coursebuild.core.files.course_root import MAP, find_course_root, is_dropping, read_regular
 from coursebuild.core.files.errors import EffectError, OutsideProjectError, UsageError, reason
 from coursebuild.core.model import MjcfModel
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
@@ -104,18 +104,8 @@ def read_bytes(root: Path, path: str) -> bytes:
         raise EffectError("a path holds a null character")
     if not Path(os.path.realpath(root / path)).is_relative_to(os.path.realpath(root)):
         raise OutsideProjectError(f"{path} {_OUTSIDE_REASON}")
-    try:  # without waiting, even for a pipe
-        fd = os.open(root / path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
-        try:
-            status = os.fstat(fd)
-            if not stat.S_ISREG(status.st_mode):
-                raise OSError("it is not a regular file")
-            parts = [os.read(fd, status.st_size + 1)]
-            while parts[-1]:
-                parts.append(os.read(fd, 1 << 20))
-            return b"".join(parts)
-        finally:
-            os.close(fd)
+    try:
+        return read_regular(root / path)
     except OSError as error:
         raise EffectError(f"{path} cannot be read: {reason(error)}") from None
 

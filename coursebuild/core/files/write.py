@@ -31,6 +31,7 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
+from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError, FileChangedError, OutsideProjectError, reason
 from coursebuild.core.files.locks import is_abandoned, project_lock, try_lock
 from coursebuild.core.files.trust import FOLDER, replace_file, seal, state_folder, store_key, unseal
@@ -164,7 +165,7 @@ def check_unchanged(target: Path, path: str, expected: bytes | None) -> None:
     One that cannot be read is an `EffectError`.
     """
     try:
-        current: bytes | None = target.read_bytes()
+        current: bytes | None = read_regular(target)
     except (FileNotFoundError, NotADirectoryError):
         current = None
     except IsADirectoryError:

@@ -1,7 +1,7 @@
 """Types of fields that several declarations share.
 
 In the `extra` of a `Meta` are two remarks for the decoder: `text` ("blocks" or "inlines": the
-string is Markdown) and `expects` (words for the strings that the pattern allows).
+string is Markdown) and `expects` (words for what the pattern or the bounds allow).
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ Inlines: TypeAlias = Annotated[
 
 Positive: TypeAlias = Annotated[float, Meta(gt=0)]
 NotNegative: TypeAlias = Annotated[float, Meta(ge=0)]
+BELOW_ONE = Meta(lt=1, extra={"expects": "a share of the number; 1 would take 0 for it"})
+RelativeTolerance: TypeAlias = Annotated[NotNegative, BELOW_ONE]
 Digits: TypeAlias = Annotated[int, Meta(ge=0, le=15)]
 
 

@@ -19,7 +19,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
-import importlib.metadata
 import importlib.util
 import os
 import platform
@@ -43,7 +42,12 @@ from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import folder_lock
 from coursebuild.core.files.trust import TEMPORARY, state_folder
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
+from coursebuild.core.run.script_environment import (
+    Interpreter,
+    engine_version,
+    installed_distributions,
+    python_version,
+)
 
 ABSENT = ""
 _TOOL_PACKAGE = "coursebuild"
@@ -137,7 +141,7 @@ def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str
     if names is None:
         names_by_module: dict[str, set[str]] = {}
         seen_names: set[str] = set()
-        for distribution in importlib.metadata.distributions(path=list(folders)):
+        for distribution in installed_distributions(folders):
             name = distribution.metadata["Name"] or ""
             if name in seen_names or name == _TOOL_PACKAGE:  # the first on the path counts
                 continue
@@ -271,7 +275,7 @@ def _create_environment(prefix: Path, engine: str) -> None:
             installed |= requirements
             needs = {  # MuJoCo requires packages of its own, as `mujoco-core==4.0.0`
                 need
-                for distribution in importlib.metadata.distributions(path=[str(_packages(new))])
+                for distribution in installed_distributions([str(_packages(new))])
                 for need in distribution.requires or ()
                 if need.startswith(f"{_ENGINE}-") and "extra ==" not in need
             }

@@ -16,12 +16,12 @@ import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from importlib.metadata import distributions
+from importlib.metadata import Distribution
 from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.files.course_root import DECISIVE
+from coursebuild.core.files.course_root import DECISIVE, read_regular
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.model import Course, NamedPath
 from coursebuild.core.model.results import Machine
@@ -157,10 +157,38 @@ def engine_version() -> str:
     return version
 
 
+class _InstalledDistribution(Distribution):
+    """One of the standard library would wait for a pipe, and never end reading a device."""
+
+    def __init__(self, place: Path) -> None:
+        self._place = place
+
+    def read_text(self, filename: str) -> str | None:
+        try:
+            return read_regular(self._place / filename).decode("utf-8", "replace")
+        except OSError:
+            return None
+
+    def locate_file(self, path: str | os.PathLike[str]) -> Path:
+        return self._place.parent / path
+
+
+def installed_distributions(folders: Iterable[str], name: str = "") -> Iterator[Distribution]:
+    """The distributions in folders, which may be a stranger's; all, or those of one name."""
+    pattern = re.sub(r"[-_.]+", "[-_.]+", name) or ".*"
+    place = re.compile(rf"(?i:{pattern}(-.*)?\.(dist|egg)-info)")
+    for folder in folders:
+        entries: list[str] = []
+        with contextlib.suppress(OSError):
+            entries = sorted(os.listdir(folder))  # noqa: PTH208
+        for entry in filter(place.fullmatch, entries):
+            yield _InstalledDistribution(Path(folder, entry))
+
+
 def package_version(name: str, folders: Iterable[str] | None = None) -> str:
     """The version of a distribution, here or in these folders; `none` where it is not installed."""
     path = list(sys.path if folders is None else folders)
-    for distribution in distributions(name=name, path=path):
+    for distribution in installed_distributions(path, name):
         # What an interrupted installation left may say no version, or have no metadata.
         with contextlib.suppress(FileNotFoundError, KeyError):
             return distribution.version or "none"
@@ -186,10 +214,11 @@ def course_environment(root: Path, course: Course) -> Parsed[Interpreter | None]
         help = f"make it: `python -m venv {folder}`, then install there what scripts import"
         return _reject(named_path, f"there is no interpreter `{named_path.path}`", help)
     try:
-        settings = dict(_SETTING.findall((prefix / "pyvenv.cfg").read_text("utf-8", "replace")))
+        text = read_regular(prefix / "pyvenv.cfg").decode("utf-8", "replace")
     except OSError as error:
         problem = f"is not of a virtual environment: no pyvenv.cfg, {reason(error)}"
         return _reject(named_path, f"`{named_path.path}` {problem}")
+    settings = dict(_SETTING.findall(text))
     version_text = settings.get("version") or settings.get("version_info", "")
     # Such as 3.12.1, or virtualenv's 3.12.1.final.0.
     match = re.match(r"(\d+)\.(\d+)\.\d+", version_text)

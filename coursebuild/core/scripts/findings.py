@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from decimal import Decimal
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import CodeBlock, Course, Document, Owner, Table, document_scripts
+from coursebuild.core.model import (
+    CodeBlock,
+    Course,
+    Document,
+    Filter,
+    Mode,
+    Owner,
+    Table,
+    document_scripts,
+)
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts import bindings, failures
@@ -16,8 +26,8 @@ from coursebuild.core.scripts.bound_numbers import BoundText, shows
 from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
-from coursebuild.core.scripts.lines import LineMatcher, Side
-from coursebuild.core.scripts.numbers import Number, only_number, scan
+from coursebuild.core.scripts.lines import ELLIPSIS, LineMatcher, Side
+from coursebuild.core.scripts.numbers import Number, only_number, scan, within_tolerance
 from coursebuild.core.scripts.tables import TableMatcher, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.source import Excerpt
@@ -78,6 +88,7 @@ def output_findings(
     for owner, document in documents:
         for verdict in outputs.of_document(document):
             recording = verdict.recording
+            yield from find_void(verdict)
             run = outputs.runs.get(recording.script or "")
             if run is not None and run.outcome is Outcome.OK and not run.stdout.strip():
                 yield failures.silence_diagnostic(recording, run.path)
@@ -90,6 +101,45 @@ def output_findings(
                 yield drift_diagnostic(verdict, owner.id, dependents)
         yield from bindings.check_bindings(document, outputs, evidence)
         yield from _find_unmarked(course, document, outputs.runs)
+
+
+_RESIDUE = Decimal("1e-9")
+"""A number below it is taken for what rounding has left of 0."""
+
+
+def find_void(verdict: Verdict) -> Iterator[Diagnostic]:
+    """Report an output that is compared so loosely that nearly any other would do."""
+    body, comparison = verdict.recording.body, verdict.comparison
+    if comparison.mode is Mode.VOLATILE or not verdict.recording.readable:
+        return
+    elides = comparison.ellipsis and isinstance(body, Excerpt)
+
+    def texts(filters: Iterable[Filter]) -> list[str]:
+        if isinstance(body, Table):
+            return [cell.mapped.text for row in table_rows(body, filters) for cell in row]
+        lines = Side.of(body.text, filters).lines
+        return [part for line in lines for part in (line.split(ELLIPSIS) if elides else [line])]
+
+    recorded = body.text if isinstance(body, Excerpt) else "".join(texts(()))
+    # What a filter keeps by its groups is compared.
+    filters = (
+        f if "\\" in f.replacement else replace(f, replacement="") for f in comparison.filters
+    )
+    compared, place = texts(tuple(filters)), verdict.recording.caption_span
+    if not any(map(str.isalnum, "".join(compared))):
+        if any(map(str.isalnum, recorded)) or (elides and ELLIPSIS in recorded):
+            message = "nothing of this recorded output is compared"
+            help = "`...`, filters and `volatile` leave nothing of it: record a line that has to "
+            help += "hold, or say `volatile` alone, of which the page tells readers"
+            yield diagnose("recording-body", place, message, help=help)
+    elif comparison.mode is Mode.TOLERANCE:
+        numbers = [n.value for text in compared for n in scan(text) if n.is_finite]
+        numbers = [value for value in numbers if abs(value) >= _RESIDUE]
+        rtol, atol = comparison.rtol, comparison.atol
+        if numbers and all(within_tolerance(n, Decimal(0), rtol, atol) for n in numbers):
+            message = f"with `atol` = {float(atol):g}, 0 would do for each number of this output"
+            help = "lower it, or print what has to hold, as in `error < 1e-6`"
+            yield diagnose("recording-loose", place, message, help=help)
 
 
 _ALIKE = 0.5

@@ -6,6 +6,7 @@ before it; `\|` is a `|` in the cell.
 
 from __future__ import annotations
 
+import posixpath
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from itertools import pairwise
@@ -253,6 +254,8 @@ def _is_in_callout(source: Source, line: int) -> bool:
 def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterator[Diagnostic]:
     """Report a heading that is repeated, a quotation torn from its callout, and lost list marks.
 
+    Also an output below code that nothing runs, as readers would take it for what that code prints,
+    unless the code names the script.
     A `>` is lost on the empty line between the two where one sentence goes on, or where other
     empty lines of theirs have it.
     """
@@ -263,6 +266,15 @@ def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterat
     if isinstance(block, model.Heading) and block.span.text.strip() == before.span.text.strip():
         place, message = block.span.first_line(), "this heading is repeated here"
         yield diagnose("text-repeated", place, message, help=Fix("delete one of the two", ""))
+    if isinstance(block, model.Recording) and isinstance(before, model.CodeBlock | model.PlainCode):
+        script = block.script
+        if script is not None and posixpath.basename(script) not in before.code.text:
+            message = "nothing runs the code above this output"
+            help = (
+                f"put it below `{script}`, which it is compared with, or make it a block of kind "
+            )
+            help += "`text illustration`, without a caption"
+            yield diagnose("recording-orphan", block.caption_span, message, help=help)
     if isinstance(before, model.Callout) and isinstance(block, model.BlockQuote):
         last = before.span.text.rstrip(" \t\r\n>")[-1:]
         text = f"{before.span.text}\n{block.span.text}"

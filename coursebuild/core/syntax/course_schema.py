@@ -23,7 +23,14 @@ from coursebuild.core.drawing.contrast import (
 )
 from coursebuild.core.model import Filter, LessonTable, Limits, Pace, Silence
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
-from coursebuild.core.model.fields import NotNegative, Slug, Text, describe, matching
+from coursebuild.core.model.fields import (
+    NotNegative,
+    RelativeTolerance,
+    Slug,
+    Text,
+    describe,
+    matching,
+)
 from coursebuild.core.registry import features
 from coursebuild.core.syntax.declarations import ModelFile
 from coursebuild.core.syntax.nodes import ObjectNode, format_name
@@ -233,9 +240,9 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
         Literal["exact", "digits", "rtol"] | None,
         describe("the same text, the same digits, or within rtol and atol; else exact"),
     ] = None
-    rtol: Annotated[NotNegative | None, describe("tolerance relative to the recorded number")] = (
-        None
-    )
+    rtol: Annotated[
+        RelativeTolerance | None, describe("tolerance relative to the recorded number")
+    ] = None
     atol: Annotated[NotNegative | None, describe("absolute tolerance")] = None
     ellipsis: Annotated[bool, describe("`...` in a recorded output matches anything")] = False
     filter: tuple[Filter, ...] = ()

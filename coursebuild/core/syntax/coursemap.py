@@ -45,7 +45,7 @@ from coursebuild.core.text.diagnostics import (
     did_you_mean,
     sort_diagnostics,
 )
-from coursebuild.core.text.patterns import pattern_mistake
+from coursebuild.core.text.patterns import makes_alike, pattern_mistake
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
 
@@ -269,6 +269,8 @@ def _check_prerequisites(lessons: list[model.Lesson], ids: Iterable[str]) -> Ite
         yield diagnose("prerequisite-cycle", place, message, help=help, notes=notes[1:])
 
 
+_DIFFERENT_TEXTS = (("length 1.962 cm", "length 2.481 cm"), ("length 1.962 cm", "weight 1.962 cm"))
+"""What no filter may take for the same, or else it would do so with any numbers or words."""
 _VARIABLE = re.compile(r"(?!PYTHON|PATH$|TMPDIR$)[A-Za-z_][A-Za-z0-9_]*")
 _CALLOUT = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
@@ -295,6 +297,14 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
         elif (mistake := pattern_mistake(filter.pattern, filter.replacement)) is not None:
             message = f"the replacement cannot be used: {mistake[0]}"
             yield diagnose("field-value", _place(node, "replacement", mistake[1]), message)
+        else:
+            for texts in _DIFFERENT_TEXTS:
+                if makes_alike(filter.pattern, filter.replacement, texts):
+                    message = "to this filter `{}` and `{}` are the same".format(*texts)
+                    help = "say what stands beside what varies, as in `took [0-9.]+ s`; or write "
+                    help += '`volatile="…"` on a fence, so that its page tells readers what varies'
+                    yield diagnose("field-value", node.place("pattern"), message, help=help)
+                    break
     for name, member in root.object("verify").object("env").members.items():
         if not _VARIABLE.fullmatch(name):
             message = f"{format_name(name)} cannot be set for scripts"

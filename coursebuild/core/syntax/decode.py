@@ -50,6 +50,8 @@ T = TypeVar("T", bound=Struct)
 
 _NO_REMARKS: Mapping[str, str] = {}
 _INVALID = object()
+_REORDERS = re.compile("[\u202a-\u202e]")
+"""Isolates (U+2066 to U+2069) do what texts in Arabic may need, and are allowed."""
 
 
 class Decoding(Struct, Generic[S], frozen=True):
@@ -123,7 +125,7 @@ class _Decoder:
                 help = did_you_mean(node.value, map(str, type.values))
                 return self.report("field-value", node.mark, message, help)
             case inspect.IntType() | inspect.FloatType(), NumberNode():
-                return self.decode_number(node, type, name)
+                return self.decode_number(node, type, name, remarks)
             case inspect.VarTupleType() | inspect.TupleType(), ArrayNode():
                 return self.decode_array(node, type, name)
             case inspect.DictType(), ObjectNode():
@@ -157,12 +159,19 @@ class _Decoder:
             return self.report("field-value", node.mark, message, help)
         if "text" in remarks:
             self.texts.append((node, remarks["text"]))
+        elif (character := _REORDERS.search(value)) is not None:
+            message = f"U+{ord(character[0]):04X} shows the text in another order than it is read"
+            return self.report("control-character", node.mark, message, "delete it")
         return value
 
     def decode_number(
-        self, node: NumberNode, type: inspect.IntType | inspect.FloatType, name: str
+        self,
+        node: NumberNode,
+        type: inspect.IntType | inspect.FloatType,
+        name: str,
+        remarks: Mapping[str, str],
     ) -> object:
-        problem = ""
+        problem, help = "", ""
         try:
             double = float(node.value)
         except OverflowError:
@@ -178,9 +187,10 @@ class _Decoder:
             limit = getattr(type, attribute)
             if limit is not None and not holds(value, limit):
                 problem = f"must be {words} {limit:g}, not {node.raw}"
+                help = f"expected: {remarks['expects']}" if "expects" in remarks else ""
                 break
         if problem:
-            return self.report("field-value", node.mark, f"{format_name(name)} {problem}")
+            return self.report("field-value", node.mark, f"{format_name(name)} {problem}", help)
         return value
 
     # ------------------------------------------------------------------------------- containers

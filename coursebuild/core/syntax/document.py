@@ -74,7 +74,29 @@ def parse_document(
         edits = tuple(Edit(source.span(place, place + 1), "") for place in places)
         help = Fix("delete it; readers would see `\ufffd`", edits=edits, safe=True)
         state.report(diagnose("control-character", source.span(at, at + 1), message, help=help))
+    state.diagnostics += _check_order(document)
     return Parsed(document, sort_diagnostics(state.diagnostics))
+
+
+_REORDERS = re.compile("[\u202a-\u202e\u2066-\u2069]")
+"""Characters by which a browser shows others in another order: in prose, some are needed."""
+
+
+def _check_order(document: model.Document) -> Iterator[Diagnostic]:
+    """Report code and outputs that readers would see otherwise than they run and are compared."""
+    for block in model.document_blocks(document):
+        match block:
+            case model.Recording():
+                place = block.body_span
+            case model.Script() | model.PlainCode() | model.CodeBlock() | model.Mjcf():
+                place = block.span
+            case _:
+                continue
+        if character := _REORDERS.search(place.text):
+            at = place.start + character.start()
+            message = f"U+{ord(character[0]):04X} shows the line in another order than it is read"
+            help = "delete it; scripts can write an escape, and print `ascii(text)`"
+            yield diagnose("control-character", place.source.span(at, at + 1), message, help=help)
 
 
 _TEXTS = frozenset(

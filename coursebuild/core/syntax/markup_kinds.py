@@ -287,7 +287,7 @@ BROKEN = {
         "a backslash before each character that is meant to be seen",
     ),
     "character": MarkupKind(
-        "[\ufffd\x01-\x08\x0b\x0e-\x1f\x7f-\x9f]",
+        "[\ufffd\x01-\x08\x0b\x0e-\x1f\x7f-\x9f\u202a-\u202e]",
         "",
         "delete it, or write the character that was meant",
         "control-character",

@@ -250,13 +250,17 @@ def check_stray_keys(fence: Fence, state: ParsingState) -> None:
 def _read_tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | None:
     if word is None or word.value is None:
         return None
-    value = Decimal(word.value) if _NUMBER.fullmatch(word.value) else None
-    if value is not None and value >= 0:
+    value, help = Decimal(word.value) if _NUMBER.fullmatch(word.value) else None, ""
+    if value is None:
+        message = f"`{word.value}` is not a number"
+    elif value < 0:
+        message = f"`{word.key}` must not be negative"
+    elif word.key == "rtol" and value >= 1:
+        message = f"`rtol` must be less than 1, not {word.value}"
+        help = "it is a share of the number; 1 would take 0 for it"
+    else:
         return value
-    message = (
-        f"`{word.value}` is not a number" if value is None else f"`{word.key}` must not be negative"
-    )
-    diagnostics.append(diagnose("fence-key-value", word.value_span, message))
+    diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
     return None
 
 

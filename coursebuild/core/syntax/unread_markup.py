@@ -41,7 +41,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, misspel
 from coursebuild.core.text.source import Excerpt, Span
 
 _ESCAPED_BRACKETS = re.compile(r"(?:\\[()\[\]]|\s)+")
-_MARKS = r"{}\uff5b\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f"
+_MARKS = r"{}\uff5b\[\]\\$`*~|#@^&<%\ufffd\x01-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e"
 _SIGN = re.compile(
     rf"[{_MARKS}!?=:._'´‘’(](?:(?<=[{_MARKS}])|(?<=[!?=:._'])[!?=:._']|(?<=:)\w"
     r"|(?<=[´‘’])[´‘’]{2}|(?<=\()(?:out\)|given\)|\.further))|[^\W\d_]> [a-z]|\w <[a-z]{2}"

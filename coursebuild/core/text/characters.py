@@ -1,4 +1,4 @@
-"""Characters: what HTML and XML forbid, and how wide a text is on a terminal."""
+"""Characters: what HTML, XML and logs forbid, and how wide a text is on a terminal."""
 
 from __future__ import annotations
 
@@ -32,6 +32,19 @@ _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 def clean_xml(text: str) -> str:
     """The text with U+FFFD in place of each character that XML cannot hold."""
     return _NOT_XML.sub("\ufffd", text)
+
+
+_COMMAND = re.compile(r"^([^\S\n]*):(?=:)|(##\w*)\[", re.MULTILINE)
+
+
+def without_commands(text: str) -> str:
+    """The text, in which a CI service that reads its log finds nothing to obey.
+
+    GitHub obeys lines such as `  ::add-mask::x`, and `##[error]x` in a line, as Azure does
+    `##vso[…]`; in JSON they stay what they are.
+    """
+    bracket = "\\u005b" if text.startswith(("{", "[")) else "\u2045"
+    return _COMMAND.sub(lambda m: f"{m[1]}\u205a" if m[2] is None else m[2] + bracket, text)
 
 
 TAB = 4

@@ -17,6 +17,12 @@ def replacements(pattern: str, replacement: str, text: str) -> dict[tuple[int, i
     return {match.span(): match.expand(template) for match in _compile(pattern).finditer(text)}
 
 
+def makes_alike(pattern: str, replacement: str, texts: tuple[str, str]) -> bool:
+    """Whether texts that differ are the same after the replacement of all matches."""
+    template = replacement.encode("ascii", "backslashreplace").decode()
+    return len({_compile(pattern).sub(template, text) for text in texts}) == 1
+
+
 def matches_empty_text(pattern: str) -> bool:
     """Whether a pattern matches an empty text."""
     return _compile(pattern).search("") is not None

@@ -183,10 +183,12 @@ GROUPS: dict[str, dict[str, str]] = {
     "Recorded outputs": {
         "recording-caption": "A `text` block looks like a recorded output, but is not compared.",
         "recording-misspelt": "The caption of an output or a figure looks misspelt.",
-        "recording-orphan": "A recorded output has no script above it.",
-        "recording-body": "Below `Output:` is neither an output block nor a table with rows.",
+        "recording-orphan": "A recorded output has no script above it, or code that nothing runs.",
+        "recording-body": "Below `Output:` is neither an output block nor a table with rows, "
+        "or nothing of it is compared.",
         "recording-keys": "Keys of comparison contradict each other, or their block is not "
         "compared.",
+        "recording-loose": "With this `atol`, 0 would do for each number of an output.",
         "recorded-run": "The run of a script with `record=once` is missing or out of date.",
         "output-drift": "A recorded output differs from what the script prints.",
         "output-unmarked": "A text or table resembles what a script printed, but is not compared.",
@@ -214,7 +216,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "lab-model": "A lab names a model that is not in `models/`.",
         "lab-name": "A lab or its code uses a name that does not exist, as of a keyframe, a "
         "control or `data.qps`.",
-        "lab-code": "The code of a lab is not JavaScript, or an expression cannot be read.",
+        "lab-code": "A lab's code is not JavaScript, or an expression cannot be read or assigns.",
         "lab-throws": "The code of a lab throws an exception.",
         "lab-value": "The value of an expression is not a finite number.",
         "lab-warning": "MuJoCo raised a warning while a lab was tried.",
@@ -236,7 +238,8 @@ GROUPS: dict[str, dict[str, str]] = {
         "quiz-id-repeated": "Two quizzes of the course have the same id.",
         "question-id-repeated": "Two questions of a quiz have the same id.",
         "quiz-answer": "The answer of a question is not one of its options.",
-        "quiz-output": "An `output` question names a script or a line that was not printed.",
+        "quiz-output": "An `output` question names a script or line that was not printed or "
+        "varies.",
         "quiz-gate": "A prediction has nothing below it to hide, or no lab to run.",
         "package-reduced": "A QTI package cannot hold a question as the page shows it.",
     },
@@ -245,7 +248,8 @@ _WARNINGS = frozenset(
     """
     draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
     symbol-repeated footnote-unused image-alt
-    recording-caption script-unrepeatable script-penetration script-writes script-connects
+    recording-caption recording-loose script-unrepeatable script-penetration script-writes
+    script-connects
     output-noise report-stale bench-unrecorded lab-penetration lab-far lab-reset package-reduced
     """.split()
 )
@@ -276,7 +280,7 @@ _NO_FIX = {
     "your code or model has to change": """
     figure-missing figure-window lab-diverged lab-endless lab-engine lab-expect lab-far lab-goal
     lab-parity lab-penetration lab-reset lab-shared lab-timeout lab-value lab-warning
-    mjcf-compiles mjcf-message model-timeout output-noise script-connects
+    mjcf-compiles mjcf-message model-timeout output-noise recording-loose script-connects
     script-diverged script-encoding script-killed script-output-limit script-penetration
     script-silent script-timeout script-unrepeatable script-writes
     """,

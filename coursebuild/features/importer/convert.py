@@ -82,9 +82,6 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     out, context = _convert_texts(course, texts, ids, files)
     leftovers = context.leftovers
     if map_path is not None:
-        paths = {text.file for text in texts}
-        unused = (path for path in files if path.endswith(TEXTS) and path not in paths)
-        leftovers += [Leftover(path, "", "a text that the map does not name") for path in unused]
         leftovers += [
             Leftover(map_path, "", f"the prerequisite {name} of {text.id}, which is not a lesson")
             for text in texts
@@ -92,11 +89,15 @@ def convert(files: SourceFiles) -> ConvertedCourse:
             if name not in ids
         ]
     packages = dict(_own_packages(files, texts))
-    out |= {**packages, **dict(_model_files(files))}
+    unused = {*files} - files.read_paths
+    models = dict(_model_paths(files))
+    unused -= {*models.values()}
+    out |= packages | {path: files.read(source) for path, source in models.items()}
     lines = map_lines(course, ids, context.callouts, ("src",) if packages else ())
     out["content/course.toml"] = _encode("".join(f"{line}\n" for line in lines))
     out[".gitignore"] = _GITIGNORE
     leftovers = [*sorted(files.leftovers), *course.leftovers, *leftovers]
+    leftovers += _describe_unused(files, (path for path in files if path in unused))
     return ConvertedCourse(dict(sorted(out.items())), tuple(leftovers), context.notebook_outputs)
 
 
@@ -225,15 +226,37 @@ def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator
                     yield f"src/{name}/{path.removeprefix(f'{root}/')}", files.read(path)
 
 
-def _model_files(files: SourceFiles) -> Iterator[tuple[str, bytes]]:
+def _model_paths(files: SourceFiles) -> Iterator[tuple[str, str]]:
+    """Yield the new path of each model, and of what lies beside models, with its own."""
     for path in files:
         folders = posixpath.dirname(path).split("/")
         if "models" in folders:
             depth = folders.index("models")
             name = "/".join(("models", *folders[depth + 1 :], posixpath.basename(path)))
-            yield name, files.read(path)
-        elif path.endswith(".xml") and b"<mujoco" in (data := files.read(path)):
-            yield f"models/{posixpath.basename(path)}", data
+            yield name, path
+        elif path.endswith(".xml") and b"<mujoco" in files.read(path):
+            yield f"models/{posixpath.basename(path)}", path
+
+
+_OTHER_TEXTS = tuple(".adoc .docx .htm .html .markdown .mdx .org .pdf .rmd .rst .tex .txt".split())
+_MOST_NAMES = 20
+
+
+def _describe_unused(files: SourceFiles, paths: Iterable[str]) -> Iterator[Leftover]:
+    """Yield what is said of files that are in no file of the new course."""
+    groups: dict[str, list[str]] = {}
+    for path in paths:
+        message = "used by no text"
+        if path.endswith(TEXTS):
+            message = "not taken for a lesson"
+        elif path.lower().endswith(_OTHER_TEXTS):
+            message = "a kind of text that is not read"
+        elif path.endswith(".py") and re.search(rb"(?m)^# ?%%", files.read(path)):
+            message = "a script of cells, which `jupytext --to ipynb` makes a notebook of"
+        groups.setdefault(message, []).append(path)
+    for message, names in groups.items():
+        rest = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+        yield Leftover(", ".join(names[:_MOST_NAMES]) + rest, "", message)
 
 
 _NOT_LESSONS = ("readme", "license", "licence", "changelog", "contributing", "code_of_conduct")
@@ -269,6 +292,9 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         left = [f"{leftover.path}: {leftover.message}" for leftover in sorted(files.leftovers)[:3]]
         message = "there is nothing to import: no course.json, no notebook and no Markdown file"
         raise UsageError(message, help="; ".join(left))
+    for name, mapping in zip(names, settings, strict=True):
+        if lost := ", ".join(f"`{key}`" for key in _lost_keys(mapping)):
+            files.leave(name, f"settings without a counterpart: {lost}")
     texts = [] if files.is_single else [part for part in parts if isinstance(part, ImportedText)]
     pages = [text for text in texts if _base_name(text.file) in _PAGES]
     # A level for each group, and one for each run of lessons outside groups
@@ -291,6 +317,18 @@ def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
     if value is None:
         raise UsageError(f"{path} is not YAML, or too large")
     return value if isinstance(value, dict) else {"chapters": value}
+
+
+_SETTINGS = ("title", "site_name", "nav", "docs_dir", "toc", "chapters", "sidebar", "root")
+"""Keys of settings that are read."""
+
+
+def _lost_keys(settings: Mapping[str, Any]) -> Iterator[str]:
+    for key, value in settings.items():
+        if key in ("project", "book", "website") and isinstance(value, Mapping):
+            yield from (f"{key}.{inner}" for inner in _lost_keys(value))
+        elif key not in _SETTINGS:
+            yield key
 
 
 def _get(settings: object, *path: str) -> object:

@@ -175,10 +175,22 @@ _COMPLETE = ("", "complete", "completed", "done", "published", "final", "ready")
 def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
     """Return the course with its texts read, and with their new ids and paths.
 
+    A lesson whose file cannot be read is only planned, and a page is left out.
+
     Raises:
-        UsageError: a file cannot be read.
+        UsageError: no file can be read.
     """
-    levels = []
+    levels, errors = [], list[UsageError]()
+
+    def read(text: ImportedText, id: str, used_ids: set[str] | None = None) -> ImportedText:
+        try:
+            return _read_file(text, id, files, used_ids)
+        except UsageError as error:
+            errors.append(error)
+            files.leave(text.file, f"it {str(error).removeprefix(f'{text.file} ')}")
+            planned = replace(text, file="", title=text.title or title_of_file(text.file))
+            return _read_file(planned, id, files)
+
     used_ids = set[str]()
     for number, level in enumerate(course.levels, 1):
         own_id = level.id if re.fullmatch("[A-Za-z0-9]+", level.id) else str(number)
@@ -190,11 +202,16 @@ def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
             lesson_id = _free_id(
                 lesson.old_id if fits else next(other_ids), other_ids, used_lesson_ids
             )
-            lessons.append(_read_file(lesson, lesson_id, files))
+            lessons.append(read(lesson, lesson_id))
         title = level.title or f"Level {id}"
         levels.append(replace(level, id=id, title=title, lessons=tuple(lessons)))
     used_ids = {*RESERVED_IDS}
-    pages = (_read_file(page, "", files, used_ids) for page in course.pages if page.file)
+    pages = [read(page, "", used_ids) for page in course.pages if page.file]
+    if errors and not any(
+        t.path for t in (*pages, *(t for level in levels for t in level.lessons))
+    ):
+        raise errors[0]
+    pages = [page for page in pages if page.path]
     return replace(course, levels=tuple(levels), pages=tuple(pages))
 
 
@@ -217,10 +234,13 @@ def _read_file(
         title = title or id
         return replace(text, id=id, slug=slug_of(slug or title), title=title)
     try:
-        heading, segments, pictures = read_segments(files.read_text(text.file), text.file)
+        read = read_segments(files.read_text(text.file), text.file)
     except RecursionError:
         raise UsageError(f"{text.file} is nested too deeply") from None
-    title = " ".join((title or heading or title_of_file(text.file)).split())
+    if read.lost:
+        names = ", ".join(f"`{name}`" for name in read.lost)
+        files.leave(text.file, f"metadata without a counterpart: {names}")
+    title = " ".join((title or read.title or title_of_file(text.file)).split())
     slug = slug_of(slug or title_of_file(text.file))
     if not re.search("[a-z]", slug):
         slug = slug_of(title)
@@ -228,8 +248,9 @@ def _read_file(
     if used_ids is not None:
         page = _free_id(page, (f"{page}-{n}" for n in itertools.count(2)), used_ids)
     path = f"content/lessons/{id}-{slug}.md" if id else f"content/pages/{page}.md"
-    read = replace(text, segments=tuple(segments), pictures=pictures)
-    return replace(read, id=id or page, slug=slug, title=title, path=path)
+    text = replace(text, summary=text.summary or read.summary)
+    text = replace(text, segments=read.segments, pictures=read.pictures)
+    return replace(text, id=id or page, slug=slug, title=title, path=path)
 
 
 def map_lines(

@@ -7,12 +7,14 @@ import binascii
 import json
 import re
 import textwrap
+import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from markdown_it import MarkdownIt
 from markdown_it.rules_block import StateBlock
 from mdit_py_plugins.admon import admon_plugin
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.files.errors import UsageError
@@ -20,13 +22,35 @@ from coursebuild.features.importer.source_files import Segment, read_yaml
 
 _COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")
 _CELL = re.compile(r"\{code-cell\b.*|\{(?:python|ipython3?)[^}]*\}")
-_FRONT_MATTER = re.compile(r"---[ \t]*\n(.*?\n)?(?:---|\.\.\.)[ \t]*(?:\n|\Z)", re.DOTALL)
+_FRONT_MATTER = re.compile(
+    r"---[ \t]*\n(?P<yaml>.*?\n)?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
+    r"|\+\+\+[ \t]*\n(?P<toml>.*?\n)?\+\+\+[ \t]*(?:\n|\Z)",
+    re.DOTALL,
+)
 _TITLE = re.compile(r"^#[ \t]+(.*?)(?:[ \t]+#+)?(?:[ \t]*\{[^{}]*\})?[ \t]*$", re.MULTILINE)
 """A heading of level 1."""
 
 
-def read_segments(text: str, name: str) -> tuple[str, list[Segment], dict[str, bytes]]:
-    """Return the title that a file states, its segments, and the pictures in it.
+_SUMMARIES = ("description", "abstract", "subtitle")
+"""Keys of front matter whose text becomes a lesson's summary; the first that there is."""
+_NEEDLESS = ("title", "jupyter", "jupytext", "kernelspec", "language_info")
+"""Further keys of which nothing is lost."""
+
+
+class ReadText(Struct, frozen=True):
+    """What the file of a lesson holds."""
+
+    title: str
+    """Empty if it states none."""
+    summary: str
+    segments: tuple[Segment, ...]
+    pictures: Mapping[str, bytes]
+    lost: tuple[str, ...]
+    """Keys of its front matter, or of a notebook's metadata, that have no counterpart."""
+
+
+def read_segments(text: str, name: str) -> ReadText:
+    """Read the file of a lesson.
 
     Raises:
         UsageError: it is no notebook, but is called so.
@@ -35,12 +59,14 @@ def read_segments(text: str, name: str) -> tuple[str, list[Segment], dict[str, b
     metadata: Mapping[str, object] = {}
     if name.endswith(".ipynb"):
         try:
-            segments, pictures = _read_cells(json.loads(text)["cells"])
+            notebook = json.loads(text)
+            metadata = notebook.get("metadata") or {}
+            segments, pictures = _read_cells(notebook["cells"], _language(metadata))
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             raise UsageError(f"{name} is not a notebook of format 4") from None
     else:
         match, size = _FRONT_MATTER.match(text), 0
-        if match is not None and isinstance(value := read_yaml(match[1] or "{}"), dict):
+        if match is not None and isinstance(value := _read_front_matter(match), dict):
             metadata, size = value, match.end()
         segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
     # The first heading of level 1, and the segments without it; later ones get level 2
@@ -56,8 +82,33 @@ def read_segments(text: str, name: str) -> tuple[str, list[Segment], dict[str, b
         else segment
         for segment in segments
     ]
-    title, segments = (titles or [""])[0], shifted
-    return str(metadata.get("title") or title), segments, pictures
+    summaries = [key for key in _SUMMARIES if isinstance(metadata.get(key), str)][:1]
+    return ReadText(
+        str(metadata.get("title") or (titles or [""])[0]),
+        " ".join("".join(str(metadata[key]) for key in summaries).split()),
+        tuple(shifted),
+        pictures,
+        tuple(
+            str(key)
+            for key, value in metadata.items()
+            if value and key not in (*_NEEDLESS, *summaries)
+        ),
+    )
+
+
+def _read_front_matter(match: re.Match[str]) -> Any:
+    if match["toml"] is None:
+        return read_yaml(match["yaml"] or "{}")
+    try:
+        return tomllib.loads(match["toml"])
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return None
+
+
+def _language(metadata: Mapping[str, Any]) -> str:
+    """The language of a notebook's cells."""
+    kernel, info = (metadata.get(key) or {} for key in ("kernelspec", "language_info"))
+    return str(kernel.get("language") or info.get("name") or "python").lower()
 
 
 def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[Segment]:
@@ -119,7 +170,9 @@ _PARSER.block.ruler.before("fence", "div", _parse_div, {"alt": ["paragraph", "li
 # --- notebooks
 
 
-def _read_cells(cells: list[dict[str, Any]]) -> tuple[list[Segment], dict[str, bytes]]:
+def _read_cells(
+    cells: list[dict[str, Any]], language: str
+) -> tuple[list[Segment], dict[str, bytes]]:
     """Return cells as segments, and the pictures that are attached to them, by name."""
     segments: list[Segment] = []
     attachments: dict[str, bytes] = {}
@@ -137,6 +190,8 @@ def _read_cells(cells: list[dict[str, Any]]) -> tuple[list[Segment], dict[str, b
                 source = source.replace(f"attachment:{picture}", f"attachment:{number}-{picture}")
                 attachments[f"{number}-{picture}"] = data
             segments += read_markdown(source, place=place)
+        elif cell.get("cell_type") == "code" and source.strip() and "python" not in language:
+            segments.append(Segment(kind="block", place=place, text=source, head=f"{{{language}}}"))
         elif cell.get("cell_type") == "code" and source.strip():
             outputs = cell.get("outputs") or ()
             tags = " ".join((cell.get("metadata") or {}).get("tags") or ())

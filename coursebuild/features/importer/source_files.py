@@ -194,6 +194,7 @@ class SourceFiles:
         self.name = stem_of(place.name) if self.is_single else place.name
         """What the new folder is called, and the course where nothing else gives it a title."""
         self.leftovers: list[Leftover] = []
+        self.read_paths: set[str] = set()
         self._real_paths: dict[str, str] = {}
         """The path of each file without links, by its path."""
         if self.is_single:
@@ -223,6 +224,7 @@ class SourceFiles:
             UsageError: it cannot be read.
         """
         parts = self._real_paths[path].split("/")
+        self.read_paths.add(path)
         try:
             fd = os.open(self.folder, _OPEN_FOLDER)
             try:
@@ -260,7 +262,7 @@ class SourceFiles:
                 with os.scandir(self.folder / folder) as iterator:
                     entries = tuple(iterator)
             except OSError as error:
-                self._leave(folder or ".", f"a folder that cannot be read: {reason(error)}")
+                self.leave(folder or ".", f"a folder that cannot be read: {reason(error)}")
                 continue
             for entry in entries:
                 path = f"{folder}/{entry.name}".lstrip("/")
@@ -268,12 +270,12 @@ class SourceFiles:
                     continue
                 if _BAD_NAME.search(entry.name):
                     name = path.encode("unicode_escape").decode()
-                    self._leave(name, "the name is not UTF-8, or holds a control character")
+                    self.leave(name, "the name is not UTF-8, or holds a control character")
                     continue
                 try:
                     status = entry.stat(follow_symlinks=False)
                 except OSError as error:
-                    self._leave(path, reason(error))
+                    self.leave(path, reason(error))
                     continue
                 if stat.S_ISLNK(status.st_mode):
                     links.append(path)
@@ -281,9 +283,9 @@ class SourceFiles:
                     pending.append(path)
                     folders.add(path)
                 elif not stat.S_ISREG(status.st_mode):
-                    self._leave(path, "a pipe, socket or device, which is not read")
+                    self.leave(path, "a pipe, socket or device, which is not read")
                 elif status.st_size > _MAX_SIZE:
-                    self._leave(path, f"a file larger than {_MAX_SIZE >> 20} MiB")
+                    self.leave(path, f"a file larger than {_MAX_SIZE >> 20} MiB")
                 else:
                     self._real_paths[path] = path
         regular_paths = {*self._real_paths}
@@ -292,11 +294,11 @@ class SourceFiles:
             if real in regular_paths:
                 self._real_paths[link] = real
             elif not real:
-                self._leave(link, _LINK_OUT)
+                self.leave(link, _LINK_OUT)
             elif not os.path.lexists(self.folder / real) or Path(self.folder, real).is_symlink():
-                self._leave(link, "a broken link")
+                self.leave(link, "a broken link")
             elif real not in folders:
-                self._leave(link, "a link to what is not imported")
+                self.leave(link, "a link to what is not imported")
         self._real_paths = dict(sorted(self._real_paths.items(), key=lambda e: e[0].split("/")))
 
     def _real_path(self, path: str) -> str:
@@ -310,12 +312,13 @@ class SourceFiles:
     def _is_found(self, path: str, real: str) -> bool:
         """Whether a single file may take this one along."""
         if not real and not path.startswith("../"):
-            self._leave(path, _LINK_OUT)
+            self.leave(path, _LINK_OUT)
         is_public = not any(map(_is_skipped, (*path.split("/"), *real.split("/"))))
         return is_public and Path(self.folder, real).is_file()
 
-    def _leave(self, path: str, message: str) -> None:
-        leftover = Leftover(path, "", message)
+    def leave(self, path: str, message: str) -> None:
+        """Note that something is not imported, and why."""
+        leftover = Leftover(path, "", " ".join(message.split()))
         if leftover not in self.leftovers:
             self.leftovers.append(leftover)
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from msgspec import Struct, ValidationError, convert
 
-from coursebuild.core.model.fields import Positive
+from coursebuild.core.model.fields import Positive, RelativeTolerance
 from coursebuild.core.syntax.decode import decode
 from coursebuild.core.syntax.fence import Fence, Prose, TextParser, Word, kind_of
 from coursebuild.core.syntax.json_text import parse_json, to_one_line
@@ -37,7 +37,7 @@ _KEYS = {
     "title": (str, "a text"),
     "height": (Height, "a whole number from 80 to 2000"),
     "seconds": (Positive, "a number above 0"),
-    "rtol": (Positive, "a number above 0"),
+    "rtol": (RelativeTolerance, "a number of at least 0 and below 1"),
     "diverges": (Positive, "a number above 0"),
 }
 """Keys of a fence `lab mjcf`, with the type of their value, and its name in messages."""

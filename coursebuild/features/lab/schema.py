@@ -8,11 +8,13 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 from msgspec import Meta, Struct
 
 from coursebuild.core.model.fields import (
+    BELOW_ONE,
     Digits,
     Inlines,
     NotNegative,
     OptionalBlocks,
     Positive,
+    RelativeTolerance,
     Text,
 )
 
@@ -230,7 +232,8 @@ class Verify(Struct, frozen=True, forbid_unknown_fields=True):
 
     seconds: Annotated[Positive | None, Meta(description="simulated time")] = None
     rtol: Annotated[
-        NotNegative | None, Meta(description="relative difference allowed to the native engine")
+        RelativeTolerance | None,
+        Meta(description="relative difference allowed to the native engine"),
     ] = None
     deep: Annotated[bool, Meta(description="whether bodies are meant to overlap deeply")] = False
 
@@ -382,7 +385,8 @@ class Tolerance(Struct, frozen=True, forbid_unknown_fields=True):
     """How closely SciPy has to agree."""
 
     rtol: Annotated[
-        Positive, Meta(description="difference, relative to the largest value of a state")
+        Annotated[Positive, BELOW_ONE],
+        Meta(description="difference, relative to the largest value of a state"),
     ] = 1e-6
     until: Annotated[
         float | None, Meta(description="where on the axis the comparison ends; else everywhere")

@@ -253,6 +253,8 @@ class _LabTrial(Struct, frozen=True):
             mjb = _save_model(self.context, self.engines.native, self.model)
             if diagnostic := self._check_size(mjb):
                 return self._fail(module, [diagnostic])
+            if assignments := list(verdict.assignment_diagnostics(lab)):
+                return self._fail(module, assignments)
             key = fingerprint((inputs.text, inputs.conditions, mjb))
             evaluate = functools.partial(self._evaluate_reply, module, key)
             cached_evaluation = store.get("labs", key, evaluate, shared=True)
@@ -299,7 +301,8 @@ class _LabTrial(Struct, frozen=True):
         self, module: LabModule, diagnostics: list[Diagnostic]
     ) -> tuple[TrialResult, list[Diagnostic]]:
         line = TrialLine(module.name, self.lab.fields.title, self.trial.owner, "failed")
-        return TrialResult(self.lab.span, line, LabOutput(module.code, module.config)), diagnostics
+        output = LabOutput(module.code, module.config)
+        return TrialResult(self.lab.span, line, output), diagnostics
 
     def _check_size(self, mjb: bytes) -> Diagnostic | None:
         memory = self.context.course.limits.memory

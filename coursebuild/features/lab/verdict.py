@@ -270,21 +270,73 @@ def references(lab: Lab) -> list[NameReference]:
     return [reference for text in texts for reference in _references(text)]
 
 
-def _references(code: Excerpt) -> Iterator[NameReference]:
-    data = code.text.encode("utf-8", "replace")
-    nodes = list(walk(parse(code.text)))
-    declared_names: set[str] = set()
+_ASSIGNS = re.compile(r"(?<![=!<>])=(?![=>])|[<>]>=|\+\+|--")
+"""What can be found in all code that changes something, and in little other code."""
+
+
+def assignment_diagnostics(lab: Lab) -> Iterator[Diagnostic]:
+    """Report expressions and conditions that assign; an expression may to variables of its own.
+
+    Assigned to on purpose, a condition has parentheses of its own, as is the custom.
+    """
+    code = dict(lab.code)
+    for piece in pieces(lab):
+        if piece.entry not in code or not _ASSIGNS.search(piece.code):
+            continue
+        nodes = list(walk(parse(piece.code)))
+        declared_names = _declared_names(nodes)
+        for node in nodes:
+            target = node.child_by_field_name("left") or node.child_by_field_name("argument")
+            if node.type not in _CHANGES or target is None:
+                continue
+            outer = node.parent
+            is_condition = (
+                outer is not None
+                and outer.type == "parenthesized_expression"
+                and outer.parent is not None
+                and outer.parent.type in _CONDITIONALS
+            )
+            owner = target
+            while (inner := owner.child_by_field_name("object")) is not None:
+                owner = inner
+            is_own = piece.form != "expression" or text_of(owner) in declared_names
+            if is_own and not (is_condition and node.type == "assignment_expression"):
+                continue
+            name = "a condition" if is_condition else _entry_name(lab, piece.entry)
+            message = f"{name} changes `{text_of(target)}`"
+            operator = next((sign for sign in node.children if sign.type == "="), None)
+            place, help = _place_in(code[piece.entry], operator or node), "an expression only reads"
+            if operator is not None:
+                help = Fix("to compare, write `===`", "===")
+            yield diagnose("lab-code", place, message, help=help)
+
+
+_CHANGES = ("assignment_expression", "augmented_assignment_expression", "update_expression")
+_CONDITIONALS = ("if_statement", "while_statement", "do_statement")
+
+
+def _declared_names(nodes: Sequence[Node]) -> frozenset[str]:
+    names: set[str] = set()
     for node in nodes:
         if node.type in ("formal_parameters", "array_pattern", "object_pattern"):
-            declared_names.update(map(text_of, node.named_children))
+            names.update(map(text_of, node.named_children))
         for field in ("name", "parameter", "left"):
             child = node.child_by_field_name(field)
-            if child is not None and child.type == "identifier":
-                declared_names.add(text_of(child))
+            is_declared = field != "left" or node.type not in _CHANGES
+            if child is not None and child.type == "identifier" and is_declared:
+                names.add(text_of(child))
+    return frozenset(names)
 
-    def place(node: Node) -> Span:
-        start, end = (len(data[:at].decode()) for at in (node.start_byte, node.end_byte))
-        return code.span(start, end)
+
+def _place_in(code: Excerpt, node: Node) -> Span:
+    data = code.text.encode("utf-8", "replace")
+    start, end = (len(data[:at].decode()) for at in (node.start_byte, node.end_byte))
+    return code.span(start, end)
+
+
+def _references(code: Excerpt) -> Iterator[NameReference]:
+    nodes = list(walk(parse(code.text)))
+    declared_names = _declared_names(nodes)
 
     for node in nodes:
         parts = dotted_names(node) if node.type == "member_expression" else ()
@@ -293,10 +345,10 @@ def _references(code: Excerpt) -> Iterator[NameReference]:
         is_longer_name = outer is not None and outer.type == "member_expression"
         if len(path) < 2 or path[0] in (*declared_names, *_OPEN_OBJECTS) or is_longer_name:
             continue
-        places = tuple(map(place, parts))
+        places = tuple(_place_in(code, part) for part in parts)
         index = outer.child_by_field_name("index") if outer is not None else None
         if outer is not None and index is not None and text_of(index).isdecimal():
-            yield NameReference(path, places, int(text_of(index)), place(outer))
+            yield NameReference(path, places, int(text_of(index)), _place_in(code, outer))
         else:
             yield NameReference(path, places)
 

@@ -14,6 +14,8 @@ from coursebuild.core.model import (
     Document,
     Heading,
     Math,
+    Mode,
+    Recording,
     ThematicBreak,
     block_inlines,
     document_scripts,
@@ -23,6 +25,7 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.model.results import Mathml, Outcome, ScriptRun
+from coursebuild.core.scripts.lines import LineMatcher, MappedText, apply_filters
 from coursebuild.core.scripts.numbers import scan_prose
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.text.diagnostics import (
@@ -34,6 +37,7 @@ from coursebuild.core.text.diagnostics import (
     did_you_mean,
     is_one_edit,
 )
+from coursebuild.core.text.source import Excerpt
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.relations import check_steps
 from coursebuild.features.quiz.model import ChoiceQuestion, NumericQuestion, Quiz
@@ -145,15 +149,42 @@ def _check_answer(question: NumericQuestion) -> Iterator[Diagnostic]:
 
 
 def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
-    """Report `output` questions about a line that the script, run to its end, did not print."""
+    """Report `output` questions about a line that the script, run to its end, did not print.
+
+    A line that varies, as its recording says, is no answer either.
+    """
     printed = {run.path: run.stdout for run in runs if run.outcome is Outcome.OK}
+    recordings: dict[str, list[Recording]] = {}
+    for document in course.documents:
+        for recording in find_blocks(document, Recording):
+            recordings.setdefault(recording.script or "", []).append(recording)
     course_quizzes = (quiz for document in course.documents for quiz in find_blocks(document, Quiz))
     for question in (q for quiz in course_quizzes for q in quiz.output_questions()):
         if question.script in printed:
-            count = len(printed[question.script].rstrip().split("\n"))
-            if question.line > count:
+            lines = printed[question.script].rstrip().split("\n")
+            count = len(lines)
+            if question.line <= count:
+                line = lines[question.line - 1].rstrip()
+                if any(_varies(course, r, line) for r in recordings.get(question.script, ())):
+                    message = f"line {question.line} of what `{question.script}` prints varies"
+                    help = "ask for a line that its recorded output compares"
+                    yield diagnose("quiz-output", question.line_span, message, help=help)
+            else:
                 message = f"`{question.script}` has no line {question.line}: it prints {count}"
                 yield diagnose("quiz-output", question.line_span, message)
+
+
+def _varies(course: Course, recording: Recording, line: str) -> bool:
+    comparison, body = course.comparison_of(recording), recording.body
+    if comparison.mode is Mode.VOLATILE:
+        return True
+    if apply_filters(MappedText.copy(line), comparison.filters).text != line:
+        return True
+    if not comparison.ellipsis or not isinstance(body, Excerpt):
+        return False
+    matcher = LineMatcher(comparison)
+    texts = [text.rstrip() for text in body.text.split("\n")]
+    return not any(matcher.matches(text, line) for text in texts if not matcher.elides(text))
 
 
 FEATURE = Feature(

@@ -123,6 +123,9 @@ def _check(node: ObjectNode, decoding: Decoding[schema.QuizFile]) -> Iterator[Di
                     "`tol` is missing: the usual tolerance is a share of the answer, which is 0"
                 )
                 yield diagnose("field-missing", node.place("answer"), message)
+            elif fields.tol is not None and 0 < abs(fields.answer) <= fields.tol:
+                message = "`tol` must be less than the answer, or else 0 would be right"
+                yield diagnose("field-value", node.place("tol"), message)
             if isinstance(unit := node.get("unit"), StringNode):
                 yield from check_unit(unit.excerpt)
         case schema.OrderFields():

@@ -42,6 +42,9 @@ def test_a_distribution_without_a_version_is_not_installed(tmp_path: Path) -> No
     folder = tmp_path / "mujoco-3.0.0.dist-info"
     folder.mkdir()
     assert package_version("mujoco", [str(tmp_path)]) == "none"
+    os.mkfifo(folder / "METADATA")  # as a stranger's environment may have it
+    assert package_version("mujoco", [str(tmp_path)]) == "none"
+    (folder / "METADATA").unlink()
     (folder / "METADATA").write_text("Name: mujoco\nVersion: 3.0.0\n")
     assert package_version("mujoco", [str(tmp_path)]) == "3.0.0"
 

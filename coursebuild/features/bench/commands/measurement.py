@@ -18,6 +18,7 @@ from msgspec.structs import replace
 from coursebuild.cli.arguments import options_of, style_of
 from coursebuild.cli.output import CLEAN, FAILURE, write
 from coursebuild.core.features import Executor
+from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.resources import template_texts
@@ -290,7 +291,7 @@ def write_records(
     for path, data in records:
         try:
             target = resolve_inside(root, path)
-            before = target.read_bytes() if target.exists() else None
+            before = read_regular(target) if target.exists() else None
             if before != data:
                 write_atomic(root, path, data, expected=before)
             remarks.append(f"{path} is unchanged" if before == data else f"wrote {path}")

@@ -259,6 +259,12 @@ class _Compiler:
         elif not axis.min <= at <= axis.max:
             message = f"`at` must lie between `min` and `max`: {axis.min:g} to {axis.max:g}"
             self.report("field-value", node.place("at"), message)
+        elif (
+            (verify := self.fields.verify) and verify.until is not None and verify.until <= axis.min
+        ):
+            message = f"`until` must be greater than `min`, which is {axis.min:g}"
+            place = self.node.object("verify").place("until")
+            self.report("field-value", place, message)
         data: dict[str, Any] = to_builtins(axis)
         return data | {"name": axis.name or name, "at": at}
 

@@ -172,6 +172,9 @@ def add_points(config: dict[str, Any], course: Course) -> Iterator[CurveFinding]
             columns = f"columns {points['x']} and {points['y']}"
             message = f"the output of `{points['script']}` has no numbers of the axis in {columns}"
             yield CurveFinding("lab-points", entry, message)
+        elif all(abs(y) <= points["within"] for _, y in points["data"]):
+            message = "`within` is not less than any of these numbers, so a curve of 0 would do"
+            yield CurveFinding("lab-points", (*entry[:-1], "within"), message)
 
 
 def run_trial(engine: EquationEngine, config: dict[str, Any], seconds: float) -> EquationReply:

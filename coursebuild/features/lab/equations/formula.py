@@ -40,7 +40,7 @@ _FOREIGN_SIGNS = {
     "&&": "write `a and b`",
     "||": "write `a or b`",
     "\\": "an expression is written as in Python: `sqrt(x)`, not as in TeX",
-    "=": "an expression has a value, and assigns none",
+    "=": "an expression assigns nothing; to compare, write `==`",
 }
 """Signs of other languages, with what to write; the first that there is counts."""
 _HELP: dict[type[ast.AST], str] = {

@@ -1,0 +1,7 @@
+# Café
+
+# %% [markdown]
+# A cell
+
+# %%
+print(1)
