@@ -146,8 +146,10 @@ export class Plot {
     ctx.restore()
   }
 
-  drawReferences({ ctx, bbox, valToPos }, font) {
+  /** Draw the lines for reference values; their labels stand on the left, or on the right while the lines end near there. */
+  drawReferences({ ctx, bbox, data, valToPos }, font) {
     const ratio = uPlot.pxRatio
+    const end = data[0].length === 0 ? 0 : valToPos(data[0].at(-1), 'x', true) - bbox.left
     for (const { y, label } of this.config.refLines) {
       const pixel = Math.round(valToPos(y, 'y', true))
       if (pixel < bbox.top || pixel > bbox.top + bbox.height) continue
@@ -162,9 +164,10 @@ export class Plot {
       if (label) {
         ctx.font = scaleFont(font, ratio)
         ctx.fillStyle = this.colours.text
-        ctx.textAlign = 'left'
+        const isLeft = end > ctx.measureText(label).width + 2 * GAP * ratio
+        ctx.textAlign = isLeft ? 'left' : 'right'
         ctx.textBaseline = 'bottom'
-        ctx.fillText(label, bbox.left + GAP * ratio, pixel - 2 * ratio)
+        ctx.fillText(label, bbox.left + (isLeft ? GAP * ratio : bbox.width), pixel - 2 * ratio)
       }
       ctx.restore()
     }
