@@ -182,12 +182,15 @@ _NUMBER = (
 )
 
 _WITH_UNITS = re.compile(rf"(?<=[0-9]) {_UNITS}")
+_TITLE = re.compile(r"[0-9]+\.[0-9]+(?= [A-Z] [a-z])")
+"""The number of a lesson before a title such as `A pendulum`: no amperes."""
 _UNITS_FIRST = rf"{_SPACES}?{_UNITS}"
 _QUANTITY = (
     rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_SPACES}?{_UNITS})?|{_NUMBER}{_SPACES}?{_UNITS})"
 )
 """Compiled when it is needed, as few pages do: it takes longer than all others together."""
 _LATIN_BEFORE = re.compile("[A-Za-z]\\s*(?:=\\s*)?$")
+_LATIN_AFTER = re.compile("[ \u00a0][A-Za-z]")
 
 
 def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:
@@ -208,7 +211,9 @@ def isolate_ltr(html: Markup) -> Markup:
 
 def join_units(text: str) -> str:
     """Put no-break spaces between numbers and their units, and inside units."""
-    return _WITH_UNITS.sub(lambda match: match[0].replace(" ", "\u00a0"), text)
+    title = _TITLE.match(text)
+    start = title.end() + 1 if title else 0
+    return text[:start] + _WITH_UNITS.sub(lambda m: m[0].replace(" ", "\u00a0"), text[start:])
 
 
 def unit_length(text: str) -> int:
@@ -222,6 +227,8 @@ def split_quantities(text: str) -> Iterator[tuple[str, bool]]:
     position = 0
     for match in re.finditer(_QUANTITY, text):
         if _LATIN_BEFORE.search(text, position, match.start()):
+            continue
+        if match[0][0].isdigit() and _LATIN_AFTER.match(text, match.end()):
             continue
         if match.start() > position:
             yield text[position : match.start()], False
