@@ -73,6 +73,29 @@ def test_on_a_desk_picture_curves_and_controls_share_a_screen(
         assert plot and view_below and plot["y"] > view_below["y"] + view_below["height"]
 
 
+COLOURED = """canvas => {
+  const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height)
+  let count = 0
+  for (let i = 0; i < data.length; i += 4) {
+    const rgb = data.subarray(i, i + 3)
+    if (data[i + 3] > 200 && Math.max(...rgb) - Math.min(...rgb) > 80) count += 1
+  }
+  return count
+}"""
+
+
+def test_lines_of_a_plot_keep_their_colours_in_high_contrast(
+    browsers: Mapping[str, Browser], base: str
+) -> None:
+    with browsers["plain"].new_context(forced_colors="active") as context:
+        page, _ = watch_page(context)
+        page.goto(base + PAGE)
+        swing = lab(page, SWING, None)
+        press(swing, "Play")
+        canvas = swing.locator(".lab-live .lab-plot canvas").first
+        wait_for_condition(page, lambda: canvas.evaluate(COLOURED) > 50)
+
+
 # ------------------------------------------------------------------------------- the goal
 
 
