@@ -38,7 +38,8 @@ from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.materials import renderer_for
 from coursebuild.core.pages.numbering import items_of
 from coursebuild.core.pages.record import PageRecord, record
-from coursebuild.core.pages.renderer import Renderer, Texts, known_mathml
+from coursebuild.core.pages.renderer import Renderer, Texts, direction, known_mathml
+from coursebuild.core.pages.typography import isolate_formulas
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import features, summarize
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
@@ -329,7 +330,8 @@ class Reader:
             renderer = self._renderer_for(request, whole)
             inputs = request.inputs
             head, html, context = draw(inputs, document, renderer)
-            page_record, body = record(head, html, request.base_url, context)
+            body = isolate_formulas(html) if direction(request.language) == "rtl" else html
+            page_record, body = record(head, body, request.base_url, context)
             all_notes = {
                 f.name: f.note(inputs, context, body) for f in features() if f.note is not None
             }

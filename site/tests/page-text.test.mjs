@@ -86,6 +86,8 @@ test('in texts from the right, numbers keep their signs and units before and beh
   assert.equal(fill('عند {t}، {n} صفحات', { t: '−0.20 s', n: 3 }), 'عند \u2066−0.20 s\u2069، 3 صفحات')
   assert.equal(fill('عند t = {t} s', { t: '1.20' }), 'عند t = 1.20 s')
   assert.equal(fill('{a}: {b}', { a: 'MuJoCo 3.14.0', b: '1.1 البندول' }), 'MuJoCo 3.14.0: 1.1 البندول')
+  assert.equal(fill('تابع مع {title}', { title: '1.1 A pendulum' }), 'تابع مع 1.1 A pendulum')
+  assert.equal(fill('تابع مع {title}', { title: '1.1 Model and data' }), 'تابع مع 1.1 Model and data')
 })
 
 test('a state comes back from a link bit for bit, whatever its values', async () => {

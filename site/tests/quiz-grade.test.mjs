@@ -73,8 +73,23 @@ test('a numeral that is the answer with fewer digits is rounded', () => {
   assert.equal(say('1', { answer: 1.4, tolerance: 0.01, unit: '' }), 'wrong rounded')
 })
 
+test('a right number is never wrong for its writing alone', () => {
+  const speed = { answer: 5, tolerance: 0.01, unit: 'm/s' }
+  for (const text of ['5 ms⁻¹', '5ms-1', '5 m s^{-1}', '5 m.s⁻¹', '٥ m/s', '5 ㎧', '5000 mms⁻¹']) assert.equal(say(text, speed), 'right', text)
+  assert.equal(say('5 ms⁻¹', { ...speed, answer: 5000, unit: '1/s' }), 'right') // of a millisecond
+  assert.equal(say('5 ms', speed), 'wrong unit')
+  assert.equal(say('5 mm', { ...speed, unit: 'm^2' }), 'wrong unit')
+  assert.equal(say('2 kgms⁻²', { ...speed, answer: 2, unit: 'N' }), 'right')
+  const angle = { answer: 30, tolerance: 0.01, unit: 'deg' }
+  for (const text of ['30º', '30 ˚', '30°', '30 Grad', '30 grad', '30 grados', '30 degrés']) assert.equal(say(text, angle), 'right', text)
+  const whole = { answer: 1200, tolerance: 1, unit: '' }
+  assert.deepEqual(gradeNumber('1.200', whole), { state: 'unread', problem: 'either', detail: '1.200', readings: ['1200', '1.2000'] })
+  for (const text of ['1.2000', '1.200+0', '1.20']) assert.equal(say(text, whole), 'wrong ten', text)
+  assert.equal(say('1.200', { ...whole, answer: 70 }), 'wrong')
+})
+
 test('what cannot be read is no try', () => {
-  const cases = { '1,200': 'comma', '0.08 foo': 'unit', '2 3': 'numbers', kg: 'sign', '': 'empty', '1/0': 'finite', '0.08 kg + m': 'sign',
+  const cases = { '1,200': 'either', '0.08 foo': 'unit', '2 3': 'numbers', kg: 'sign', '': 'empty', '1/0': 'finite', '0.08 kg + m': 'sign',
     '0.08 kg 3': 'unit', '1e300*1e300': 'finite' }
   for (const [text, problem] of Object.entries(cases)) assert.equal(say(text, INERTIA), `unread ${problem}`, text)
   assert.equal(say('5 kg', { answer: 5, tolerance: 0.1, unit: '' }), 'unread no_unit')
@@ -153,7 +168,7 @@ test('no message gives the answer away', () => {
 test('every problem and every slip has its words', () => {
   const words = readFileSync(new URL('../../templates/strings/en.toml', import.meta.url), 'utf8')
   const table = (name) => words.split(`[quiz.live.${name}]`)[1].split('\n[')[0]
-  for (const problem of ['empty', 'long', 'end', 'sign', 'numeral', 'numbers', 'comma', 'product', 'parenthesis', 'argument', 'log',
+  for (const problem of ['empty', 'long', 'end', 'sign', 'numeral', 'numbers', 'either', 'product', 'parenthesis', 'argument', 'log',
     'finite', 'unit', 'no_unit'])
     assert.match(table('unread'), new RegExp(`^${problem} = `, 'm'))
   for (const near of ['rounded', 'close', 'sign', 'degrees', 'radians', 'ten', 'signed_ten', 'two', 'turn', 'reciprocal', 'unit',
@@ -193,6 +208,9 @@ test('numbers are compared as the recording is', () => {
   assert.equal(printed('0.080', '0.08'), 'right')
   assert.equal(printed('8e-2', '0.08'), 'right')
   assert.equal(printed('−1.5', '-1.5'), 'right')
+  for (const text of ['−1,5', '‒١٫٥', '-\u20091.5']) assert.equal(printed(text, '-1.5'), text.includes('\u2009') ? 'space' : 'right', text)
+  assert.equal(printed('(1,5)', '(1, 5)'), 'right')
+  assert.equal(printed('(1,5)', '(1, 6)'), 'numbers')
   assert.equal(printed('1.5', '-1.5'), 'wrong')
   assert.equal(printed('3', '3'), 'right')
   assert.equal(printed('3.0', '3'), 'right') // the same value

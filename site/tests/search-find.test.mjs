@@ -72,6 +72,10 @@ test('a beginning of a word finds it, a short one in titles only', async () => {
   assert.equal(await first('equa'), 'Mass and inertia')
   assert.deepEqual(await titles('equ'), [])
   assert.deepEqual(await titles('ro'), ['Free rotation'])
+  const { source } = indexed([...COURSE, { kind: 'page', title: 'MuJoCo', sections: [['', '', 0, [['t', 'The muscle μ of MuJoCo.']], '']] },
+    { name: '9.3', title: 'Cones', sections: [['', '', 0, [['t', 'Its slope is μ.']], '']] }])
+  const { pages } = await findPages('μ', source)
+  assert.deepEqual(pages.map(({ page }) => page), [6, 5], 'a word as it is comes before a title that begins so')
 })
 
 test('characters without spaces are found inside', async () => {

@@ -50,6 +50,52 @@ def test_motion_that_is_not_welcome_begins_with_a_press_or_a_move(
         reach(page, SWING, "playing")
 
 
+def test_on_a_desk_picture_curves_and_controls_share_a_screen(
+    browsers: Mapping[str, Browser], base: str
+) -> None:
+    size = {"width": 1440, "height": 900}
+    with browsers["plain"].new_context(viewport=size) as context:  # type: ignore[arg-type]
+        page, _ = watch_page(context)
+        page.goto(base + PAGE)
+        swing = lab(page, SWING, None)
+        parts = [".lab-view", ".lab-play", ".lab-live .lab-plot", ".lab-slider", ".lab-live dd"]
+        boxes = {part: swing.locator(part).first.bounding_box() for part in parts}
+        view, play, *parts_beside = (box for box in boxes.values() if box)
+        assert len(parts_beside) == 3, boxes
+        assert view["width"] > 480 and play["y"] > view["y"] + view["height"]
+        for box in parts_beside:
+            assert box["x"] > view["x"] + view["width"], boxes
+        height = max(box["y"] + box["height"] for box in (play, *parts_beside)) - view["y"]
+        assert height < 760, boxes
+        page.set_viewport_size({"width": 1000, "height": 800})
+        plot = swing.locator(".lab-live .lab-plot").first.bounding_box()
+        view_below = swing.locator(".lab-view").bounding_box()
+        assert plot and view_below and plot["y"] > view_below["y"] + view_below["height"]
+
+
+COLOURED = """canvas => {
+  const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height)
+  let count = 0
+  for (let i = 0; i < data.length; i += 4) {
+    const rgb = data.subarray(i, i + 3)
+    if (data[i + 3] > 200 && Math.max(...rgb) - Math.min(...rgb) > 80) count += 1
+  }
+  return count
+}"""
+
+
+def test_lines_of_a_plot_keep_their_colours_in_high_contrast(
+    browsers: Mapping[str, Browser], base: str
+) -> None:
+    with browsers["plain"].new_context(forced_colors="active") as context:
+        page, _ = watch_page(context)
+        page.goto(base + PAGE)
+        swing = lab(page, SWING, None)
+        press(swing, "Play")
+        canvas = swing.locator(".lab-live .lab-plot canvas").first
+        wait_for_condition(page, lambda: canvas.evaluate(COLOURED) > 50)
+
+
 # ------------------------------------------------------------------------------- the goal
 
 

@@ -5,8 +5,9 @@ A browser never breaks a line inside a `math` element, but may do so on either s
 1. a long formula is split into several elements where TeX would break it too: after the relations
    and binary operators of its outermost level;
 2. a piece that may be wider than a narrow window scrolls inside a box;
-3. a formula is kept together with adjacent punctuation, and with a unit after a no-break space;
-4. an operator at an end of a formula, next to a space of the text, gets no space of its own, as in
+3. pieces are isolated as text from the left, or text from the right would turn their order;
+4. a formula is kept together with adjacent punctuation, and with a unit after a no-break space;
+5. an operator at an end of a formula, next to a space of the text, gets no space of its own, as in
    TeX.
 
 In numbers and their units
@@ -44,10 +45,13 @@ _WHOLE = re.compile(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", r
 _ANNOTATION = re.compile(r"<annotation\b.*?</annotation>", re.DOTALL)
 _TAG = re.compile(r"<[^>]*>")
 _PIECE = re.compile(r"<math>.*?</math>", re.DOTALL)
+_BOX = '<span class="formula-inline"[^>]*>'
+_WHOLE_PIECE = f"(?>{_PIECE.pattern})"
+_PIECES = re.compile(rf"(?:{_BOX}{_WHOLE_PIECE}</span>|{_WHOLE_PIECE}){{2,}}", re.DOTALL)
 _GLUE_START, _GLUE_END = '<span class="held">', "</span>"
 _FORMULAS = re.compile(r"(<math>.*?</math>(?:<math>.*?</math>)*)", re.DOTALL)
-_OPENING = "([“‘\"'"
-_CLOSING = re.compile(r"""(?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*""")
+_OPENING = "([“‘\"'\u2066"
+_CLOSING = re.compile(r"""\u2069?(?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*""")
 
 _RELATIONS = frozenset("=<>≤≥≠≈≡∼≃≅∝→←↔⇒⇐⇔↦⟶⟹∈∉⊂⊆⊃⊇≪≫≔:")
 _BINARY = frozenset("+-−±∓×·⋅∗∘⊗⊕∧∨∪∩")
@@ -136,8 +140,13 @@ def wrap_wide_pieces(html: str, label: str) -> str:
     return html if _length(html) < WIDE else _PIECE.sub(boxed, html)
 
 
+def isolate_formulas(html: str) -> str:
+    """Isolate the pieces of each formula, in a page from the right: they follow from the left."""
+    return _PIECES.sub(lambda pieces: f"\u2066{pieces[0]}\u2069", html)
+
+
 def glue_formulas(html: str) -> str:
-    """Glue each inline formula of a page to its punctuation and unit (steps 3 and 4)."""
+    """Glue each inline formula of a page to its punctuation and unit (steps 4 and 5)."""
     html = _FIRST.sub(r'\g<0> lspace="0em"', html)
     html = _LAST.sub(r'\g<0> rspace="0em"', html)
     parts = _FORMULAS.split(html)
@@ -182,12 +191,15 @@ _NUMBER = (
 )
 
 _WITH_UNITS = re.compile(rf"(?<=[0-9]) {_UNITS}")
+_TITLE = re.compile(r"[0-9]+\.[0-9]+(?= [A-Z] [a-z])")
+"""The number of a lesson before a title such as `A pendulum`: no amperes."""
 _UNITS_FIRST = rf"{_SPACES}?{_UNITS}"
 _QUANTITY = (
     rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_SPACES}?{_UNITS})?|{_NUMBER}{_SPACES}?{_UNITS})"
 )
 """Compiled when it is needed, as few pages do: it takes longer than all others together."""
 _LATIN_BEFORE = re.compile("[A-Za-z]\\s*(?:=\\s*)?$")
+_LATIN_AFTER = re.compile("[ \u00a0][A-Za-z]")
 
 
 def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:
@@ -208,7 +220,9 @@ def isolate_ltr(html: Markup) -> Markup:
 
 def join_units(text: str) -> str:
     """Put no-break spaces between numbers and their units, and inside units."""
-    return _WITH_UNITS.sub(lambda match: match[0].replace(" ", "\u00a0"), text)
+    title = _TITLE.match(text)
+    start = title.end() + 1 if title else 0
+    return text[:start] + _WITH_UNITS.sub(lambda m: m[0].replace(" ", "\u00a0"), text[start:])
 
 
 def unit_length(text: str) -> int:
@@ -222,6 +236,8 @@ def split_quantities(text: str) -> Iterator[tuple[str, bool]]:
     position = 0
     for match in re.finditer(_QUANTITY, text):
         if _LATIN_BEFORE.search(text, position, match.start()):
+            continue
+        if match[0][0].isdigit() and _LATIN_AFTER.match(text, match.end()):
             continue
         if match.start() > position:
             yield text[position : match.start()], False

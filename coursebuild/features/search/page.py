@@ -44,6 +44,8 @@ class Section(Struct, frozen=True):
     pieces: tuple[SectionPiece, ...]
     names: tuple[str, ...] = ()
     """Names that it is found by and that are not shown: of TeX commands, of files."""
+    symbols: tuple[str, ...] = ()
+    """Symbols that it says the meaning of."""
 
 
 _TAG = re.compile(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
@@ -89,12 +91,13 @@ class SectionReader:
         self._head = anchor, heading, level
         self._pieces: list[SectionPiece] = []
         self._names: dict[str, None] = {}
+        self._symbols: list[str] = []
 
     def end(self) -> tuple[Section, ...]:
         """End the section, unless it has neither heading nor content, and return all sections."""
         if any(self._head) or self._pieces:
-            section = Section(*self._head, tuple(self._pieces), tuple(self._names))
-            self._sections.append(section)
+            names, symbols = tuple(self._names), tuple(self._symbols)
+            self._sections.append(Section(*self._head, tuple(self._pieces), names, symbols))
         return tuple(self._sections)
 
     def add(self, kind: Literal["text", "code", "formula", "output"], text: str) -> None:
@@ -175,9 +178,11 @@ class SectionReader:
             case model.Text() | CodeSpan() | model.NumberBinding():
                 return inline.text
             case model.Math():
+                text = self._formula(inline.tex.text)
                 if inline.meaning is not None:
                     self._names[inline.meaning.text] = None
-                return self._formula(inline.tex.text)
+                    self._symbols.append(text)
+                return text
             case model.SoftBreak() | model.HardBreak():
                 return " "
             case model.Image():
@@ -316,7 +321,7 @@ def weigh_terms(titles: list[str], sections: Iterable[Section]) -> bytes:
     """
     fields: dict[int, list[str]] = {_CODE: [], _TEXT: [], _HEADING: [], _TITLE: titles}
     for section in sections:
-        fields[_HEADING].append(section.heading)
+        fields[_HEADING] += section.heading, *section.symbols
         fields[_CODE] += section.names
         for piece in section.pieces:
             fields[_FIELDS[piece.kind]].append(piece.text)

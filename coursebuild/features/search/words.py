@@ -56,6 +56,8 @@ _TOKEN = re.compile(
     r"[0-9]+(?:\.[0-9]+)*[eE][+-]?[0-9]+(?!\w)|\w+(?:\.\w+)*|[" + "".join(_SYMBOLS) + "]"
 )
 _NUMBER = re.compile(r"[0-9][0-9.eE+-]*\Z")
+_SYLLABLE = 3
+"""Characters; a name of shorter parts only, such as MuJoCo, has none."""
 _SEAM = re.compile(
     r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=[0-9])|(?<=[0-9])(?=[A-Za-z])"
     r"|_+"
@@ -118,6 +120,8 @@ def _split_name(token: str) -> Iterator[str]:
         if len(name) > 1:
             yield name.lower()
         parts = [part.lower() for part in _SEAM.split(name) if part]
+        if name.isalpha() and max(map(len, parts)) < _SYLLABLE:
+            continue
         if len(parts) > 1:
             if "_" in name:
                 yield name.lower().replace("_", "")

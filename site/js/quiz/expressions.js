@@ -8,13 +8,19 @@
  *    as code.
  * 3. The first name that is neither a function nor a constant begins the unit, which extends to the end.
  *
- * An ambiguous entry, such as `1,200`, `1/2π` or `3 e-3`, is refused.
+ * An ambiguous entry, such as `1,200`, `1·5`, `1/2π` or `3 e-3`, is refused.
  */
 
 import { normalise, numeralEnd, readNumeral } from './numbers.js'
 
 const LONGEST = 200 // characters
 const DEEPEST = 60 // nested calls
+
+/** What may be a calculation or a numeral: a raised point, and an exponent that is not raised any more; with both readings. */
+const AMBIGUOUS = [
+  { form: /^([-+−]?\d+)·(\d+)(?=$| ?[\p{L}°%])/u, readings: ['$1.$2', '$1*$2'] },
+  { form: /^([-+−]?[\d.,]+) ?[·⋅×*xX] ?10 ?[-−](\d+)(?=$| ?[\p{L}°%])/u, readings: ['$1*10^-$2', '$1*10 - $2'] },
+]
 
 const CONSTANTS = { pi: Math.PI, π: Math.PI, tau: 2 * Math.PI, τ: 2 * Math.PI, e: Math.E }
 const FUNCTIONS = {
@@ -37,7 +43,7 @@ class Unread extends Error {
  * @param {string} text
  * @returns {{value?: number, unit?: string, step?: number | null, problem?: string, detail?: string, readings?: string[]}} `step`: a unit
  *   of the last place of a numeral; null for a calculation. Problems: empty, long, end, sign, numeral, numbers,
- *   comma, product, parenthesis, argument, log, finite
+ *   either, product, parenthesis, argument, log, finite
  */
 export function readQuantity(text) {
   if (text.length > LONGEST) return { problem: 'long', detail: '', readings: [] }
@@ -46,6 +52,10 @@ export function readQuantity(text) {
     .replace(/^(?:\p{L}[\p{L}\d_]*)? ?[=≈~] ?/u, '')
     .replace(/(\d) ?[.,;]$/, '$1')
   if (source === '') return { problem: 'empty', detail: '', readings: [] }
+  for (const { form, readings } of AMBIGUOUS) {
+    const [detail] = form.exec(text.trim()) ?? []
+    if (detail) return { problem: 'either', detail, readings: readings.map((reading) => detail.replace(form, reading)) }
+  }
   try {
     const reader = new Reader(source)
     const value = reader.sum()
@@ -114,7 +124,10 @@ class Reader {
         const start = this.#index
         if (/^1 ?\//.test(this.#text.slice(start)) && this.#inside === 0 && this.#startsUnit(start + 1, '/')) return value
         if (numeralEnd(this.#text, start) > start) throw new Unread('numbers', this.#text)
-        if (/^e[-+]?\d/.test(this.#text.slice(start))) throw new Unread('product', this.#text)
+        if (/^e[-+]?\d/.test(this.#text.slice(start))) {
+          const [before, after] = [this.#text.slice(0, start).trimEnd(), this.#text.slice(start)]
+          throw new Unread('either', this.#text, [`${before}${after}`, `${before}*${after}`])
+        }
         const factor = this.#power()
         if (divided) throw new Unread('product', this.#text.slice(0, this.#index))
         value *= factor
@@ -180,7 +193,10 @@ class Reader {
     const end = / 1$/.test(this.#text.slice(this.#index, limit)) && this.#startsUnit(limit, '/') ? limit - 2 : limit
     const digits = this.#text.slice(this.#index, end)
     const numeral = readNumeral(digits.replace(/[.]$/, ''))
+    if (numeral.problem === 'numbers') throw new Unread('numbers', this.#text)
     if (numeral.problem) throw new Unread(numeral.problem, digits, numeral.readings)
+    // `6.022 10^23`: no group of digits, but a power.
+    if (/[ '’]/.test(digits) && /^ ?\^/.test(this.#text.slice(end))) throw new Unread('numbers', this.#text)
     const [exponent] = /^[eE][-+]?\d+/.exec(this.#text.slice(end)) ?? ['']
     this.#index = end + exponent.length
     const plain = String(numeral.value)

@@ -10,6 +10,7 @@
 
 import { nearMiss, isWithin } from './diagnose.js'
 import { readQuantity } from './expressions.js'
+import { normalise } from './numbers.js'
 import { hasAngle, plain, readUnit, relation } from './units.js'
 
 /**
@@ -63,6 +64,11 @@ export function gradeNumber(text, { answer, tolerance, unit }) {
   const converted = read.step === null || factor !== 1 || offset !== 0
   if (!Number.isFinite(value)) return { state: 'unread', problem: 'finite', detail: '', readings: [] }
   if (isWithin(value, answer, tolerance)) return { state: 'right', value, converted }
+  // A point that may have separated thousands, where the number would then be right.
+  const [detail, whole, part] = /(?<![\d.,])([1-9]\d{0,2})\.(\d{3})(?![\d.,])/.exec(normalise(text)) ?? []
+  if (detail && read.step !== null && isWithin(value * 1000, answer, tolerance)) {
+    return { state: 'unread', problem: 'either', detail, readings: [`${whole}${part}`, `${detail}0`] }
+  }
   const isScaled = Math.abs(factor - 1) > 1e-9 || offset !== 0
   const angle = hasAngle(readUnit(unit))
   const slip = isScaled && isWithin(read.value, answer, tolerance) ? 'scale' : nearMiss({ value, step }, { answer, tolerance, angle })

@@ -15,26 +15,31 @@
 
 const ZEROS = [0x660, 0x6f0, 0x966, 0x9e6, 0xe50, 0xff10] // of the decimal digits of other scripts that learners type
 const SIGNS = {
-  '\u2212': '-', '\u2013': '-', '\ufe63': '-', '\uff0d': '-', '\u2010': '-', '\u2011': '-',
-  '\uff0b': '+', '\u066b': '.', '\u066c': '\u2019', '\uff0e': '.', '\uff0c': ',', '\uff08': '(', '\uff09': ')',
-  '\u00b7': '*', '\u22c5': '*', '\u2219': '*', '\u00d7': '*', '\u2217': '*', '\u00f7': '/', '\u2215': '/', '\u2044': '/',
-  '\u2032': "'", '\u00b5': '\u03bc',
+  '\u2212': '-', '\u2010': '-', '\u2012': '-', '\u2013': '-', '\u2014': '-',
+  '\u066b': '.', '\u066c': '\u2019', '\u060c': ',', '\u066a': '%',
+  '\u00b7': '*', '\u22c5': '*', '\u2219': '*', '\u2022': '*', '\u2217': '*', '\u00d7': '*', '\u2715': '*', '\u2a2f': '*',
+  '\u00f7': '/', '\u2215': '/', '\u2044': '/', '\u2032': "'", '\u02bc': "'",
 }
+const FRACTION = '[\u00bc-\u00be\u2150-\u215e\u2189]' // from ¼ to ↉
+const MIXED = new RegExp(`((?<![\\d.,][ '’]?)\\d+(?: \\d{3})*)? ?(${FRACTION})`, 'gu')
 const SUPERSCRIPTS = '⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻'
 const PLAIN = '0123456789+-'
 
-/** Replace signs and digits that mean the same by one of them: minus signs, multiplication dots, spaces, superscripts. */
+/** Replace signs and digits that mean the same by one of them: minus signs, multiplication dots, spaces, superscripts, fractions. */
 export function normalise(text) {
-  const characters = [...text.normalize('NFC')].map((char) => {
+  const plain = (digits) => [...digits].map((digit) => PLAIN[SUPERSCRIPTS.indexOf(digit)]).join('')
+  const raised = text.replace(new RegExp(`[${SUPERSCRIPTS}]+`, 'g'), (digits) => `^${plain(digits)}`)
+  const marked = raised
+    .replace(MIXED, (_, whole, part, at) => (whole ? `(${whole}+${part})` : /[\d.,]$/.test(raised.slice(0, at)) ? ` ${part}` : `(${part})`))
+    .replace(/[\u00ba\u02da]/g, '°')
+  const characters = [...marked.normalize('NFKC')].map((char) => {
     if (char in SIGNS) return SIGNS[char]
     if (/\s|[\u200b\u2060\ufeff\u200e\u200f]/u.test(char)) return ' '
     const code = char.codePointAt(0)
     const zero = ZEROS.find((zero) => code >= zero && code < zero + 10)
     return zero === undefined ? char : String(code - zero)
   })
-  const source = characters.join('').replace(new RegExp(`[${SUPERSCRIPTS}]+`, 'g'), (digits) =>
-    `^${[...digits].map((digit) => PLAIN[SUPERSCRIPTS.indexOf(digit)]).join('')}`)
-  return source.replace(/\*\*/g, '^').replace(/ +/g, ' ').trim()
+  return characters.join('').replace(/\*\*/g, '^').replace(/ +/g, ' ').trim()
 }
 
 /** The end of a numeral in a normalised text: its digits with all that may separate them. `start` if there is none. */
@@ -45,7 +50,7 @@ export function numeralEnd(text, start) {
   return end > start && /[.]/.test(text[end] ?? '') && !/[.,]/.test(text.slice(start, end)) ? end + 1 : end
 }
 
-/** @typedef {{value?: number, step?: number, problem?: 'numbers' | 'numeral' | 'comma', readings?: string[]}} Numeral */
+/** @typedef {{value?: number, step?: number, problem?: 'numbers' | 'numeral' | 'either', readings?: string[]}} Numeral */
 
 /**
  * The value of a numeral.
@@ -71,7 +76,7 @@ export function readNumeral(text) {
     return isGrouped(groups) && !/[ '’]/.test(text) ? number(groups.join(''), part) : { problem: 'numeral' }
   }
   if (last === ',' && /^[1-9]\d{0,2}$/.test(whole) && /^\d{3}$/.test(part)) {
-    return { problem: 'comma', readings: [whole + part, `${whole}.${part}`] }
+    return { problem: 'either', readings: [whole + part, `${whole}.${part}`] }
   }
   return readGroups(whole, part)
 }

@@ -7,8 +7,10 @@
  * as equal values. Everything else is text.
  */
 
+import { normalise } from './numbers.js'
+
 const NUMBER = /^[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?/
-const SIGNS = { '\u2212': '-', '\u2013': '-', '“': '"', '”': '"', '‘': "'", '’': "'" }
+const QUOTES = { '“': '"', '”': '"', '‘': "'", '’': "'" }
 
 /**
  * The comparison of numbers by the rule in the page: `exact`, `digits`, or `rtol=1e-6 atol=1e-12`.
@@ -40,6 +42,8 @@ export function gradeOutput(text, expected, isEqual) {
   const isAlike = (token, second) => token.text === second.text || (token.number && second.number && isEqual(token.text, second.text))
   const everyPair = (test) => actualTokens.length === expectedTokens.length && actualTokens.every((token, i) => test(token, expectedTokens[i]))
   if (everyPair(isAlike)) return { right: true, slip: '' }
+  const pointed = text.replace(/(\d),(\d)/g, '$1.$2')
+  if (pointed !== text && gradeOutput(pointed, expected, isEqual).right) return { right: true, slip: '' }
   if (everyPair((a, b) => isAlike(a, b) || a.text.toLowerCase() === b.text.toLowerCase())) return { right: false, slip: 'case' }
   const areNumbers = (a, b) => a.text === b.text || (a.number && b.number)
   if (everyPair((a, b) => areNumbers(a, b) && (!a.number || isRounding(a.text, b.text)))) return { right: false, slip: 'digits' }
@@ -55,7 +59,7 @@ function isRounding(actual, expected) {
 
 /** Split a text into words, numbers and signs; white space only separates them. */
 function tokens(text) {
-  const source = [...text.normalize('NFC')].map((char) => SIGNS[char] ?? char).join('')
+  const source = normalise(text).replace(/[“”‘’]/g, (quote) => QUOTES[quote])
   const list = []
   let index = 0
   while (index < source.length) {

@@ -80,6 +80,7 @@ const UNITS = {
 /** Other ways to write a unit. */
 const NAMES = {
   deg: '°', degree: '°', degrees: '°', arcmin: "'", radian: 'rad', radians: 'rad', degC: '°C', celsius: '°C',
+  grad: '°', Grad: '°', grado: '°', grados: '°', degré: '°', degrés: '°',
   rev: 'turn', revs: 'turn', turns: 'turn', revolution: 'turn', revolutions: 'turn', RPM: 'rpm',
   meter: 'm', meters: 'm', metre: 'm', metres: 'm', kilogram: 'kg', kilograms: 'kg', gram: 'g', grams: 'g', kelvin: 'K',
   sec: 's', secs: 's', second: 's', seconds: 's', minute: 'min', minutes: 'min', hour: 'h', hours: 'h', hr: 'h', day: 'd', days: 'd',
@@ -96,15 +97,16 @@ const KELVIN = 273.15
  */
 
 /**
- * The readings of a text as a unit: mostly one; two if several factors follow a solidus (`J/kg K`), the strict one first.
+ * The readings of a text as a unit, the strict one first: mostly one; more if several factors follow a solidus (`J/kg K`), or if a
+ * prefix may also be a unit (`ms⁻¹`, a millisecond or a metre per second).
  *
  * @returns {Unit[]} empty if it is no unit; an empty text is the unit 1
  */
 export function readUnit(text) {
   const source = plain(text)
   if (source === '') return [{ scale: 1, offset: 0, powers: {} }]
-  const readings = [parse(source, false)]
-  if (/\/.*[ *]/.test(source)) readings.push(parse(source, true))
+  const readings = [{}, { split: true }].map((way) => parse(source, way))
+  if (/\/.*[ *]/.test(source)) readings.push(parse(source, { wide: true }))
   return readings.filter((unit) => unit !== null)
 }
 
@@ -163,13 +165,14 @@ export const hasAngle = (units) => units.some(({ powers }) => angular(powers) ==
 
 // --- reading
 
-function parse(source, wide) {
-  const reader = { text: source, index: 0, wide, depth: 0 }
+/** `wide`: everything after a solidus is in the denominator; `split`: no prefix before a power where there may be a unit. */
+function parse(source, { wide = false, split = false }) {
+  const reader = { text: source, index: 0, wide, split, depth: 0 }
   const unit = product(reader)
   return unit !== null && reader.index === source.length && Number.isFinite(unit.scale) && unit.scale > 0 ? unit : null
 }
 
-/** Factors with signs between them; with `wide`, everything after a solidus is in the denominator. */
+/** Factors with signs between them. */
 function product(reader) {
   let unit = { scale: 1, offset: 0, powers: {} }
   let sign = 1
@@ -204,10 +207,10 @@ function group(reader) {
     if (symbol === undefined) return null
     reader.index += symbol.length
     if (symbol === '1') return { scale: 1, offset: 0, powers: {} }
-    const parts = unitsOf(symbol)
-    if (parts === null) return null
     const power = exponent(reader)
     if (power === null) return null
+    const parts = (reader.split && power !== 1 && apart(symbol)) || unitsOf(symbol)
+    if (parts === null) return null
     // After units written together, an exponent belongs to the last.
     const last = raise(parts.at(-1), power)
     return parts.slice(0, -1).reduce((result, part) => multiply(result, part, 1), last)
@@ -236,6 +239,19 @@ function unitsOf(word) {
     const head = single(word.slice(0, end))
     const tail = head === null ? null : unitsOf(word.slice(end))
     if (tail !== null) return [head, ...tail]
+  }
+  return null
+}
+
+/** The units of a word that is none by itself, as few of them with a prefix as there may be; null if a unit comes twice: `mm` is a length. */
+function apart(word) {
+  if (word.length > 12 || Object.hasOwn(UNITS, word) || Object.hasOwn(NAMES, word)) return null
+  for (let end = word.length - 1; end > 0; end--) {
+    const [head, tail] = [word.slice(0, end), word.slice(end)]
+    if (single(head) === null || head === tail) continue
+    if (Object.hasOwn(UNITS, tail)) return [single(head), single(tail)]
+    const rest = apart(tail)
+    if (rest !== null) return [single(head), ...rest]
   }
   return null
 }

@@ -15,6 +15,7 @@ import { BEGINNING, isFuzzy, isRow, termsOf, wordsOf } from './words.js'
 
 const EXACT = 1
 const PREFIX = 0.55
+const HINT = 0.15 // the beginning of a title, by a short word that is found as it is
 const PARTS = 0.5
 const MISSPELT = [0, 0.45, 0.3] // by mistakes
 const FIELDS = [0.7, 1, 2.4, 5] // code, text, heading, title
@@ -75,7 +76,7 @@ async function lookUp(terms, source) {
     const longerTerms = [...lines.keys()].filter((term) => term !== whole && term.startsWith(whole))
     for (const term of longerTerms.slice(0, MOST_BEGUN)) add(word, term, lines.get(term), PREFIX)
   } else {
-    byTitle(word, source.listing)
+    byTitle(word, source.listing, word.terms.size > 0 ? HINT : PREFIX)
   }
   if (word.terms.size === 0 && parts.length > 0) await byParts(word, parts, source)
   return word
@@ -84,7 +85,7 @@ async function lookUp(terms, source) {
 const titles = new WeakMap() // list of pages → terms of each title
 
 /** Match a short word, which may begin terms in any file, with titles only. */
-function byTitle(word, listing) {
+function byTitle(word, listing, fit) {
   if (!titles.has(listing)) {
     titles.set(
       listing,
@@ -94,8 +95,8 @@ function byTitle(word, listing) {
   titles.get(listing).forEach((terms, page) => {
     for (const term of terms) {
       if (term === word.whole || !term.startsWith(word.whole)) continue
-      word.terms.set(term, PREFIX)
-      raise(word.pages, page, PREFIX, TITLE)
+      if (fit === PREFIX) word.terms.set(term, fit)
+      raise(word.pages, page, fit, TITLE)
     }
   })
 }

@@ -5,6 +5,7 @@
 
 const LONGEST = 48
 const LONGEST_NUMBER = 12
+const SYLLABLE = 3 // characters; a name of shorter parts only, such as MuJoCo, has none
 
 const SYMBOLS = {
   '∂': ['partial'],
@@ -145,7 +146,7 @@ function latin(token) {
     const name = segment.replace(/^_+|_+$/g, '')
     if (name.length > 1) terms.push(name.toLowerCase())
     const parts = name.split(SEAM).filter(Boolean)
-    if (parts.length < 2) continue
+    if (parts.length < 2 || (/^[A-Za-z]+$/.test(name) && parts.every((part) => part.length < SYLLABLE))) continue
     if (name.includes('_')) terms.push(name.toLowerCase().replaceAll('_', ''))
     terms.push(...parts.filter((part) => part.length > 1).map((part) => part.toLowerCase()))
   }

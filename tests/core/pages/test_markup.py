@@ -17,6 +17,7 @@ from coursebuild.core.pages.markup import SpecialBlock
 from coursebuild.core.pages.renderer import Strings, direction, parse_strings
 from coursebuild.core.pages.typography import (
     glue_formulas,
+    isolate_formulas,
     isolate_ltr,
     join_units,
     split_formula,
@@ -217,6 +218,16 @@ def test_a_long_formula_is_cut_between_its_outermost_rows() -> None:
 def test_formulas_keep_their_punctuation_and_operators_their_space() -> None:
     for html, expected in CASES["punctuation"] + CASES["operators"]:
         assert glue_formulas(filled(html)) == filled(expected)
+
+
+def test_pieces_of_a_formula_follow_from_the_left_in_text_from_the_right() -> None:
+    box = '<span class="formula-inline" tabindex="0">{Y}</span>'
+    for html, expected in {
+        "x {X}{Y}.": 'x <span class="held">\u2066{X}</span><span class="held">{Y}\u2069.</span>',
+        f"{{X}}{box} y": f'<span class="held">\u2066{{X}}</span>{box}\u2069 y',
+        f"x {{X}} y {{Y}}, {box} y": f'x {{X}} y <span class="held">{{Y}},</span> {box} y',
+    }.items():
+        assert glue_formulas(isolate_formulas(filled(html))) == filled(expected)
 
 
 LANGUAGES = {

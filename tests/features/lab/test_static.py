@@ -122,6 +122,26 @@ def test_an_endless_plane_is_around_what_the_camera_looks_at(bench: Bench) -> No
     assert floor.position == pytest.approx((0, 0, -1)), "so that its squares stay where they are"
 
 
+def test_the_floor_with_a_grid_replaces_a_grey_one(bench: Bench) -> None:
+    ball = '<body pos="0 0 .3"><freejoint/><geom size=".1"/></body>'
+    planes = {
+        "": 0,
+        'rgba=".8 .8 .8 1"': 0,
+        'rgba=".8 .2 .2 1"': 1,
+        'rgba=".5 .5 .5 .5"': 1,
+        'euler="0 10 0"': 1,
+        'pos="0 0 -1"': 1,
+    }
+    for extra, plane_count in planes.items():
+        second = '<geom type="plane" size="1 1 .1"/>' if "pos" in extra else ""
+        xml = f'<mujoco><worldbody><geom type="plane" size="1 1 .1" {extra}/>{second}{ball}'
+        _, main = main_of(bench, xml=xml + "</worldbody></mujoco>")
+        assert sum(solid.plane for solid in solids(main)) == plane_count, extra
+    xml = f'<mujoco><worldbody><light/><geom type="plane" size="1 1 .1"/>{ball}'
+    _, main = main_of(bench, xml=xml + "</worldbody></mujoco>")
+    assert sum(solid.plane for solid in solids(main)) == 1, "the author has lit it"
+
+
 def test_an_orthographic_camera(bench: Bench) -> None:
     xml = """<mujoco><visual><global orthographic="true" fovy="2"/></visual><worldbody>
       <body><geom type="box" size="0.5 0.5 0.5"/></body></worldbody></mujoco>"""

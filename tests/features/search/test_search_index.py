@@ -295,6 +295,11 @@ def test_a_lesson_by_its_sections(make: Make) -> None:
     assert pieces(empty) == [("text", "raw text & more"), ("text", "A note.")]
 
 
+def test_a_symbol_is_found_where_it_is_defined(make: Make) -> None:
+    (section,) = sections_of(make, 'With $\\mu${symbol="friction"} and $m$.')
+    assert (section.names, section.symbols) == (("friction",), ("μ",))
+
+
 def test_a_quiz_gives_no_answer_away(make: Make) -> None:
     texts = [text for section in sections_of(make, LESSON) for _, text in pieces(section)]
     at = texts.index("Check")
@@ -320,13 +325,15 @@ def test_pages_that_are_searched_and_that_are_not(make: Make) -> None:
 def test_terms_have_weights_by_place_and_frequency(make: Make) -> None:
     piece = SectionPiece("text", "body body body body; inertia")
     code = SectionPiece("code", "body mj_step " + "x1 " * 10 + "y1 " * 9 + "z1 " * 4 + "w1 " * 3)
-    sections = (Section("a", "Inertia", 2, (piece, code), ("frac",)),)
+    sections = (Section("a", "Inertia", 2, (piece, code), ("frac",), ("I_0",)),)
     lines = weigh_terms(["4.2", "Body"], sections).decode().split("\n")
     assert lines == sorted(lines, key=lambda line: line[1:])
     assert {line[1:]: line[0] for line in lines} == {
         "4.2": "c",
         "body": "e",
         "inertia": "9",
+        "i_0": "8",
+        "i0": "8",
         "frac": "0",
         "mj_step": "0",
         "mjstep": "0",

@@ -43,6 +43,12 @@ def scene_solids(scene: dict[str, Any], frame: Array) -> Iterator[Solid]:
     return _Scene(scene, np.asarray(frame, dtype=float)).solids()
 
 
+def ground_of(scene: dict[str, Any]) -> float | None:
+    """Return the height of the floor with a grid, which replaces a plane without a colour."""
+    height: float | None = None if scene["lights"] else scene["floor"]
+    return height
+
+
 class _Scene:
     def __init__(self, scene: dict[str, Any], frame: Array) -> None:
         self.scene, self.frame, self.layout = scene, frame, scene["layout"]
@@ -52,9 +58,11 @@ class _Scene:
 
     def solids(self) -> Iterator[Solid]:
         solids: list[Solid | None] = []
+        ground = ground_of(self.scene)
         for part in ("geoms", "sites"):
             for i, item in enumerate(self.scene[part]):
-                if item["group"] in _VISIBLE:
+                replaced = ground is not None and item.get("level") == ground
+                if item["group"] in _VISIBLE and not replaced:
                     row = self._row(self.layout[part] + _GEOM * i, _GEOM)
                     material = shapes.material_of(self.scene, item["material"])
                     data, index = item.get("data", -1), item["material"]

@@ -24,7 +24,7 @@ from coursebuild.features.lab.equations.reference import CurveRun
 from coursebuild.features.lab.model import ODE, Lab
 from coursebuild.features.lab.picture.draw import Floor, FreeCamera, draw, round_length
 from coursebuild.features.lab.picture.raster import SKY, texture_of
-from coursebuild.features.lab.picture.scenery import scene_solids
+from coursebuild.features.lab.picture.scenery import ground_of, scene_solids
 from coursebuild.features.lab.picture.shapes import light_of
 from coursebuild.features.lab.reply import LabRecord, MainRun, unpack_arrays
 from coursebuild.features.lab.schema import Plot, TraceFields
@@ -47,9 +47,8 @@ def draw_picture(lab: Lab, main: MainRun) -> bytes:
     light = light_of(scene, np.asarray(frame, dtype=float), camera.forward)
     skies = (texture_of(t) for t in scene["textures"] if t["type"] == SKY)
     solids = tuple(scene_solids(scene, frame))
-    floor = None
-    if scene["floor"] is not None and not scene["lights"]:
-        floor = Floor(scene["floor"], camera.distance, camera.target)
+    ground = ground_of(scene)
+    floor = None if ground is None else Floor(ground, camera.distance, camera.target)
     return png(draw(solids, camera, _size(lab), light, next(skies, None), floor))
 
 

@@ -10,6 +10,8 @@ import { nameOf } from './names.js'
 const TEXTURE_ROLES = 10 // mjNTEXROLE
 const ROLE_USER = 0
 const ROLE_RGB = 1
+const COLOURLESS = 0.1 // largest difference of red, green and blue
+const STEEPEST = 1e-3 // half the angle of a level plane
 
 /**
  * @param {import('./engine.js').Engine} engine
@@ -45,6 +47,7 @@ export function describeScene(engine, { model, displayData: data }, config, came
       group: model.geom_group[i],
       material: model.geom_matid[i],
       data: model.geom_dataid[i],
+      level: levelOf(k, model, i),
     })),
     sites: list(model.nsite, (i) => ({
       name: name(k.obj.SITE, i),
@@ -65,6 +68,15 @@ export function describeScene(engine, { model, displayData: data }, config, came
     flexes: list(model.nflex, (i) => flex(model, i, name(k.obj.FLEX, i))),
     skins: list(model.nskin, (i) => skin(model, i, name(k.obj.SKIN, i))),
   }
+}
+
+/** The height of a level plane of the world that is grey and no more, which a view with a floor of its own need not draw; else null. */
+function levelOf(k, model, i) {
+  const [r, g, b, a] = row(model.geom_rgba, i, 4)
+  const [, x, y] = row(model.geom_quat, i, 4)
+  const isGrey = model.geom_matid[i] < 0 && a === 1 && Math.max(r, g, b) - Math.min(r, g, b) <= COLOURLESS
+  const isLevel = model.geom_type[i] === k.geom.PLANE && model.geom_bodyid[i] === 0 && Math.hypot(x, y) < STEEPEST
+  return isGrey && isLevel ? model.geom_pos[3 * i + 2] : null
 }
 
 const part = (array, start, count) => array.slice(start, start + count)

@@ -107,7 +107,12 @@ export class Desk {
         this.transport.element,
         this.notices.message,
       ),
-      h('div', { class: 'lab-panel' }, this.goal?.element ?? null, this.controls.element, this.readouts.element, foot),
+      h(
+        'div',
+        { class: 'lab-side' },
+        this.goal?.element ?? null,
+        h('div', { class: 'lab-panel' }, this.controls.element, this.readouts.element, foot),
+      ),
       this.notices.announcement,
     )
     const still = element.querySelector('.lab-static')

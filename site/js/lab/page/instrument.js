@@ -92,13 +92,16 @@ export class Instrument {
     this.body = h(
       'div',
       { class: 'lab-live' },
-      h('div', { class: 'lab-screen' }, this.view.element, this.transport.full),
-      this.transport.element,
-      this.motion,
-      this.notices.message,
-      this.goal?.element ?? null,
-      ...this.plots.map((plot) => plot.element),
-      h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element, this.makeFoot()),
+      h('div', { class: 'lab-stage' }, h('div', { class: 'lab-screen' }, this.view.element, this.transport.full), this.transport.element),
+      h(
+        'div',
+        { class: 'lab-side' },
+        this.motion,
+        this.notices.message,
+        this.goal?.element ?? null,
+        ...this.plots.map((plot) => plot.element),
+        h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element, this.makeFoot()),
+      ),
       this.notices.announcement,
     )
     this.controls.show(this.values)

@@ -2,11 +2,12 @@
 
 const TRACES = 6
 
-/** Resolve a CSS colour, as it applies inside an element, to `rgb(…)`. */
-export function resolve(element, colour) {
+/** Resolve a CSS colour, as it applies inside an element, to `rgb(…)`; one that is `kept` stays itself in high contrast. */
+export function resolve(element, colour, kept = false) {
   const probe = document.createElement('span')
   probe.hidden = true
   probe.style.color = colour
+  if (kept) probe.style.setProperty('forced-color-adjust', 'none')
   element.append(probe)
   const text = getComputedStyle(probe).color
   probe.remove()
@@ -17,9 +18,9 @@ export function resolve(element, colour) {
 export function palette(element) {
   return {
     text: resolve(element, 'var(--ink-soft)'),
-    grid: resolve(element, 'var(--rule)'),
+    grid: resolve(element, 'var(--rule)', true),
     rule: resolve(element, 'var(--rule-firm)'),
-    traces: Array.from({ length: TRACES }, (_, i) => resolve(element, `var(--trace-${i + 1})`)),
+    traces: Array.from({ length: TRACES }, (_, i) => resolve(element, `var(--trace-${i + 1})`, true)),
   }
 }
 

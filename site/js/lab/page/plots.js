@@ -146,11 +146,17 @@ export class Plot {
     ctx.restore()
   }
 
-  drawReferences({ ctx, bbox, valToPos }, font) {
+  /** Draw the lines for reference values; their labels stand on the left, or on the right while the lines end near there. */
+  drawReferences({ ctx, bbox, data, valToPos }, font) {
     const ratio = uPlot.pxRatio
-    for (const { y, label } of this.config.refLines) {
-      const pixel = Math.round(valToPos(y, 'y', true))
-      if (pixel < bbox.top || pixel > bbox.top + bbox.height) continue
+    const end = data[0].length === 0 ? 0 : valToPos(data[0].at(-1), 'x', true) - bbox.left
+    const { refLines } = this.config
+    const [top, bottom] = [bbox.top, bbox.top + bbox.height]
+    const pixels = refLines.map(({ y }) => Math.round(valToPos(y, 'y', true))).map((pixel) => (pixel < top || pixel > bottom ? null : pixel))
+    const places = spread(pixels.map((pixel) => pixel && pixel - (2 + FONT / 2) * ratio), FONT * ratio, 0, bottom)
+    pixels.forEach((pixel, i) => {
+      if (pixel === null) return
+      const { label } = refLines[i]
       ctx.save()
       ctx.strokeStyle = this.colours.text
       ctx.lineWidth = ratio
@@ -162,12 +168,13 @@ export class Plot {
       if (label) {
         ctx.font = scaleFont(font, ratio)
         ctx.fillStyle = this.colours.text
-        ctx.textAlign = 'left'
-        ctx.textBaseline = 'bottom'
-        ctx.fillText(label, bbox.left + GAP * ratio, pixel - 2 * ratio)
+        const isLeft = end > ctx.measureText(label).width + 2 * GAP * ratio
+        ctx.textAlign = isLeft ? 'left' : 'right'
+        ctx.textBaseline = 'middle'
+        ctx.fillText(label, bbox.left + (isLeft ? GAP * ratio : bbox.width), places[i])
       }
       ctx.restore()
-    }
+    })
   }
 
   drawLabels(chart, font) {

@@ -6,5 +6,5 @@ export function fill(text, values = {}) {
 
 const FROM_THE_RIGHT = /[\p{Script=Arabic}\p{Script=Hebrew}]/u
 
-/** Numbers with a sign or a unit, which would stand on the wrong side of them in text from the right. */
-const QUANTITY = /(?<![\w.,]|[A-Za-z] *= *)(?:[-+−±]\d[\d.,]*(?:[ \u00a0]?[A-Za-zµΩ°%][\w/²³·]*)?|\d[\d.,]*[ \u00a0]?[A-Za-zµΩ°%][\w/²³·]*)/g
+/** Numbers with a sign or a unit, which would stand on the wrong side of them in text from the right; with a unit before a Latin word they do not. */
+const QUANTITY = /(?<![\w.,]|[A-Za-z] *= *)(?:[-+−±]\d[\d.,]*(?:[ \u00a0]?[A-Za-zµΩ°%][\w/²³·]*)?|\d[\d.,]*[ \u00a0]?[A-Za-zµΩ°%][\w/²³·]*(?![\w/²³·]|[ \u00a0][A-Za-z]))/g

@@ -30,7 +30,10 @@ export class World {
     this.lights = new Lights(description, this.scene)
     this.meshes = description.meshes.map(() => null)
     this.hfields = description.hfields.map(() => null)
-    this.geoms = description.geoms.map((geom) => (geom.group < SHOWN_GROUPS ? this.solid(geom) : null))
+    // A floor with a grid takes the place of a plane without a colour of its own.
+    this.ground = description.lights.length > 0 ? null : description.floor
+    const isShown = ({ group, level }) => group < SHOWN_GROUPS && (level === null || level !== this.ground)
+    this.geoms = description.geoms.map((geom) => (isShown(geom) ? this.solid(geom) : null))
     this.sites = description.sites.map((site) => (site.group < SHOWN_GROUPS ? this.solid(site) : null))
     this.skins = description.skins.map((skin) => new Skin(this.scene, this.materials, skin, description.layout))
     this.flexes = description.flexes.map((flex) => new Flex(this.scene, this.materials, flex, description.layout))
@@ -50,8 +53,7 @@ export class World {
     const solids = this.geoms.filter((solid) => solid !== null && !solid.plane)
     const bodies = solids.flatMap(({ meshes }) => meshes)
     for (const { meshes, material } of solids) for (const mesh of meshes) this.edges.add(mesh, material)
-    const { floor, camera, lights } = this.description
-    return floor === null || lights.length > 0 ? null : new Floor(this.scene, floor, camera.distance, bodies)
+    return this.ground === null ? null : new Floor(this.scene, this.ground, this.description.camera.distance, bodies)
   }
 
   setSky() {
