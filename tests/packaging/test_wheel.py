@@ -110,7 +110,7 @@ def test_metadata_names_the_command_and_the_ranges(
     info = f"{full_name}.dist-info"
     metadata = email.message_from_bytes(archive.read(f"{info}/METADATA"))
     assert metadata["License-Expression"] == "Apache-2.0"
-    assert metadata["Requires-Python"] == ">=3.11.5"
+    assert metadata["Requires-Python"] == ">=3.11"
     required = [line for line in metadata.get_all("Requires-Dist") if "extra ==" not in line]
     requirements = {str(Requirement(line)) for line in pyproject["project"]["dependencies"]}
     assert {str(Requirement(line)).lower() for line in required} == set(

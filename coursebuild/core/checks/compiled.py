@@ -39,7 +39,7 @@ from coursebuild.core.text.diagnostics import (
 )
 from coursebuild.core.text.source import Excerpt, Source, Span
 
-INCLUDED_ROOT = re.compile(r"\s*+(?:<(?:\?.*?\?|!--.*?--)>\s*+)*+<mujocoinclude\b", re.DOTALL)
+INCLUDED_ROOT = re.compile(r"\s*+(?>(?:<(?:\?.*?\?|!--.*?--)>\s*+)*)<mujocoinclude\b", re.DOTALL)
 """How a file begins that is meant to be included by others."""
 
 

@@ -110,11 +110,11 @@ _FUNCTIONS = frozenset(
 
 _ESCAPE = r"\\(?:[0-9a-f]{1,6}(?:\r\n|[ \t\r\n\f])?|[^0-9a-f\r\n\f])"
 _ESCAPED = re.compile(_ESCAPE, re.IGNORECASE)
-_NAME = rf"(?:[\w-]|[^\x00-\x7f]|{_ESCAPE})++"
+_NAME = rf"(?>(?:[\w-]|[^\x00-\x7f]|{_ESCAPE})+)"
 _TOKEN = re.compile(
-    rf"""(?P<blank>(?:\s|/\*.*?\*/)++)
-    |(?P<string>"(?:[^"\\\n\r\f]|\\.)*+"|'(?:[^'\\\n\r\f]|\\.)*+')
-    |(?P<link>url\(\s*(?P<q>["']?)\#(?:[\w.:-]|[^\x00-\x7f])++(?P=q)\s*\))
+    rf"""(?P<blank>(?>(?:\s|/\*.*?\*/)+))
+    |(?P<string>"(?>(?:[^"\\\n\r\f]|\\.)*)"|'(?>(?:[^'\\\n\r\f]|\\.)*)')
+    |(?P<link>url\(\s*(?P<q>["']?)\#(?>(?:[\w.:-]|[^\x00-\x7f])+)(?P=q)\s*\))
     |(?P<font>url\(\s*(?P<p>["']?)data:(?:font|application)/[\w.+-]+(?:;charset=utf-8)?;base64,
         [a-z0-9+/=]*+(?P=p)\s*\))
     |(?P<function>{_NAME}\()

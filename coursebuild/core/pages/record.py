@@ -111,7 +111,7 @@ def record(
 
 # --- inline styles
 
-_INSIDE = r"""(?:[^"'>]++|"[^"]*+(?:"|\Z)|'[^']*+(?:'|\Z))*+"""
+_INSIDE = r"""(?>(?:[^"'>]++|"[^"]*+(?:"|\Z)|'[^']*+(?:'|\Z))*)"""
 _PIECE = re.compile(
     r"<!--.*?(?:-->|\Z)"
     rf"|<(?P<raw>script|style|textarea|title)\b{_INSIDE}(?:\Z|(?<!/)>.*?(?:</(?P=raw)\s*>|\Z))"

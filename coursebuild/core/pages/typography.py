@@ -56,9 +56,9 @@ _CLOSING = re.compile(r"""\u2069?(?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'�
 _RELATIONS = frozenset("=<>≤≥≠≈≡∼≃≅∝→←↔⇒⇐⇔↦⟶⟹∈∉⊂⊆⊃⊇≪≫≔:")
 _BINARY = frozenset("+-−±∓×·⋅∗∘⊗⊕∧∨∪∩")
 _SIGN = "|".join(re.escape(escape(sign)) for sign in sorted(_RELATIONS | _BINARY))
-_FIRST = re.compile(rf"<math>(?<=\s<math>)(?:<semantics>)?(?:<mrow>)*+<mo(?=>(?:{_SIGN})</mo>)")
+_FIRST = re.compile(rf"<math>(?<=\s<math>)(?:<semantics>)?(?>(?:<mrow>)*)<mo(?=>(?:{_SIGN})</mo>)")
 _LAST = re.compile(
-    rf"""<mo(?: lspace="0em")?(?=>(?:{_SIGN})</mo>(?:</mrow>)*+"""
+    rf"""<mo(?: lspace="0em")?(?=>(?:{_SIGN})</mo>(?>(?:</mrow>)*)"""
     r"""(?:<annotation\b[^<]*</annotation></semantics>)?</math>\s)"""
 )
 _OPEN, _CLOSE, _BAR = frozenset("([{⟨⌊⌈"), frozenset(")]}⟩⌋⌉"), frozenset("|‖∥∣")

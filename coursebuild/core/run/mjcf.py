@@ -295,7 +295,7 @@ _SUBJECTS = (
 """What messages are about: an attribute, an element, an end tag; others are about a value."""
 _MARKUP = re.compile(
     r"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)|<(?P<end>/?)(?P<name>[A-Za-z_][\w:.-]*+)"
-    r"(?P<rest>(?:[^<>\"']|\"[^\"]*+\"|'[^']*+')*+)>",
+    r"(?P<rest>(?>(?:[^<>\"']|\"[^\"]*+\"|'[^']*+')*))>",
     re.DOTALL,
 )
 _ATTRIBUTE = re.compile(r"(?<![\w:.-])([\w:.-]++)\s*+=\s*+(?:\"([^\"]*+)\"|'([^']*+)')")

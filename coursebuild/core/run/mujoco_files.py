@@ -32,7 +32,7 @@ _DEEPEST = 32
 LONGEST = 8 << 20
 """Bytes of a file that is scanned."""
 _COMMENTS = re.compile(rb"<!--.*?(?:-->|\Z)", re.DOTALL)
-_TAGS = re.compile(rb"<([A-Za-z_][\w:.-]*+)((?:[^<>\"']|\"[^\"]*+\"|'[^']*+')*+)>")
+_TAGS = re.compile(rb"<([A-Za-z_][\w:.-]*+)((?>(?:[^<>\"']|\"[^\"]*+\"|'[^']*+')*))>")
 _ATTRIBUTES = re.compile(rb"(?<![\w:.-])([\w:.-]++)\s*+=\s*+(?:\"([^\"]*+)\"|'([^']*+)')")
 
 

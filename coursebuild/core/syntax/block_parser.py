@@ -31,8 +31,8 @@ from coursebuild.core.syntax.attributes import LABEL, SYMBOL
 from coursebuild.core.syntax.spans import BlockState, InlineState, PositionedToken
 from coursebuild.core.text.source import Excerpt
 
-_TEX = re.compile(r"(?:[^\\`$]++|\\[\s\S])*+")
-_BLOCK_TEX = re.compile(r"(?:[^\\$]++|\\[\s\S]|\$(?!\$))*+")
+_TEX = re.compile(r"(?>(?:[^\\`$]++|\\[\s\S])*)")
+_BLOCK_TEX = re.compile(r"(?>(?:[^\\$]++|\\[\s\S]|\$(?!\$))*)")
 BACKTICKS = re.compile(r"`+")
 _DOLLARS = re.compile(r"\$+")
 _LABEL = re.compile(r"\{#[^{}$]*\}?")

@@ -33,7 +33,7 @@ _RAW_TEXT = frozenset("script style textarea title".split())
 LITERAL = frozenset("code kbd math pre samp svg".split()) | _RAW_TEXT
 """Elements in which a dollar is a dollar."""
 
-_TAG = re.compile(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?:"[^"]*"|'[^']*'|[^"'<>])*+)>""")
+_TAG = re.compile(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?>(?:"[^"]*"|'[^']*'|[^"'<>])*))>""")
 _ATTRIBUTE = re.compile(
     r"""\s([^\s"'<>/=]+)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))|\s[^\s"'<>/=]+"""
 )
@@ -237,15 +237,15 @@ _STYLES = frozenset(
     "text-decoration text-rendering vector-effect visibility word-spacing writing-mode".split()
 )
 """Attributes whose value is CSS, or is read as such."""
-_STYLE = re.compile(r"(?:(?!url|position)[^\\\"'@{}<>]|url\(#[\w-]+\))*+", re.IGNORECASE)
+_STYLE = re.compile(r"(?>(?:(?!url|position)[^\\\"'@{}<>]|url\(#[\w-]+\))*)", re.IGNORECASE)
 _ADDRESSES = frozenset("cite href poster src srcset xlink:href".split())
 """Attributes whose schemes and files are checked in every course."""
 
 _STRICT_ATTRIBUTE = r"""\s+([A-Za-z][A-Za-z0-9:_-]*)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?"""
-_STRICT_TAG = re.compile(rf"<([A-Za-z][A-Za-z0-9-]*)((?:{_STRICT_ATTRIBUTE})*+)\s*/?>")
+_STRICT_TAG = re.compile(rf"<([A-Za-z][A-Za-z0-9-]*)((?>(?:{_STRICT_ATTRIBUTE})*))\s*/?>")
 _ATTRIBUTES = re.compile(_STRICT_ATTRIBUTE)
 _HARMLESS = re.compile(
-    r"[^<]++|<(?![A-Za-z/!?])|</[A-Za-z][A-Za-z0-9-]*\s*>|<!--(?!-?>)(?:(?!--!?>|</title).)*+-->",
+    r"[^<]++|<(?![A-Za-z/!?])|</[A-Za-z][A-Za-z0-9-]*\s*>|<!--(?!-?>)(?>(?:(?!--!?>|</title).)*)-->",
     re.DOTALL | re.IGNORECASE,
 )
 """Text, the end of an element, a comment."""

@@ -129,7 +129,7 @@ _LINE = re.compile(
     r"\((?P<address>[^()\s]+)(?P<title>[ \t]+\"[^\"\n]*\")?\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     r"|(?P<math>\$\$?[^$\n]+\$\$?)"
-    r"|(?P<paren>\\\((?P<inner>(?:(?!\\[()])[^\n])++)\\\))"
+    r"|(?P<paren>\\\((?P<inner>(?>(?:(?!\\[()])[^\n])+))\\\))"
     r"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst)-(?P<label>[\w-]+)\]?)"
     r"|(?P<cite>\[-?@[\w:.-]+(?:[;,][^\[\]\n]*)?\])"
     r"|(?P<substitution>\{\{[^{}\n]*\}\})"
@@ -143,12 +143,12 @@ _DISPLAY = re.compile(
 _ENVIRONMENT = re.compile(
     r"(?P<before>(?:\A|\n[ \t]*\n))[ \t]*"
     r"(?P<tex>\\begin\{(?P<env>align|equation|gather|multline|alignat)(?P<star>\*?)\}"
-    r"(?:(?!\\(?:begin|end)\{(?P=env)(?P=star)\}).)*+"
+    r"(?>(?:(?!\\(?:begin|end)\{(?P=env)(?P=star)\}).)*)"
     r"\\end\{(?P=env)(?P=star)\})(?P<after>[ \t]*(?=\n|\Z))",
     re.DOTALL,
 )
 _BRACKETS = re.compile(
-    r"^[ \t]*\\\[(?P<tex>(?:(?!\\[\[\]]).)++)\\\][ \t]*$", re.DOTALL | re.MULTILINE
+    r"^[ \t]*\\\[(?P<tex>(?>(?:(?!\\[\[\]]).)+))\\\][ \t]*$", re.DOTALL | re.MULTILINE
 )
 _TARGET = re.compile(
     r"^\((?P<name>[\w:.-]+)\)=[ \t]*(?:\n+(?P<heading>#{1,6}[ \t].*))?$", re.MULTILINE

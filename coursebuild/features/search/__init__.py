@@ -36,7 +36,7 @@ _BATCH = 16
 _PAGES_PER_SHARD = 8
 _MAX_SHARDS = 1024
 _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
-_SLICE = re.compile(rb"(?:[^\n ]++ (?:[0-9a-f]{2})*+(?:\n(?!\Z)|\Z))*+")
+_SLICE = re.compile(rb"(?>(?:[^\n ]++ (?>(?:[0-9a-f]{2})*)(?:\n(?!\Z)|\Z))*)")
 _LIVE = "search.live."
 """The prefix of interface texts that only the search script needs."""
 
