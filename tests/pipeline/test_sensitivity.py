@@ -118,7 +118,7 @@ def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     scripts = [("double", DOUBLE_PENDULUM), ("fall", FALL), ("limit", LIMIT), ("plain", PLAIN)]
     scripts += [(name, SWING.replace("INTEGRATOR", name)) for name in ("Euler", "RK4")]
     blocks = [block(f"{name}.py", code, "?") for name, code in scripts]
-    blocks.append(block("loose.py", DOUBLE_PENDULUM, "?", "rtol=10 atol=100"))
+    blocks.append(block("loose.py", DOUBLE_PENDULUM, "?", "rtol=1e-9 atol=29"))
     folder.fill(["## One\n\n" + "".join(blocks)], stores)
     folder.main("update", "--quiet")
     return folder

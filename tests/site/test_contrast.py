@@ -38,6 +38,11 @@ class Rule:
     """The at-rules that it stands in."""
     declarations: dict[str, str]
 
+    @property
+    def is_seen(self) -> bool:
+        """Whether it is for screens in the colours of the page."""
+        return not re.search("print|forced-colors", self.at_rules)
+
 
 def rules(text: str, file: str, at_rules: str = "", outer: str = "") -> Iterator[Rule]:
     """The rules of a style sheet, those inside others after them."""
@@ -70,7 +75,7 @@ ALL = [rule for path in SHEETS for rule in rules(without_comments(path), path.na
 PROPERTIES: dict[str, list[str]] = {}
 for _rule in ALL:
     for _name, _value in _rule.declarations.items():
-        if _name.startswith("--") and "print" not in _rule.at_rules:
+        if _name.startswith("--") and _rule.is_seen:
             PROPERTIES.setdefault(_name, []).append(_value)
 
 
@@ -160,7 +165,7 @@ def test_text(theme: str) -> None:
     failures = []
     for rule in ALL:
         text = colour_of(rule, "color")
-        if text is None or "print" in rule.at_rules:
+        if text is None or not rule.is_seen:
             continue
         ground_value = colour_of(rule, "background", "background-color")
         grounds = plain(theme)
@@ -193,7 +198,7 @@ def test_text_on_tints(theme: str) -> None:
     failures = []
     for rule in ALL:
         tint = colour_of(rule, "background", "background-color")
-        if tint is None or "color" in rule.declarations or "print" in rule.at_rules:
+        if tint is None or "color" in rule.declarations or not rule.is_seen:
             continue
         if any(part in rule.selector for part in WITHOUT_TEXT):
             continue

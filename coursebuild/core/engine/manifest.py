@@ -7,7 +7,6 @@ written. Where it is missing or damaged, everything is made again.
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 import stat
@@ -18,6 +17,7 @@ from msgspec import Struct
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.course_root import read_regular
+from coursebuild.core.files.errors import lacking
 
 KIND = "published"
 """The kind of a manifest's entry."""
@@ -110,9 +110,14 @@ def foreign_files(place: Path) -> list[str]:
     if not os.path.lexists(place):
         return []
     own_paths: list[str] = []
-    with contextlib.suppress(OSError, UnicodeDecodeError):
+    try:
         header, *own_paths = read_regular(place / MARKER).decode().split("\n")
         own_paths = [MARKER, *own_paths] if header == _HEADER else []
+    except UnicodeDecodeError:
+        pass
+    except OSError as error:
+        if lacking(error):
+            raise
     return sorted(set(_files(place)).difference(own_paths))
 
 

@@ -22,7 +22,7 @@ from pathlib import Path
 from msgspec import Struct
 
 from coursebuild.core.files.course_root import DECISIVE, read_regular
-from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.errors import EffectError, lacking, reason
 from coursebuild.core.model import Course, NamedPath
 from coursebuild.core.model.results import Machine
 from coursebuild.core.text.diagnostics import Parsed, diagnose
@@ -166,7 +166,9 @@ class _InstalledDistribution(Distribution):
     def read_text(self, filename: str) -> str | None:
         try:
             return read_regular(self._place / filename).decode("utf-8", "replace")
-        except OSError:
+        except OSError as error:
+            if lacking(error):
+                raise
             return None
 
     def locate_file(self, path: str | os.PathLike[str]) -> Path:
@@ -178,9 +180,12 @@ def installed_distributions(folders: Iterable[str], name: str = "") -> Iterator[
     pattern = re.sub(r"[-_.]+", "[-_.]+", name) or ".*"
     place = re.compile(rf"(?i:{pattern}(-.*)?\.(dist|egg)-info)")
     for folder in folders:
-        entries: list[str] = []
-        with contextlib.suppress(OSError):
+        try:
             entries = sorted(os.listdir(folder))  # noqa: PTH208
+        except OSError as error:
+            if lacking(error):
+                raise
+            continue
         for entry in filter(place.fullmatch, entries):
             yield _InstalledDistribution(Path(folder, entry))
 

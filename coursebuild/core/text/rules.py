@@ -238,8 +238,8 @@ GROUPS: dict[str, dict[str, str]] = {
         "quiz-id-repeated": "Two quizzes of the course have the same id.",
         "question-id-repeated": "Two questions of a quiz have the same id.",
         "quiz-answer": "The answer of a question is not one of its options.",
-        "quiz-output": "An `output` question names a script or line that was not printed or "
-        "varies.",
+        "quiz-output": "An `output` question names a script or line that was not printed or is "
+        "not compared.",
         "quiz-gate": "A prediction has nothing below it to hide, or no lab to run.",
         "package-reduced": "A QTI package cannot hold a question as the page shows it.",
     },

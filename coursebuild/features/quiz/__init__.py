@@ -166,7 +166,7 @@ def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Di
             if question.line <= count:
                 line = lines[question.line - 1].rstrip()
                 if any(_varies(course, r, line) for r in recordings.get(question.script, ())):
-                    message = f"line {question.line} of what `{question.script}` prints varies"
+                    message = f"output line {question.line} of `{question.script}` is not compared"
                     help = "ask for a line that its recorded output compares"
                     yield diagnose("quiz-output", question.line_span, message, help=help)
             else:
