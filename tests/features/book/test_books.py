@@ -30,7 +30,7 @@ def export(folder: Folder, kind: str) -> Path:
     return folder.root / {"epub": "course.epub", "page": "course.html"}[kind]
 
 
-HOSTILE = "<b>\\\"&amp;' \\u0007 ]](x) $x$ ‮ `"
+HOSTILE = "<b>\\\"&amp;' \\u0007 ]](x) $x$ ‏ `"
 """A title, as TOML has it."""
 WILD = fixture_text("documents/wild.md")
 
