@@ -16,7 +16,7 @@ import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from importlib.metadata import Distribution
+from importlib.metadata import Distribution, PathDistribution
 from pathlib import Path
 
 from msgspec import Struct
@@ -157,22 +157,20 @@ def engine_version() -> str:
     return version
 
 
-class _InstalledDistribution(Distribution):
-    """One of the standard library would wait for a pipe, and never end reading a device."""
+class _InstalledDistribution(PathDistribution):
+    """That of the standard library would wait for a pipe, and never end reading a device."""
 
     def __init__(self, place: Path) -> None:
+        super().__init__(place)
         self._place = place
 
-    def read_text(self, filename: str) -> str | None:
+    def read_text(self, filename: str | os.PathLike[str]) -> str | None:
         try:
             return read_regular(self._place / filename).decode("utf-8", "replace")
         except OSError as error:
             if lacking(error):
                 raise
             return None
-
-    def locate_file(self, path: str | os.PathLike[str]) -> Path:
-        return self._place.parent / path
 
 
 def installed_distributions(folders: Iterable[str], name: str = "") -> Iterator[Distribution]:

@@ -88,7 +88,7 @@ def output_findings(
     for owner, document in documents:
         for verdict in outputs.of_document(document):
             recording = verdict.recording
-            yield from find_void(verdict)
+            yield from _find_loose(verdict)
             run = outputs.runs.get(recording.script or "")
             if run is not None and run.outcome is Outcome.OK and not run.stdout.strip():
                 yield failures.silence_diagnostic(recording, run.path)
@@ -107,7 +107,7 @@ _RESIDUE = Decimal("1e-9")
 """A number below it is taken for what rounding has left of 0."""
 
 
-def find_void(verdict: Verdict) -> Iterator[Diagnostic]:
+def _find_loose(verdict: Verdict) -> Iterator[Diagnostic]:
     """Report an output that is compared so loosely that nearly any other would do."""
     body, comparison = verdict.recording.body, verdict.comparison
     if comparison.mode is Mode.VOLATILE or not verdict.recording.readable:

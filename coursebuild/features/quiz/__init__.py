@@ -151,7 +151,7 @@ def _check_answer(question: NumericQuestion) -> Iterator[Diagnostic]:
 def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
     """Report `output` questions about a line that the script, run to its end, did not print.
 
-    A line that varies, as its recording says, is no answer either.
+    Nor is a line an answer that its recording leaves out of the comparison.
     """
     printed = {run.path: run.stdout for run in runs if run.outcome is Outcome.OK}
     recordings: dict[str, list[Recording]] = {}
@@ -165,7 +165,7 @@ def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Di
             count = len(lines)
             if question.line <= count:
                 line = lines[question.line - 1].rstrip()
-                if any(_varies(course, r, line) for r in recordings.get(question.script, ())):
+                if any(_is_left_out(course, r, line) for r in recordings.get(question.script, ())):
                     message = f"output line {question.line} of `{question.script}` is not compared"
                     help = "ask for a line that its recorded output compares"
                     yield diagnose("quiz-output", question.line_span, message, help=help)
@@ -174,7 +174,7 @@ def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Di
                 yield diagnose("quiz-output", question.line_span, message)
 
 
-def _varies(course: Course, recording: Recording, line: str) -> bool:
+def _is_left_out(course: Course, recording: Recording, line: str) -> bool:
     comparison, body = course.comparison_of(recording), recording.body
     if comparison.mode is Mode.VOLATILE:
         return True

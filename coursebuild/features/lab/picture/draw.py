@@ -362,8 +362,8 @@ class Floor(Struct, frozen=True):
                 in_view = raster.rotate(vertices - eye.position, eye.axes)
             shadow = np.full_like(depth, np.inf)
             fragments = raster.fragments(eye, in_view, joined_surface.faces, front=False)
-            for triangles, numbers, shares, x, y in fragments:
-                weights = shares / triangles[:, :, 2][numbers]
+            for triangles, indices, shares, x, y in fragments:
+                weights = shares / triangles[:, :, 2][indices]
                 depths = 1.0 / (weights[:, 0] + weights[:, 1] + weights[:, 2])
                 np.minimum.at(shadow, (y, x), depths)
             shade += shadow < depth * (1 + _DEPTH_TOLERANCE)

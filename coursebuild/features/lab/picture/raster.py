@@ -62,15 +62,15 @@ class GBuffer:
         uv = np.zeros((len(in_view), 2)) if surface.uv is None else surface.uv
         # One row for each vertex: its place in the camera's frame, and its attributes.
         vertices = np.column_stack((in_view, surface.vertices, surface.normals, uv))
-        for triangles, numbers, shares, x, y in fragments(
+        for triangles, indices, shares, x, y in fragments(
             eye, vertices, surface.faces, front=front
         ):
             # What is linear on the surface is linear in 1/z on the screen.
-            weights = shares / triangles[:, :, 2][numbers]
+            weights = shares / triangles[:, :, 2][indices]
             depth = 1.0 / (weights[:, 0] + weights[:, 1] + weights[:, 2])
             nearest = np.flatnonzero(depth < self.depth[y, x])
             weights, depth, x, y = weights[nearest], depth[nearest], x[nearest], y[nearest]
-            corners = triangles[:, :, 3:][numbers[nearest]]
+            corners = triangles[:, :, 3:][indices[nearest]]
             attributes = np.einsum("sk,skc->sc", weights, corners) * depth[:, None]
             if eye.mirror is not None:
                 normal, offset = eye.mirror
@@ -89,7 +89,7 @@ class GBuffer:
 Fragments: TypeAlias = Iterator[
     tuple[Array, NDArray[np.int64], Array, NDArray[np.int64], NDArray[np.int64]]
 ]
-"""Triangles (t, 3, columns), and the samples that they cover: of each the number of its triangle,
+"""Triangles (t, 3, columns), and the samples that they cover: of each the index of its triangle,
 the shares of the triangle's corners in it (n, 3), its column and its row."""
 
 
@@ -163,7 +163,7 @@ def _samples(
         left = np.where(is_crossed, np.minimum(left, place), left)
         right = np.where(is_crossed, np.maximum(right, place), right)
     line, column = _count_up(_first(left, width), _first(right, width))
-    numbers = triangle[line]
+    indices = triangle[line]
     # The shares are linear along a row.
     (x0, x1, x2), (y0, y1, y2) = px.T, py.T
     area = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
@@ -173,9 +173,9 @@ def _samples(
     for k, (xa, ya, xb, yb) in enumerate(((x1, y1, x2, y2), (x2, y2, x0, y0))):
         slope, rise = (ya - yb) / area, (xb - xa) / area
         at_zero = (rise[triangle] * (middle - ya[triangle])) - slope[triangle] * xa[triangle]
-        shares[:, k] = at_zero[line] + slope[numbers] * x
+        shares[:, k] = at_zero[line] + slope[indices] * x
     shares[:, 2] = 1 - shares[:, 0] - shares[:, 1]
-    return numbers, shares, column, row[line]
+    return indices, shares, column, row[line]
 
 
 def _first(places: Array, size: int) -> NDArray[np.int64]:
