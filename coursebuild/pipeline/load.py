@@ -61,7 +61,7 @@ MAP_TEXT = 1_000_000
 _TEXTS = tuple(
     ".bib .css .csv .html .js .json .md .mjs .py .svg .toml .tsv .txt .vtt .xml .yaml .yml".split()
 )
-"""The ends of names of files in which a merge conflict is looked for."""
+"""The ends of names of files whose text is looked through as such."""
 
 
 def load(
@@ -80,7 +80,7 @@ def load(
     """
     loader = _Loader(root, reader, open_texts, code)
     course = loader.load()
-    loader.find_conflicts(course)
+    loader.check_texts(course)
     return Parsed(course, tuple(loader.diagnostics))
 
 
@@ -216,9 +216,12 @@ class _Loader:
             self.unreadable.append(source.path)
         return tuple(short)
 
-    def find_conflicts(self, course: Course | None) -> None:
-        """Report merge conflicts in all texts but lessons and pages, which their parser reports."""
-        from coursebuild.core.syntax.document import find_conflict
+    def check_texts(self, course: Course | None) -> None:
+        """Report what is wrong in any text, but lessons and pages, where their parser reports it.
+
+        Merge conflicts, and characters by which a browser shows others in another order.
+        """
+        from coursebuild.core.syntax.document import find_conflict, find_reordering
 
         sources = [*self.files.declarations, *(model.source for model in self.files.models)]
         sources += [] if self.files.map is None else [self.files.map]
@@ -235,6 +238,11 @@ class _Loader:
             sources += [] if text is None else [Source(path, text)]
         conflicts = (find_conflict(source) for source in sources)
         self.diagnostics += (conflict for conflict in conflicts if conflict is not None)
+        for source in sources:
+            if not source.path.endswith(".toml"):  # whose values are looked at
+                whole = source.span(0, len(source.text))
+                is_code = source.path.endswith((".js", ".mjs", ".py"))
+                self.diagnostics += find_reordering(whole, is_code=is_code)
 
     def _load_theme(self, theme: Theme) -> Theme:
         if theme == Theme() and not (self.root / TEMPLATES).is_dir():

@@ -35,6 +35,7 @@ from coursebuild.core.syntax.nodes import (
     type_help,
     wrong_type_message,
 )
+from coursebuild.core.text.characters import REORDERING
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Note,
@@ -50,8 +51,6 @@ T = TypeVar("T", bound=Struct)
 
 _NO_REMARKS: Mapping[str, str] = {}
 _INVALID = object()
-_REORDERS = re.compile("[\u202a-\u202e]")
-"""Isolates (U+2066 to U+2069) do what texts in Arabic may need, and are allowed."""
 
 
 class Decoding(Struct, Generic[S], frozen=True):
@@ -159,7 +158,7 @@ class _Decoder:
             return self.report("field-value", node.mark, message, help)
         if "text" in remarks:
             self.texts.append((node, remarks["text"]))
-        elif (character := _REORDERS.search(value)) is not None:
+        elif (character := REORDERING.search(value)) is not None:
             message = f"U+{ord(character[0]):04X} shows the text in another order than it is read"
             return self.report("control-character", node.mark, message, "delete it")
         return value

@@ -16,6 +16,7 @@ from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.recording import ILLUSTRATION
 from coursebuild.core.syntax.spans import read_markdown
 from coursebuild.core.syntax.tree import TextReader
+from coursebuild.core.text.characters import ISOLATING, REORDERING
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Edit,
@@ -78,10 +79,6 @@ def parse_document(
     return Parsed(document, sort_diagnostics(state.diagnostics))
 
 
-_REORDERS = re.compile("[\u202a-\u202e\u2066-\u2069]")
-"""Characters by which a browser shows others in another order: in prose, some are needed."""
-
-
 def _check_order(document: model.Document) -> Iterator[Diagnostic]:
     """Report code and outputs that readers would see otherwise than they run and are compared."""
     for block in model.document_blocks(document):
@@ -92,11 +89,17 @@ def _check_order(document: model.Document) -> Iterator[Diagnostic]:
                 place = block.span
             case _:
                 continue
-        if character := _REORDERS.search(place.text):
-            at = place.start + character.start()
-            message = f"U+{ord(character[0]):04X} shows the line in another order than it is read"
-            help = "delete it; scripts can write an escape, and print `ascii(text)`"
-            yield diagnose("control-character", place.source.span(at, at + 1), message, help=help)
+        yield from find_reordering(place, is_code=True)
+
+
+def find_reordering(place: Span, *, is_code: bool) -> Iterator[Diagnostic]:
+    """Report the first character of a text by which a browser shows others in another order."""
+    if character := (ISOLATING if is_code else REORDERING).search(place.text):
+        at = place.start + character.start()
+        message = f"U+{ord(character[0]):04X} shows the line in another order than it is read"
+        help = "delete it"
+        help += "; scripts can write an escape, and print `ascii(text)`" if is_code else ""
+        yield diagnose("control-character", place.source.span(at, at + 1), message, help=help)
 
 
 _TEXTS = frozenset(

@@ -47,6 +47,11 @@ def without_commands(text: str) -> str:
     return _COMMAND.sub(lambda m: f"{m[1]}\u205a" if m[2] is None else m[2] + bracket, text)
 
 
+REORDERING = re.compile("[\u202a-\u202e]")
+"""Characters by which a browser shows others in another order than they are read."""
+ISOLATING = re.compile("[\u202a-\u202e\u2066-\u2069]")
+"""These, and those that texts in Arabic may need, but code does not."""
+
 TAB = 4
 
 
