@@ -334,24 +334,26 @@ class _Gauge:
         """Compare places, attitudes and sensors now."""
         places = np.linalg.norm(data.xpos[self._bodies] - variant_data.xpos, axis=1)
         first, second = data.xquat[self._bodies], variant_data.xquat
-        chords = [np.linalg.norm(first - sign * second, axis=1) for sign in (1, -1)]
-        turns = 4 * np.arcsin(np.minimum(np.minimum(*chords) / 2, 1.0))
+        signs = np.copysign(1.0, np.einsum("ij,ij->i", first, second))  # q and -q turn alike
+        chords = np.linalg.norm(first - signs[:, None] * second, axis=1)
+        turns = 4 * np.arcsin(np.minimum(chords / 2, 1.0))
         for gaps, size, unit in ((places, self._length, "m"), (turns, self._angle, "rad")):
-            values = np.nan_to_num(gaps, nan=np.inf)
-            worst = int(values.argmax())
-            if (share := float(values[worst]) / size) > self.seen:
+            worst = int(gaps.argmax())  # of NaN, if there is one, which is no place
+            gap = math.inf if math.isnan(gaps[worst]) else float(gaps[worst])
+            if (share := gap / size) > self.seen:
                 number = int(self._bodies[worst])
                 name = self._base.body(number).name or f"number {number}"
-                off = f"off by {values[worst]:.2g} {unit} at {float(data.time):.3g} s"
+                off = f"off by {gap:.2g} {unit} at {float(data.time):.3g} s"
                 self.seen, self.shown = share, f"the body {name} is {off}"
-        readings = data.sensordata[self._readings]
-        gaps = np.nan_to_num(np.abs(readings - variant_data.sensordata), nan=np.inf)
-        np.maximum(self._gaps, gaps, out=self._gaps)
-        np.maximum(self._largest, np.abs(readings), out=self._largest)
+        if len(self._readings):
+            readings = data.sensordata[self._readings]
+            np.maximum(self._gaps, np.abs(readings - variant_data.sensordata), out=self._gaps)
+            np.maximum(self._largest, np.abs(readings), out=self._largest)
 
     def with_sensors(self) -> tuple[float, str]:
         """The largest of bodies and sensors, whose readings count relative to their largest."""
-        gaps = np.where(self._gaps > _ROUNDING * np.maximum(self._largest, 1.0), self._gaps, 0.0)
+        gaps = np.nan_to_num(self._gaps, nan=np.inf)
+        gaps = np.where(gaps > _ROUNDING * np.maximum(self._largest, 1.0), gaps, 0.0)
         shares = gaps / (self._share * np.maximum(self._largest, _ROUNDING))
         if shares.max(initial=0.0) <= self.seen:
             return self.seen, self.shown
