@@ -99,6 +99,16 @@ def test_transparent_things_are_mixed_in_any_order_and_hidden_by_others() -> Non
     assert not draw((solid(rgba=(1, 1, 1, 0)),), FRONT, SIZE).any()
 
 
+def test_a_transparent_face_in_the_place_of_another_is_drawn_over_it() -> None:
+    """The box of inertia of a box has its faces, with other rounding."""
+    turn = np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]])
+    size = (0.7, 0.5, 0.3)
+    inertia = solid(at=(1e-9, 1e-9, 0), size=size, rgba=(0, 0, 1, 0.6), rotation=turn)
+    pixels = draw((solid(size=size, rotation=turn), inertia), FRONT, SIZE)
+    inside = pixels[25:35, 30:50].reshape(-1, 4)
+    assert np.all(inside[:, 2] > inside[:, 0])
+
+
 def test_colours_stay_in_range() -> None:
     pixels = draw((solid("sphere", size=(1,), rgba=(9.0, -3.0, 0.5, 1.0)),), FRONT, SIZE)
     assert (pixels[30, 40, 0], pixels[30, 40, 1]) == (255, 0)

@@ -38,6 +38,9 @@ _NEAR_SHARE = 0.01
 _OPAQUE_ALPHA, _CLEAR_ALPHA = 0.999, 0.001
 _FROM_BELOW = 0.5
 """Factor of the opacity of a plane seen from below, as in MuJoCo."""
+_SAME_PLACE = 1e-5
+"""A transparent face that is further than another by this part of its distance is drawn over it:
+the box of inertia of a box has the same faces, and rounding would decide for each sample."""
 _TOP = 0.5
 _AT_ONCE = 1 << 16
 _STEPS = 127
@@ -201,7 +204,7 @@ class _Canvas:
             )
         for solid in sorted((s for s in solids if not s.opaque), key=self._depth, reverse=True):
             film = raster.GBuffer(self.eye)
-            film.depth = buffer.depth.copy()
+            film.depth = buffer.depth * (1 + _SAME_PLACE)
             # Only the outside is drawn, as in the live view.
             front = not (solid.open or solid.plane)
             film.add(0, solid.surface, solid.position, solid.rotation, front=front)
