@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -81,6 +81,16 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         integrator: [measure(problem, integrator, h) for h in problem.timesteps]
         for integrator in STANDARD
     }
+    # The time of a step is that at the longest timestep with which the run went well.
+    jobs, names, counts = [], [], []
+    for integrator, lines in runs.items():
+        step = next((line.timestep for line in lines if line.status == "ok"), None)
+        if step is not None:
+            model = simulation.compile_model(problem.mjcf, integrator, step)
+            jobs.append(scenario_job(model, [problem.scenario], step))
+            names.append(integrator.value)
+            counts.append(round(problem.scenario.duration / step))
+    timings = time_jobs(jobs, 0, clock, quick=True) if jobs else ()
     return CaseReport(
         name=problem.name,
         title=problem.title,
@@ -92,26 +102,10 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         figures=tuple(measure_figures(problem, problem.checks)),
         orders=tuple(orders(problem, lines) for lines in runs.values() if lines),
         errors=tuple(line for lines in runs.values() for line in lines),
-        costs=_costs(problem, runs, clock),
-    )
-
-
-def _costs(
-    problem: Problem, runs: Mapping[Integrator, Sequence[ErrorLine]], clock: Clock
-) -> tuple[StepCost, ...]:
-    """The time of a step, at the longest timestep with which the run went well."""
-    jobs, names, counts = [], [], []
-    for integrator, lines in runs.items():
-        step = next((line.timestep for line in lines if line.status == "ok"), None)
-        if step is not None:
-            model = simulation.compile_model(problem.mjcf, integrator, step)
-            jobs.append(scenario_job(model, [problem.scenario], step))
-            names.append(integrator.value)
-            counts.append(round(problem.scenario.duration / step))
-    timings = time_jobs(jobs, 0, clock, quick=True) if jobs else ()
-    return tuple(
-        StepCost(name, line.nanoseconds.scale(1e-9 / count))
-        for name, count, line in zip(names, counts, timings, strict=True)
+        costs=tuple(
+            StepCost(name, line.nanoseconds.scale(1e-9 / count))
+            for name, count, line in zip(names, counts, timings, strict=True)
+        ),
     )
 
 

@@ -104,7 +104,12 @@ def _extrapolate(rate: Rate, y: State, step: Any, columns: int) -> tuple[State, 
         slope = rate(y)
         rows: list[State] = []
         for j in range(1, columns + 1):
-            new = [_midpoint(rate, y, slope, step, 2 * j)]
+            # The change by Gragg's smoothed midpoint rule with 2j substeps.
+            h = step / (2 * j)
+            before, change = np.zeros_like(y), h * slope
+            for _ in range(2 * j - 1):
+                before, change = change, before + 2 * h * rate(y + change)
+            new = [(before + change + h * rate(y + change)) / 2]
             for k in range(1, j):
                 fine, coarse = j * j, (j - k) * (j - k)
                 new.append(new[-1] + (new[-1] - rows[k - 1]) * coarse / (fine - coarse))
@@ -112,17 +117,6 @@ def _extrapolate(rate: Rate, y: State, step: Any, columns: int) -> tuple[State, 
         size = 1.0 + np.abs(y.astype(float))
         error = np.max(np.abs((rows[-1] - rows[-2]).astype(float)) / size)
     return rows[-1], float(error)
-
-
-def _midpoint(rate: Rate, y: State, slope: State, step: Any, n: int) -> State:
-    """The change of y by Gragg's smoothed midpoint rule with n (even) substeps."""
-    h = step / n
-    before, change = np.zeros_like(y), h * slope
-    for _ in range(n - 1):
-        before, change = change, before + 2 * h * rate(y + change)
-    last = h * rate(y + change)
-    smooth: State = (before + change + last) / 2
-    return smooth
 
 
 def dop853(rate: Rate, start: Array, times: Array) -> Array:

@@ -136,12 +136,6 @@ def _step_derivative(model: Any, data: Any, state: FixedState) -> tuple[Array, F
     return _derivative(after, units, _NEAR_STEP if state.touches else _STEP), following
 
 
-def _spectral_radius(matrix: Array) -> float:
-    if not np.isfinite(matrix).all():
-        return math.inf
-    return float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0))
-
-
 def _has_theory(model: Any, most: int) -> bool:
     """Whether a step is a function of the state alone, which differences can show."""
     history = getattr(model, "actuator_history", np.zeros((1, 1)))
@@ -252,7 +246,9 @@ def rest_limit(
     def is_lost(timestep: float) -> bool:
         variant.opt.timestep = timestep
         matrix, _ = _step_derivative(variant, data, rest)
-        return not _spectral_radius(matrix) <= unit
+        if not np.isfinite(matrix).all():
+            return True
+        return not float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0)) <= unit
 
     count = max(2, round(_GRID * math.log10(high / low)) + 1)
     before = 0.0

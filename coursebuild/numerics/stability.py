@@ -205,7 +205,9 @@ def search_row(
        that is lost first, and one for the own start over the doubled span.
     3. Where nothing drives the motion, the first timestep at which energy rises.
     """
-    grid = _grid(search, quick)
+    low, high = search
+    count = max(2, round((_QUICK_GRID if quick else _GRID) * math.log10(high / low)) + 1)
+    grid: list[float] = np.geomspace(low, high, count).tolist()
     resolution = _COARSE if quick else _FINE
     largest = _look_closer(partial(laboratory.is_lost, 0), grid, resolution, quick)
     near = [h for h in grid if h < _NEAR * min(largest, grid[-1])] or grid[:1]
@@ -242,12 +244,6 @@ def search_row(
         gain=gain,
         tries=_tries(laboratory),
     )
-
-
-def _grid(search: tuple[float, float], quick: bool) -> list[float]:
-    low, high = search
-    count = max(2, round((_QUICK_GRID if quick else _GRID) * math.log10(high / low)) + 1)
-    return [float(step) for step in np.geomspace(low, high, count)]
 
 
 def _bisect(

@@ -211,20 +211,18 @@ def check_target(root: Path, out: Path, mark: str, *, archive: bool) -> None:
         )
     if place.is_dir():
         raise PublishRefusedError(f"{out} is a folder", help="name a file, such as `course.zip`")
-    if os.path.lexists(place) and not _has_mark(place, mark, archive=archive):
-        raise PublishRefusedError(
-            f"{out} exists and is not such an export", help="move it away, or name another file"
-        )
-
-
-def _has_mark(place: Path, mark: str, *, archive: bool) -> bool:
-    try:
+    if not os.path.lexists(place):
+        return
+    with contextlib.suppress(OSError, zipfile.BadZipFile, ValueError):
         if archive:
             with zipfile.ZipFile(place) as entries:
-                return mark in entries.namelist()
-        return mark.encode() in read_regular(place)[:1000]
-    except (OSError, zipfile.BadZipFile, ValueError):
-        return False
+                if mark in entries.namelist():
+                    return
+        elif mark.encode() in read_regular(place)[:1000]:
+            return
+    raise PublishRefusedError(
+        f"{out} exists and is not such an export", help="move it away, or name another file"
+    )
 
 
 def write_export(out: Path, files: Iterable[SiteFile], *, archive: bool) -> int:

@@ -28,7 +28,6 @@ from coursebuild.core.model import Course
 from coursebuild.core.model.addresses import RecordedFigure, recorded_figures
 from coursebuild.core.model.results import Machine, Outcome, ScriptRun
 from coursebuild.core.run.dependencies import (
-    Dependency,
     Inputs,
     Kind,
     dependencies_of,
@@ -103,14 +102,25 @@ def record_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], option
     """Record the successful runs of scripts that are recorded once."""
     states = States(options.root, options.store, options.interpreter)
     by_path = {run.path: run for run in runs}
+    # Not the same on every machine are files of an environment inside the course's folder, and
+    # those of our library, which may be installed elsewhere.
+    places = dict(states.places)
+    folders = (places["prefix"], f"{places['library']}/mjcourse")
+    local_folders = tuple(f"{os.path.relpath(folder, states.root)}/" for folder in folders)
     for extraction in scripts:
         run, path = by_path.get(extraction.path), _path(extraction.path)
         if run is None or not extraction.script.once or run.outcome is not Outcome.OK:
             continue
         dependencies = dependencies_of(run, (), states.places, states)
+        portable = tuple(
+            dependency
+            for dependency in dependencies
+            if dependency.kind in (Kind.FILE, Kind.LISTING, Kind.SOUGHT)
+            and not dependency.name.startswith(local_folders)
+        )
         record = record_of(
             _inputs(extraction),
-            tuple(_find_portable(dependencies, states)),
+            portable,
             int(time.time()),
             "",
             replace(run, seconds=round(run.seconds, 1), stderr="", figures=(), unrepeated=False),
@@ -130,21 +140,6 @@ def record_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], option
         data = msgspec.json.format(msgspec.json.encode(recorded_run), indent=2) + b"\n"
         expected = read_regular(file) if file.exists() else None
         write_atomic(options.root, path, data, expected=expected)
-
-
-def _find_portable(dependencies: Iterable[Dependency], states: States) -> Iterator[Dependency]:
-    """Find the dependencies that are the same on every machine.
-
-    Files of an environment inside the course's folder are not, nor are those of our library, which
-    may be installed elsewhere.
-    """
-    places = dict(states.places)
-    folders = (places["prefix"], f"{places['library']}/mjcourse")
-    excluded_folders = tuple(f"{os.path.relpath(folder, states.root)}/" for folder in folders)
-    for dependency in dependencies:
-        of_course = dependency.kind in (Kind.FILE, Kind.LISTING, Kind.SOUGHT)
-        if of_course and not dependency.name.startswith(excluded_folders):
-            yield dependency
 
 
 def _inputs(extraction: Extraction) -> Inputs:

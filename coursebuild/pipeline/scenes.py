@@ -135,27 +135,8 @@ def scene_digest(root: Path, model: MjcfModel, declarations: Declarations) -> st
     exact = root / exact_file(model.name)
     if exact.is_file():
         add(exact.name.encode("utf-8", "surrogateescape"), _hash_file(exact))
-    add(_canonical_text(declarations).encode("utf-8", "surrogatepass"))
-    return digest.hexdigest()
-
-
-def _hash_file(file: Path) -> bytes:
-    try:
-        with file.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").digest()
-    except OSError:
-        return b"unreadable"
-
-
-_LATER = ("room", "stable_for", "search", "limits", "expected", "precision", "horizon_error")
-_PLAIN = asdict(ScenarioTable("plain"))
-
-
-def _canonical_text(declarations: Declarations) -> str:
-    """A text of all declarations that change a measurement, in whatever order the file has them.
-
-    Recorded reports hold its digest: with another text for the same, none of them would fit.
-    """
+    # A text of all declarations that change a measurement, in whatever order the file has them.
+    # Recorded reports hold its digest: with another text for the same, none of them would fit.
     bench = declarations.bench
     parts = [f"Visible(share={bench.visible}, angle={bench.visible_angle})"]
     for s in declarations.scenarios:
@@ -171,7 +152,20 @@ def _canonical_text(declarations: Declarations) -> str:
     for sweep in declarations.sweeps:
         vary = [(v.parameter, v.values, v.relative) for v in sweep.variations]
         parts.append(repr((sweep.name, sweep.title or "", sweep.scenario or "", vary, sweep.show)))
-    return f"[{', '.join(parts)}]"
+    add(f"[{', '.join(parts)}]".encode("utf-8", "surrogatepass"))
+    return digest.hexdigest()
+
+
+def _hash_file(file: Path) -> bytes:
+    try:
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").digest()
+    except OSError:
+        return b"unreadable"
+
+
+_LATER = ("room", "stable_for", "search", "limits", "expected", "precision", "horizon_error")
+_PLAIN = asdict(ScenarioTable("plain"))
 
 
 # --- selection

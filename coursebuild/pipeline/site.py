@@ -299,20 +299,20 @@ class Site:
                 help = "give one of the two another id"
                 span = source.span(start, end)
                 diagnostics.append(diagnose("anchor-repeated", span, message, help=help))
-        if self._has_all_pages and not self._are_links_sound():
-            diagnostics += broken_links(self._library.course, self.files)
-        return tuple(diagnostics)
-
-    def _are_links_sound(self) -> bool:
+        if not self._has_all_pages:
+            return tuple(diagnostics)
         ids = {path: frozenset(entry.record.ids) for path, entry in self._pages.items()}
         paths = {file.path for file in self.files}
         links = set[Reference]().union(*(entry.record.references for entry in self._pages.values()))
-        return all(
+        are_sound = all(
             path in paths
             if path not in ids
             else anchor in ("", "top") or has_anchor(ids[path], anchor)
             for path, anchor in links
         )
+        if not are_sound:
+            diagnostics += broken_links(self._library.course, self.files)
+        return tuple(diagnostics)
 
 
 def frame_page(page: DrawnPage, frame: PageFrame) -> bytes:

@@ -105,11 +105,10 @@ class Statement(Struct, frozen=True):
 @lru_cache(maxsize=256)
 def read_statements(tex: str) -> tuple[Statement, ...]:
     """Return the statements of a formula; none if it is too long."""
-    return tuple(_read_statements(tex)) if len(tex) <= _MAX_LENGTH else ()
-
-
-def _read_statements(tex: str) -> Iterator[Statement]:
+    if len(tex) > _MAX_LENGTH:
+        return ()
     tex = _ENVIRONMENT.sub(lambda match: " " * len(match[0]), tex)
+    statements: list[Statement] = []
     sides: list[FormulaSide] = []
     relations: list[str] = []
     for start, end, sign in _split_sides(tex):
@@ -119,8 +118,9 @@ def _read_statements(tex: str) -> Iterator[Statement]:
             relations.append(_RELATIONS[sign])
             continue
         if sides and len(relations) == len(sides) - 1:
-            yield Statement(tuple(sides), tuple(relations))
+            statements.append(Statement(tuple(sides), tuple(relations)))
         sides, relations = [], []
+    return tuple(statements)
 
 
 def _split_sides(tex: str) -> Iterator[tuple[int, int, str]]:

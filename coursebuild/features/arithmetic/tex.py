@@ -217,7 +217,10 @@ class _Reader:
                     raise factor.not_understood("two numbers stand side by side")
                 is_spaced = self.tex[:start].rstrip().endswith(r"\,")
                 if not (sign or is_spaced) and product.kind == "symbol" and self.tex[start] in "([":
-                    _refuse_application(factor)
+                    # The symbol can be a function of what the bracket holds.
+                    content = factor.parts[0] if factor.kind in ("^", "factorial") else factor
+                    if content.kind in ("symbol", "number", "/", "*"):
+                        raise content.not_understood("it may be a product or a function of this")
             is_quotient = sign in ("/", r"\div")
             unit = self.unit() if is_quotient else None
             if unit is not None and product.has("unit"):  # `10 m/2 s`, unlike `1/2 m`
@@ -441,10 +444,3 @@ def _is_mixed(left: Expression, right: Expression) -> bool:
     while left.kind in ("*", "-") and left.parts:
         left = left.parts[-1]
     return is_fraction and left.kind == "number"
-
-
-def _refuse_application(factor: Expression) -> None:
-    """Raise where a symbol before a bracket can be a function of its content."""
-    factor = factor.parts[0] if factor.kind in ("^", "factorial") else factor
-    if factor.kind in ("symbol", "number", "/", "*"):
-        raise factor.not_understood("it may be a product or a function of this")

@@ -251,7 +251,17 @@ _RANGE = re.compile(rf"(?i)\blessons\s+({_NUMBER})\s?(?:–|-|to\b)\s?({_NUMBER}
 
 def rename_references(course: Course, lesson: Lesson, new: str) -> list[Edit]:
     """Return the edits of the map, and of all links and mentions, each once."""
-    edits = {(e.span.path, e.span.start): e for e in _map_edits(course, lesson, new)}
+    root, new_id = _map(course), toml_string(new)
+    ids = [node.get("id") for level in root.objects("level") for node in level.objects("lesson")]
+    spans = [id.span for id in ids if isinstance(id, StringNode) and id.value == lesson.id]
+    for dependent in course.lessons:
+        pairs = zip(dependent.prerequisites, dependent.prerequisite_spans, strict=True)
+        spans += [span for id, span in pairs if id == lesson.id]
+    map_edits = [Edit(span, new_id) for span in spans]
+    new_path = toml_string(replace(lesson, id=new).path)
+    paths = (path for path in _silenced_paths(root) if path.value == lesson.path)
+    map_edits += [Edit(path.span, new_path) for path in paths]
+    edits = {(edit.span.path, edit.span.start): edit for edit in map_edits}
     name = re.compile(rf"(?<![\w.]){re.escape(lesson.id)}(?!\w|\.\w)")
     for document in course.documents:
         for inline in find_inlines(document, Link):
@@ -263,21 +273,6 @@ def rename_references(course: Course, lesson: Lesson, new: str) -> list[Edit]:
                     place = Excerpt.of_span(span).span(*match.span())
                     edits[place.path, place.start] = Edit(place, new)
     return list(edits.values())
-
-
-def _map_edits(course: Course, lesson: Lesson, new: str) -> Iterator[Edit]:
-    root = _map(course)
-    for level in root.objects("level"):
-        for node in level.objects("lesson"):
-            id = node.get("id")
-            if isinstance(id, StringNode) and id.value == lesson.id:
-                yield Edit(id.span, toml_string(new))
-    for dependent in course.lessons:
-        ids = zip(dependent.prerequisites, dependent.prerequisite_spans, strict=True)
-        yield from (Edit(span, toml_string(new)) for id, span in ids if id == lesson.id)
-    for path in _silenced_paths(root):
-        if path.value == lesson.path:
-            yield Edit(path.span, toml_string(replace(lesson, id=new).path))
 
 
 def doubtful_places(

@@ -286,10 +286,11 @@ def align_table(rows: Sequence[str], width: int) -> list[str]:
     widths = [max(cells(cell) for cell in column) for column in zip(*table, strict=True)]
     widths = [max(pair) for pair in zip(widths, min_widths, strict=True)]
     fits = sum(widths) + 3 * len(widths) + 1 <= width
-    table = [
-        [_pad(*cell) if fits else cell[0] for cell in zip(row, widths, marks, strict=True)]
-        for row in table
-    ]
+    for row in table if fits else ():
+        for n, (cell, most, mark) in enumerate(zip(row, widths, marks, strict=True)):
+            room = most - cells(cell)
+            left = 0 if not mark.endswith(":") else room // 2 if mark.startswith(":") else room
+            row[n] = " " * left + cell + " " * (room - left)
     table.insert(
         1,
         [
@@ -298,12 +299,6 @@ def align_table(rows: Sequence[str], width: int) -> list[str]:
         ],
     )
     return ["|" + "".join(f" {cell} |" if cell else " |" for cell in row) for row in table]
-
-
-def _pad(cell: str, width: int, mark: str) -> str:
-    room = width - cells(cell)
-    left = 0 if not mark.endswith(":") else room // 2 if mark.startswith(":") else room
-    return " " * left + cell + " " * (room - left)
 
 
 # --- JSON

@@ -93,9 +93,39 @@ def parse_bench(fence: Fence, _: TextParser) -> Parsed[Bench | None]:
 
 def check_benches(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
     """Report mistakes of `bench` fences that the course alone shows."""
-    for document in documents:
-        for block in find_blocks(document, Bench):
-            yield from _check(block, course)
+    benches = [bench for document in documents for bench in find_blocks(document, Bench)]
+    if not benches:
+        return
+    # Late: most courses do not need it.
+    from coursebuild.numerics.reports.records import BENCH, ENGINES
+
+    models = [model.name for model in course.models]
+    for bench in benches:
+        if bench.model not in models:
+            message = f"no model `{bench.model}` in models/"
+            help = did_you_mean(bench.model, models)
+            yield diagnose("bench-model", bench.model_span, message, help=help)
+            continue
+        declarations = [d for d in course.declarations if d.model == bench.model]
+        sweeps = [sweep.name for declaration in declarations for sweep in declaration.sweeps]
+        if bench.sweep is not None and bench.sweep not in sweeps:
+            message = f"the model `{bench.model}` has no sweep `{bench.sweep}`"
+            help = did_you_mean(bench.sweep, sweeps)
+            yield diagnose("bench-scenario", bench.sweep_span or bench.span, message, help=help)
+        scenarios = declared_scenarios(course, bench.model)
+        if scenarios:
+            yield from _check_scenario(bench, scenarios)
+        commands: dict[str, str] = {}
+        if bench.shows != ("engines",):
+            commands[BENCH.path(bench.model)] = BENCH.command(bench.model)
+        if "engines" in bench.shows:
+            commands[ENGINES.path(bench.model)] = ENGINES.command(bench.model)
+        for path, command in commands.items():
+            if path not in course.files:
+                message = f"no measurements of the model `{bench.model}` are recorded, "
+                message += "and the page says so"
+                help = f"measure it with `{command}`"
+                yield diagnose("bench-unrecorded", bench.model_span, message, help=help)
 
 
 def check_keyframes(
@@ -108,38 +138,6 @@ def check_keyframes(
                 facts = facts_of(block)
                 if facts is not None:
                     yield from _check_scenario(block, keyframe_scenarios(facts.keyframes))
-
-
-def _check(bench: Bench, course: Course) -> Iterator[Diagnostic]:
-    # Late: most courses do not need it.
-    from coursebuild.numerics.reports.records import BENCH, ENGINES
-
-    models = [model.name for model in course.models]
-    if bench.model not in models:
-        message, help = f"no model `{bench.model}` in models/", did_you_mean(bench.model, models)
-        yield diagnose("bench-model", bench.model_span, message, help=help)
-        return
-    declarations = [d for d in course.declarations if d.model == bench.model]
-    sweeps = [sweep.name for declaration in declarations for sweep in declaration.sweeps]
-    if bench.sweep is not None and bench.sweep not in sweeps:
-        message = f"the model `{bench.model}` has no sweep `{bench.sweep}`"
-        help = did_you_mean(bench.sweep, sweeps)
-        yield diagnose("bench-scenario", bench.sweep_span or bench.span, message, help=help)
-    scenarios = declared_scenarios(course, bench.model)
-    if scenarios:
-        yield from _check_scenario(bench, scenarios)
-    commands: dict[str, str] = {}
-    if bench.shows != ("engines",):
-        commands[BENCH.path(bench.model)] = BENCH.command(bench.model)
-    if "engines" in bench.shows:
-        commands[ENGINES.path(bench.model)] = ENGINES.command(bench.model)
-    for path, command in commands.items():
-        if path not in course.files:
-            message = (
-                f"no measurements of the model `{bench.model}` are recorded, and the page says so"
-            )
-            help = f"measure it with `{command}`"
-            yield diagnose("bench-unrecorded", bench.model_span, message, help=help)
 
 
 def _check_scenario(bench: Bench, names: Collection[str]) -> Iterator[Diagnostic]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 from markupsafe import Markup
 from msgspec import Struct
@@ -340,9 +340,24 @@ _UNCERTAIN = 0.1
 def engine_view(words: Strings, scenario: EngineScenario, report: EngineReport) -> EngineView:
     """Make the view of a scenario in other engines."""
     title = scenario.title or scenario.name
+    description = [
+        words("measured.usual", setting=setting_text(scenario.setting)),
+        words("measured.duration", time=seconds_text(scenario.duration)),
+    ]
+    if scenario.horizon < scenario.duration:
+        description.append(words("measured.horizon", time=seconds_text(scenario.horizon)))
+    key, floor = f"measured.reference_{scenario.reference}", grids.power(scenario.floor, 1)
+    description.append(grids.phrase(words, key, source=scenario.source, floor=floor))
+    description.append(words("measured.engines_cost"))
+    versions = dict(pair for row in scenario.rows for pair in row.versions)
+    texts = (f"{name} {version}" for name, version in versions.items())
+    description.append(words("measured.engines_versions", versions=", ".join(texts)))
+    if report.load >= _BUSY:
+        load, count = f"{report.load:.1f}", f"{report.machine.processors}"
+        description.append(words("measured.engines_load", load=load, processors=count))
     return EngineView(
         title=title,
-        description=tuple(_describe_engines(words, scenario, report)),
+        description=tuple(description),
         table=_engine_table(words, scenario, words("measured.engines_of", title=title)),
         notes=tuple(
             f"{row_name(row)}, {words('measured.worlds', n=cost.worlds)}: {cost.remark}."
@@ -352,24 +367,6 @@ def engine_view(words: Strings, scenario: EngineScenario, report: EngineReport) 
         ),
         scenario=scenario,
     )
-
-
-def _describe_engines(
-    words: Strings, scenario: EngineScenario, report: EngineReport
-) -> Iterator[str]:
-    yield words("measured.usual", setting=setting_text(scenario.setting))
-    yield words("measured.duration", time=seconds_text(scenario.duration))
-    if scenario.horizon < scenario.duration:
-        yield words("measured.horizon", time=seconds_text(scenario.horizon))
-    key, floor = f"measured.reference_{scenario.reference}", grids.power(scenario.floor, 1)
-    yield grids.phrase(words, key, source=scenario.source, floor=floor)
-    yield words("measured.engines_cost")
-    versions = dict(pair for row in scenario.rows for pair in row.versions)
-    texts = (f"{name} {version}" for name, version in versions.items())
-    yield words("measured.engines_versions", versions=", ".join(texts))
-    if report.load >= _BUSY:
-        load, count = f"{report.load:.1f}", f"{report.machine.processors}"
-        yield words("measured.engines_load", load=load, processors=count)
 
 
 def _engine_table(words: Strings, scenario: EngineScenario, label: str) -> grids.Grid:

@@ -84,30 +84,29 @@ def rewrite(content: Iterable[HtmlContent], rules: RewriteRules) -> Iterator[Htm
     for child in content:
         if isinstance(child, str):
             yield child
-        elif child.name not in _DROPPED_ELEMENTS and not child.classes & dropped_classes:
-            yield _rewrite_element(child, rules)
-
-
-def _rewrite_element(element: HtmlElement, rules: RewriteRules) -> HtmlContent:
-    name, old_attributes = element.name, element.attributes
-    if name == "img":
-        path, _ = rules.place.target(old_attributes.get("src", ""))
-        address = rules.picture(path) if path is not None else ""
-        if not address:
-            return old_attributes.get("alt", "")
-        old_attributes = old_attributes | {"src": address}
-    attributes = {
-        key: new_value
-        for key, value in old_attributes.items()
-        if (new_value := _rewrite_attribute(element, key, value, rules)) is not None
-    }
-    if name == "details" and not rules.live and not element.classes & rules.closed_classes:
-        attributes["open"] = ""
-    if name in _WITHOUT_MARKUP:
-        name = "pre"
-    if len(name) == 2 and name[0] == "h" and name[1] in "123456":
-        name = f"h{min(int(name[1]) + rules.heading_shift, 6)}"
-    return HtmlElement(name, attributes, list(rewrite(element.children, rules)))
+            continue
+        name, old_attributes = child.name, child.attributes
+        if name in _DROPPED_ELEMENTS or child.classes & dropped_classes:
+            continue
+        if name == "img":
+            path, _ = rules.place.target(old_attributes.get("src", ""))
+            address = rules.picture(path) if path is not None else ""
+            if not address:
+                yield old_attributes.get("alt", "")
+                continue
+            old_attributes = old_attributes | {"src": address}
+        attributes = {
+            key: new_value
+            for key, value in old_attributes.items()
+            if (new_value := _rewrite_attribute(child, key, value, rules)) is not None
+        }
+        if name == "details" and not rules.live and not child.classes & rules.closed_classes:
+            attributes["open"] = ""
+        if name in _WITHOUT_MARKUP:
+            name = "pre"
+        if len(name) == 2 and name[0] == "h" and name[1] in "123456":
+            name = f"h{min(int(name[1]) + rules.heading_shift, 6)}"
+        yield HtmlElement(name, attributes, list(rewrite(child.children, rules)))
 
 
 def _rewrite_attribute(
@@ -329,7 +328,17 @@ def pdf_file(context: ExportContext) -> OutputFile:
     html = page_file(context, page_numbers=True).data.decode()
     with tempfile.TemporaryDirectory(prefix="coursebuild-pdf-") as folder:
         first = _print(program, Path(folder), _with_numbers(html, {}))
-        data = _print(program, Path(folder), _with_numbers(html, _page_numbers(first)))
+        # The pages on which it has the targets of links.
+        objects = {int(number): text for number, text in _OBJECT.findall(first)}
+        root = _ROOT.search(first)
+        nodes = () if root is None else _pages(objects, int(root[1]))
+        pages = {node: number for number, node in enumerate(nodes, 1)}
+        page_numbers = {
+            unquote_to_bytes(name.replace(b"#", b"%")).decode(errors="replace"): pages[int(node)]
+            for name, node in _DESTINATION.findall(first)
+            if int(node) in pages
+        }
+        data = _print(program, Path(folder), _with_numbers(html, page_numbers))
     times = _TIMES.search(data, 0, 4096)
     if times is not None:
         note = f"{PDF_MARK})".encode().ljust(len(times[0]))
@@ -390,17 +399,6 @@ def _with_numbers(html: str, numbers: Mapping[str, int]) -> str:
     return _ENTRY.sub(
         lambda entry: f"{entry[1]}{numbers.get(unescape(entry[2]), '000')}{entry[3]}", html
     )
-
-
-def _page_numbers(pdf: bytes) -> dict[str, int]:
-    objects = {int(number): text for number, text in _OBJECT.findall(pdf)}
-    root = _ROOT.search(pdf)
-    pages = {} if root is None else {p: n for n, p in enumerate(_pages(objects, int(root[1])), 1)}
-    names = (
-        (unquote_to_bytes(name.replace(b"#", b"%")).decode(errors="replace"), int(page))
-        for name, page in _DESTINATION.findall(pdf)
-    )
-    return {name: pages[page] for name, page in names if page in pages}
 
 
 def _pages(objects: Mapping[int, bytes], number: int, depth: int = 0) -> Iterator[int]:

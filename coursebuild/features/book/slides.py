@@ -97,7 +97,12 @@ def slides_file(context: ExportContext) -> OutputFile:
         quiz_script=quiz_script,
         script=Markup(script),
         files=[
-            (path, _TYPES.get(chapters.extension(path), ""), _pack(files[path])) for path in files
+            (
+                path,
+                _TYPES.get(chapters.extension(path), ""),
+                base64.b64encode(gzip.compress(data, 9, mtime=0)).decode(),
+            )
+            for path, data in files.items()
         ],
     )
     return OutputFile("slides.html", visible(html).encode())
@@ -142,10 +147,6 @@ def _embed(context: ExportContext, place: urls.Place, address: str, files: dict[
     if path not in files:
         files[path] = file.make()
     return path
-
-
-def _pack(data: bytes) -> str:
-    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
 
 
 def _fold_code(figure: HtmlElement, label: str) -> None:

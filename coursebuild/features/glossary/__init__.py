@@ -136,7 +136,17 @@ def definition_of(inlines: tuple[model.Inline, ...], term: model.Term) -> tuple[
     index = next(n for n, inline in enumerate(inlines) if term in model.walk_inlines((inline,)))
     term_start = sum(map(len, texts[:index]))
     text = "".join(texts)
-    ends = [0, *_sentence_ends(text), len(text)]
+    ends = [0]
+    for mark in _END.finditer(text):
+        end = mark.end()
+        word = _LAST_WORD.search(text[: mark.start() + 1])
+        is_short = word is not None and (
+            word[0].lower() in _ABBREVIATIONS or (len(word[0]) == 2 and word[0][0].isalpha())
+        )
+        goes_on = text[end : end + 1].islower() or (is_short and mark[0][0] == ".")
+        if mark[0][0] in "。！？" or not goes_on:
+            ends.append(end)
+    ends.append(len(text))
     start = max(end for end in ends if end <= term_start)
     stop, *later = (end for end in ends if end > term_start)
     sentence = tuple(_slice(inlines, texts, start, stop))
@@ -165,18 +175,6 @@ def _plain_text(inline: model.Inline) -> str:
             parts = model.walk_inlines((inline,))
             texts = [part.text for part in parts if isinstance(part, model.Text)]
             return _OBJECT + (texts[-1][-1:] if texts else "")
-
-
-def _sentence_ends(text: str) -> Iterator[int]:
-    for mark in _END.finditer(text):
-        end = mark.end()
-        word = _LAST_WORD.search(text[: mark.start() + 1])
-        is_short = word is not None and (
-            word[0].lower() in _ABBREVIATIONS or (len(word[0]) == 2 and word[0][0].isalpha())
-        )
-        goes_on = text[end : end + 1].islower() or (is_short and mark[0][0] == ".")
-        if mark[0][0] in "。！？" or not goes_on:
-            yield end
 
 
 def _slice(

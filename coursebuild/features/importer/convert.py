@@ -40,7 +40,6 @@ from coursebuild.features.importer.source_files import (
     ImportedLevel,
     ImportedText,
     Leftover,
-    Segment,
     SourceFiles,
     read_yaml,
     stem_of,
@@ -90,7 +89,15 @@ def convert(files: SourceFiles) -> ConvertedCourse:
         ]
     packages = dict(_own_packages(files, texts))
     unused = {*files} - files.read_paths
-    models = dict(_model_paths(files))
+    # Models, and what lies beside them, by their new path.
+    models: dict[str, str] = {}
+    for path in files:
+        folders = posixpath.dirname(path).split("/")
+        if "models" in folders:
+            inner_folders = folders[folders.index("models") + 1 :]
+            models["/".join(("models", *inner_folders, posixpath.basename(path)))] = path
+        elif path.endswith(".xml") and b"<mujoco" in files.read(path):
+            models[f"models/{posixpath.basename(path)}"] = path
     unused -= {*models.values()}
     out |= packages | {path: files.read(source) for path, source in models.items()}
     lines = map_lines(course, ids, context.callouts, ("src",) if packages else ())
@@ -198,19 +205,14 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
                 parts.append(fence("output", output))
                 context.notebook_outputs[script_path] = text.file
             continue
-        is_cell = segment.kind == "cell"
-        parts.append(_write_cell(segment) if is_cell else convert_segment(segment, context))
+        if segment.kind != "cell":
+            parts.append(convert_segment(segment, context))
+        elif (magic := re.match(r"\s*%%(\w+).*\n", segment.text)) is not None:
+            parts.append(fence(magic[1], segment.text[magic.end() :].strip("\n")))
+        elif shown_code := code_for_readers(segment):
+            parts.append(fence("python fragment", shown_code))
         shown_end = shown_end if number in codes else len(parts)
     return "\n\n".join(part.strip("\n") for part in parts if part.strip()) + "\n"
-
-
-def _write_cell(cell: Segment) -> str:
-    """Return a cell to be read: a part of the script below, or code that is not run."""
-    magic = re.match(r"\s*%%(\w+).*\n", cell.text)
-    if magic is not None:
-        return fence(magic[1], cell.text[magic.end() :].strip("\n"))
-    text = code_for_readers(cell)
-    return fence("python fragment", text) if text else ""
 
 
 def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator[tuple[str, bytes]]:
@@ -224,18 +226,6 @@ def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator
             for path in files:
                 if path.startswith(f"{root}/"):
                     yield f"src/{name}/{path.removeprefix(f'{root}/')}", files.read(path)
-
-
-def _model_paths(files: SourceFiles) -> Iterator[tuple[str, str]]:
-    """Yield the new path of each model, and of what lies beside models, with its own."""
-    for path in files:
-        folders = posixpath.dirname(path).split("/")
-        if "models" in folders:
-            depth = folders.index("models")
-            name = "/".join(("models", *folders[depth + 1 :], posixpath.basename(path)))
-            yield name, path
-        elif path.endswith(".xml") and b"<mujoco" in files.read(path):
-            yield f"models/{posixpath.basename(path)}", path
 
 
 _OTHER_TEXTS = tuple(".adoc .docx .htm .html .markdown .mdx .org .pdf .rmd .rst .tex .txt".split())

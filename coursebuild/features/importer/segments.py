@@ -56,12 +56,14 @@ def read_segments(text: str, name: str) -> ReadText:
         UsageError: it is no notebook, but is called so.
     """
     pictures: dict[str, bytes] = {}
-    metadata: Mapping[str, object] = {}
+    metadata: Mapping[str, Any] = {}
     if name.endswith(".ipynb"):
         try:
             notebook = json.loads(text)
             metadata = notebook.get("metadata") or {}
-            segments, pictures = _read_cells(notebook["cells"], _language(metadata))
+            kernel, info = (metadata.get(key) or {} for key in ("kernelspec", "language_info"))
+            language = str(kernel.get("language") or info.get("name") or "python").lower()
+            segments, pictures = _read_cells(notebook["cells"], language)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             raise UsageError(f"{name} is not a notebook of format 4") from None
     else:
@@ -103,12 +105,6 @@ def _read_front_matter(match: re.Match[str]) -> Any:
         return tomllib.loads(match["toml"])
     except (tomllib.TOMLDecodeError, RecursionError):
         return None
-
-
-def _language(metadata: Mapping[str, Any]) -> str:
-    """The language of a notebook's cells."""
-    kernel, info = (metadata.get(key) or {} for key in ("kernelspec", "language_info"))
-    return str(kernel.get("language") or info.get("name") or "python").lower()
 
 
 def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[Segment]:

@@ -54,10 +54,16 @@ class _Part(Struct, frozen=True):
 
 def parse_io(fence: Fence, texts: TextParser) -> Parsed[Io]:
     """Parse an `io` fence."""
-    unlabelled, *labelled_parts = _split_at_labels(fence.body)
+    unlabelled = part = _Part("", fence.body.span(), [])
     parts: dict[str, _Part] = {}
     diagnostics = list(fence.keys().diagnostics)
-    for part in labelled_parts:
+    for line in fence.body.lines():
+        mark = _LABEL.match(line.text)
+        if mark is None:
+            part.lines.append(line)
+            continue
+        span = line.span(mark.start(1), mark.end())
+        part = _Part(mark[1], span, [line.slice(mark.end())])
         if (first := parts.setdefault(part.label, part)) is not part:
             notes = [Note("first given here", first.span)]
             message = f"`{part.label}:` is given twice"
@@ -85,19 +91,6 @@ def parse_io(fence: Fence, texts: TextParser) -> Parsed[Io]:
             diagnostics += inlines.diagnostics
     io = Io(fence.span, *(contents.get(label, ()) for label in LABELS))
     return Parsed(io, tuple(diagnostics))
-
-
-def _split_at_labels(body: Excerpt) -> list[_Part]:
-    """Split a block into parts; the first holds the lines before the first label."""
-    parts = [_Part("", body.span(), [])]
-    for line in body.lines():
-        label = _LABEL.match(line.text)
-        if label is None:
-            parts[-1].lines.append(line)
-        else:
-            span = line.span(label.start(1), label.end())
-            parts.append(_Part(label[1], span, [line.slice(label.end())]))
-    return parts
 
 
 def _diagnose_missing(

@@ -114,7 +114,15 @@ def compile_lab(lab: Lab, name: str) -> LabModule:
         ],
     }
     if fields.goal is not None:
-        config["goal"] = {"hold": fields.goal.hold, "log": list(_log_data(fields, fields.goal.log))}
+        # Each act: its time, the number of its control and, except for a button, the value.
+        numbers = {control.label: i for i, control in enumerate(fields.controls)}
+        log: list[tuple[float | str, ...]] = []
+        for act in fields.goal.log:
+            if isinstance(act.do, str):
+                log.append((act.t, numbers[act.do]))
+            else:
+                log += ((act.t, numbers[label], value) for label, value in act.do.items())
+        config["goal"] = {"hold": fields.goal.hold, "log": log}
     if lab.kind == MJCF and lab.xml is not None:
         config |= {"kind": MJCF, "xml": lab.xml.text.rstrip("\n")}
     data: dict[str, Any] = to_builtins(config)
@@ -161,18 +169,6 @@ _FIELDS = (
 """Fields of a lab that are passed on as written; only overlays become a list."""
 _PLOT = ("ylabel", "xlabel", "window", "ymin", "ymax", "height", "refLines")
 """Fields of a plot that are passed on as written."""
-
-
-def _log_data(
-    fields: schema.SimLab, log: tuple[schema.LogEntry, ...]
-) -> Iterator[tuple[float | str, ...]]:
-    """Yield each act: its time, the number of its control and, except for a button, the value."""
-    numbers = {control.label: i for i, control in enumerate(fields.controls)}
-    for entry in log:
-        if isinstance(entry.do, str):
-            yield entry.t, numbers[entry.do]
-        else:
-            yield from ((entry.t, numbers[label], value) for label, value in entry.do.items())
 
 
 _CONTROL = {

@@ -14,7 +14,7 @@ from msgspec import Struct, ValidationError, convert
 
 from coursebuild.core.model.fields import Positive, RelativeTolerance
 from coursebuild.core.syntax.decode import decode
-from coursebuild.core.syntax.fence import Fence, Prose, TextParser, Word, kind_of
+from coursebuild.core.syntax.fence import Fence, Prose, TextParser, kind_of
 from coursebuild.core.syntax.json_text import parse_json, to_one_line
 from coursebuild.core.syntax.nodes import JSON, ObjectNode, StringNode
 from coursebuild.core.text.diagnostics import Parsed, diagnose, sort_diagnostics
@@ -47,15 +47,12 @@ def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Lab | None]:
     """Parse the lab of a fence; its kind may stand after the word `lab`."""
     keys = fence.keys(has_name=True)
     name = keys.value.name
-    if name is not None and name.key == MJCF:
-        return _parse_mjcf(fence, name)
-    kind, place = (SIMLAB, kind_of(fence.info).span()) if name is None else (name.key, name.span)
-    parse = parse_equations if kind in (PLOT, ODE) else parse_lab
-    lab = parse(fence.span, kind, place, fence.body, texts)
-    return Parsed(lab.value, (*keys.diagnostics, *lab.diagnostics))
-
-
-def _parse_mjcf(fence: Fence, name: Word) -> Parsed[Lab | None]:
+    if name is None or name.key != MJCF:
+        kind = SIMLAB if name is None else name.key
+        place = kind_of(fence.info).span() if name is None else name.span
+        parse = parse_equations if kind in (PLOT, ODE) else parse_lab
+        parsed_lab = parse(fence.span, kind, place, fence.body, texts)
+        return Parsed(parsed_lab.value, (*keys.diagnostics, *parsed_lab.diagnostics))
     keys = fence.keys(values=tuple(_KEYS), flags=("dock", "deep"), has_name=True)
     diagnostics, values = list(keys.diagnostics), dict[str, Any]()
     for word in keys.value.words:

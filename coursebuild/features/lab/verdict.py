@@ -266,8 +266,25 @@ class NameReference(Struct, frozen=True):
 def references(lab: Lab) -> list[NameReference]:
     """List the names that the pieces of a lab use and do not declare themselves."""
     code = dict(lab.code)
-    texts = (code[piece.entry] for piece in pieces(lab) if piece.entry in code)
-    return [reference for text in texts for reference in _references(text)]
+    names: list[NameReference] = []
+    for text in (code[piece.entry] for piece in pieces(lab) if piece.entry in code):
+        nodes = list(walk(parse(text.text)))
+        declared_names = _declared_names(nodes)
+        for node in nodes:
+            parts = dotted_names(node) if node.type == "member_expression" else ()
+            path = tuple(map(text_of, parts))
+            outer = node.parent
+            is_longer_name = outer is not None and outer.type == "member_expression"
+            if len(path) < 2 or path[0] in (*declared_names, *_OPEN_OBJECTS) or is_longer_name:
+                continue
+            places = tuple(_place_in(text, part) for part in parts)
+            index = outer.child_by_field_name("index") if outer is not None else None
+            if outer is not None and index is not None and text_of(index).isdecimal():
+                place = _place_in(text, outer)
+                names.append(NameReference(path, places, int(text_of(index)), place))
+            else:
+                names.append(NameReference(path, places))
+    return names
 
 
 _ASSIGNS = re.compile(r"(?<![=!<>])=(?![=>])|[<>]>=|\+\+|--")
@@ -332,25 +349,6 @@ def _place_in(code: Excerpt, node: Node) -> Span:
     data = code.text.encode("utf-8", "replace")
     start, end = (len(data[:at].decode()) for at in (node.start_byte, node.end_byte))
     return code.span(start, end)
-
-
-def _references(code: Excerpt) -> Iterator[NameReference]:
-    nodes = list(walk(parse(code.text)))
-    declared_names = _declared_names(nodes)
-
-    for node in nodes:
-        parts = dotted_names(node) if node.type == "member_expression" else ()
-        path = tuple(map(text_of, parts))
-        outer = node.parent
-        is_longer_name = outer is not None and outer.type == "member_expression"
-        if len(path) < 2 or path[0] in (*declared_names, *_OPEN_OBJECTS) or is_longer_name:
-            continue
-        places = tuple(_place_in(code, part) for part in parts)
-        index = outer.child_by_field_name("index") if outer is not None else None
-        if outer is not None and index is not None and text_of(index).isdecimal():
-            yield NameReference(path, places, int(text_of(index)), _place_in(code, outer))
-        else:
-            yield NameReference(path, places)
 
 
 def name_diagnostics(

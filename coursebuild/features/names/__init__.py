@@ -65,8 +65,11 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
             if not isinstance(answer, Unknown):
                 continue
             text = code.text.strip("` ")
-            if claim.kind in ("plain", "token") and _is_used_again(course, claim.name):
-                continue
+            if claim.kind in ("plain", "token"):
+                pattern = re.compile(rf"(?<!\w){re.escape(claim.name)}(?!\w)")
+                texts = (source.text for source in course.sources if claim.name in source.text)
+                if sum(len(pattern.findall(text)) for text in texts) > 1:
+                    continue  # used more than once, so it is no slip
             if any(
                 fnmatchcase(word, name) for word in (text, answer.part) for name in course.names
             ):
@@ -76,13 +79,6 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
             at = code.source.text.find(answer.part, span.start, code.end)
             place = code.source.span(at, at + len(answer.part)) if at >= 0 else span
             yield diagnose("name-unknown", place, answer.message, help=answer.help or _HELP)
-
-
-def _is_used_again(course: Course, word: str) -> bool:
-    """Whether the texts of a course have a word more than once, so that it is no slip."""
-    pattern = re.compile(rf"(?<!\w){re.escape(word)}(?!\w)")
-    texts = (source.text for source in course.sources if word in source.text)
-    return sum(len(pattern.findall(text)) for text in texts) > 1
 
 
 def lost_names(course: Course, python: str) -> Iterator[Diagnostic]:

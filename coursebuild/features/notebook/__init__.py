@@ -58,7 +58,17 @@ def note_cells(inputs: PageInputs, page: PageContext | None, body: str) -> bytes
     parts = head(inputs, words, locate)
     if address:
         parts.append(link(writer.words("exports.on_site"), page_address))
-    cells = [*_block_cells(writer, page.document.blocks), *_footnote_cells(writer)]
+    cells = list(_block_cells(writer, page.document.blocks))
+    footnotes = page.document.footnotes
+    if footnotes:
+        notes = (hang(f"{n.number}. ", writer.blocks(n.blocks)) for n in footnotes)
+        title = f"## {writer.words('markup.footnotes')}"
+        cells.append(_text_cell("footnotes", "\n\n".join((title, *notes))))
+    if references := writer.references():
+        cells.append(_text_cell("references", references))
+    for note in footnotes:
+        for script in _find_scripts(note.blocks):
+            cells += _script_cells(writer, "footnotes", script)
     counts: Counter[str] = Counter()
     for cell in cells:
         counts[cell["id"]] += 1
@@ -120,19 +130,6 @@ def _block_cells(writer: DocumentWriter, blocks: Iterable[model.Block]) -> Itera
 
 def _find_scripts(blocks: tuple[model.Block, ...]) -> list[model.Script]:
     return [block for block in model.walk_blocks(blocks) if isinstance(block, model.Script)]
-
-
-def _footnote_cells(writer: DocumentWriter) -> Iterator[Cell]:
-    footnotes = writer.page.document.footnotes
-    if footnotes:
-        notes = (hang(f"{n.number}. ", writer.blocks(n.blocks)) for n in footnotes)
-        title = f"## {writer.words('markup.footnotes')}"
-        yield _text_cell("footnotes", "\n\n".join((title, *notes)))
-    if references := writer.references():
-        yield _text_cell("references", references)
-    for note in footnotes:
-        for script in _find_scripts(note.blocks):
-            yield from _script_cells(writer, "footnotes", script)
 
 
 def _script_cells(writer: DocumentWriter, section: str, block: model.Script) -> Iterator[Cell]:

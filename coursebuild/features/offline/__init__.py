@@ -105,12 +105,21 @@ def listing(shell: frozenset[str], files: Iterable[FileFacts]) -> bytes:
     groups: dict[str, dict[str, str]] = {"shell": {}, "text": {}, "rest": {}}
     sizes = dict.fromkeys(groups, 0)
     for file in files:
-        group = _group(shell, file)
-        if group is not None:
-            hash_in_name = file.path.rpartition(".")[0].rpartition(".")[2]
-            is_hashed = file.path.startswith("assets/") and hash_in_name == file.digest[:8]
-            groups[group][file.path] = "" if is_hashed else file.digest[:_DIGITS]
-            sizes[group] += file.size
+        path = file.path
+        if path in _FOR_MACHINES or path.endswith(_COPIES) or path == urls.NOT_FOUND:
+            continue
+        is_asset = path.startswith("assets/")
+        if path in shell or path.startswith("assets/fonts/"):
+            group = "shell"
+        elif is_asset:
+            is_lab_data = path.startswith("assets/labs/") and not path.endswith(_PICTURES)
+            group = "rest" if is_lab_data else "text"
+        else:
+            is_text = path.endswith(_TEXT) or path == _SEARCH_INDEX
+            group = "text" if is_text and file.size <= _LARGE else "rest"
+        is_hashed = is_asset and path.rpartition(".")[0].rpartition(".")[2] == file.digest[:8]
+        groups[group][path] = "" if is_hashed else file.digest[:_DIGITS]
+        sizes[group] += file.size
     parts = [f'"format": {_FORMAT}']
     for name, digests in groups.items():
         # A line for each file, as `json` writes them with an indent of 0, but faster
@@ -118,19 +127,6 @@ def listing(shell: frozenset[str], files: Iterable[FileFacts]) -> bytes:
         text = f"{{\n{text[1:-1]}\n}}" if digests else "{}"
         parts.append(f'"{name}": {{\n"bytes": {sizes[name]},\n"files": {text}\n}}')
     return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8", "surrogatepass")
-
-
-def _group(shell: frozenset[str], file: FileFacts) -> str | None:
-    path = file.path
-    if path in _FOR_MACHINES or path.endswith(_COPIES) or path == urls.NOT_FOUND:
-        return None
-    if path in shell or path.startswith("assets/fonts/"):
-        return "shell"
-    if path.startswith("assets/"):
-        is_lab_data = path.startswith("assets/labs/") and not path.endswith(_PICTURES)
-        return "rest" if is_lab_data else "text"
-    is_text = path.endswith(_TEXT) or path == _SEARCH_INDEX
-    return "text" if is_text and file.size <= _LARGE else "rest"
 
 
 FEATURE = Feature(

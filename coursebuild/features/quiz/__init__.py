@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import chain
 
 from msgspec import Struct
 
@@ -79,49 +78,51 @@ def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Dia
 
 def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | None]:
     """Report predictions with nothing to hide below them, or no lab there to run."""
-    diagnostics = (_check_predictions(quiz, document) for quiz in find_blocks(document, Quiz))
-    return Parsed(None, tuple(chain.from_iterable(diagnostics)))
-
-
-def _check_predictions(quiz: Quiz, document: Document) -> Iterator[Diagnostic]:
-    # The blocks after a quiz, up to the next heading or rule; none if it is inside a block
-    at = next((at for at, block in enumerate(document.blocks) if block is quiz), None)
-    rest = () if at is None else document.blocks[at + 1 :]
-    ends = (i for i, block in enumerate(rest) if isinstance(block, Heading | ThematicBreak))
-    end = next(ends, len(rest))
-    blocks = rest[:end]
-    stops = [Note("what can be hidden ends here", b.span.first_line()) for b in rest[end:][:1]]
-    labs = [block for block in blocks if isinstance(block, Lab)]
-    above = [b for b in document.blocks[: at or 0] if isinstance(b, Heading)][-1:]
-    for title in (plain_text(heading.children) for heading in above):
-        if quiz.title and quiz.title != title and is_one_edit(quiz.title, title):
-            start = quiz.span.start + max(quiz.span.text.find(quiz.title), 0)
-            place = quiz.span.source.span(start, start + len(quiz.title))
-            message = f"the title `{quiz.title}` is almost that of the heading above"
-            fix = Fix(f"did you mean `{title}`?", title)
-            yield diagnose("field-value", place, message, help=fix)
-    for question in quiz.questions:
-        if isinstance(question, NumericQuestion):
-            yield from _check_answer(question)
-        if not isinstance(question, ChoiceQuestion):
-            continue
-        if question.gate and blocks in ((), tuple(labs[:1])):
-            message = "nothing follows that could be hidden"
-            help = "what answers the question stands below the quiz, before the next heading"
-            yield diagnose("quiz-gate", question.gate_span, message, help=help, notes=stops)
-        run = question.run
-        if run is not None and labs:
-            node = parse_json(run, run.span()).value
-            controls = {control.label: control for control in labs[0].fields.controls}
-            yield from () if node is None else check_steps(node, "run", controls)
-        elif run is not None and not any(
-            isinstance(block, CodeBlock) and block.language == "lab" for block in blocks
-        ):
-            message = "no lab follows that could be run"
-            help = "the lab stands below the quiz, before the next heading"
-            later = [block.span.first_line() for block in rest if isinstance(block, Lab)][:1]
-            notes = [Note("the next lab is here", span) for span in later]
-            yield diagnose("quiz-gate", run.span(), message, help=help, notes=notes)
+    diagnostics: list[Diagnostic] = []
+    for quiz in find_blocks(document, Quiz):
+        # The blocks after a quiz, up to the next heading or rule; none if it is inside a block
+        at = next((at for at, block in enumerate(document.blocks) if block is quiz), None)
+        rest = () if at is None else document.blocks[at + 1 :]
+        ends = (i for i, block in enumerate(rest) if isinstance(block, Heading | ThematicBreak))
+        end = next(ends, len(rest))
+        blocks = rest[:end]
+        stops = [Note("what can be hidden ends here", b.span.first_line()) for b in rest[end:][:1]]
+        labs = [block for block in blocks if isinstance(block, Lab)]
+        above = [b for b in document.blocks[: at or 0] if isinstance(b, Heading)][-1:]
+        for title in (plain_text(heading.children) for heading in above):
+            if quiz.title and quiz.title != title and is_one_edit(quiz.title, title):
+                start = quiz.span.start + max(quiz.span.text.find(quiz.title), 0)
+                place = quiz.span.source.span(start, start + len(quiz.title))
+                message = f"the title `{quiz.title}` is almost that of the heading above"
+                fix = Fix(f"did you mean `{title}`?", title)
+                diagnostics.append(diagnose("field-value", place, message, help=fix))
+        for question in quiz.questions:
+            if isinstance(question, NumericQuestion):
+                diagnostics += _check_answer(question)
+            if not isinstance(question, ChoiceQuestion):
+                continue
+            if question.gate and blocks in ((), tuple(labs[:1])):
+                message = "nothing follows that could be hidden"
+                help = "what answers the question stands below the quiz, before the next heading"
+                diagnostics.append(
+                    diagnose("quiz-gate", question.gate_span, message, help=help, notes=stops)
+                )
+            run = question.run
+            if run is not None and labs:
+                node = parse_json(run, run.span()).value
+                controls = {control.label: control for control in labs[0].fields.controls}
+                diagnostics += () if node is None else check_steps(node, "run", controls)
+            elif run is not None and not any(
+                isinstance(block, CodeBlock) and block.language == "lab" for block in blocks
+            ):
+                message = "no lab follows that could be run"
+                help = "the lab stands below the quiz, before the next heading"
+                later = [block.span.first_line() for block in rest if isinstance(block, Lab)][:1]
+                notes = [Note("the next lab is here", span) for span in later]
+                diagnostics.append(
+                    diagnose("quiz-gate", run.span(), message, help=help, notes=notes)
+                )
+    return Parsed(None, tuple(diagnostics))
 
 
 def _check_answer(question: NumericQuestion) -> Iterator[Diagnostic]:

@@ -237,17 +237,14 @@ def restitution(integrator: Integrator, steps: int) -> float:
     A contact begins at any moment of a step, and lasts `steps` steps or a part of a step more.
     """
     cases = ((steps + k / _LENGTHS, j / _PHASES) for k in range(_LENGTHS) for j in range(_PHASES))
-    restitutions = [_back(integrator, length, phase) for length, phase in cases]
+    restitutions = []
+    for length, phase in cases:
+        timestep = CONTACT / length
+        start = GAP - SPEED * timestep * (2 + phase)
+        scenario = Scenario(0.1, 0.01, (start,), (SPEED,))
+        data = run_steps(BOUNCE, scenario, integrator, timestep, 3 * math.ceil(length) + 8)
+        restitutions.append(-float(data.qvel[0]) / SPEED)
     return max(restitutions, key=lambda back: math.inf if math.isnan(back) else abs(back - 1))
-
-
-def _back(integrator: Integrator, length: float, phase: float) -> float:
-    """The restitution where a contact lasts `length` steps and begins at `phase` of one."""
-    timestep = CONTACT / length
-    start = GAP - SPEED * timestep * (2 + phase)
-    scenario = Scenario(0.1, 0.01, (start,), (SPEED,))
-    data = run_steps(BOUNCE, scenario, integrator, timestep, 3 * math.ceil(length) + 8)
-    return -float(data.qvel[0]) / SPEED
 
 
 def last_velocity(
@@ -261,11 +258,7 @@ def last_velocity(
 
 def problems() -> tuple[Problem, ...]:
     """The throw, the impact and the cradles."""
-    return _throw_problem(), _impact_problem(), _cradle_problem(), _touching_problem()
-
-
-def _impact_problem() -> Problem:
-    return Problem(
+    impact = Problem(
         name="elastic-impact",
         title="Elastic impact on a wall",
         case=8,
@@ -288,14 +281,11 @@ def _impact_problem() -> Problem:
         smooth=False,
         note="an impact begins within a step: no order can be expected",
     )
-
-
-def _cradle_problem() -> Problem:
     law = "equal masses exchange their velocities"
     last_ball = partial(last_velocity, CRADLE, _CRADLE_SCENARIO, ball=2, steps=20)
     name = "velocity of the last ball, 20 steps in a contact"
-    return replace(
-        _impact_problem(),
+    cradle = replace(
+        impact,
         name="newtons-cradle",
         title="Newton's cradle with gaps",
         mjcf=CRADLE,
@@ -304,16 +294,8 @@ def _cradle_problem() -> Problem:
         checks=(ScalarCheck(name, "m/s", SPEED, last_ball, law),),
         note="a cradle whose balls touch is another problem: all contacts act at once",
     )
-
-
-_TOUCHING = Reference(
-    "ode", "MuJoCo's soft contacts, Bulirsch–Stoer in small steps", TouchingCradle()
-)
-
-
-def _touching_problem() -> Problem:
-    return replace(
-        _impact_problem(),
+    touching = replace(
+        impact,
         name="newtons-cradle-touching",
         title="Newton's cradle, two balls of which touch",
         mjcf=TOUCHING_BALLS,
@@ -326,6 +308,12 @@ def _touching_problem() -> Problem:
         ),
         note="all contacts act at once: the last ball does not take over the whole velocity",
     )
+    return _throw_problem(), impact, cradle, touching
+
+
+_TOUCHING = Reference(
+    "ode", "MuJoCo's soft contacts, Bulirsch–Stoer in small steps", TouchingCradle()
+)
 
 
 def _touching_check(ball: int, name: str) -> ScalarCheck:

@@ -284,18 +284,14 @@ class Swing(Struct, frozen=True):
         sn, cn, dn, _ = ellipj(self.rate * times, k * k)
         # The cosine beside the sine: near the top the sine alone would lose half of the digits.
         angle = 2 * np.arctan2(k * cn / dn, k1 / dn)
-        return _as_motion(self.kind, times, angle, -2 * k * self.rate * k1 * sn / dn)
-
-
-def _as_motion(kind: Kind, times: Array, angle: Array, rate: Array) -> Motion:
-    """The motion of an angle (n,) rad with its rate (n,) rad/s."""
-    if kind == "hinge":
-        return motion_without_attitude(times, angle[:, None], rate[:, None])
-    attitude = axis_angle_to_quat(_AXIS, angle)[:, None]
-    turning = rate[:, None] * _AXIS
-    if kind == "ball":
-        return Motion(times, np.empty((len(times), 0)), attitude, turning)
-    return turning_at_rest(times, attitude[:, 0], turning)
+        rate = -2 * k * self.rate * k1 * sn / dn
+        if self.kind == "hinge":
+            return motion_without_attitude(times, angle[:, None], rate[:, None])
+        attitude = axis_angle_to_quat(_AXIS, angle)[:, None]
+        turning = rate[:, None] * _AXIS
+        if self.kind == "ball":
+            return Motion(times, np.empty((len(times), 0)), attitude, turning)
+        return turning_at_rest(times, attitude[:, 0], turning)
 
 
 def _held_motion(text: str, scenario: Scenario, times: Array) -> Motion:

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 import mujoco
@@ -45,18 +45,15 @@ def far_bodies(
     """
     model, tree = text.model, text.model.body_treeid
     commanded = commanded_actuators(model, scenarios)
-    used_names = {
-        name
-        for inner in text.elements
-        if not (
-            commanded
-            and section_of(inner) == "actuator"
-            and inner.get("name") not in code_names
-            and commanded.isdisjoint(text.ids(inner))
-        )
-        for name in _references(inner, code_names)
-    }
-    used_names |= set(code_names)
+    used_names = set(code_names)
+    for inner in text.elements:
+        section = section_of(inner)
+        is_idle = section == "actuator" and commanded and commanded.isdisjoint(text.ids(inner))
+        # Excluded pairs and unread sensors do not count either.
+        is_optional = is_idle or section in ("contact", "sensor")
+        if not is_optional or inner.get("name") in code_names:
+            attributes = (a for a in inner.attributes if a.name not in _NOT_REFERENCES)
+            used_names.update(attribute.value for attribute in attributes)
     used_names |= {
         name.rstrip("0123456789") for name in used_names
     }  # what is repeated has a number
@@ -111,19 +108,6 @@ def far_bodies(
 
 _REFERRING = ("contact", "sensor", "actuator")
 _NOT_REFERENCES = frozenset(("name", "class", "childclass", "material", "mesh", "file", "type"))
-
-
-def _references(element: Element, code_names: Collection[str]) -> Iterator[str]:
-    """The names that an element refers to; excluded pairs and unread sensors do not count."""
-    is_optional = (
-        section_of(element) in ("contact", "sensor") and element.get("name") not in code_names
-    )
-    if not is_optional:
-        yield from (
-            attribute.value
-            for attribute in element.attributes
-            if attribute.name not in _NOT_REFERENCES
-        )
 
 
 def _users(

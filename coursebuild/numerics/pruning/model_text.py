@@ -143,7 +143,26 @@ class ModelText:
             return {}
         if any(getattr(model, size) != getattr(self.model, size) for _, size in KINDS.values()):
             return {}
-        return _find_names(names, model)
+        known_names = {
+            kind: [mujoco.mj_id2name(model, code, i) or "" for i in range(getattr(model, size))]
+            for kind, (code, size) in KINDS.items()
+        }
+        ids: dict[Element, tuple[int, ...]] = {}
+        for element, name in names.items():
+            candidates = known_names[thing_kind(element) or ""]
+            if any(node.tag == "replicate" for node in element.ancestors()):
+                shape = re.compile(re.escape(name) + r".*\d", re.DOTALL)
+                matches = (i for i, text in enumerate(candidates) if shape.fullmatch(text))
+                ids[element] = tuple(matches)
+            else:
+                ids[element] = (candidates.index(name),) if name in candidates else ()
+        # Elements that may mean the same thing get none.
+        owners = Counter((thing_kind(e), i) for e, numbers in ids.items() for i in numbers)
+        return {
+            e: numbers
+            for e, numbers in ids.items()
+            if numbers and all(owners[thing_kind(e), i] == 1 for i in numbers)
+        }
 
 
 def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -> ModelText:
@@ -234,25 +253,3 @@ def thing_kind(element: Element) -> str | None:
         return section
     is_in_holder = element.parent is not None and element.parent.tag in _HOLDERS
     return _IN_BODIES.get(element.tag) if is_in_holder else None
-
-
-def _find_names(names: Mapping[Element, str], model: Any) -> dict[Element, tuple[int, ...]]:
-    """The things with the names of elements; elements that may mean the same one get none."""
-    known_names = {
-        kind: [mujoco.mj_id2name(model, code, i) or "" for i in range(getattr(model, size))]
-        for kind, (code, size) in KINDS.items()
-    }
-    ids: dict[Element, tuple[int, ...]] = {}
-    for element, name in names.items():
-        candidates = known_names[thing_kind(element) or ""]
-        if any(node.tag == "replicate" for node in element.ancestors()):
-            shape = re.compile(re.escape(name) + r".*\d", re.DOTALL)
-            ids[element] = tuple(i for i, text in enumerate(candidates) if shape.fullmatch(text))
-        else:
-            ids[element] = (candidates.index(name),) if name in candidates else ()
-    owners = Counter((thing_kind(e), i) for e, numbers in ids.items() for i in numbers)
-    return {
-        e: numbers
-        for e, numbers in ids.items()
-        if numbers and all(owners[thing_kind(e), i] == 1 for i in numbers)
-    }

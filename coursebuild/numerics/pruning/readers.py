@@ -68,12 +68,15 @@ def _prefixes() -> tuple[tuple[str, str, str], ...]:
 
 def difference(whole: Any, variant: Any) -> frozenset[str]:
     """The fields that differ between two models, or two states."""
-    rest = dict(_leaves(variant))
-    fields = {
-        name.rpartition(".")[2]
-        for name, value in _leaves(whole)
-        if not _are_same(value, rest.get(name))
-    }
+    rest, fields = dict(_leaves(variant)), set[str]()
+    for name, value in _leaves(whole):
+        twin = rest.get(name)
+        if isinstance(value, np.ndarray) and isinstance(twin, np.ndarray):
+            is_same = value.shape == twin.shape and value.tobytes() == twin.tobytes()
+        else:
+            is_same = type(value) is type(twin) and bool(value == twin)
+        if not is_same:
+            fields.add(name.rpartition(".")[2])
     return frozenset(fields.union(*(_COMPUTED_IF.get(field, ()) for field in fields)))
 
 
@@ -96,12 +99,6 @@ def _names(structure: type) -> tuple[str, ...]:
     return tuple(
         name for name in names if name not in _POINTERS and not callable(getattr(structure, name))
     )
-
-
-def _are_same(a: Any, b: Any) -> bool:
-    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-        return a.shape == b.shape and a.tobytes() == b.tobytes()
-    return type(a) is type(b) and bool(a == b)
 
 
 _LEAVE_MODELS_ALONE = frozenset(
@@ -241,24 +238,17 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Mod
     elif match := _SCRIPT.search(code):
         reasons.append(f"it lists what exists: `{match[0]}`")
     kinds = {VIEWS[word] for word in members if word in VIEWS}
-    for word in _whole_parts(text, code):
-        words |= _fields_of(word) - {"actuator_trnid"}
-        kinds |= {VIEWS[word]} if word in VIEWS else set()
-        kinds |= _DRIVEN if VIEWS.get(word) == "Actuator" else set()
-    kinds |= {"Keyframe"} if "mj_resetDataKeyframe" in words else set()
-    reason = next(iter(reasons), "")
-    return ModelReader(path, names, words, members, frozenset(parts), frozenset(kinds), reason)
-
-
-def _whole_parts(text: str, code: str) -> Iterator[str]:
-    """The words for things and structures that code may print whole, or hand on.
-
-    One that only has a name is looked at by its attributes, which are words themselves.
-    """
+    # Things and structures that code may print whole, or hand on. One that only has a name is
+    # looked at by its attributes, which are words themselves.
     for name, structure, view in _WHOLE.findall(text):
         is_handed_on = not name or re.search(rf"\b{name}\b(?!\s*(?:\.|=\s*[^=}}!:]))", code)
         if is_handed_on and (structure or view in VIEWS):
-            yield structure or view
+            words |= _fields_of(structure or view) - {"actuator_trnid"}
+            kinds |= {VIEWS[view]} if view in VIEWS else set()
+            kinds |= _DRIVEN if VIEWS.get(view) == "Actuator" else set()
+    kinds |= {"Keyframe"} if "mj_resetDataKeyframe" in words else set()
+    reason = next(iter(reasons), "")
+    return ModelReader(path, names, words, members, frozenset(parts), frozenset(kinds), reason)
 
 
 @functools.cache

@@ -362,10 +362,15 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         timed = not kind.startswith("unused-") or kind == "unused-site"
         reader = self._find_noticing_reader((), _views(items), change)
         unfixed = self._reason_unfixed(kind, reason, label, edits)
+        places = []
+        for item in items:
+            if (element := item.element) is not None:
+                path, position = element.document.path, element.document.position(element.start)
+                places.append(ModelPlace(item.name, place_of(element), path, *position))
         finding = Finding(
             kind=kind,
             message=message_of(items),
-            places=tuple(_place(item) for item in items if item.element is not None),
+            places=tuple(places),
             label=label,
             difference=comparison.difference,
             scenarios=tuple(run.scene.name for run in self.good_runs),
@@ -440,10 +445,3 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
 def _views(items: Iterable[Item]) -> frozenset[str]:
     """The kinds of things that items are to code."""
     return frozenset(KINDS[item.kind].view for item in items) - {""}
-
-
-def _place(item: Item) -> ModelPlace:
-    element = item.element
-    assert element is not None
-    line, column = element.document.position(element.start)
-    return ModelPlace(item.name, place_of(element), element.document.path, line, column)

@@ -117,9 +117,17 @@ def parse_markup(path: str, data: bytes) -> Markup:
 
     def start(tag: str, pairs: list[str]) -> None:
         begin = parser.CurrentByteIndex
-        attributes, at = _attributes(data, begin, pairs)
+        name = _NAME.match(data, begin)
+        assert name is not None
+        at, attributes = name.end(), []
+        for key, value in zip(pairs[::2], pairs[1::2], strict=True):
+            match = _ATTRIBUTE.search(data, at)
+            assert match is not None
+            at, value_span = match.end(), (match.start(2) + 1, match.end() - 1)
+            attributes.append(Attribute(key, value, match.start(), at, value_span))
         parent = stack[-1] if stack else None
-        element = Element(document, tag, parent, attributes, begin, data.index(b">", at) + 1)
+        head = data.index(b">", at) + 1
+        element = Element(document, tag, parent, tuple(attributes), begin, head)
         if parent is None:
             document.root = element
         else:
@@ -146,19 +154,6 @@ def parse_markup(path: str, data: bytes) -> Markup:
         message = expat.errors.messages[error.code]
         raise MarkupError(document, parser.ErrorByteIndex, message) from None
     return document
-
-
-def _attributes(data: bytes, start: int, pairs: list[str]) -> tuple[tuple[Attribute, ...], int]:
-    """The attributes of a start tag, and where the last of them ends."""
-    name = _NAME.match(data, start)
-    assert name is not None
-    at, attributes = name.end(), []
-    for key, value in zip(pairs[::2], pairs[1::2], strict=True):
-        match = _ATTRIBUTE.search(data, at)
-        assert match is not None
-        at = match.end()
-        attributes.append(Attribute(key, value, match.start(), at, (match.start(2) + 1, at - 1)))
-    return tuple(attributes), at
 
 
 def splice(include: Element, inner: Markup) -> None:
@@ -255,10 +250,25 @@ def remove_elements(elements: Iterable[Element]) -> tuple[ModelEdit, ...]:
         if _is_left_empty(parent, includes):
             removals.add(parent)
             queue.append(parent)
-    # A file that nothing includes any more stays as it is.
-    return merge_edits(
-        _removal(e) for e in removals | includes if e.document.include not in includes
-    )
+    edits = []
+    for element in removals | includes:
+        document, start, end = element.document, element.start, element.end
+        if document.include in includes:
+            continue  # a file that nothing includes any more stays as it is
+        data = document.data
+        line = max(data.rfind(b"\n", 0, start), data.rfind(b"\r", 0, start)) + 1
+        left = line + len(data[line:start].rstrip(b" \t"))
+        blanks = _BLANKS.match(data, end)
+        right = end if blanks is None else blanks.end()
+        line_end = _LINE_END.match(data, right)
+        if left > line:
+            start = left
+        elif line_end is None:  # more stands behind it on its line
+            end = right
+        else:
+            start, end = left, line_end.end()
+        edits.append(ModelEdit(document.path, start, end, b""))
+    return merge_edits(edits)
 
 
 def _is_left_empty(section: Element, includes: Collection[Element]) -> bool:
@@ -272,22 +282,6 @@ def _is_left_empty(section: Element, includes: Collection[Element]) -> bool:
         rest += data[at : element.start]
         at = element.end
     return not (rest + data[at : section.tail]).strip()
-
-
-def _removal(element: Element) -> ModelEdit:
-    data, start, end = element.document.data, element.start, element.end
-    line = max(data.rfind(b"\n", 0, start), data.rfind(b"\r", 0, start)) + 1
-    left = line + len(data[line:start].rstrip(b" \t"))
-    blanks = _BLANKS.match(data, end)
-    right = end if blanks is None else blanks.end()
-    line_end = _LINE_END.match(data, right)
-    if left > line:
-        start = left
-    elif line_end is None:  # more stands behind it on its line
-        end = right
-    else:
-        start, end = left, line_end.end()
-    return ModelEdit(element.document.path, start, end, b"")
 
 
 def set_attributes(element: Element, values: Iterable[tuple[str, str]]) -> tuple[ModelEdit, ...]:

@@ -241,17 +241,6 @@ def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
     """
     if not any(line.visible_points for line in chart.lines):
         return ""
-    x, y = _scales(chart, size)
-    body, height = "".join(_parts(chart, x, y)), y.start + 48
-    if chart.marks:
-        lines = (Entry("line", line.name, line.number) for line in chart.lines)
-        left = 6.0 if size == NARROW_SIZE else x.start
-        key_svg, height = key((*lines, *chart.marks), left, y.start + 62, size[0])
-        body += key_svg
-    return svg(body, (size[0], height), name, (chart.title, chart.text))
-
-
-def _scales(chart: Chart, size: tuple[float, float]) -> tuple[Scale, Scale]:
     points = [point for line in chart.lines for point in line.points]
     xs = [log(x) for point in points for x in (point.x.low, point.x.high)]
     ys = [log(point.y) for point in points if point.y]
@@ -263,11 +252,17 @@ def _scales(chart: Chart, size: tuple[float, float]) -> tuple[Scale, Scale]:
     if floor > bottom - 1.5:  # the band, with room for what it says
         bottom = min(bottom, floor) - 0.07 * max(top - bottom, 1.0)
     span = max(top - bottom, 0.6)
-    width, height = size
-    y = Scale(_TOP + height, _TOP, bottom - 0.05 * span, bottom + 1.08 * span)
+    y = Scale(_TOP + size[1], _TOP, bottom - 0.05 * span, bottom + 1.08 * span)
     left = 32 + max((text_width(text, TICK_SIZE) for _, text in _ticks_y(y)), default=0.0)
-    right = width - (10 if chart.marks else _NAMES)
-    return Scale(left, right, min(xs) - pad, max(xs) + pad), y
+    right = size[0] - (10 if chart.marks else _NAMES)
+    x = Scale(left, right, min(xs) - pad, max(xs) + pad)
+    body, height = "".join(_parts(chart, x, y)), y.start + 48
+    if chart.marks:
+        lines = (Entry("line", line.name, line.number) for line in chart.lines)
+        key_left = 6.0 if size == NARROW_SIZE else x.start
+        key_svg, height = key((*lines, *chart.marks), key_left, y.start + 62, size[0])
+        body += key_svg
+    return svg(body, (size[0], height), name, (chart.title, chart.text))
 
 
 def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
@@ -296,8 +291,18 @@ def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
         yield path(bars, f'stroke="{paint}"') if bars else ""
         yield symbols(line.number, marks)
         yield from (ring(*_place(point, x, y), RING) for point in line.points if point.ringed)
-    if not chart.marks:
-        yield from _names(chart, x, y)
+    if chart.marks:  # a key has the names
+        return
+    visible_lines = [line for line in chart.lines if line.visible_points]
+    ends = [(_place(line.visible_points[-1], x, y), line) for line in visible_lines]
+    ends.sort(key=lambda end: end[0][1])
+    heights = separate_labels([down for (_, down), _ in ends], _NAME, y.end, y.start)
+    for ((right, down), line), at in zip(ends, heights, strict=True):
+        paint = colour(line.number)
+        lead = f"M{right + 5:.1f} {down:.1f}L{x.end + 6:.1f} {at:.1f}"
+        yield path(lead, f'stroke="{paint}" stroke-opacity="0.5" stroke-width="0.8"')
+        look = f'fill="{paint}" font-weight="600" {FINE} {HALO}'
+        yield label(x.end + 9, at + 4, line.name, look)
 
 
 def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
@@ -329,19 +334,6 @@ def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
 
 def _place(point: Point, x: Scale, y: Scale) -> tuple[float, float]:
     return x(point.x.value), y.end - 6 if point.y is None else y(point.y)
-
-
-def _names(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
-    lines = [line for line in chart.lines if line.visible_points]
-    ends = [(_place(line.visible_points[-1], x, y), line) for line in lines]
-    ends.sort(key=lambda end: end[0][1])
-    places = separate_labels([down for (_, down), _ in ends], _NAME, y.end, y.start)
-    for ((right, down), line), at in zip(ends, places, strict=True):
-        paint = colour(line.number)
-        lead = f"M{right + 5:.1f} {down:.1f}L{x.end + 6:.1f} {at:.1f}"
-        yield path(lead, f'stroke="{paint}" stroke-opacity="0.5" stroke-width="0.8"')
-        look = f'fill="{paint}" font-weight="600" {FINE} {HALO}'
-        yield label(x.end + 9, at + 4, line.name, look)
 
 
 def _grid(x: Scale, y: Scale, titles: tuple[str, str]) -> tuple[list[str], list[str]]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from pathlib import Path
 
 from msgspec.structs import replace
 
@@ -14,7 +12,7 @@ from coursebuild.core.files.course_root import FOLDERS
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.files.write import FileChange
-from coursebuild.core.model import Course, Lesson
+from coursebuild.core.model import Lesson
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.text.diagnostics import Edit, did_you_mean
 from coursebuild.core.text.source import Source
@@ -52,7 +50,21 @@ def run(arguments: argparse.Namespace) -> int:
         help = did_you_mean(arguments.old, [lesson.id for lesson in course.lessons])
         raise UsageError(f"no lesson is called `{arguments.old}`", help=help)
     edits = rename_references(course, lesson, new)
-    changes = _list_changes(root, course, lesson, new, edits)
+    by_source: dict[Source, list[Edit]] = {}
+    for edit in edits:
+        by_source.setdefault(edit.span.source, []).append(edit)
+    new_map = with_lesson_renamed(course, lesson, new, by_source.pop(course.map))
+    changes = [FileChange(course.map.path, course.map.text.encode(), new_map.encode())]
+    for source, source_edits in by_source.items():
+        text = apply_edits(source.text, source_edits)
+        changes.append(FileChange(source.path, source.text.encode(), text.encode()))
+    if lesson.document is not None:
+        data = read_bytes(root, lesson.path)
+        unchanged = FileChange(lesson.path, data, data)
+        lesson_change = next((c for c in changes if c.path == lesson.path), unchanged)
+        changes = [change for change in changes if change is not lesson_change]
+        changes.append(FileChange(replace(lesson, id=new).path, None, lesson_change.new))
+        changes.append(FileChange(lesson.path, lesson_change.old, None))
     files = (path for top in (*FOLDERS, "src") for path in (root / top).rglob("*.*"))
     code = [path for path in files if path.suffix in (".py", ".js") and path.is_file()]
     sources = read_sources(root, sorted(path.relative_to(root).as_posix() for path in code)).value
@@ -65,26 +77,3 @@ def run(arguments: argparse.Namespace) -> int:
         help = "edit them first, or leave them as they are with --leave; nothing was changed"
         return fail(FAILURE, "\n".join(lines), help)
     return apply_changes(root, changes)
-
-
-def _list_changes(
-    root: Path, course: Course, lesson: Lesson, new: str, edits: Sequence[Edit]
-) -> list[FileChange]:
-    by_source: dict[Source, list[Edit]] = {}
-    for edit in edits:
-        by_source.setdefault(edit.span.source, []).append(edit)
-    new_map = with_lesson_renamed(course, lesson, new, by_source.pop(course.map))
-    changes = [FileChange(course.map.path, course.map.text.encode(), new_map.encode())]
-    for source, source_edits in by_source.items():
-        text = apply_edits(source.text, source_edits)
-        changes.append(FileChange(source.path, source.text.encode(), text.encode()))
-    if lesson.document is None:
-        return changes
-    data = read_bytes(root, lesson.path)
-    unchanged = FileChange(lesson.path, data, data)
-    lesson_change = next((c for c in changes if c.path == lesson.path), unchanged)
-    return [
-        *(change for change in changes if change is not lesson_change),
-        FileChange(replace(lesson, id=new).path, None, lesson_change.new),
-        FileChange(lesson.path, lesson_change.old, None),
-    ]

@@ -160,28 +160,25 @@ def check(
             recorded[scene.name] = report
     by_name = {scene.name: scene for scene in scenes.value if scene.name in recorded}
     measurement = run.measure_each(tuple(by_name.values()), run.measure)
-    checks = [
-        _compare(recorded[report.model], report, by_name[report.model])
-        for report in measurement.reports
-    ]
+    checks = []
+    for report in measurement.reports:
+        record, remarks = recorded[report.model], []
+        if record.digest != report.digest:
+            remarks.append("the model or its scenarios have changed since it was recorded")
+        old, new = record.machine, report.machine
+        for program, before, now in (
+            ("MuJoCo ", old.engine, new.engine),
+            ("NumPy ", old.numpy, new.numpy),
+            ("Python ", old.python, new.python),
+            ("", old.system, new.system),
+        ):
+            if before != now:
+                remarks.append(f"recorded with {program}{before}, measured with {now}")
+        bench = by_name[report.model].declarations.bench
+        departures = scene_departures(record, report, bench)
+        path = BENCH.path(report.model)
+        checks.append(RecordCheck(report.model, path, departures, tuple(remarks)))
     return replace(measurement, checked=tuple(checks))
-
-
-def _compare(recorded: SceneReport, report: SceneReport, scene: CourseScene) -> RecordCheck:
-    remarks = []
-    if recorded.digest != report.digest:
-        remarks.append("the model or its scenarios have changed since it was recorded")
-    old, new = recorded.machine, report.machine
-    for program, before, now in (
-        ("MuJoCo ", old.engine, new.engine),
-        ("NumPy ", old.numpy, new.numpy),
-        ("Python ", old.python, new.python),
-        ("", old.system, new.system),
-    ):
-        if before != now:
-            remarks.append(f"recorded with {program}{before}, measured with {now}")
-    departures = scene_departures(recorded, report, scene.declarations.bench)
-    return RecordCheck(report.model, BENCH.path(report.model), departures, tuple(remarks))
 
 
 class SceneRun(MeasuringRun):
@@ -358,7 +355,33 @@ def bench_text(scenes: Sequence[SceneReport], style: Style) -> str:
         if not scene.scenarios:
             lines.append(f"{_INDENT}nothing in it can move, so nothing was measured")
         for scenario in scene.scenarios:
-            lines += ["", *_scenario(scenario, style)]
+            view = scenario_view(english(), scenario)
+            lines += ["", _title(scenario.name, scenario.title, style)]
+            sentences = [plain_text(text) for text in view.description]
+            if scenario.figure:  # a page says this and the next in its plot
+                sentences.append(f"It measures {scenario.figure}.")
+            if scenario.velocity_floor > scenario.floor:
+                floor = plain_text(power(scenario.velocity_floor, 1))
+                sentences.append(f"Velocities are known to {floor}.")
+            for text in (*sentences, *scenario.notes, *_theory(scenario)):
+                lines += style.wrap(text, 2 * _INDENT)
+            legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
+            marks = []
+            for row in scenario.rows:
+                if not is_idle(row):
+                    code = BOLD if row.own else RED if row.status in ("diverged", "reset") else ""
+                    code = code or (YELLOW if row.status != "ok" else GREEN if row.front else "")
+                    mark = (_OWN_MARK if row.own else " ") + (_FRONT_MARK if row.front else " ")
+                    marks.append((mark, code))
+            lines += _table(view.settings, marks, legend, style)
+            verdict = scenario.verdict
+            colour = GREEN if verdict.on_front and not verdict.noticeable else YELLOW
+            if verdict.text:
+                lines += ["", *style.wrap(verdict.text, 2 * _INDENT, colour)]
+            for grid in filter(None, (view.orders, view.stable)):
+                grid_text = grid_lines(grid, style)
+                lines += ["", *(f"{2 * _INDENT}{line}".rstrip() for line in grid_text)]
+            lines += _notes(view.notes, style)
         for sweep in scene.sweeps:
             view = scenario_view(english(), sweep)
             marks = [((_OWN_MARK, BOLD) if row.own else (" ", "")) for row in sweep.rows]
@@ -367,34 +390,6 @@ def bench_text(scenes: Sequence[SceneReport], style: Style) -> str:
             lines += _notes(view.notes, style)
         texts.append("\n".join(lines) + "\n")
     return "\n".join(texts)
-
-
-def _scenario(report: ScenarioReport, style: Style) -> list[str]:
-    view = scenario_view(english(), report)
-    lines = [_title(report.name, report.title, style)]
-    texts = [plain_text(text) for text in view.description]
-    if report.figure:  # a page says this and the next in its plot
-        texts.append(f"It measures {report.figure}.")
-    if report.velocity_floor > report.floor:
-        texts.append(f"Velocities are known to {plain_text(power(report.velocity_floor, 1))}.")
-    for text in (*texts, *report.notes, *_theory(report)):
-        lines += style.wrap(text, 2 * _INDENT)
-    legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
-    marks = []
-    for row in report.rows:
-        if not is_idle(row):
-            code = BOLD if row.own else RED if row.status in ("diverged", "reset") else ""
-            code = code or (YELLOW if row.status != "ok" else GREEN if row.front else "")
-            mark = (_OWN_MARK if row.own else " ") + (_FRONT_MARK if row.front else " ")
-            marks.append((mark, code))
-    lines += _table(view.settings, marks, legend, style)
-    colour = GREEN if report.verdict.on_front and not report.verdict.noticeable else YELLOW
-    if report.verdict.text:
-        lines += ["", *style.wrap(report.verdict.text, 2 * _INDENT, colour)]
-    for grid in (view.orders, view.stable):
-        if grid is not None:
-            lines += ["", *(f"{2 * _INDENT}{line}".rstrip() for line in grid_lines(grid, style))]
-    return [*lines, *_notes(view.notes, style)]
 
 
 def _theory(report: ScenarioReport) -> Iterator[str]:

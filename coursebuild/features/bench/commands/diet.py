@@ -141,12 +141,6 @@ def diet(
     return write_records(options.root, measurement, records)
 
 
-def _file_state(file: Path) -> tuple[int, int]:
-    """Return what changes when a file is edited."""
-    status = file.stat()
-    return status.st_size, status.st_mtime_ns
-
-
 class _DietRun(MeasuringRun):
     """Looks at models one after the other."""
 
@@ -239,7 +233,8 @@ class _DietRun(MeasuringRun):
         if model.readers and self.course is not None:
             parts += [(d.source.path, d.source.text) for d in self.course.documents]
             paths = (*self.files.files, *package_files(self.options.root, self.course))
-            parts += [(path, _file_state(self.options.root / path)) for path in paths]
+            states = [(path, (self.options.root / path).stat()) for path in paths]
+            parts += [(path, state.st_size, state.st_mtime_ns) for path, state in states]
         return tuple(parts)
 
     def load(self, kind: str, parts: tuple[object, ...], report_type: type[_T]) -> _T | None:
@@ -302,30 +297,29 @@ def diet_text(reports: Sequence[DietReport], style: Style) -> str:
     """Write every model with its findings, and a blank line between; empty without models."""
     if not reports:
         return ""
+    texts: list[str] = []
+    for report in reports:
+        head = style.paint(visible(report.model), BOLD)
+        if report.quick:
+            head += "  " + style.paint("quick: short runs and rough times", YELLOW)
+        lines = [head]
+        names = [scenario.name for scenario in report.scenarios if scenario.status == "ok"]
+        lines += style.wrap(f"in {name_list(names)}" if names else "in no scenario", "  ")
+        for scenario in report.scenarios:
+            if scenario.status != "ok":
+                status = f"{scenario.status}: {'; '.join(scenario.reasons)}"
+                text = f"scenario {scenario.name}: {status}; nothing is claimed from it"
+                lines += style.wrap(text, "  ", RED)
+        for finding in report.findings:
+            lines += ["", *_finding(finding, style)]
+        for entry in report.stale:
+            place = f"{entry.path}:{entry.line}:{entry.column}"
+            text = f"`{entry.finding}` no longer keeps anything: remove the entry ({place})"
+            lines += ["", *style.wrap(text, "  ", RED)]
+        lines += ["", *_summary(report, style)]
+        texts.append("\n".join(lines) + "\n")
     footnote = "".join(line + "\n" for line in style.wrap(_FOOTNOTE, "", FAINT))
-    return "\n".join([*(_model(report, style) for report in reports), footnote])
-
-
-def _model(report: DietReport, style: Style) -> str:
-    head = style.paint(visible(report.model), BOLD)
-    if report.quick:
-        head += "  " + style.paint("quick: short runs and rough times", YELLOW)
-    lines = [head]
-    names = [scenario.name for scenario in report.scenarios if scenario.status == "ok"]
-    lines += style.wrap(f"in {name_list(names)}" if names else "in no scenario", "  ")
-    for scenario in report.scenarios:
-        if scenario.status != "ok":
-            status = f"{scenario.status}: {'; '.join(scenario.reasons)}"
-            text = f"scenario {scenario.name}: {status}; nothing is claimed from it"
-            lines += style.wrap(text, "  ", RED)
-    for finding in report.findings:
-        lines += ["", *_finding(finding, style)]
-    for entry in report.stale:
-        place = f"{entry.path}:{entry.line}:{entry.column}"
-        text = f"`{entry.finding}` no longer keeps anything: remove the entry ({place})"
-        lines += ["", *style.wrap(text, "  ", RED)]
-    lines += ["", *_summary(report, style)]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*texts, footnote])
 
 
 def _summary(report: DietReport, style: Style) -> list[str]:
@@ -337,7 +331,13 @@ def _summary(report: DietReport, style: Style) -> list[str]:
         if fixable:
             text += f", {len(fixable)} of them for `coursebuild diet {report.model} --fix`"
         lines += style.wrap(text, "  ", RED)
-        lines += style.wrap(_how_to_keep(report, findings), "  ", FAINT)
+        for first in findings[:1]:
+            name = first.places[0].name if len(first.places) == 1 else ""
+            key = f"{first.kind} {name}".strip()
+            quote = "'" if '"' in key else '"'
+            text = f"give the reason for what you keep in models/{report.model}.toml: "
+            text += f"[[keep]] finding = {quote}{key}{quote}, reason = …"
+            lines += style.wrap(text, "  ", FAINT)
     elif all(finding.kept for finding in report.findings):
         lines.append("  " + style.paint("nothing in it is useless", GREEN))
     else:
@@ -356,18 +356,6 @@ def _summary(report: DietReport, style: Style) -> list[str]:
         outcome = f"not found, because {reason}" if reason else "tried and needed"
         lines += style.wrap(f"{outcome}: {name_list(list(dict.fromkeys(kinds)))}", "  ", FAINT)
     return lines
-
-
-def _how_to_keep(report: DietReport, findings: Sequence[Finding]) -> str:
-    """Say how to keep the first of the findings."""
-    if not findings:
-        return ""
-    first = findings[0]
-    name = first.places[0].name if len(first.places) == 1 else ""
-    key = f"{first.kind} {name}".strip()
-    quote = "'" if '"' in key else '"'
-    place = f"give the reason for what you keep in models/{report.model}.toml: [[keep]]"
-    return f"{place} finding = {quote}{key}{quote}, reason = …"
 
 
 def _finding(finding: Finding, style: Style) -> list[str]:

@@ -12,10 +12,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shutil
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,6 @@ from coursebuild.core.files.read import CourseFiles, read_bytes
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model import Course, FeatureBlock, MjcfModel, find_blocks
 from coursebuild.core.model.results import Machine
-from coursebuild.core.model.scenarios import DeclaredScenario
 from coursebuild.core.run.mjcf import TEXT_PATH, model_files
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import diagnose
@@ -62,7 +62,11 @@ def readers_of(
     if course is None:
         return (ModelReader("content/course.toml", opaque="the course cannot be read"),)
     paths = [path for path in files.files if path.endswith(_CODE)]
-    texts = {path: _read_text(root, path) for path in (*paths, *package_files(root, course))}
+    texts: dict[str, str | None] = {}
+    for path in (*paths, *package_files(root, course)):
+        texts[path] = None  # unless it can be read
+        with contextlib.suppress(EffectError):
+            texts[path] = read_bytes(root, path).decode("utf-8", "replace")
     texts |= {script.path: script.text for script in extract(course).value}
     modules = {name for path in texts for name in _module_names(path)}
     users = _find_users({path: text or "" for path, text in texts.items()}, scene.name)
@@ -76,14 +80,6 @@ def readers_of(
         for path, text in texts.items()
         if path in users or path in files.files
     )
-
-
-def _read_text(root: Path, path: str) -> str | None:
-    """The text of a file; `None` if it cannot be read."""
-    try:
-        return read_bytes(root, path).decode("utf-8", "replace")
-    except EffectError:
-        return None
 
 
 def _module_names(path: str) -> frozenset[str]:
@@ -225,7 +221,20 @@ class DietModel:
         self.scene = scene
         self.path = scene.model.source.path
         self.keeps = {" ".join(keep.finding.split()): keep for keep in scene.declarations.keep}
-        self.locked = _find_locked_files(root, files, self.path, scene.model.source.text)
+        parts = model_files(root, self.path, scene.model.source.text)
+        self.locked = {
+            part: f"{part} is not in models/"
+            for part in parts
+            if not (part.startswith("models/") and part.endswith(".xml"))
+        }
+        """The files of the model that must not be changed, with the reason."""
+        own_files = {self.path, *parts}
+        for model in files.models:
+            user = model.source.path
+            if user not in own_files:
+                used_files = model_files(root, user, model.source.text)
+                for part in sorted(own_files.intersection(used_files)):
+                    self.locked.setdefault(part, f"{user} uses {part} too")
         self.readers = _find_readers(root, files, course, scene)
         self._files: dict[str, bytes | None] = {}
 
@@ -257,6 +266,13 @@ class DietModel:
             CannotMeasureError: the model cannot be looked at.
         """
         scene, declarations = self.scene, self.scene.declarations
+        # The kinds of findings about things that scenarios give by number.
+        numbered_kinds: set[str] = set()
+        for scenario in declarations.scenarios:
+            if scenario.controls:
+                numbered_kinds.add("actuator-idle")
+            if isinstance(scenario.keyframe, int):
+                numbered_kinds.add("unused-keyframe")
         failure = "the diet cannot look at the model `{}`"
         with report_errors(scene, failure, ModelTextError, ValueError):
             try:
@@ -276,7 +292,7 @@ class DietModel:
                 readers=self.readers,
                 keeps=self.keeps,
                 locked=self.locked,
-                numbered_kinds=frozenset(_find_numbered_kinds(declarations.scenarios)),
+                numbered_kinds=frozenset(numbered_kinds),
                 clock=time.thread_time_ns,
                 quick=quick,
                 tell=tell,
@@ -309,32 +325,6 @@ class DietModel:
         text = (self.read(self.path) or b"").decode("utf-8")
         model = MjcfModel(self.scene.name, Source(self.path, text))
         return scene_digest(self.root, model, self.scene.declarations)
-
-
-def _find_locked_files(root: Path, files: CourseFiles, path: str, text: str) -> Mapping[str, str]:
-    """Map the files of the model that must not be changed to the reason."""
-    parts = model_files(root, path, text)
-    reasons = {
-        part: f"{part} is not in models/"
-        for part in parts
-        if not (part.startswith("models/") and part.endswith(".xml"))
-    }
-    own_files = {path, *parts}
-    for model in files.models:
-        user = model.source.path
-        if user not in own_files:
-            for part in sorted(own_files.intersection(model_files(root, user, model.source.text))):
-                reasons.setdefault(part, f"{user} uses {part} too")
-    return reasons
-
-
-def _find_numbered_kinds(scenarios: Iterable[DeclaredScenario]) -> Iterator[str]:
-    """Yield the kinds of findings about things that scenarios give by number."""
-    for scenario in scenarios:
-        if scenario.controls:
-            yield "actuator-idle"
-        if isinstance(scenario.keyframe, int):
-            yield "unused-keyframe"
 
 
 def _find_readers(

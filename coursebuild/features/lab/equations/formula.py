@@ -95,7 +95,14 @@ def _compile(text: Excerpt, compile_tree: Callable[[ast.expr], T]) -> Parsed[T |
     try:
         return Parsed(compile_tree(tree))
     except _MistakeError as mistake:
-        return Parsed(None, (_diagnose(text, mistake),))
+        # The place of its node is in bytes of the stripped line.
+        line, node = text.text.replace("\n", " ").replace("\r", " "), mistake.node
+        start = len(line) - len(line.lstrip())
+        data = line[start:].encode("utf-8", "replace")
+        ends = (node.col_offset, node.end_col_offset or node.col_offset)
+        first, last = (start + len(data[:at].decode("utf-8", "replace")) for at in ends)
+        place = text.span(first, last)
+        return Parsed(None, (diagnose(mistake.rule, place, mistake.message, help=mistake.help),))
     except RecursionError:
         return Parsed(None, (diagnose("lab-code", text.span(), "the expression nests too deep"),))
 
@@ -122,16 +129,6 @@ def _parse(text: Excerpt) -> ast.expr | Diagnostic:
         return diagnose("lab-code", text.span(at, at + 1), message, help=help)
     except (ValueError, RecursionError, MemoryError):
         return diagnose("lab-code", text.span(), "the expression cannot be read")
-
-
-def _diagnose(text: Excerpt, mistake: _MistakeError) -> Diagnostic:
-    """Report a mistake at its node, whose place is in bytes of the stripped line."""
-    line = text.text.replace("\n", " ").replace("\r", " ")
-    start = len(line) - len(line.lstrip())
-    data, node = line[start:].encode("utf-8", "replace"), mistake.node
-    ends = (node.col_offset, node.end_col_offset or node.col_offset)
-    first, last = (start + len(data[:at].decode("utf-8", "replace")) for at in ends)
-    return diagnose(mistake.rule, text.span(first, last), mistake.message, help=mistake.help)
 
 
 def _emit(node: ast.expr, names: Mapping[str, int], program: Program) -> None:

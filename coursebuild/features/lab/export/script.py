@@ -292,10 +292,19 @@ def _try_export(
     record = main.get("recorded")
     if record is None:
         return LabExport(None, "the lab makes no step")
+    start = initial_values(lab)
+    variants = []  # each with a single control at another value than at the start
+    for i, control in enumerate(lab.fields.controls):
+        values: list[float | str] = []
+        if isinstance(control, Slider):
+            values = [control.min, control.max]
+        elif isinstance(control, Select):
+            values = [value for _, value in control.options]
+        variants += [{**start, i: value} for value in values if value != start[i]]
     request = {
         "path": str(root / "examples" / export.name),
-        "text": fill_in_values(export, initial_values(lab)),
-        "variants": [fill_in_values(export, values) for values in _control_variants(lab)],
+        "text": fill_in_values(export, start),
+        "variants": [fill_in_values(export, values) for values in variants],
         "buttons": list(export.buttons),
         "near": record["near"],
     }
@@ -305,20 +314,6 @@ def _try_export(
     rtol = PARITY_RTOL if lab.verify.rtol is None else lab.verify.rtol
     reason = _difference(main, run, rtol)
     return LabExport(None, reason) if reason else LabExport((export.name, export.text))
-
-
-def _control_variants(lab: Lab) -> list[dict[int, float | str]]:
-    """List values of all controls, with a single one at another value than at the start."""
-    start = initial_values(lab)
-    variants = []
-    for i, control in enumerate(lab.fields.controls):
-        values: list[float | str] = []
-        if isinstance(control, Slider):
-            values = [control.min, control.max]
-        elif isinstance(control, Select):
-            values = [value for _, value in control.options]
-        variants += [{**start, i: value} for value in values if value != start[i]]
-    return variants
 
 
 # --- the script's run compared with the lab's

@@ -94,16 +94,34 @@ the shares of the triangle's corners in it (n, 3), its column and its row."""
 
 
 def fragments(eye: Eye, vertices: Array, faces: NDArray[np.int64], *, front: bool) -> Fragments:
-    """Yield the samples that faces cover; the first columns of `vertices` are places in view."""
+    """Yield the samples that faces cover; the first columns of `vertices` are places in view.
+
+    A sample on the edge between two triangles belongs to only one of them: otherwise a transparent
+    surface would have seams.
+    """
+    width, height = eye.size
     is_finite = np.all(np.abs(np.nan_to_num(vertices, nan=np.inf)) < FAR_AWAY, axis=1)
     faces = faces[np.all(is_finite[faces], axis=1)]
-    for start in range(0, len(faces), _FACES_AT_ONCE):
-        triangles = vertices[faces[start : start + _FACES_AT_ONCE]]
+    for first_face in range(0, len(faces), _FACES_AT_ONCE):
+        triangles = vertices[faces[first_face : first_face + _FACES_AT_ONCE]]
         if front:
             a, b, c = triangles[..., :3].transpose(1, 0, 2)
             volume = np.einsum("ij,ij->i", a, np.cross(b, c))
             triangles = triangles[volume * np.linalg.det(eye.axes) < 0]
-        yield from _project(eye, _clip(triangles, eye.near))
+        triangles = _clip(triangles, eye.near)
+        scale = eye.focal / triangles[..., 2]
+        px = width / 2 + scale * triangles[..., 0]
+        py = height / 2 - scale * triangles[..., 1]
+        top, bottom = _first(py.min(axis=1), height), _first(py.max(axis=1), height)
+        columns = _first(px.max(axis=1), width) - _first(px.min(axis=1), width)
+        most_samples = np.cumsum((bottom - top) * np.maximum(columns, 0))
+        start = 0
+        while start < len(triangles):
+            offset = most_samples[start - 1] if start else 0
+            end = int(np.searchsorted(most_samples, offset + _AT_ONCE, side="right"))
+            part = slice(start, max(end, start + 1))
+            yield triangles[part], *_samples(px[part], py[part], top[part], bottom[part], width)
+            start = part.stop
 
 
 def _clip(triangles: Array, near: float) -> Array:
@@ -122,28 +140,6 @@ def _clip(triangles: Array, near: float) -> Array:
             np.array([[polygon[0], polygon[k], polygon[k + 1]]]) for k in range(1, len(polygon) - 1)
         ]
     return np.concatenate(parts)
-
-
-def _project(eye: Eye, triangles: Array) -> Fragments:
-    """Go through triangles row by row.
-
-    A sample on the edge between two triangles belongs to only one of them: otherwise a transparent
-    surface would have seams.
-    """
-    width, height = eye.size
-    scale = eye.focal / triangles[..., 2]
-    px = width / 2 + scale * triangles[..., 0]
-    py = height / 2 - scale * triangles[..., 1]
-    top, bottom = _first(py.min(axis=1), height), _first(py.max(axis=1), height)
-    columns = _first(px.max(axis=1), width) - _first(px.min(axis=1), width)
-    most_samples = np.cumsum((bottom - top) * np.maximum(columns, 0))
-    start = 0
-    while start < len(triangles):
-        offset = most_samples[start - 1] if start else 0
-        end = int(np.searchsorted(most_samples, offset + _AT_ONCE, side="right"))
-        part = slice(start, max(end, start + 1))
-        yield triangles[part], *_samples(px[part], py[part], top[part], bottom[part], width)
-        start = part.stop
 
 
 def _samples(

@@ -174,7 +174,16 @@ class _Scene:
                 rows = self._row(first, floats * item["count"]).reshape(-1, floats)
                 if item["group"] not in _VISIBLE or not np.isfinite(rows).all():
                     continue
-                shape = _flex(item, rows) if part == "flexes" else _skin(item, rows)
+                indices = np.asarray(item["elements" if part == "flexes" else "faces"], np.int64)
+                if part == "skins":
+                    uv = item["texcoords"]
+                    uv = None if uv is None else np.asarray(uv, dtype=float).reshape(-1, 2)
+                    shape = Surface(rows[:, :3], rows[:, 3:], indices.reshape(-1, 3), uv)
+                elif item["dim"] == 1:
+                    shape = shapes.ropes(rows, indices.reshape(-1, 2), item["radius"])
+                else:
+                    surface = shapes.flat_surface if item["flat"] else shapes.smooth_surface
+                    shape = surface(rows, indices.reshape(-1, 3))
                 index, texture = item["material"], None
                 if shape.uv is not None:
                     texture = self._texture(index, "mesh", (1.0, 1.0, 1.0), has_uv=True)
@@ -189,23 +198,6 @@ class _Scene:
 def _rgba(values: Any) -> RGBA:
     red, green, blue, alpha = (float(x) for x in values)
     return red, green, blue, alpha
-
-
-def _flex(item: dict[str, Any], points: Array) -> Surface:
-    elements = np.asarray(item["elements"], dtype=np.int64)
-    if item["dim"] == 1:
-        return shapes.ropes(points, elements.reshape(-1, 2), item["radius"])
-    faces = elements.reshape(-1, 3)
-    return (
-        shapes.flat_surface(points, faces) if item["flat"] else shapes.smooth_surface(points, faces)
-    )
-
-
-def _skin(item: dict[str, Any], rows: Array) -> Surface:
-    texcoords = item["texcoords"]
-    faces = np.asarray(item["faces"], dtype=np.int64).reshape(-1, 3)
-    uv = None if texcoords is None else np.asarray(texcoords, dtype=float).reshape(-1, 2)
-    return Surface(rows[:, :3], rows[:, 3:], faces, uv)
 
 
 def _mesh(mesh: dict[str, Any]) -> Surface:

@@ -237,16 +237,6 @@ def _range(values: list[float], ymin: float | None, ymax: float | None) -> tuple
     return (low if ymin is not None else low - pad), (high if ymax is not None else high + pad)
 
 
-def _time_ticks(times: Scale) -> list[tuple[float, str]]:
-    """Return ticks of the time, few enough that their texts do not touch."""
-    for count in (6, 4, 3, 2):
-        ticks = times.ticks(count)
-        longest = max(len(text) for _, text in ticks)
-        if len(ticks) * (longest + 1.5) * _LETTER <= times.end - times.start:
-            return ticks
-    return ticks[:1]
-
-
 def _is_finite(value: float | None) -> TypeGuard[float]:
     return value is not None and math.isfinite(value)
 
@@ -283,7 +273,14 @@ class _Frame(Struct, frozen=True):
             parts.append(f'<path class="lab-grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>')
             place = f'x="{left - 6:.1f}" y="{y + 3.5:.1f}"'
             parts.append(f'<text {place} text-anchor="end">{text}</text>')
-        for x, text in _time_ticks(self.x):
+        for count in (6, 4, 3, 2):  # few enough that their texts do not touch
+            ticks = self.x.ticks(count)
+            longest = max(len(text) for _, text in ticks)
+            if len(ticks) * (longest + 1.5) * _LETTER <= right - left:
+                break
+        else:
+            ticks = ticks[:1]
+        for x, text in ticks:
             parts.append(f'<path class="lab-axis" d="M{x:.1f} {bottom:g}v4"/>')
             place = f'x="{x:.1f}" y="{bottom + 16:g}"'
             parts.append(f'<text {place} text-anchor="middle">{text}</text>')

@@ -67,25 +67,20 @@ def _diagnose(session: Session, version: int) -> tuple[Diagnostic, ...]:
                 if document.source.path in changed_paths
             ]
             diagnostics += tuple(output_findings(course, changed_documents, printed))
-        at_new_lines = (_move_diagnostic(diagnostic, sources) for diagnostic in last_run)
-        diagnostics += tuple(diagnostic for diagnostic in at_new_lines if diagnostic is not None)
+        for diagnostic in last_run:
+            span = _move_span(diagnostic.span, sources)
+            if span is None:  # its lines have changed
+                continue
+            notes = tuple(
+                Note(note.message, note.span and _move_span(note.span, sources))
+                for note in diagnostic.notes
+            )
+            edits = diagnostic.edits if span is diagnostic.span else ()
+            diagnostics += (replace(diagnostic, span=span, notes=notes, edits=edits),)
     return judge(course, diagnostics).diagnostics
 
 
 # --- diagnostics of a text as it was
-
-
-def _move_diagnostic(diagnostic: Diagnostic, sources: dict[str, Source]) -> Diagnostic | None:
-    """Return a diagnostic for the text as it is now; `None` where its lines have changed."""
-    span = _move_span(diagnostic.span, sources)
-    if span is None:
-        return None
-    notes = [
-        Note(note.message, note.span and _move_span(note.span, sources))
-        for note in diagnostic.notes
-    ]
-    edits = diagnostic.edits if span is diagnostic.span else ()
-    return replace(diagnostic, span=span, notes=tuple(notes), edits=edits)
 
 
 def _move_span(span: Span, sources: dict[str, Source]) -> Span | None:
@@ -157,7 +152,16 @@ def actions(
         fix_all = _make_action(texts.places, title, edits, safe_fixes)
         fix_all.kind = types.CodeActionKind.SourceFixAll
         actions.append(fix_all)
-    actions += [*_accept_outputs(texts, place, diagnostics), *_bind_numbers(texts, place)]
+    for verdict in texts.library.results.verdicts:
+        span = verdict.recording.span
+        if verdict.status == "drift" and span.source == place.source and _overlap(span, place):
+            edit = new_output(texts.session, texts.library, verdict)
+            if isinstance(edit, Edit):
+                drifts = (d for d in diagnostics if d.rule == "output-drift")
+                solved = [d for d in drifts if span.contains(d.span)]
+                title = f"accept what `{verdict.recording.script}` prints"
+                actions.append(_make_action(texts.places, title, [edit], solved))
+    actions += _bind_numbers(texts, place)
     asked_kinds = tuple(str(getattr(kind, "value", kind)) for kind in params.context.only or ("",))
     kinds = [str(getattr(action.kind, "value", action.kind)) for action in actions]
     return [
@@ -184,21 +188,6 @@ def _make_action(
 
 def _overlap(first: Span, second: Span) -> bool:
     return first.start <= second.end and second.start <= first.end
-
-
-def _accept_outputs(
-    texts: OpenTexts, place: Span, diagnostics: Iterable[Diagnostic]
-) -> Iterator[types.CodeAction]:
-    library = texts.library
-    for verdict in library.results.verdicts:
-        span = verdict.recording.span
-        if verdict.status == "drift" and span.source == place.source and _overlap(span, place):
-            edit = new_output(texts.session, library, verdict)
-            if isinstance(edit, Edit):
-                drifts = (d for d in diagnostics if d.rule == "output-drift")
-                solved = [d for d in drifts if span.contains(d.span)]
-                title = f"accept what `{verdict.recording.script}` prints"
-                yield _make_action(texts.places, title, [edit], solved)
 
 
 def _bind_numbers(texts: OpenTexts, place: Span) -> Iterator[types.CodeAction]:

@@ -33,7 +33,6 @@ from coursebuild.core.text.source import Source, Span
 from coursebuild.features.authoring.course_map import rename_references, with_lesson_renamed
 from coursebuild.features.language_server.commands.lookup import label_titles, look_up, members
 from coursebuild.features.language_server.commands.texts import (
-    FieldPlace,
     OpenTexts,
     fence_at,
     field_place,
@@ -82,15 +81,31 @@ def completions(
     mentions = "|".join((*words.lessons, *words.lesson))
     for subject, kind, pattern in _SUBJECTS:
         prefix = re.search(pattern.replace("LESSON", mentions), line)
-        names = {} if prefix is None else _find_names(texts, cursor, subject, prefix)
-        if prefix is not None and names:
+        known_names = {} if prefix is None else _find_names(texts, cursor, subject, prefix)
+        if prefix is not None and known_names:
             span = source.span(offset - len(prefix["word"]), offset)
-            return _make_items(texts, span, kind, names)
+            return _make_items(texts, span, kind, known_names)
     place = field_place(source, offset)
     if place is None:
         return []
+    match place.key:
+        case "":
+            quote = "" if place.span.path.endswith(".toml") else '"'
+            missing = {n: field for n, field in place.fields.items() if n not in place.keys}
+            names = {
+                f"{quote}{name}{quote}": field_description(field.type)
+                for name, field in missing.items()
+            }
+        case "rule":
+            warnings = (rule for rule in RULES.values() if rule.severity == "warning")
+            names = {f'"{rule.name}"': rule.summary for rule in warnings}
+        case "prerequisites":
+            lessons = texts.library.lessons.values()
+            names = {f'"{lesson.id}"': lesson.title for lesson in lessons}
+        case _:
+            names = dict.fromkeys(possible_values(place.field.type) if place.field else (), "")
     kind = Kind.Value if place.key else Kind.Property
-    return _make_items(texts, place.span, kind, _find_field_names(texts.library, place))
+    return _make_items(texts, place.span, kind, names)
 
 
 def _make_items(
@@ -185,24 +200,6 @@ def _find_anchors(texts: OpenTexts, source: Source, prefix: re.Match[str]) -> Ma
         name: place.first_line().text.lstrip("# ") for name, place in anchors(document).items()
     }
     return lines | label_titles(library, texts.owner(source), document)
-
-
-def _find_field_names(library: Library, place: FieldPlace) -> Mapping[str, str]:
-    quote = "" if place.span.path.endswith(".toml") else '"'
-    match place.key:
-        case "":
-            missing = {n: field for n, field in place.fields.items() if n not in place.keys}
-            return {
-                f"{quote}{name}{quote}": field_description(field.type)
-                for name, field in missing.items()
-            }
-        case "rule":
-            warnings = (rule for rule in RULES.values() if rule.severity == "warning")
-            return {f'"{rule.name}"': rule.summary for rule in warnings}
-        case "prerequisites":
-            return {f'"{lesson.id}"': lesson.title for lesson in library.lessons.values()}
-        case _:
-            return dict.fromkeys(possible_values(place.field.type) if place.field else (), "")
 
 
 # --- renaming
