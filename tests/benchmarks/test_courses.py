@@ -52,6 +52,7 @@ def test_so_are_those_of_scripts_with_mujoco(tmp_path: Path) -> None:
     assert "2 lessons, 2 scripts run: everything holds" in result.out
 
 
+@pytest.mark.long
 @pytest.mark.site
 def test_scripts_are_run_in_all_ways(tmp_path: Path) -> None:
     scripts = measure_scripts(1, 1, tmp_path, Places(None, None), lambda text: None)
@@ -132,6 +133,7 @@ COURSE = ROOT / "tests/courses/full/course"
 EXPECTED = Path(__file__).parent / "mistakes.md"
 
 
+@pytest.mark.long
 @pytest.mark.site
 def test_mistakes_of_each_kind_end_as_they_did(rewriting: bool) -> None:
     outcomes = list(run(COURSE, [37], 2 * len(KINDS), KINDS, 1))

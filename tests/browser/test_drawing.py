@@ -13,7 +13,7 @@ from support.built_sites import Site
 from support.fixture_cases import fixture_text
 from support.lab_page import PAGE, lab, until, watch_page
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.long]
 
 LABS = 7
 """Lit and unlit, from above and from below; the course is `tests/courses/drawing`."""

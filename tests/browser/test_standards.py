@@ -61,6 +61,7 @@ def launch_page(scorm: Path) -> Iterator[str]:
         yield f"{host.url}sco/1.1-one.html"
 
 
+@pytest.mark.long
 @pytest.mark.browser
 def test_nu_checker_finds_nothing(
     sites: Mapping[str, Site], live_quizzes: str, launch_page: str
@@ -232,6 +233,7 @@ def test_hostile_drawings_act_where_nobody_judges_them(drawings: Drawings) -> No
     assert [name for name in ACTIVE if not drawings.open(files[name])] == []
 
 
+@pytest.mark.long
 def test_a_published_drawing_runs_nothing_and_asks_nobody(drawings: Drawings) -> None:
     files = {name: published_files(data) for name, data in (*HOSTILE, *mutants(1_000, seed=36))}
     assert sum(not files[name] for name, _ in HOSTILE) > 250, "these are refused"

@@ -78,6 +78,7 @@ def normalize(result: CommandResult, folder: Folder) -> tuple[int, str, str]:
 EDITS = {"DRIFT": ("2.5\n```", "2.4\n```"), "SLIP": ("```text\n2.4", "```tetx\n2.4")}
 
 
+@pytest.mark.long
 def test_commands_do_what_they_do_without_a_preview(make: Make, runtime: str) -> None:
     first = FIRST + block("drifted.py", "print(2.5)", "2.5")
     alone, served = (make(first, SECOND + "* a\n\n\n* b\n", name=n) for n in ("alone", "served"))

@@ -145,6 +145,7 @@ def git(*words: str) -> str:
     return subprocess.run(["git", *words], cwd=DOCS, capture_output=True, text=True).stdout
 
 
+@pytest.mark.site
 def test_the_first_change_records_its_words_wherever_they_stand() -> None:
     """The files that hold the text of the example, and the tests that its last command runs."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")

@@ -27,6 +27,7 @@ def signatures_of(attempts: Attempts) -> list[str]:
     return [json.loads(path.read_text())[0] for path in attempts.folder.glob("found-*.json")]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TARGETS)
 def test_kept_inputs_survive(name: str, tmp_path: Path) -> None:
     attempts = Attempts(TARGETS[name], tmp_path)
@@ -38,6 +39,7 @@ def test_kept_inputs_survive(name: str, tmp_path: Path) -> None:
     assert signatures_of(attempts) == []
 
 
+@pytest.mark.long
 def test_input_that_takes_long_or_much_or_fails_is_found(tmp_path: Path) -> None:
     """A limit holds though the code under test lets no exception through."""
 

@@ -23,6 +23,8 @@ from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.problems.impact import Bounce
 from coursebuild.numerics.simulation import compile_model
 
+pytestmark = pytest.mark.long
+
 OFF = 1 + 1e-6
 DIRECTIONS = ("axis", "zaxis", "condim", "iterations")
 """Attributes of MJCF whose size says nothing."""
@@ -71,7 +73,6 @@ def test_all_thirteen_cases_are_there() -> None:
     assert len(all_problems()) == 44, "each has a name of its own"
 
 
-@pytest.mark.site
 def test_both_references_agree() -> None:
     assert [name for name, problem in all_problems().items() if not said_to_be_known(problem)] == []
 

@@ -36,7 +36,7 @@ from coursebuild.numerics.stability import (
     with_energy_bound,
 )
 
-pytestmark = pytest.mark.site
+pytestmark = pytest.mark.long
 
 
 def test_limits_are_those_of_theory() -> None:

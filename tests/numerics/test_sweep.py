@@ -19,6 +19,8 @@ from coursebuild.numerics.sweep import measure_sweep
 from support.bench_reports import scene
 from support.surveys import parse_declared
 
+pytestmark = pytest.mark.long
+
 BALL = """\
 <mujoco>
   <option timestep="0.0005" gravity="0 0 0"><flag refsafe="disable"/></option>

@@ -19,7 +19,7 @@ from coursebuild.numerics.work_precision import measure_scenario
 from support.bench_runs import FAMILY, MODELS, measure, orders, row
 from support.surveys import NO_DECLARATIONS, parse_declared
 
-pytestmark = pytest.mark.site
+pytestmark = pytest.mark.long
 
 
 @functools.cache

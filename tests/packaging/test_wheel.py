@@ -41,6 +41,7 @@ def files_below(folder: Path, pattern: str = "*") -> set[str]:
     return {p.relative_to(folder).as_posix() for p in paths if "__pycache__" not in p.parts}
 
 
+@pytest.mark.long
 def test_wheel_holds_packages_templates_and_scripts_and_nothing_beside_them(
     root: Path, archive: zipfile.ZipFile, names: list[str], full_name: str
 ) -> None:

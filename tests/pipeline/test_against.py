@@ -19,7 +19,7 @@ from coursebuild.core.run.script_environment import engine_version
 from support.scratch_course import CommandResult, Folder, Make, block, kill_at_end, wait_until_alone
 from support.waiting import wait_for_file
 
-pytestmark = pytest.mark.site
+pytestmark = pytest.mark.long
 
 VERSION = engine_version()
 NEW_VERSION = "9.1.0"

@@ -121,6 +121,7 @@ def read_files(folder: Path) -> dict[str, bytes]:
     return {str(path): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.site
 @pytest.mark.parametrize(
     "bring",
     [bring_orders, bring_links, bring_store_link, bring_pipes, bring_environment],
@@ -215,6 +216,7 @@ def test_folder_that_is_opened_in_an_editor_runs_nothing_until_it_is_saved(
     assert editor.close() == 0
 
 
+@pytest.mark.site
 def test_published_site_is_the_one_of_a_course_without_a_store(make: Make, home: Path) -> None:
     """Not one byte of what another machine has made is published."""
     foreign, root = make(GOOD), home / "course"

@@ -135,6 +135,7 @@ def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
 JUNK = (b"null", msgspec.msgpack.encode((["os:system"], [16, "exit 70"])), pickle.dumps(Trap()))
 
 
+@pytest.mark.long
 @pytest.mark.site
 def test_entries_that_are_damaged_or_of_somebody_else_are_made_again(course: Course) -> None:
     before = build(course)
@@ -183,6 +184,7 @@ def test_a_mistake_that_an_edit_makes_elsewhere_is_found(course: Course) -> None
 # --- any edits
 
 
+@pytest.mark.long
 @pytest.mark.site
 @given(
     st.lists(
@@ -216,6 +218,7 @@ def test_after_any_edits_the_site_is_that_of_a_clean_checkout(
             assert differences(folder.tree("public"), clean.tree("public")) == []
 
 
+@pytest.mark.long
 @pytest.mark.site
 def test_copies_of_the_process_give_what_one_gives(tmp_path: Path, stores: Path) -> None:
     sites = []
@@ -243,6 +246,7 @@ def original(built_courses: BuiltCourses) -> Folder:
     return built_courses["full"]
 
 
+@pytest.mark.long
 @pytest.mark.engine
 def test_build_elsewhere_in_another_environment_gives_the_same_bytes(
     original: Folder, tmp_path: Path, stores: Path

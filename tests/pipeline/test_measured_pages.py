@@ -286,6 +286,7 @@ SINGULAR = """\
 """A model of whose inertia MuJoCo warns at compilation and in each `mj_forward`."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command",
     [

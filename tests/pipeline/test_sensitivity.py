@@ -11,7 +11,7 @@ import pytest
 
 from support.scratch_course import Folder, Make, block
 
-pytestmark = pytest.mark.site
+pytestmark = pytest.mark.long
 
 DOUBLE_PENDULUM = """
 import mujoco

@@ -91,6 +91,7 @@ def test_theme_is_on_every_page_and_in_what_pages_share(course: Folder) -> None:
     assert "#e8a9bd" in course.text("course.html")
 
 
+@pytest.mark.long
 def test_theme_is_in_the_ebook(course: Folder) -> None:
     assert course.main("export", "epub").status == 0
     with zipfile.ZipFile(course.root / "course.epub") as book:

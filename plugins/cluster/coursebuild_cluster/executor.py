@@ -389,6 +389,8 @@ class Cluster:
         if not self._is_waiting:
             self._is_waiting = True
             self._say(f"the cluster at {self._address} has no worker: waiting for one")
+        if self._client.cluster is not None:  # `local`: Dask gives up one that dies while it starts
+            self._client.cluster.scale(len(self._client.cluster.worker_spec))
         time.sleep(_INTERVAL)
 
     def _refuse(self, address: str, reason: str) -> None:

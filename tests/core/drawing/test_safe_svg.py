@@ -48,6 +48,7 @@ def test_each_reason_why_a_file_is_no_drawing_has_its_words() -> None:
     assert {data: read_svg(data) for data in WHOLE} == WHOLE
 
 
+@pytest.mark.long
 def test_hostile_files_are_refused_in_words() -> None:
     readings = {name: read_svg(data) for name, data in HOSTILE}
     assert {name for name, reading in readings.items() if not isinstance(reading, str)} == UNHARMED

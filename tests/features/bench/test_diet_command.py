@@ -132,6 +132,7 @@ def test_a_finding_is_kept_with_a_reason(course: Path, capsys: Capture) -> None:
     ]
 
 
+@pytest.mark.long
 def test_sensor_that_a_lesson_reads_is_no_finding(course: Path, capsys: Capture) -> None:
     lessons = course / "content" / "lessons"
     lessons.mkdir()
@@ -168,6 +169,7 @@ def test_sensor_that_a_lesson_reads_is_no_finding(course: Path, capsys: Capture)
     assert run(course) == 1
 
 
+@pytest.mark.long
 def test_a_part_without_which_a_script_prints_something_else_is_no_finding(
     course: Path, capsys: Capture
 ) -> None:
@@ -184,6 +186,7 @@ def test_a_part_without_which_a_script_prints_something_else_is_no_finding(
     assert "because examples/a.py prints something else then: far-body" in output
 
 
+@pytest.mark.long
 def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
     course: Path, capsys: Capture
 ) -> None:

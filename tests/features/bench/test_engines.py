@@ -55,6 +55,7 @@ def rows(course: Path, *names: str, seconds: float = 900.0) -> dict[str, EngineR
     return {row.engine: row for row in report.scenarios[0].rows}
 
 
+@pytest.mark.long
 @pytest.mark.site
 def test_each_engine_has_a_row_whatever_it_does(course: Path) -> None:
     names = ("single", "wild", "alone", "picky", "broken", "crash", "driverless")
@@ -92,6 +93,7 @@ def test_an_engine_that_hangs_costs_its_row_only(course: Path) -> None:
     assert (row.status, row.message) == ("failed", "its process took longer than 2 s")
 
 
+@pytest.mark.long
 @pytest.mark.site
 def test_engines_agree_with_mujoco_where_they_are_mujoco(course: Path) -> None:
     engines, _ = chosen_engines("mujoco,threads")

@@ -13,7 +13,7 @@ from coursebuild.numerics.reports.scene_report import ScenarioReport
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import write
 
-pytestmark = pytest.mark.site
+pytestmark = pytest.mark.long
 
 BALL = """\
 <mujoco>

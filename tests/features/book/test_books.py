@@ -76,6 +76,7 @@ def full_course(tmp_path_factory: pytest.TempPathFactory, built_courses: BuiltCo
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.site
 def test_ebook_of_every_construct_and_of_wild_html_is_valid(full_course: Folder) -> None:
     book = export(full_course, "epub")

@@ -30,7 +30,7 @@ from support.scratch_course import (
 )
 from support.waiting import wait_for_file, wait_until
 
-pytestmark = pytest.mark.engine
+pytestmark = pytest.mark.long
 
 PENDULUM = """\
 <mujoco>
@@ -264,11 +264,14 @@ def test_a_killed_worker_costs_its_task_only(
 
 
 def test_a_script_that_kills_its_worker_each_time(
-    make: Make, run: Callable[..., CommandResult], address: str
+    make: Make, run: Callable[..., CommandResult], tmp_path: Path, path: str
 ) -> None:
+    """On workers of its own, since Dask gives up those that die while they start."""
     kills = block("kills.py", f"{WORKER}os.kill(worker, 9)\nprint(1)", "1")
     rest = "".join(block(f"{n}.py", f"print({n})", f"{n}") for n in "1234")
-    result = run(make("## One\n\n" + kills + rest), "check", "--cluster", address)
+    folder = make("## One\n\n" + kills + rest)
+    with local_cluster(tmp_path / "workers", 4, path) as address:
+        result = run(folder, "check", "--cluster", address)
     assert result.status == 1
     assert len(re.findall("^ok ", result.out, re.MULTILINE)) == 4
     assert "each of the 3 workers that ran this script died" in result.out

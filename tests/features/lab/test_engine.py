@@ -75,6 +75,7 @@ def test_memory_that_runs_out_takes_no_other_lab_along(tmp_path: Path) -> None:
         assert failures_of(bench.trial(make_lab())) == []
 
 
+@pytest.mark.long
 def test_code_that_takes_all_memory_or_breaks_the_engine_is_told_and_goes(bench: Bench) -> None:
     for code in (
         "ctx.all = []; for (;;) ctx.all.push(new mj.DoubleBuffer(5000000))",

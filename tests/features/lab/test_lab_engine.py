@@ -54,6 +54,7 @@ def test_version_is_that_of_the_bundled_engine(tmp_path: Path) -> None:
         assert bench.trial(make_lab())["version"] == LAB_ENGINE
 
 
+@pytest.mark.long
 def test_other_mujoco_of_scripts_leaves_labs_to_an_environment_of_their_own(
     folder: Folder, variables: dict[str, str]
 ) -> None:

@@ -143,6 +143,7 @@ def test_many_small_triangles_look_as_few_large_ones() -> None:
     assert np.abs(colours[0] - colours[1]).max() <= 12  # brightness is worked out at corners
 
 
+@pytest.mark.long
 def test_the_shadows_of_hundreds_of_bodies_take_little_memory() -> None:
     """A ball has 868 triangles; with all that is known of their corners they took 1 GB."""
     places = [(x / 8, y / 8, 0.0) for x in range(-10, 10) for y in range(-10, 10)]

@@ -93,6 +93,7 @@ class MissedError(Exception):
     pass
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore:.* encountered:RuntimeWarning")
 @pytest.mark.parametrize("count", [15, pytest.param(500, marks=pytest.mark.slow)])
 def test_poisoned_trials_are_one_that_can_be_shown_or_told(

@@ -14,7 +14,7 @@ from coursebuild.numerics.pruning.survey import Survey
 from coursebuild.numerics.reports.diet_report import PROVED_LABEL
 from support.surveys import PATH, findings_by_kind, fixed_text, names, open_files, run_survey
 
-pytestmark = pytest.mark.site
+pytestmark = pytest.mark.long
 
 
 def motion(model: mujoco.MjModel, joints: list[str], steps: int = 150) -> bytes:

@@ -20,6 +20,8 @@ from support.surveys import (
     scene,
 )
 
+pytestmark = pytest.mark.long
+
 CART = """<mujoco>
   <worldbody>
     <body name="cart" pos="0 0 .1"><joint name="track" type="slide" axis="1 0 0" damping=".2"/>

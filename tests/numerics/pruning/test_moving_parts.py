@@ -9,6 +9,8 @@ import pytest
 from coursebuild.numerics.reports.diet_report import MEASURED_LABEL, PROVED_LABEL
 from support.surveys import PENDULUM, field, findings_by_kind, fixed_text, names, run_survey, scene
 
+pytestmark = pytest.mark.long
+
 
 def test_actuators_that_nobody_commands() -> None:
     rest = """<actuator>

@@ -8,6 +8,8 @@ import pytest
 
 from support.surveys import names, parse_declared, run_survey, scene
 
+pytestmark = pytest.mark.long
+
 MODEL = scene(
     """<geom name="wall" type="box" size=".1 .1 .1" pos="0 0 2" material="m"/>
     <body name="leg" pos="0 0 1"><joint name="hip" axis="0 1 0"/>
@@ -86,7 +88,6 @@ HOSTILE = {
 }
 
 
-@pytest.mark.site
 def test_no_hostile_script_loses_a_part() -> None:
     findings = run_survey(MODEL, declarations=GO).report.findings
     whole = {finding.kind: names(finding) for finding in findings if finding.fixable}
@@ -101,7 +102,6 @@ def test_no_hostile_script_loses_a_part() -> None:
     assert lost == []
 
 
-@pytest.mark.site
 def test_what_a_script_names_stays_and_the_rest_goes() -> None:
     """The default is that everything is used, but not that everything always is."""
     script = textwrap.dedent("""
