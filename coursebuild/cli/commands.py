@@ -92,7 +92,21 @@ def run(directory: str | None, words: list[str], *, alone: bool) -> int:
                 for number in _SIGNALS:
                     if signal.getsignal(number) is not signal.SIG_IGN:  # as in the background
                         handlers[number] = signal.signal(number, interrupt)
-            return _run_command(directory, words)
+            limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+            if limit < _FILES_NEEDED:
+                text = f"only {limit} files may be open at a time, and {_FILES_NEEDED} are needed"
+                return fail(FAILURE, text, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
+            return _choose_command(directory, words)
+        except UsageError as error:
+            return fail(USAGE, str(error))
+        except EffectError as error:
+            status = USAGE if isinstance(error, PublishRefusedError) else FAILURE
+            return fail(status, error.message, error.help)
+        except (MemoryError, OSError, RuntimeError) as error:
+            lack = lacking(error)
+            if lack is None:
+                raise
+            return fail(FAILURE, lack.message, lack.help)
         finally:
             if not alone:
                 gc.set_threshold(*thresholds)
@@ -103,25 +117,6 @@ def run(directory: str | None, words: list[str], *, alone: bool) -> int:
             raise
         number = signal.Signals(received[-1]) if received else signal.SIGINT
         return say(128 + number, _SIGNALS[number])
-
-
-def _run_command(directory: str | None, words: list[str]) -> int:
-    limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-    if limit < _FILES_NEEDED:
-        message = f"only {limit} files may be open at a time, and {_FILES_NEEDED} are needed"
-        return fail(FAILURE, message, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
-    try:
-        return _choose_command(directory, words)
-    except UsageError as error:
-        return fail(USAGE, str(error))
-    except EffectError as error:
-        status = USAGE if isinstance(error, PublishRefusedError) else FAILURE
-        return fail(status, error.message, error.help)
-    except (MemoryError, OSError, RuntimeError) as error:
-        lack = lacking(error)
-        if lack is None:
-            raise
-        return fail(FAILURE, lack.message, lack.help)
 
 
 def _choose_command(directory: str | None, words: list[str]) -> int:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import tomllib
-from collections.abc import Iterable
 from pathlib import Path
 
 from coursebuild.cli.commands import known_commands, parser_of
@@ -63,39 +62,35 @@ def run(arguments: argparse.Namespace) -> int:
     *before, last = words or [""]
     commands = known_commands()
     if not before or before == ["help"]:
-        candidates: Iterable[str] = [*commands, *([] if before else ["help", "--version", "-C"])]
+        candidates = [*commands, *([] if before else ["help", "--version", "-C"])]
     else:
         actions = parser_of(commands[before[0]])._actions if before[0] in commands else []
-        positionals = [action for action in actions if not action.option_strings]
         takes_word = (a for a in actions if before[-1] in a.option_strings and a.nargs != 0)
         if last.startswith("-"):
             candidates = [name for action in actions for name in action.option_strings]
         elif (option := next(takes_word, None)) is not None:
-            candidates = option.choices or ()
+            candidates = [*(option.choices or ())]
         else:
-            values = (_argument_values(action, directory) for action in positionals)
-            candidates = [word for words in values for word in words]
+            candidates = []
+            for action in (action for action in actions if not action.option_strings):
+                root = None if action.choices else find_course_root(directory or ".")
+                match action.metavar:
+                    case _ if action.choices:
+                        candidates += action.choices
+                    case "LESSON" if root is not None:
+                        candidates += _read_ids(Path(root))
+                    case "MODEL" | "SCENE" if root is not None:
+                        candidates += (path.stem for path in Path(root, "models").glob("*.xml"))
+                    case "RULE|PATH":
+                        candidates += [*RULES, *(_read_ids(Path(root)) if root is not None else ())]
+                    case "SCHEMA":
+                        candidates += schema_roots()
+                    case "EXPORT":
+                        candidates += (e.name for feature in features() for e in feature.exporters)
+                    case _:
+                        pass
     completions = sorted({word for word in candidates if word.startswith(last)})
     return write("".join(f"{word}\n" for word in completions), CLEAN)
-
-
-def _argument_values(action: argparse.Action, directory: str | None) -> Iterable[str]:
-    if action.choices:
-        return action.choices
-    root = find_course_root(directory or ".")
-    match action.metavar:
-        case "LESSON" if root is not None:
-            return _read_ids(Path(root))
-        case "MODEL" | "SCENE" if root is not None:
-            return sorted(path.stem for path in Path(root, "models").glob("*.xml"))
-        case "RULE|PATH":
-            return [*RULES, *(_read_ids(Path(root)) if root is not None else ())]
-        case "SCHEMA":
-            return schema_roots()
-        case "EXPORT":
-            return [exporter.name for feature in features() for exporter in feature.exporters]
-        case _:
-            return ()
 
 
 def _read_ids(root: Path) -> list[str]:

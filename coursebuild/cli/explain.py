@@ -98,8 +98,15 @@ def rule_text(rule: Rule, page: str) -> str:
 def explanation_text(explanation: Explanation, style: Style) -> str:
     """Return an explanation as text for people."""
     e = explanation
-    is_run = e.kind in ("script", "lab")
-    parts = [] if is_run else [style.paint(_heading(e), BOLD)]
+    is_run, heading = e.kind in ("script", "lab"), visible(e.path)
+    kinds = [run.kind for run in e.runs]
+    if kinds and e.kind not in ("model", "file"):
+        counts = [plural(kinds.count(kind), kind) for kind in ("script", "lab") if kind in kinds]
+        count = sum(run.state == "would run" for run in e.runs)
+        heading += f": {' and '.join(counts)}, of which {count or 'none'} would run"
+    elif e.kind not in ("model", "file"):
+        heading += " has no scripts and no labs"
+    parts = [] if is_run else [style.paint(heading, BOLD)]
     parts += ["\n".join(_run_lines(run, style, full=is_run)) for run in e.runs]
     if e.files:
         parts.append(_block("consists also of", e.files))
@@ -113,17 +120,6 @@ def explanation_text(explanation: Explanation, style: Style) -> str:
     if e.shown_in:
         parts.append(_block("shown, linked or quoted in", e.shown_in))
     return "\n\n".join(parts) + "\n"
-
-
-def _heading(e: Explanation) -> str:
-    if e.kind in ("model", "file"):
-        return visible(e.path)
-    if not e.runs:
-        return f"{visible(e.path)} has no scripts and no labs"
-    kinds = [run.kind for run in e.runs]
-    counts = [plural(kinds.count(kind), kind) for kind in ("script", "lab") if kind in kinds]
-    count = sum(run.state == "would run" for run in e.runs)
-    return f"{visible(e.path)}: {' and '.join(counts)}, of which {count or 'none'} would run"
 
 
 def _block(head: str, lines: tuple[str, ...]) -> str:

@@ -17,16 +17,12 @@ import warnings
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 import pytest
 
 from coursebuild.core.files.course_root import MAP, find_course_root
 from coursebuild.core.text.characters import without_commands
-
-if TYPE_CHECKING:
-    from coursebuild.core.model import Course
 
 _PAGE, _MAP, _MODEL = "page", "map", "model"
 _PLACE = re.compile(r"^ *--> (.*):(\d+):\d+$", re.MULTILINE)
@@ -73,14 +69,31 @@ class CourseTests:
     """The tests of a course, and their results, which `check` finds when the first of them runs."""
 
     def __init__(self, root: Path) -> None:
+        from coursebuild.core.model import FeatureBlock, Recording, Script, document_blocks
+        from coursebuild.core.registry import feature_trials
         from coursebuild.pipeline.load import load
 
         course = load(root).value
         self.root = root
-        self.tests: Mapping[str, Mapping[str, _Lines]] = _tests_by_file(course)
+        self.tests: dict[str, Mapping[str, _Lines]] = {MAP: {_MAP: ()}}
         """By path and name: where in the file the test's mistakes stand. The first test of a file
         has those that stand in none of the others."""
         self._results: dict[str, list[tuple[str, str]]] | None = None
+        if course is None:
+            return
+        self.tests |= {model.source.path: {_MODEL: ()} for model in course.models}
+        trials = {id(trial.block): name for name, (_, trial) in feature_trials(course).items()}
+        for document in course.documents:
+            tests: dict[str, _Lines] = {_PAGE: ()}
+            for block in document_blocks(document):
+                name: str | None = None
+                if isinstance(block, Script | Recording):
+                    name = block.path if isinstance(block, Script) else block.script
+                elif isinstance(block, FeatureBlock):  # a lab or a quiz
+                    name = trials.get(id(block)) or (block.progress_keys() or (None,))[0]
+                if name is not None:
+                    tests[name] = (*tests.get(name, ()), (block.span.line, block.span.end_line))
+            self.tests[document.source.path] = tests
 
     def results_of(self, session: pytest.Session, test: str) -> list[tuple[str, str]]:
         """The results of a test: JUnit's tags, with their texts."""
@@ -117,29 +130,6 @@ class CourseTests:
 
 
 _COURSES = pytest.StashKey[dict[str, CourseTests]]()
-
-
-def _tests_by_file(course: Course | None) -> dict[str, Mapping[str, _Lines]]:
-    from coursebuild.core.model import FeatureBlock, Recording, Script, document_blocks
-    from coursebuild.core.registry import feature_trials
-
-    tests_by_path: dict[str, Mapping[str, _Lines]] = {MAP: {_MAP: ()}}
-    if course is None:
-        return tests_by_path
-    tests_by_path |= {model.source.path: {_MODEL: ()} for model in course.models}
-    trials = {id(trial.block): name for name, (_, trial) in feature_trials(course).items()}
-    for document in course.documents:
-        tests: dict[str, _Lines] = {_PAGE: ()}
-        for block in document_blocks(document):
-            name: str | None = None
-            if isinstance(block, Script | Recording):
-                name = block.path if isinstance(block, Script) else block.script
-            elif isinstance(block, FeatureBlock):  # a lab or a quiz
-                name = trials.get(id(block)) or (block.progress_keys() or (None,))[0]
-            if name is not None:
-                tests[name] = (*tests.get(name, ()), (block.span.line, block.span.end_line))
-        tests_by_path[document.source.path] = tests
-    return tests_by_path
 
 
 class FileTests(pytest.File):

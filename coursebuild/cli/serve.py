@@ -54,7 +54,7 @@ from coursebuild.cli.output import CLEAN, FAILURE, say
 from coursebuild.core.engine.lifetime import end_with_parent
 from coursebuild.core.engine.page_pool import can_fork
 from coursebuild.core.registry import installed_features
-from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.options import UsageError
 from coursebuild.preview.live_course import LiveCourse
 from coursebuild.preview.server import PreviewServer
 
@@ -114,22 +114,23 @@ def run(arguments: argparse.Namespace) -> int:
             if arguments.open:
                 webbrowser.open(link)
             return CLEAN
-    _serve(options, arguments, takes_commands=served is None)
-
-
-def _serve(options: Options, arguments: argparse.Namespace, *, takes_commands: bool) -> NoReturn:
-    """Serve until interrupted; `takes_commands`: do what is given in other terminals."""
     host, port = arguments.host, arguments.port
     live_course = LiveCourse(options, style_of(sys.stderr))
     try:
         server = PreviewServer(host, port, live_course.session, tuple(arguments.embed))
     except OSError as error:
         message = f"port {port} of {host} cannot be used: {error.strerror or error}"
-        raise UsageError(message, help=_propose_port(host, port, error)) from None
+        is_taken, help = error.errno == EADDRINUSE, ""
+        for number in range(port + 1, min(port + 100, 65536)) if is_taken else ():
+            with contextlib.suppress(OSError), socket.create_server((host, number)):
+                option = "" if host == "127.0.0.1" else f" --host {host}"
+                help = f"`coursebuild serve{option} --port {number}`"
+                break
+        raise UsageError(message, help=help) from None
     links = server.links
     preview = {"host": host, "port": server.access.port, "links": links, "process": os.getpid()}
-    # Now, while this process has no threads.
-    commands = CommandServer(options.root, preview) if takes_commands else None
+    # For what is given in other terminals; now, while this process has no threads.
+    commands = CommandServer(options.root, preview) if served is None else None
     try:
         live_course.start()
         server.start()
@@ -152,14 +153,6 @@ def _serve(options: Options, arguments: argparse.Namespace, *, takes_commands: b
             commands.close()
         server.stop()
         live_course.close()
-
-
-def _propose_port(host: str, port: int, error: OSError) -> str:
-    for number in range(port + 1, min(port + 100, 65536)) if error.errno == EADDRINUSE else ():
-        with contextlib.suppress(OSError), socket.create_server((host, number)):
-            option = "" if host == "127.0.0.1" else f" --host {host}"
-            return f"`coursebuild serve{option} --port {number}`"
-    return ""
 
 
 # --- commands for other terminals

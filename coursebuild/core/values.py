@@ -173,25 +173,22 @@ def _make_builder(names: list[str], source: Source | None) -> Callable[[list[Any
         Source: lambda: source,
     }
     by_number = [constructors[kind] for kind in _PARTS]
-    by_number += [_make_constructor(_find_class(name)) for name in names]
+    for name in names:
+        module, _, inner = name.partition(":")
+        if module not in sys.modules and module.startswith(_VALUE_PACKAGES) and "__" not in module:
+            importlib.import_module(module)
+        kind: Any = sys.modules[module]
+        for part in inner.split("."):
+            kind = vars(kind)[part]
+        if not isinstance(kind, type) or not issubclass(kind, enum.Enum | Struct | tuple):
+            raise TypeError(f"{name} is no class of values")
+        by_number.append(_make_constructor(kind))
 
     def build(packed: list[Any]) -> Any:
         number, *parts = packed
         return by_number[number](*[build(part) if type(part) is list else part for part in parts])
 
     return build
-
-
-def _find_class(name: str) -> type:
-    module, _, inner = name.partition(":")
-    if module not in sys.modules and module.startswith(_VALUE_PACKAGES) and "__" not in module:
-        importlib.import_module(module)
-    kind: Any = sys.modules[module]
-    for part in inner.split("."):
-        kind = vars(kind)[part]
-    if isinstance(kind, type) and issubclass(kind, enum.Enum | Struct | tuple):
-        return kind
-    raise TypeError(f"{name} is no class of values")
 
 
 @functools.cache

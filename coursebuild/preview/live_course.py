@@ -106,29 +106,26 @@ class FolderWatcher:
         return frozenset(p for p in paths if p not in new_paths or os.path.lexists(self._root / p))
 
     def _run(self) -> None:
+        before: frozenset[str] | None = None
         try:
-            self._follow()
+            while not self._stop.is_set():
+                folders = self._folders()
+                # Folders that are new, or were not watched for a moment, are reported once they are
+                # watched: files may have been put into them before.
+                unseen_folders = frozenset() if before is None else before | folders.keys()
+                for paths in self._watch(tuple(self._root / f for f in folders)):
+                    self._ready.set()
+                    all_paths = paths | unseen_folders | self._find_changed_files()
+                    if all_paths:
+                        self._events.put(all_paths)
+                    unseen_folders = frozenset()
+                    if self._folders() != folders:
+                        break
+                before = frozenset(folders)
         except OSError as error:
             self._events.put(error)
         finally:
             self._ready.set()
-
-    def _follow(self) -> None:
-        before: frozenset[str] | None = None
-        while not self._stop.is_set():
-            folders = self._folders()
-            # Folders that are new, or were not watched for a moment, are reported once they are
-            # watched: files may have been put into them before.
-            unseen_folders = frozenset() if before is None else before | folders.keys()
-            for paths in self._watch(tuple(self._root / f for f in folders)):
-                self._ready.set()
-                all_paths = paths | unseen_folders | self._find_changed_files()
-                if all_paths:
-                    self._events.put(all_paths)
-                unseen_folders = frozenset()
-                if self._folders() != folders:
-                    break
-            before = frozenset(folders)
 
     def _folders(self) -> dict[str, tuple[int, ...]]:
         """The watched folders that exist, with their device and inode."""
@@ -248,7 +245,17 @@ class LiveCourse:
         began = time.monotonic()
         self.session.calm.clear()
         try:
-            paths = _wait_until_complete(self.session.root, self._watcher, paths)
+            later = paths
+            while later:
+                paths |= later
+                is_part = len(paths) > MAX_SINGLE_READS
+                try:
+                    files = (self.session.root / path for path in paths)
+                    is_part |= any(file.stat().st_size == 0 for file in files)
+                except OSError:
+                    is_part = True
+                remaining = began + LONGEST - time.monotonic()
+                later = self._watcher.get(min(LONG_QUIET if is_part else QUIET, remaining))
             paths = self._watcher.drop_passing(paths)
             if not paths:
                 return
@@ -261,21 +268,3 @@ class LiveCourse:
             names = ", ".join(sorted(paths)[:3]) + (" …" if len(paths) > 3 else "")
             milliseconds = 1e3 * (time.monotonic() - began)
             self.session.options.progress.say(f"changed: {names} ({milliseconds:.0f} ms)")
-
-
-def _wait_until_complete(
-    root: Path, watcher: FolderWatcher, paths: frozenset[str]
-) -> frozenset[str]:
-    began = now = time.monotonic()
-    while True:
-        is_part = len(paths) > MAX_SINGLE_READS
-        try:
-            is_part |= any((root / path).stat().st_size == 0 for path in paths)
-        except OSError:
-            is_part = True
-        remaining = began + LONGEST - now
-        later = watcher.get(min(LONG_QUIET if is_part else QUIET, remaining))
-        if not later:
-            return paths
-        paths |= later
-        now = time.monotonic()

@@ -128,8 +128,7 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
     news: dict[str, Any] = {
         "problems": [
             {
-                **_describe_mistake(d, document_path),
-                **_offer_fix(session, d),
+                **_describe_mistake(session, d, document_path),
                 "blocks": d in blocking,
             }
             for d in diagnostics
@@ -161,8 +160,16 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
 # --- mistakes
 
 
-def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, Any]:
-    span = diagnostic.span
+def _describe_mistake(
+    session: Session, diagnostic: Diagnostic, document_path: str
+) -> dict[str, Any]:
+    span, offer = diagnostic.span, {}
+    if len({edit.span.source for edit in diagnostic.edits}) == 1:
+        first = min(diagnostic.edits, key=lambda edit: edit.span.start)
+        if may_edit(session.root, first.span.path):
+            offered = Offer.of(*diagnostic.edits)
+            fixed = Source(offered.path, offered.new.decode()).line_text(first.span.line)
+            offer = {"offer": offered, "fixed": fixed}
     line = span.source.line_text(span.line)
     end = len(line) if span.end_line > span.line else span.end_column - 1
     return {
@@ -180,17 +187,8 @@ def _describe_mistake(diagnostic: Diagnostic, document_path: str) -> dict[str, A
         "start": span.column - 1,
         "end": max(end, span.column - 1),
         "inPlace": span.path == document_path and diagnostic.rule in _IN_PLACE,
+        **offer,
     }
-
-
-def _offer_fix(session: Session, diagnostic: Diagnostic) -> dict[str, Any]:
-    sources = {edit.span.source for edit in diagnostic.edits}
-    if len(sources) != 1 or not may_edit(session.root, diagnostic.edits[0].span.path):
-        return {}
-    first = min(diagnostic.edits, key=lambda edit: edit.span.start)
-    offer = Offer.of(*diagnostic.edits)
-    line = Source(offer.path, offer.new.decode()).line_text(first.span.line)
-    return {"offer": offer, "fixed": line}
 
 
 # --- scripts and outputs

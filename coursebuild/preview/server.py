@@ -190,11 +190,15 @@ class _Handler(BaseHTTPRequestHandler):
     do_HEAD = do_GET
 
     def do_POST(self) -> None:
-        body = self._read_body()
+        body = self.rfile.read(int(self.headers.get("Content-Length", "0")))
         if not self._is_allowed():
             return
         session = self.server.session
-        match self.path.removeprefix(PREFIX), _decode_texts(body):
+        try:
+            texts = msgspec.json.decode(body, type=dict[str, str])
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            texts = {}
+        match self.path.removeprefix(PREFIX), texts:
             case "accept", {"page": page, "id": id}:
                 failure = accept(session, page, id)
             case "open", {"place": place}:
@@ -227,10 +231,6 @@ class _Handler(BaseHTTPRequestHandler):
         status = HTTPStatus.FORBIDDEN if redirect is None else HTTPStatus.SEE_OTHER
         self._send(status, TEXT, f"{message}\n".encode(), redirect or {})
         return False
-
-    def _read_body(self) -> bytes:
-        """Read the body of a request; empty if its length is not given."""
-        return self.rfile.read(int(self.headers.get("Content-Length", "0")))
 
     def _send_message(self, status: HTTPStatus, message: str) -> None:
         self._send(status, "application/json", json.dumps({"message": message}).encode())
@@ -304,14 +304,6 @@ class _Handler(BaseHTTPRequestHandler):
     def _send_event(self, event: str, data: str) -> None:
         self.wfile.write(f"event: {event}\ndata: {data}\n\n".encode("utf-8", "replace"))
         self.wfile.flush()
-
-
-def _decode_texts(body: bytes) -> dict[str, str]:
-    """Decode a JSON object of texts; empty if the body is something else."""
-    try:
-        return msgspec.json.decode(body, type=dict[str, str])
-    except (msgspec.DecodeError, UnicodeDecodeError):
-        return {}
 
 
 _ARGUMENTS = {

@@ -186,7 +186,14 @@ class Session:
                 if is_saved and not self.open_texts.keys().isdisjoint(paths):
                     self.notify(is_saved=True)  # its scripts may run
                 return False
-            self._show(_replace_owners(course, [owner for owner, _ in changed_owners]))
+            lessons = {owner.id: owner for owner, _ in changed_owners if isinstance(owner, Lesson)}
+            pages = {owner.id: owner for owner, _ in changed_owners if isinstance(owner, Page)}
+            levels = tuple(
+                replace(level, lessons=tuple(lessons.get(old.id, old) for old in level.lessons))
+                for level in course.levels
+            )
+            all_pages = tuple(pages.get(page.id, page) for page in course.pages)
+            self._show(replace(course, levels=levels, pages=all_pages))
             for owner, diagnostics in changed_owners:
                 assert owner.document is not None
                 self._diagnostics_by_file[owner.path] = (*diagnostics, *self._check(owner.document))
@@ -368,13 +375,3 @@ class Session:
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
     """Whether there are errors among diagnostics."""
     return any(d.is_error for d in diagnostics)
-
-
-def _replace_owners(course: Course, new_owners: Iterable[Owner]) -> Course:
-    lessons = {owner.id: owner for owner in new_owners if isinstance(owner, Lesson)}
-    pages = {owner.id: owner for owner in new_owners if isinstance(owner, Page)}
-    levels = tuple(
-        replace(level, lessons=tuple(lessons.get(old.id, old) for old in level.lessons))
-        for level in course.levels
-    )
-    return replace(course, levels=levels, pages=tuple(pages.get(p.id, p) for p in course.pages))

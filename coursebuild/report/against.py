@@ -80,7 +80,17 @@ def comparison_json(report: ComparisonReport) -> str:
     return json_text(
         {
             **plain(report, version="against"),
-            "scripts": [_script_value(script) for script in report.scripts],
+            "scripts": [
+                {
+                    **plain(script, reason="why"),
+                    "by_mujoco": script.status in ("changed", "fails"),
+                    "changes": [plain(change) for change in script.changes],
+                    "failure": None
+                    if script.failure is None
+                    else {**plain(script.failure), "said": script.failure.label},
+                }
+                for script in report.scripts
+            ],
             "names": [plain(name) for name in report.names],
             "summary": {
                 **_count(report.scripts),
@@ -89,16 +99,6 @@ def comparison_json(report: ComparisonReport) -> str:
             },
         }
     )
-
-
-def _script_value(script: ScriptComparison) -> dict[str, object]:
-    failure = script.failure
-    return {
-        **plain(script, reason="why"),
-        "by_mujoco": script.status in ("changed", "fails"),
-        "changes": [plain(change) for change in script.changes],
-        "failure": None if failure is None else {**plain(failure), "said": failure.label},
-    }
 
 
 def comparison_text(report: ComparisonReport, style: Style, *, quiet: bool = False) -> str:

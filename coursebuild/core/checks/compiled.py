@@ -298,16 +298,11 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
             names = [name for name in facts.keyframes if name]
             message = f"the model has no keyframe `{keyframe}`"
             yield diagnose(_RULE, place, message, help=did_you_mean(keyframe, names))
+        command = next(iter(scenario.controls), None)
         rows = (
             ("qpos", "`qpos`", scenario.qpos or None, facts.nq, "positions (`nq`)"),
             ("qvel", "`qvel`", scenario.qvel or None, facts.nv, "velocities (`nv`)"),
-            (
-                "controls",
-                "a command",
-                next(iter(scenario.controls), None),
-                facts.nu,
-                "controls (`nu`)",
-            ),
+            ("controls", "a command", command, facts.nu, "controls (`nu`)"),
         )
         for name, subject, values, count, noun in rows:
             if values is not None and len(values) != count:
@@ -319,7 +314,18 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
                 message = f"the model has no {measure.kind} `{measure.name}`"
                 help = did_you_mean(measure.name, [name for name in model_names if name])
                 yield diagnose(_RULE, scenario.place("measure"), message, help=help)
-        yield from _check_horizon_error(scenario, facts.sizes)
+        place, sizes = scenario.place("horizon_error"), facts.sizes
+        for unit, error in scenario.horizon_error.items():
+            if unit not in sizes:
+                kind = {"rad": "hinge, ball or free joint", "m": "slide or free joint"}[unit]
+                message = f"no coordinate of the model is in {unit}: it has no {kind}"
+                help = f"state an error in {next(iter(sizes))}" if sizes else "leave it out"
+                yield diagnose(_RULE, place, message, help=help)
+            elif not _LEAST_ERROR * (size := sizes[unit]) <= error <= size:
+                side = "small" if error < size else "large"
+                message = f"an error of {error:g} {unit} is too {side}"
+                help = f"state one from {_LEAST_ERROR * size:.3g} to {size:.3g} {unit}"
+                yield diagnose(_RULE, place, message, help=help)
         yield from _check_timestep(scenario, facts.timestep)
     for sweep in declarations.sweeps:
         yield from _check_sweep(sweep, declarations.scenarios, facts)
@@ -327,25 +333,6 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
 
 _LEAST_ERROR = 1e-8
 """Of a difference of coordinates: whether a motion is chaotic is seen by differences of 1e-10."""
-
-
-def _check_horizon_error(
-    scenario: DeclaredScenario, sizes: Mapping[str, float]
-) -> Iterator[Diagnostic]:
-    place = scenario.place("horizon_error")
-    kinds = {"rad": "hinge, ball or free joint", "m": "slide or free joint"}
-    for unit, error in scenario.horizon_error.items():
-        if unit not in sizes:
-            message = f"no coordinate of the model is in {unit}: it has no {kinds[unit]}"
-            help = f"state an error in {next(iter(sizes))}" if sizes else "leave it out"
-            yield diagnose(_RULE, place, message, help=help)
-        elif not _LEAST_ERROR * sizes[unit] <= error <= sizes[unit]:
-            least, most = f"{_LEAST_ERROR * sizes[unit]:.3g}", f"{sizes[unit]:.3g} {unit}"
-            message = (
-                f"an error of {error:g} {unit} is too {'small' if error < sizes[unit] else 'large'}"
-            )
-            help = f"state one from {least} to {most}"
-            yield diagnose(_RULE, place, message, help=help)
 
 
 def _check_timestep(scenario: DeclaredScenario, step: float) -> Iterator[Diagnostic]:

@@ -39,7 +39,23 @@ def check_course(course: Course) -> tuple[Diagnostic, ...]:
         for document in documents
         for diagnostic in _check_core_rules(course, document, targets)
     ]
-    return (*diagnostics, *_check_unproven(course), *_check_features(course, documents))
+    scripts = {s.path: s for document in documents for s in document_scripts(document)}
+    first: dict[str, Span] = {}
+    for entry in course.unproven:
+        script, notes = scripts.get(entry.path), []
+        if first.setdefault(entry.path, entry.span) is not entry.span:
+            message, help = f"the script `{entry.path}` is named twice", "remove it here"
+            notes = [Note("the first one is here", first[entry.path])]
+        elif script is None:
+            message = f"no lesson or page has a script `{entry.path}`"
+            help = did_you_mean(entry.path, scripts) or "remove it"
+        elif not (script.norun or script.requires):
+            message = f"`{entry.path}` always runs: it says neither `norun` nor `requires`"
+            help = "remove it"
+        else:
+            continue
+        diagnostics.append(diagnose("unproven-name", entry.span, message, help=help, notes=notes))
+    return (*diagnostics, *_check_features(course, documents))
 
 
 def check_document(
@@ -98,25 +114,6 @@ def _check_features(course: Course, documents: Collection[Document]) -> Iterator
                     break
             error.add_note(note)
             raise
-
-
-def _check_unproven(course: Course) -> Iterator[Diagnostic]:
-    scripts = {s.path: s for document in course.documents for s in document_scripts(document)}
-    first: dict[str, Span] = {}
-    for entry in course.unproven:
-        script = scripts.get(entry.path)
-        if first.setdefault(entry.path, entry.span) is not entry.span:
-            message = f"the script `{entry.path}` is named twice"
-            notes = [Note("the first one is here", first[entry.path])]
-            help = "remove it here"
-            yield diagnose("unproven-name", entry.span, message, help=help, notes=notes)
-        elif script is None:
-            message = f"no lesson or page has a script `{entry.path}`"
-            help = did_you_mean(entry.path, scripts) or "remove it"
-            yield diagnose("unproven-name", entry.span, message, help=help)
-        elif not (script.norun or script.requires):
-            message = f"`{entry.path}` always runs: it says neither `norun` nor `requires`"
-            yield diagnose("unproven-name", entry.span, message, help="remove it")
 
 
 _WORDS = re.compile(

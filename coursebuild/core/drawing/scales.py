@@ -105,9 +105,12 @@ def log_ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
     these are few.
     """
     first, last = math.ceil(low - 1e-9), math.floor(high + 1e-9)
-    decade_ticks = (
-        [(float(n), _scaled(1, n)) for n in _decades(first, last, most)] if first <= last else []
-    )
+    step = 1  # between the exponents that are shown: the least that `most` allows
+    while last // step - -(-first // step) + 1 > max(most, 1):
+        power: int = 10 ** (len(str(step)) - 1)
+        step = next(power * m for m in (2, 3, 5, 10) if power * m > step)
+    decades = [*range(-(-first // step) * step, last + 1, step)] or [first]
+    decade_ticks = [(float(n), _scaled(1, n)) for n in decades] if first <= last else []
     if last - first < 2:
         finer = [
             (n + math.log10(m), _scaled(m, n))
@@ -122,15 +125,6 @@ def log_ticks(low: float, high: float, most: int) -> list[tuple[float, str]]:
     values = ticks(10.0**low, 10.0**high, min(most, 5))
     texts = tick_texts(values)
     return [(math.log10(v), text) for v, text in zip(values, texts, strict=True) if v > 0]
-
-
-def _decades(low: int, high: int, most: int) -> list[int]:
-    """Exponents from `low` to `high`, 1 to `most` of them: all, or every second, third, fifth."""
-    step = 1
-    while high // step - -(-low // step) + 1 > max(most, 1):
-        power: int = 10 ** (len(str(step)) - 1)
-        step = next(power * m for m in (2, 3, 5, 10) if power * m > step)
-    return list(range(-(-low // step) * step, high + 1, step)) or [low]
 
 
 def number_text(value: float) -> str:

@@ -13,7 +13,7 @@ import hashlib
 import os
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 from coursebuild.core.files.errors import EffectError, reason
@@ -26,7 +26,7 @@ _CORE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH
 
 def tool_digest() -> str:
     """A hash over everything that the tool consists of, including Python and others' features."""
-    parts = _tool(), features_digest(), *package_versions(*feature_packages())
+    parts = _tool(), features_digest(), *package_versions(*feature_packages(), tuple(sys.path))
     return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()
 
 
@@ -41,21 +41,15 @@ def typesetter_digest() -> str:
     return _digest(str(assets_dir() / "temml"), os.path.join(_CORE, "run"))  # noqa: PTH118
 
 
+@functools.lru_cache(maxsize=8)
 def package_versions(
-    names: frozenset[str], modules: frozenset[str] = frozenset(), path: Sequence[str] = sys.path
+    names: frozenset[str], modules: frozenset[str], path: tuple[str, ...]
 ) -> tuple[str, ...]:
     """The names and versions of packages and of all that they need, from their `.dist-info`.
 
     Given are the names of some, and modules that others hold. Without a package of a name, as where
     the tool was never installed, all installed ones count.
     """
-    return _package_versions(names, modules, tuple(path))
-
-
-@functools.lru_cache(maxsize=8)
-def _package_versions(
-    names: frozenset[str], modules: frozenset[str], path: tuple[str, ...]
-) -> tuple[str, ...]:
     folders: dict[str, str] = {}  # by name of the package
     for folder in path:
         with contextlib.suppress(OSError):
@@ -74,10 +68,18 @@ def _package_versions(
     extras_by_name: dict[str, frozenset[str]] = {}
     while pending:
         name, extras = pending.pop()
-        if name not in extras_by_name or not extras <= extras_by_name[name]:
-            extras_by_name[name] = extras | extras_by_name.get(name, frozenset())
-            if name in folders:
-                pending += _requirements(folders[name], extras_by_name[name])
+        if name in extras_by_name and extras <= extras_by_name[name]:
+            continue
+        extras = extras_by_name[name] = extras | extras_by_name.get(name, frozenset())
+        # Markers of systems do not matter: what they exclude is not installed.
+        for line in _lines_of(f"{folders[name]}/METADATA") if name in folders else ():
+            if line == "\n":  # a description follows
+                break
+            if (match := _REQUIREMENT.match(line)) is not None:
+                for_extras = {_normalize(extra) for extra in _EXTRA.findall(match[3])}
+                if not for_extras or for_extras & extras:
+                    asked_extras = map(_normalize, re.findall(r"[\w.-]+", match[2] or ""))
+                    pending.append((_normalize(match[1]), frozenset(asked_extras)))
     # One that is missing may be installed next.
     places = (folders.get(name, name) for name in sorted(extras_by_name))
     return tuple(map(os.path.basename, places))
@@ -91,22 +93,6 @@ _REQUIREMENT = re.compile(r"Requires-Dist: *([\w.-]+) *(?:\[([^\]]*)\])?(.*)")
 _EXTRA = re.compile(r"""\bextra *== *["']([\w.-]+)["']""")
 
 
-def _requirements(folder: str, extras: frozenset[str]) -> Iterator[tuple[str, frozenset[str]]]:
-    """What a package needs with some of its extras, each with the extras asked of it.
-
-    Markers of systems do not matter: what they exclude is not installed.
-    """
-    for line in _lines_of(f"{folder}/METADATA"):
-        if line == "\n":  # a description follows
-            return
-        match = _REQUIREMENT.match(line)
-        if match is not None:
-            for_extras = {_normalize(extra) for extra in _EXTRA.findall(match[3])}
-            if not for_extras or for_extras & extras:
-                extra_names = re.findall(r"[\w.-]+", match[2] or "")
-                yield _normalize(match[1]), frozenset(map(_normalize, extra_names))
-
-
 def _lines_of(path: str) -> Iterator[str]:
     with (
         contextlib.suppress(OSError),
@@ -116,7 +102,8 @@ def _lines_of(path: str) -> Iterator[str]:
 
 
 def _digest(*folders: str) -> str:
-    versions = (sys.version, *package_versions(frozenset({"coursebuild"})), "")
+    own_packages = package_versions(frozenset({"coursebuild"}), frozenset(), tuple(sys.path))
+    versions = (sys.version, *own_packages, "")
     lines = (line for folder in folders for line in _lines(folder, ""))
     text = "\0".join(versions) + "".join(lines)
     return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()

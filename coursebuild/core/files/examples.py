@@ -81,7 +81,17 @@ def write_examples(root: Path, scripts: Mapping[str, bytes]) -> ExamplesReport:
         resolve_inside(root, FOLDER)
     except OutsideProjectError:
         raise OutsideProjectError(f"{FOLDER}/ is a link that leads out of the project") from None
-    hashes_by_path = _load_manifest(root)
+    hashes_by_path: dict[str, tuple[str, ...]] = {}  # those that each extracted file may have
+    try:
+        hashes_by_path = msgspec.json.decode(read_regular(root / MANIFEST), type=_Manifest).files
+    except OSError as error:
+        # An empty manifest would make all files look edited, now and later.
+        if errors.lacking(error):
+            raise
+    except ValueError:
+        pass  # it is damaged
+    if not all(p.startswith(f"{FOLDER}/") and ".." not in p.split("/") for p in hashes_by_path):
+        hashes_by_path = {}
     if not scripts and not hashes_by_path:
         return ExamplesReport((), (), (), ())
     try:
@@ -131,7 +141,15 @@ class _Update:
                     self.written.remove(path)
                     self._block(path, Obstacle.EDITED, now)
         for path in list(self.removed):
-            self._remove(path)
+            full = self.root / path
+            if full.read_bytes() != self.current[path]:
+                self.removed.remove(path)
+                self._block(path, Obstacle.ORPHAN, full.read_bytes())
+                continue
+            full.unlink()
+            with contextlib.suppress(OSError):  # the folder holds something else
+                for folder in full.relative_to(self.root).parents[:-2]:
+                    (self.root / folder).rmdir()
         _save_manifest(self.root, self.manifest)
         blocked = tuple(sorted(self.blocked, key=lambda b: b.path))
         return ExamplesReport(
@@ -174,17 +192,6 @@ class _Update:
         except (FileNotFoundError, NotADirectoryError):
             return None, None
 
-    def _remove(self, path: str) -> None:
-        full = self.root / path
-        if full.read_bytes() != self.current[path]:
-            self.removed.remove(path)
-            self._block(path, Obstacle.ORPHAN, full.read_bytes())
-            return
-        full.unlink()
-        with contextlib.suppress(OSError):  # the folder holds something else
-            for folder in full.relative_to(self.root).parents[:-2]:
-                (self.root / folder).rmdir()
-
     def _block(self, path: str, obstacle: Obstacle, current: bytes | None) -> None:
         if path in self.known_hashes:
             self.manifest[path] = self.known_hashes[path]
@@ -226,21 +233,6 @@ def _hash(data: bytes) -> str:
 class _Manifest(Struct, frozen=True):
     version: int
     files: dict[str, tuple[str, ...]]
-
-
-def _load_manifest(root: Path) -> dict[str, tuple[str, ...]]:
-    """The hashes that each extracted file may have; empty if the manifest is missing or damaged."""
-    try:
-        files = msgspec.json.decode(read_regular(root / MANIFEST), type=_Manifest).files
-    except OSError as error:
-        # An empty manifest would make all files look edited, now and later.
-        if errors.lacking(error):
-            raise
-        return {}
-    except ValueError:
-        return {}
-    is_ours = all(p.startswith(f"{FOLDER}/") and ".." not in p.split("/") for p in files)
-    return files if is_ours else {}
 
 
 def _save_manifest(root: Path, manifest: Mapping[str, tuple[str, ...]]) -> None:

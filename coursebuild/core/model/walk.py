@@ -241,40 +241,35 @@ def without_prose(document: Document) -> Document:
     recorded_ids: set[int] = set()
     blocks: list[Block] = []
     for block in document_blocks(document):
-        if isinstance(block, Recording):
-            recorded_ids.add(id(block.body))
-        if id(block) not in recorded_ids:  # a recorded table comes with its recording
-            blocks += _summarize_block(block)
+        if id(block) in recorded_ids:  # a recorded table comes with its recording
+            continue
+        match block:
+            case Paragraph() if block.figure:
+                blocks.append(replace(block, children=_summary_inlines(block)))
+            case Paragraph() | HtmlFlow() | Table():
+                blocks += _paragraph_of(block.span, _summary_inlines(block))
+            case Heading():
+                blocks.append(replace(block, children=_summary_inlines(block)))
+            case Script() | Mjcf() | HtmlBlock():
+                blocks.append(block)
+            case Recording():
+                recorded_ids.add(id(block.body))
+                blocks.append(replace(block, caption=_summary_inlines(block)))
+            case FeatureBlock():
+                bare = block.summary()
+                blocks += [] if bare is None else [bare]
+                blocks += _paragraph_of(block.span, _summary_inlines(block))
+            case Callout():
+                blocks.append(replace(block, title=_summary_inlines(block), blocks=()))
+            case PlainCode():
+                blocks += [] if block.source is None else [block]
+            case BlockQuote() | ListBlock() | CodeBlock() | ThematicBreak() | MathBlock():
+                pass
+            case _:
+                assert_never(block)
     if is_blank(blocks) and not is_blank(document_blocks(document)):
         blocks.append(ThematicBreak(document.blocks[0].span))
     return Document(document.source, tuple(blocks), (), document.title_anchor, document.unclaimed)
-
-
-def _summarize_block(block: Block) -> Iterator[Block]:
-    match block:
-        case Paragraph() if block.figure:
-            yield replace(block, children=_summary_inlines(block))
-        case Paragraph() | HtmlFlow() | Table():
-            yield from _paragraph_of(block.span, _summary_inlines(block))
-        case Heading():
-            yield replace(block, children=_summary_inlines(block))
-        case Script() | Mjcf() | HtmlBlock():
-            yield block
-        case Recording():
-            yield replace(block, caption=_summary_inlines(block))
-        case FeatureBlock():
-            bare = block.summary()
-            if bare is not None:
-                yield bare
-            yield from _paragraph_of(block.span, _summary_inlines(block))
-        case Callout():
-            yield replace(block, title=_summary_inlines(block), blocks=())
-        case PlainCode() if block.source is not None:
-            yield block
-        case BlockQuote() | ListBlock() | CodeBlock() | PlainCode() | ThematicBreak() | MathBlock():
-            pass
-        case _:
-            assert_never(block)
 
 
 def _paragraph_of(span: Span, inlines: tuple[Inline, ...]) -> Iterator[Paragraph]:

@@ -9,7 +9,7 @@ from msgspec import Struct
 
 from coursebuild.core import model
 from coursebuild.core.model import Document, Lesson, Level, Owner, document_scripts
-from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import (
     DocumentInputs,
@@ -48,6 +48,15 @@ def document_inputs(
         elif isinstance(block, model.FeatureBlock):
             for script, line in block.quoted_lines():
                 lines_by_script.setdefault(script, set()).add(line)
+    runs: dict[str, ShownRun] = {}
+    for script, numbers in lines_by_script.items():
+        if (run := library.runs.get(script)) is not None:
+            lines = run.stdout.split("\n")
+            quotes = tuple(
+                (n, visible(lines[n - 1].rstrip()) if 1 <= n <= len(lines) else None)
+                for n in (sorted(numbers) if run.outcome is Outcome.OK else ())
+            )
+            runs[script] = ShownRun(run.outcome, run.missing, quotes, run.recorded, run.unrepeated)
     names = {target: name_elsewhere(library, path, target) for target in targets}
     verdicts = ((block.span.start, library.verdict(block)) for block in recordings)
     trials = ((block.span.start, library.trial_value(block)) for block in feature_blocks)
@@ -59,11 +68,7 @@ def document_inputs(
         names={target: name for target, name in names.items() if name},
         number_prefix=number_prefix,
         callouts={b.kind: library.callout(b.kind) for b in blocks if isinstance(b, model.Callout)},
-        runs={
-            script: _shown_run(library.runs[script], lines)
-            for script, lines in lines_by_script.items()
-            if script in library.runs
-        },
+        runs=runs,
         verdicts={start: ShownVerdict(v.status, v.comparison) for start, v in verdicts if v},
         trials={start: value for start, value in trials if value is not None},
         blocks={b.span.start: make(library, place, b) for b, make in values if make is not None},
@@ -72,15 +77,6 @@ def document_inputs(
         keyframes={n: library.facts[n].keyframes for n in models if n in library.facts},
         address=urls.absolute(library.course.base_url, place.path),
     )
-
-
-def _shown_run(run: ScriptRun, numbers: set[int]) -> ShownRun:
-    lines = run.stdout.split("\n")
-    quoted_lines = (
-        (n, visible(lines[n - 1].rstrip()) if 1 <= n <= len(lines) else None)
-        for n in (sorted(numbers) if run.outcome is Outcome.OK else ())
-    )
-    return ShownRun(run.outcome, run.missing, tuple(quoted_lines), run.recorded, run.unrepeated)
 
 
 def address(library: Library, place: urls.Place, path: str, target: model.Target) -> str:

@@ -162,6 +162,11 @@ class PageFrame(Struct, frozen=True):
         place = place_of(inputs.base_url, head.path)
         looks = ("figure-light", "figure-dark") if names.logo and names.logo_dark else ("", "")
         logos = zip((names.logo, names.logo_dark), looks, strict=True)
+        known_parts, part_names = parts_by_mark(), dict[str, str]()
+        for mark, path in names.scripts:  # one that is loaded late has a name
+            if mark in parts:
+                part = known_parts[mark]
+                part_names[place.href(path)] = part.bundled.removesuffix(".js") if part.late else ""
         is_missing = head.path == urls.NOT_FOUND
         canonical = "" if is_missing else urls.absolute(inputs.base_url, head.path)
         html = renderer.render(
@@ -187,7 +192,7 @@ class PageFrame(Struct, frozen=True):
             style=place.href(names.style),
             theme_script=place.href(names.theme_script),
             script=place.href(names.script),
-            part_scripts=_part_scripts(place, names, parts),
+            part_scripts=tuple((name, href) for href, name in part_names.items()),
             manifest=place.href(urls.MANIFEST),
             touch_icon=place.href(names.touch_icon) if names.touch_icon else "",
             logos=tuple((place.href(path), look) for path, look in logos if path),
@@ -199,18 +204,6 @@ class PageFrame(Struct, frozen=True):
             page_words=script_words(renderer.words.texts, parts),
         )
         return f"{visible(html)}\n"
-
-
-def _part_scripts(
-    place: urls.Place, names: Names, parts: tuple[str, ...]
-) -> tuple[tuple[str, str], ...]:
-    """The addresses of the scripts of parts, each after its name if it is loaded late."""
-    known_parts, name_by_href = parts_by_mark(), dict[str, str]()
-    for mark, path in names.scripts:
-        if mark in parts:
-            part = known_parts[mark]
-            name_by_href[place.href(path)] = part.bundled.removesuffix(".js") if part.late else ""
-    return tuple((name, href) for href, name in name_by_href.items())
 
 
 def script_words(keys: Collection[str], parts: Iterable[str]) -> tuple[str, ...]:

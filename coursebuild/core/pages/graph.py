@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import functools
 from bisect import bisect_right, insort
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from graphlib import TopologicalSorter
 from itertools import pairwise
 from typing import TypeAlias
@@ -140,19 +140,7 @@ def _drawing(graph: LessonGraph, layout: Layout, words: Strings, look: _Look) ->
     parts = [
         f'<svg class="graph-{name}" width="{width:.0f}" height="{height:.0f}" role="group"'
         f' aria-label="{escape(words("graph.label"))}">',
-        *_edges(layout, look, unit),
     ]
-    for node, placed_node in zip(graph.nodes, layout.nodes, strict=True):
-        x, top = _x(placed_node.x, unit, look), _EDGE + placed_node.layer * look.step
-        parts.append(_node(node, x, top, wide, words, look))
-    return Markup("".join((*parts, "</svg>")))
-
-
-def _x(place: float, unit: float, look: _Look) -> float:
-    return place * unit - look.gap / 2 + _EDGE
-
-
-def _edges(layout: Layout, look: _Look, unit: float) -> Iterator[str]:
     lines, heads = [], []
     for edge in layout.edges:
         xs = [_x(x, unit, look) for x in edge.xs]
@@ -167,15 +155,29 @@ def _edges(layout: Layout, look: _Look, unit: float) -> Iterator[str]:
         lines.append("".join(path))
         heads.append(f"M{xs[-1] - 4:.1f} {top - 7:.1f}l4 7 4-7z")
     if lines:
-        yield f'<path class="edges" d="{"".join(lines)}"/>'
-        yield f'<path class="heads" d="{"".join(heads)}"/>'
+        parts.append(f'<path class="edges" d="{"".join(lines)}"/>')
+        parts.append(f'<path class="heads" d="{"".join(heads)}"/>')
+    for node, placed_node in zip(graph.nodes, layout.nodes, strict=True):
+        x, top = _x(placed_node.x, unit, look), _EDGE + placed_node.layer * look.step
+        parts.append(_node(node, x, top, wide, words, look))
+    return Markup("".join((*parts, "</svg>")))
+
+
+def _x(place: float, unit: float, look: _Look) -> float:
+    return place * unit - look.gap / 2 + _EDGE
 
 
 def _node(node: GraphNode, x: float, top: float, width: float, words: Strings, look: _Look) -> str:
     """A node, its middle at `x`, with its status as a full or half disc, or a ring."""
     kinds = f"node node-{node.status}" + (" node-outside" if node.outside else "")
     left, middle = x - width / 2, top + look.height / 2
-    texts = _lines(node.title, width - 12) if look.titles else []
+    texts: list[str] = []
+    if look.titles:
+        room, line, title_words = width - 12, "", node.title.split()
+        while title_words and text_width(f"{line} {title_words[0]}".strip(), _SIZE) <= room:
+            line = f"{line} {title_words.pop(0)}".strip()
+        lines = (line, shorten_to_width(" ".join(title_words), room, _SIZE))
+        texts = [text for text in lines if text]
     first = middle + 4.3 - len(texts) * _LINE / 2
     id_x, mark_x, mark_y = x, left + 10, top + 10
     if not look.titles:  # the mark is on the line of the number
@@ -205,17 +207,6 @@ def _node(node: GraphNode, x: float, top: float, width: float, words: Strings, l
         status = words(f"status.{node.status}")
         name = f' aria-label="{markup_text(f"{node.id} {node.title} ({status})")}"'
     return f'<a class="{kinds}" href="{escape(node.href)}"{name}>{content}</a>'
-
-
-def _lines(title: str, room: float) -> list[str]:
-    words = title.split()
-    first = ""
-    while words and text_width(f"{first} {words[0]}".strip(), _SIZE) <= room:
-        first = f"{first} {words.pop(0)}".strip()
-    if not first:
-        return [shorten_to_width(title, room, _SIZE)]
-    rest = " ".join(words)
-    return [first, shorten_to_width(rest, room, _SIZE)] if rest else [first]
 
 
 # --- layout
@@ -277,7 +268,17 @@ def layered_layout(count: int, edges: tuple[tuple[int, int], ...], passing: floa
 
     `passing` is the room, in widths of a node, for an edge that crosses a layer.
     """
-    layers = _assign_layers(count, edges)
+    predecessors: dict[int, list[int]] = {node: [] for node in range(count)}
+    successors: dict[int, list[int]] = {node: [] for node in range(count)}
+    for a, b in edges:
+        predecessors[b].append(a)
+        successors[a].append(b)
+    layers = [0] * count
+    for node in TopologicalSorter(predecessors).static_order():
+        layers[node] = max((layers[b] + 1 for b in predecessors[node]), default=0)
+    for node in range(count):
+        if not predecessors[node] and successors[node]:
+            layers[node] = min(layers[successor] for successor in successors[node]) - 1
     rows: list[list[_Point]] = [[] for _ in range(max(layers, default=-1) + 1)]
     for node, layer in enumerate(layers):
         rows[layer].append(node)
@@ -304,21 +305,6 @@ def layered_layout(count: int, edges: tuple[tuple[int, int], ...], passing: floa
         right - left,
         len(rows),
     )
-
-
-def _assign_layers(count: int, edges: Iterable[tuple[int, int]]) -> list[int]:
-    predecessors: dict[int, list[int]] = {node: [] for node in range(count)}
-    successors: dict[int, list[int]] = {node: [] for node in range(count)}
-    for a, b in edges:
-        predecessors[b].append(a)
-        successors[a].append(b)
-    layers = [0] * count
-    for node in TopologicalSorter(predecessors).static_order():
-        layers[node] = max((layers[b] + 1 for b in predecessors[node]), default=0)
-    for node in range(count):
-        if not predecessors[node] and successors[node]:
-            layers[node] = min(layers[successor] for successor in successors[node]) - 1
-    return layers
 
 
 def _neighbours(

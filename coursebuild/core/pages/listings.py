@@ -17,8 +17,7 @@ import re
 import warnings
 from collections.abc import Iterable, Iterator
 from html import escape
-from itertools import chain, pairwise
-from typing import TypeAlias
+from itertools import pairwise
 
 import tree_sitter_python
 from markupsafe import Markup
@@ -78,8 +77,6 @@ def _python() -> tuple[Parser, Query]:
     return Parser(language), Query(language, _QUERY.replace("KEYWORDS", keywords))
 
 
-Run: TypeAlias = tuple[str, str]
-
 _CLASSES: tuple[tuple[_TokenType, str], ...] = (
     (Comment, "c"),
     (String.Doc, "d"),
@@ -112,13 +109,26 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
     # Lexers drop a byte order mark at the start.
     mark = "\ufeff" if text.startswith("\ufeff") else ""
     text, language = text.removeprefix(mark), language.lower()
-    runs: Iterable[Run] = [("", text)]
+    runs: Iterable[tuple[str, str]] = [("", text)]
     if language in _PYTHON and len(text) <= _MAX_FOR_TREE_SITTER:
         runs = python_runs(text)
     elif (lexer := _lexer(_ALIASES.get(language, language))) is not None:
-        runs = _lex(lexer, text)
+        for end in ("", "\n"):  # lexers of sessions need a line end
+            tokens = [(_class_of(token), part) for token, part in lexer.get_tokens(text + end)]
+            if "".join(part for _, part in tokens) == text + end:  # else nothing is marked
+                if end:
+                    css, part = tokens.pop()
+                    tokens.append((css, part.removesuffix(end)))
+                runs = tokens
+                break
+    groups = [["", mark]]
+    for css, run in runs:  # neighbours of the same class, with the space between them on a line
+        if css == groups[-1][0] or not run or (run.isspace() and "\n" not in run):
+            groups[-1][1] += run
+        else:
+            groups.append([css, run])
     parts: list[str] = []
-    for css, run in _merge(chain([("", mark)], runs)):
+    for css, run in groups:
         html = escape(run, quote=False)
         if css:  # an element for each line, without the white space around it
             element = f'<span class="{css}">'
@@ -135,36 +145,9 @@ def _lexer(language: str) -> Lexer | None:
         return None
 
 
-def _lex(lexer: Lexer, code: str) -> list[Run]:
-    """The runs of a text. If the lexer leaves anything out, nothing is marked."""
-    # Lexers of sessions need a line end.
-    for end in ("", "\n"):
-        runs = [(_class_of(token), text) for token, text in lexer.get_tokens(code + end)]
-        if "".join(text for _, text in runs) == code + end:
-            break
-    else:
-        return [("", code)]
-    if end:
-        css, text = runs.pop()
-        runs.append((css, text.removesuffix(end)))
-    return runs
-
-
 @functools.cache
 def _class_of(token: _TokenType) -> str:
     return next((css for kind, css in _CLASSES if token in kind), "")
-
-
-def _merge(runs: Iterator[Run]) -> Iterator[Run]:
-    """Merge neighbours of the same class, with the space between them on a line."""
-    css, run = "", ""
-    for kind, text in runs:
-        if kind == css or not text or (text.isspace() and "\n" not in text):
-            run += text
-        else:
-            yield css, run
-            css, run = kind, text
-    yield css, run
 
 
 LONG = 48
@@ -250,7 +233,15 @@ def _fold_long(body: list[ast.stmt], lines: list[str]) -> tuple[Part, ...]:
     for number in range(len(starts)):  # comments above a statement belong to it
         while cuts[number] > 1 and lines[cuts[number] - 2].startswith("#"):
             cuts[number] -= 1
-    head = _head_length(body)
+    # The head has the docstring, imports, and constants before a definition.
+    head = int(_is_docstring(body[0]))
+    while head < len(body) and isinstance(body[head], ast.Import | ast.ImportFrom):
+        head += 1
+    first = head
+    while first < len(body) and isinstance(body[first], ast.Assign | ast.AnnAssign):
+        first += 1
+    if first < len(body) and isinstance(body[first], _DEFINITIONS):
+        head = first
     if head == len(body) or cuts[head] - 1 < HEAD:
         return _fold_rest(body, [1, *cuts[1:]], lines)
     return (
@@ -297,18 +288,6 @@ def _folded_part(first: int, last: int, body: list[ast.stmt]) -> Part:
         elif isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
             names.append(statement.target.id)
     return Part(first, last, True, docstring, imports, tuple(names))
-
-
-def _head_length(body: list[ast.stmt]) -> int:
-    """How many statements the head has: docstring, imports, and constants before a definition."""
-    count = int(_is_docstring(body[0]))
-    while count < len(body) and isinstance(body[count], ast.Import | ast.ImportFrom):
-        count += 1
-    first = count
-    while first < len(body) and isinstance(body[first], ast.Assign | ast.AnnAssign):
-        first += 1
-    defines = first < len(body) and isinstance(body[first], _DEFINITIONS)
-    return first if defines else count
 
 
 def _is_docstring(statement: ast.stmt) -> bool:

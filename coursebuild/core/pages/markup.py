@@ -143,15 +143,12 @@ class HtmlWriter:
         return "".join(map(self._block, blocks))
 
     def _inlines(self, inlines: Iterable[model.Inline]) -> str:
+        """Inlines; in prose with formulas and bound numbers joined to their units."""
         if not self.direction:
             return "".join(map(self._inline, inlines))
-        return "".join(self._with_units(tuple(inlines)))
-
-    def _with_units(self, inlines: tuple[model.Inline, ...]) -> list[str]:
-        """Inlines, with formulas and bound numbers joined to their units."""
-        parts: list[str] = []
+        row, parts = tuple(inlines), list[str]()
         unit_end = 0
-        for inline, after in zip_longest(inlines, inlines[1:]):
+        for inline, after in zip_longest(row, row[1:]):
             if isinstance(inline, model.Text):
                 parts.append(self._text(inline.text[unit_end:]))
                 unit_end = 0
@@ -169,7 +166,7 @@ class HtmlWriter:
                 if self.direction == "rtl":
                     html = isolate_ltr(Markup(html))
             parts.append(html)
-        return parts
+        return "".join(parts)
 
     def _text(self, text: str) -> str:
         """Text with quantities joined to their units, and isolated in text from the right."""
@@ -189,7 +186,9 @@ class HtmlWriter:
         """A block, with its line end unless it is a paragraph of a tight list."""
         match block:
             case model.Paragraph() if block.figure:
-                return self._figure(block)
+                image = next(part for part in block.children if isinstance(part, model.Image))
+                caption = self._inlines(part for part in block.children if part is not image)
+                return self.figure(block, image, Markup(caption.removeprefix("Figure:").strip()))
             case model.Paragraph():
                 inner = self._inlines(block.children)
                 return inner if block.tight else f"<p>{inner}</p>\n"
@@ -220,12 +219,6 @@ class HtmlWriter:
             case _:
                 assert_never(block)
 
-    def _figure(self, paragraph: model.Paragraph) -> str:
-        """An image with the rest of its paragraph as its caption."""
-        image = next(inline for inline in paragraph.children if isinstance(inline, model.Image))
-        words = self._inlines(inline for inline in paragraph.children if inline is not image)
-        return self.figure(paragraph, image, Markup(words.removeprefix("Figure:").strip()))
-
     def _heading(self, heading: model.Heading) -> str:
         inner, name = self._inlines(heading.children), f"h{heading.level}"
         anchor = escape(heading.anchor)
@@ -245,7 +238,9 @@ class HtmlWriter:
         """An item; a tight paragraph follows on the same line."""
         parts = ["<li>"]
         if item.checked is not None:
-            parts.append(self._box(item.checked))
+            label = escape(self.words("markup.done" if item.checked else "markup.not_done"))
+            state = " checked" if item.checked else ""
+            parts.append(f'<input type="checkbox" disabled{state} aria-label="{label}"> ')
         line_end = False
         for block in item.blocks:
             if not (line_end or (is_tight(block) and len(parts) == 1 + (item.checked is not None))):
@@ -253,11 +248,6 @@ class HtmlWriter:
             parts.append(self._block(block))
             line_end = not is_tight(block)
         return "".join([*parts, "</li>\n"])
-
-    def _box(self, is_done: bool) -> str:
-        label = escape(self.words("markup.done" if is_done else "markup.not_done"))
-        state = " checked" if is_done else ""
-        return f'<input type="checkbox" disabled{state} aria-label="{label}"> '
 
     def _table(self, table: model.Table) -> str:
         """A table, below its caption; its columns are aligned by class."""

@@ -23,7 +23,6 @@ from coursebuild.core.model import (
     find_blocks,
     listing_anchor,
 )
-from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import AddedParts, HighlightedFile, PageHead, PageInputs
 from coursebuild.core.pages.document_inputs import (
@@ -261,13 +260,30 @@ def gallery_inputs(library: Library) -> PageInputs:
 
 def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
     """The inputs of the page of a model: description, facts, uses, text."""
-    place = urls.Place(urls.model_page_path(model.name))
-    title = library.words("model.title", name=model.name)
+    place, words = urls.Place(urls.model_page_path(model.name)), library.words
+    title = words("model.title", name=model.name)
     facts = library.facts.get(model.name)
     parts = {} if facts is None else model_parts()
-    further_facts = [fact for part in parts.values() for fact in part.facts(library, model)]
+    rows: list[tuple[str, str]] = []
+    if facts is not None:
+        unnamed = words("model.unnamed")
+        rows = [
+            (words("model.bodies"), str(facts.bodies)),
+            (words("model.geoms"), str(facts.geoms)),
+            (words("model.joints"), str(facts.joints)),
+            (words("model.coordinates"), str(facts.nq)),
+            (words("model.freedom"), str(facts.nv)),
+            (words("model.actuators"), str(facts.nu)),
+            (words("model.mass"), f"{number(facts.total_mass)} kg"),
+            (words("model.timestep"), f"{number(facts.timestep)} s"),
+            (words("model.integrator"), facts.integrator),
+            (words("model.keyframes"), words.join(name or unnamed for name in facts.keyframes)),
+            (words("model.sites"), words.join(name or unnamed for name in facts.sites)),
+            (words("model.includes"), words.join(facts.includes)),
+        ]
+    further_rows = [row for part in parts.values() for row in part.facts(library, model)]
     values_by_part = {name: part.values(library, place, model) for name, part in parts.items()}
-    words, uses = library.words, []
+    uses = []
     for use in library.uses[model.name]:
         text = use.owner.title
         if isinstance(use.owner, Lesson):
@@ -283,7 +299,7 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
         "anchor": listing_anchor(model.source.path),
         "title": title,
         "href": place.href(urls.model_file_path(model.name)),
-        "facts": () if facts is None else (*_facts(library, facts), *further_facts),
+        "facts": (*((label, value) for label, value in rows if value), *further_rows),
         "code": HighlightedFile("xml", model.source.text.rstrip(), model.source.path),
         "about": model.description,
         "opening": _added_parts(parts, values_by_part, opens=True),
@@ -298,26 +314,6 @@ def _added_parts(
 ) -> AddedParts:
     pairs = ((name, values[name]) for name, part in parts.items() if part.opens is opens)
     return AddedParts({name: value for name, value in pairs if value is not None})
-
-
-def _facts(library: Library, facts: ModelFacts) -> tuple[tuple[str, str], ...]:
-    words = library.words
-    unnamed = words("model.unnamed")
-    rows = (
-        (words("model.bodies"), str(facts.bodies)),
-        (words("model.geoms"), str(facts.geoms)),
-        (words("model.joints"), str(facts.joints)),
-        (words("model.coordinates"), str(facts.nq)),
-        (words("model.freedom"), str(facts.nv)),
-        (words("model.actuators"), str(facts.nu)),
-        (words("model.mass"), f"{number(facts.total_mass)} kg"),
-        (words("model.timestep"), f"{number(facts.timestep)} s"),
-        (words("model.integrator"), facts.integrator),
-        (words("model.keyframes"), words.join(name or unnamed for name in facts.keyframes)),
-        (words("model.sites"), words.join(name or unnamed for name in facts.sites)),
-        (words("model.includes"), words.join(facts.includes)),
-    )
-    return tuple((label, value) for label, value in rows if value)
 
 
 def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:

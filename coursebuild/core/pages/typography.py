@@ -98,10 +98,17 @@ def _length(mathml: str) -> int:
 def _pieces(row: str) -> list[str]:
     """The inside of a row, split after relations and binary operators outside brackets."""
     pieces: list[str] = []
-    start = depth = 0
+    start = end = inner = depth = 0
     bars = False
     operand = False
-    for end, element in _elements(row):
+    for tag in _TAG.finditer(row):
+        if tag[0].startswith("</"):
+            inner -= 1
+        elif not tag[0].endswith("/>"):
+            inner += 1
+        if inner:
+            continue
+        element, end = row[end : tag.end()], tag.end()  # the next of the outermost elements
         sign = unescape(_TAG.sub("", element)).strip() if element.startswith("<mo") else ""
         if sign in _OPEN and sign:
             depth += 1
@@ -115,19 +122,6 @@ def _pieces(row: str) -> list[str]:
             start = end
         operand = not (sign in _RELATIONS or sign in _BINARY or sign in _OPEN) or not sign
     return [*pieces, row[start:]]
-
-
-def _elements(row: str) -> Iterator[tuple[int, str]]:
-    """The outermost elements in a row, each with the offset of its end."""
-    start = depth = 0
-    for tag in _TAG.finditer(row):
-        if tag[0].startswith("</"):
-            depth -= 1
-        elif not tag[0].endswith("/>"):
-            depth += 1
-        if depth == 0:
-            yield tag.end(), row[start : tag.end()]
-            start = tag.end()
 
 
 def wrap_wide_pieces(html: str, label: str) -> str:

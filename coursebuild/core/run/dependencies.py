@@ -226,35 +226,30 @@ def state_changes(
 ) -> Iterator[str]:
     """The dependencies whose state has changed, each as a clause; none where a result holds."""
     for dependency in dependencies:
-        now = state(dependency.need)
-        # A device may give something else each time.
-        if now != dependency.state or now == SPECIAL:
-            yield _change(dependency, now)
-
-
-def _change(old: Dependency, now: str) -> str:
-    match old.kind:
-        case Kind.FILE | Kind.OUTSIDE:
-            return f"{old.name} {_became(old.state, now)}"
-        case Kind.LISTING:
-            if ABSENT in (old.state, now):
-                return f"the folder {old.name} {_became(old.state, now)}"
-            return f"the list of files in {old.name} changed"
-        case Kind.SOUGHT:
-            folder = parse_sought(old.name)[0]
-            return f"{folder} has now a file with the name of a module: {now}"
-        case Kind.MODULE:
-            if not now:
-                return f"{old.name} is no longer installed (it was {old.state})"
-            if not old.state:
-                return f"{old.name} is installed now: {now}"
-            if now.startswith("files "):
-                return f"the files of the module {old.name} changed"
-            return f"{old.state} → {now}"
-        case Kind.PLACE:
-            return f"it printed a path of this machine: {old.state} → {now}"
-        case _:
-            assert_never(old.kind)
+        name, before, now = dependency.name, dependency.state, state(dependency.need)
+        if now == before and now != SPECIAL:  # a device may give something else each time
+            continue
+        match dependency.kind:
+            case Kind.FILE | Kind.OUTSIDE:
+                yield f"{name} {_became(before, now)}"
+            case Kind.LISTING if ABSENT in (before, now):
+                yield f"the folder {name} {_became(before, now)}"
+            case Kind.LISTING:
+                yield f"the list of files in {name} changed"
+            case Kind.SOUGHT:
+                yield f"{parse_sought(name)[0]} has now a file with the name of a module: {now}"
+            case Kind.MODULE if not now:
+                yield f"{name} is no longer installed (it was {before})"
+            case Kind.MODULE if not before:
+                yield f"{name} is installed now: {now}"
+            case Kind.MODULE if now.startswith("files "):
+                yield f"the files of the module {name} changed"
+            case Kind.MODULE:
+                yield f"{before} → {now}"
+            case Kind.PLACE:
+                yield f"it printed a path of this machine: {before} → {now}"
+            case _:
+                assert_never(dependency.kind)
 
 
 def _became(old: str, now: str) -> str:

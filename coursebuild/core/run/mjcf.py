@@ -129,7 +129,13 @@ class _Compiler(JsonChild):
         for name, content in texts.items():
             if file := _outer_file(self.root, name, content):
                 # Its content, or that it exists, is nothing for those who wrote the course.
-                return CompileResult(f"'{file}' leads out of the course", _line_of(file, text))
+                lines = (
+                    tag.line
+                    for tag in read_tags(text)
+                    for _, _, value, _ in tag.attributes
+                    if value and Path(value).name == Path(file).name
+                )
+                return CompileResult(f"'{file}' leads out of the course", next(lines, None))
         files = {f for name in texts for f in model_files(self.root, name, texts[name])}
         for file in sorted(files):
             if file_state(str(self.root / file)) == SPECIAL:  # to read it may take for ever
@@ -239,14 +245,6 @@ def _outer_file(root: Path, path: str, text: str) -> str:
             is_relative = sought_path.startswith(f"{root}/")
             return os.path.relpath(sought_path, root) if is_relative else sought_path
     return ""
-
-
-def _line_of(file: str, text: str) -> int | None:
-    """The line of a text on which an element names a file, from 1; `None` if none does."""
-    for tag in read_tags(text):
-        if any(Path(value).name == Path(file).name for _, _, value, _ in tag.attributes if value):
-            return tag.line
-    return None
 
 
 def existing_files(root: Path, path: str, text: str) -> tuple[str, ...]:

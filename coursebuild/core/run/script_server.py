@@ -247,10 +247,28 @@ class _Work:
         return None
 
     def give(self, worker: Worker, index: int) -> None:
+        job = self.jobs[index]
         if index not in self.announced_jobs:
             self.announced_jobs.add(index)
-            self.on_start(self.jobs[index].path)
-        worker.give(index, self._message(self.jobs[index]))
+            self.on_start(job.path)
+        request: Job = {
+            "root": str(self.root),
+            "path": job.path,
+            "args": list(job.args),
+            "timeout": job.timeout,
+            "requires": list(job.requires),
+            "packages": list(self.packages),
+            "environment": self.environment,
+            "scratch": self.scratch,
+            "library": self.library,
+            "folders": [f"{self.root}/{folder}" for folder in job.packages],
+            "writes": [f"{self.root}/{folder}" for folder in job.writes],
+            "copies": self.copies,
+            "figures": list(job.figures),
+            "perturbation": job.perturbation,
+            "memory": job.memory,
+        }
+        worker.give(index, json.dumps(request).encode())
 
     def read_report(self, worker: Worker) -> bool:
         """Read from a supervisor, and finish its job; `False` when the supervisor has ended."""
@@ -317,26 +335,6 @@ class _Work:
         self._finish(index, run)
         if self.sandbox is None and (next_index := self.take_job()) is not None:
             self.give(worker, next_index)
-
-    def _message(self, job: ScriptJob) -> bytes:
-        request: Job = {
-            "root": str(self.root),
-            "path": job.path,
-            "args": list(job.args),
-            "timeout": job.timeout,
-            "requires": list(job.requires),
-            "packages": list(self.packages),
-            "environment": self.environment,
-            "scratch": self.scratch,
-            "library": self.library,
-            "folders": [f"{self.root}/{folder}" for folder in job.packages],
-            "writes": [f"{self.root}/{folder}" for folder in job.writes],
-            "copies": self.copies,
-            "figures": list(job.figures),
-            "perturbation": job.perturbation,
-            "memory": job.memory,
-        }
-        return json.dumps(request).encode()
 
     def _finish(self, index: int, run: ScriptRun) -> None:
         self.runs[index] = run

@@ -100,7 +100,18 @@ def align(recorded: Side, printed: Side, matcher: LineMatcher) -> tuple[Step, ..
     i = j = 0
     for literal_index, printed_index in (*pairs, (len(literal), len(printed.lines))):
         stop = literal[literal_index] if literal_index < len(literal) else len(recorded.lines)
-        steps += _gap_steps(i, stop, j, printed_index, recorded, matcher)
+        elides = [matcher.elides_lines(line) for line in recorded.lines[i:stop]]
+        if any(elides):
+            for k, is_ellipsis in enumerate(elides, start=i):
+                steps.append(Step(StepKind.ELLIPSIS if is_ellipsis else StepKind.MISSING, k, j))
+                if is_ellipsis:
+                    steps += (Step(StepKind.ELIDED, k + 1, n) for n in range(j, printed_index))
+                    j = printed_index
+        else:
+            count = min(stop - i, printed_index - j)
+            steps += (Step(StepKind.DIFFERS, i + k, j + k) for k in range(count))
+            steps += (Step(StepKind.MISSING, k, printed_index) for k in range(i + count, stop))
+            steps += (Step(StepKind.EXTRA, stop, k) for k in range(j + count, printed_index))
         if stop < len(recorded.lines):
             is_match = matcher.matches(recorded.lines[stop], printed.lines[printed_index])
             steps.append(Step(StepKind.SAME if is_match else StepKind.DIFFERS, stop, printed_index))
@@ -130,26 +141,6 @@ def _line_pairs(
         return 1 + 3 * (2 * shared - most) // most if shared and 2 * shared >= most else 0
 
     return pair(lines, texts, weight, is_free)
-
-
-def _gap_steps(
-    i: int, i_stop: int, j: int, j_stop: int, recorded: Side, matcher: LineMatcher
-) -> list[Step]:
-    """The steps between two pairs: recorded lines `[i, i_stop)`, printed lines `[j, j_stop)`."""
-    elliptic = [matcher.elides_lines(recorded.lines[k]) for k in range(i, i_stop)]
-    steps: list[Step] = []
-    if any(elliptic):
-        for k, elides in enumerate(elliptic, start=i):
-            steps.append(Step(StepKind.ELLIPSIS if elides else StepKind.MISSING, k, j))
-            if elides:
-                steps += (Step(StepKind.ELIDED, k + 1, line) for line in range(j, j_stop))
-                j = j_stop
-        return steps
-    paired_count = min(i_stop - i, j_stop - j)
-    steps += (Step(StepKind.DIFFERS, i + k, j + k) for k in range(paired_count))
-    steps += (Step(StepKind.MISSING, k, j_stop) for k in range(i + paired_count, i_stop))
-    steps += (Step(StepKind.EXTRA, i_stop, k) for k in range(j + paired_count, j_stop))
-    return steps
 
 
 # --- pairs of items of any kind

@@ -29,7 +29,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Mode, Table
 from coursebuild.core.model.results import Change, DriftKind, Verdict
-from coursebuild.core.scripts.align import MATCH, Step, StepKind, align, pair, same_lines
+from coursebuild.core.scripts.align import MATCH, StepKind, align, pair, same_lines
 from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.numbers import (
     Number,
@@ -208,32 +208,26 @@ def diff_rows(verdict: Verdict, stdout: str) -> tuple[DiffRow, ...]:
         return tuple(cells)
     matcher, filters = LineMatcher(verdict.comparison), verdict.comparison.filters
     recorded, printed = Side.of(body.text, filters), Side.of(stdout, filters)
-    steps = align(recorded, printed, matcher)
-    rows = (row for step in steps for row in _step_rows(step, recorded, printed, matcher))
+    rows: list[DiffRow] = []  # one for each line of either side, none for elided lines
+    for step in align(recorded, printed, matcher):
+        match step.kind:
+            case StepKind.SAME | StepKind.ELLIPSIS:
+                rows += (_row(" ", text) for text in recorded.raw_lines(step.recorded))
+            case StepKind.DIFFERS:
+                old, new = recorded.lines[step.recorded], printed.lines[step.printed]
+                places = find_differences(old, new, matcher)
+                rows.append(("-", _parts(old, ((d.start, d.end) for d in places))))
+                ranges = ((d.printed_start, d.printed_end) for d in places)
+                rows.append(("+", _parts(new, ranges)))
+            case StepKind.MISSING:
+                rows.append(_row("-", recorded.lines[step.recorded]))
+            case StepKind.EXTRA:
+                rows.append(_row("+", printed.lines[step.printed]))
+            case StepKind.ELIDED:
+                pass
     # Between two common lines, all removed lines come before all added ones.
     hunks = (list(group) for _, group in groupby(rows, key=lambda row: row[0] == " "))
     return tuple(row for hunk in hunks for row in sorted(hunk, key=lambda r: r[0], reverse=True))
-
-
-def _step_rows(
-    step: Step, recorded: Side, printed: Side, matcher: LineMatcher
-) -> Iterator[DiffRow]:
-    """The rows of a step: one for each line of either side, none for elided lines."""
-    match step.kind:
-        case StepKind.SAME | StepKind.ELLIPSIS:
-            yield from (_row(" ", text) for text in recorded.raw_lines(step.recorded))
-        case StepKind.DIFFERS:
-            recorded_line, printed_line = recorded.lines[step.recorded], printed.lines[step.printed]
-            line_differences = find_differences(recorded_line, printed_line, matcher)
-            yield "-", _parts(recorded_line, ((d.start, d.end) for d in line_differences))
-            ranges = ((d.printed_start, d.printed_end) for d in line_differences)
-            yield "+", _parts(printed_line, ranges)
-        case StepKind.MISSING:
-            yield _row("-", recorded.lines[step.recorded])
-        case StepKind.EXTRA:
-            yield _row("+", printed.lines[step.printed])
-        case StepKind.ELIDED:
-            pass
 
 
 def _row(mark: Mark, text: str) -> DiffRow:

@@ -219,7 +219,11 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
         begins_inside = re.match(r">[ >]*(?:[a-z]|\$\$)", span.text)
         is_doubled = marks[0].count(">") == 2 and (any(fewer) or begins_inside is not None)
         is_in_text = is_in_text or is_doubled
-        if not is_in_text and marks[0].count(">") > 1 and _is_in_callout(source, line):
+        first = line  # of the quotation
+        while first > 1 and source.line_text(first - 1).startswith(">"):
+            first -= 1
+        begins_callout = re.match(r"> ?\[!", source.line_text(first)) is not None
+        if not is_in_text and marks[0].count(">") > 1 and begins_callout:
             place, message = span.first_line(), "a second quotation begins in this callout"
             help = "remove one `>`, or begin each line of it with `> > `"
             yield diagnose("markup-unread", place, message, help=help)
@@ -242,13 +246,6 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
             place = source.span(start + slip.start(1), start + slip.end(1))
             help = Fix("begin the line with `> `", ">", safe=True)
             yield diagnose("markup-unread", place, message, help=help)
-
-
-def _is_in_callout(source: Source, line: int) -> bool:
-    """Whether the quotation that has a line begins as a callout does."""
-    while line > 1 and source.line_text(line - 1).startswith(">"):
-        line -= 1
-    return re.match(r"> ?\[!", source.line_text(line)) is not None
 
 
 def check_neighbours(above: Sequence[model.Block], block: model.Block) -> Iterator[Diagnostic]:

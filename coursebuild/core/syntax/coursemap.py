@@ -57,8 +57,27 @@ def parse_course_map(source: Source) -> Parsed[model.Course | None]:
     if root is None:
         return Parsed(None, sort_diagnostics(parsed_toml.diagnostics))
     decoding = decode(root, CourseFile, "the course map", TOML)
-    levels = tuple(_read_levels(root, decoding))
-    lessons = [lesson for level in levels for lesson in level.lessons]
+    levels, strays = [], []
+    for level_node in root.objects("level"):
+        level_id, lessons = _read_id(level_node.get("id")), []
+        for node, table in decoding.find_structs(model.LessonTable, level_node.objects("lesson")):
+            if level_id and not table.id.startswith(f"{level_id}."):
+                message = f"the lesson `{table.id}` is in the level `{shorten(level_id)}`"
+                help = f"an id in this level begins with `{shorten(level_id)}.`"
+                strays.append(diagnose("field-value", node.place("id"), message, help=help))
+            spans = tuple(item.span for item in node.items("prerequisites"))
+            lessons.append(
+                model.Lesson(
+                    **asdict(table),
+                    span=node.span,
+                    prerequisite_spans=spans,
+                    level=level_id,
+                    document=None,
+                )
+            )
+        fields = decoding.structs.get(level_node)
+        texts = (fields.title, fields.summary) if isinstance(fields, LevelTable) else ("", "")
+        levels.append(model.Level(level_node.span, level_id, *texts, tuple(lessons)))
     nodes = [node for level in root.objects("level") for node in level.objects("lesson")]
     diagnostics = [
         *parsed_toml.diagnostics,
@@ -68,18 +87,14 @@ def parse_course_map(source: Source) -> Parsed[model.Course | None]:
         *check_settings(root, decoding),
     ]
     unusable = bool(diagnostics)
-    for level, level_node in zip(levels, root.objects("level"), strict=True):
-        for node, table in decoding.find_structs(model.LessonTable, level_node.objects("lesson")):
-            if level.id and not table.id.startswith(f"{level.id}."):
-                message = f"the lesson `{table.id}` is in the level `{shorten(level.id)}`"
-                help = f"an id in this level begins with `{shorten(level.id)}.`"
-                diagnostics.append(diagnose("field-value", node.place("id"), message, help=help))
+    diagnostics += strays
     diagnostics += _check_prerequisites(
-        lessons, [name for node in nodes if (name := _read_id(node.get("id")))]
+        [lesson for level in levels for lesson in level.lessons],
+        [name for node in nodes if (name := _read_id(node.get("id")))],
     )
     if unusable or decoding.value is None:
         return Parsed(None, sort_diagnostics(diagnostics))
-    course = _build_course(source, root, decoding.value, levels)
+    course = _build_course(source, root, decoding.value, tuple(levels))
     diagnostics += check_contrast(root.object("theme"), course.theme)
     return Parsed(course, sort_diagnostics(diagnostics))
 
@@ -144,28 +159,6 @@ def _named_paths(
 ) -> tuple[model.NamedPath, ...]:
     places = (item.span for item in table.items(field))
     return tuple(map(model.NamedPath, paths, places))
-
-
-# --------------------------------------------------------------------------- levels and lessons
-
-
-def _read_levels(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[model.Level]:
-    for node in root.objects("level"):
-        name = _read_id(node.get("id"))
-        inner = decoding.find_structs(model.LessonTable, node.objects("lesson"))
-        lessons = tuple(
-            model.Lesson(
-                **asdict(table),
-                span=lesson.span,
-                prerequisite_spans=tuple(item.span for item in lesson.items("prerequisites")),
-                level=name,
-                document=None,
-            )
-            for lesson, table in inner
-        )
-        fields = decoding.structs.get(node)
-        texts = (fields.title, fields.summary) if isinstance(fields, LevelTable) else ("", "")
-        yield model.Level(node.span, name, *texts, lessons)
 
 
 def _read_id(node: Node | None) -> str:

@@ -25,7 +25,7 @@ from coursebuild.core.model.scenarios import (
     is_multiple,
 )
 from coursebuild.core.syntax.decode import Decoding, check_unique, decode
-from coursebuild.core.syntax.nodes import TOML, ObjectNode, shorten
+from coursebuild.core.syntax.nodes import TOML, shorten
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -130,12 +130,21 @@ def _check_sweeps(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
 
 def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
     for node, table in decoding.find_structs(ScenarioTable):
-        yield from _check_times(node, table)
+        sample, hold, duration = table.sample, table.hold, table.duration
+        for name, length in (("duration", duration), ("hold", hold)):
+            if sample is not None and length is not None and not is_multiple(length, sample):
+                message = f"`{name}` ({length:g} s) is not a multiple of `sample` ({sample:g} s)"
+                help = "the state is looked at in even steps, and a command changes at such a look"
+                yield diagnose("field-value", node.place(name), message, help=help)
+        most_samples = MOST_SAMPLES * (1 + _TOLERANCE)
+        if sample is not None and duration is not None and duration / sample > most_samples:
+            message = f"`sample` makes {duration / sample:.3g} looks at the state"
+            help = f"{MOST_SAMPLES} are the most: look less often"
+            yield diagnose("field-value", node.place("sample"), message, help=help)
         spans = [item.mark for item in node.items("timesteps")]
         pairs = list(zip(table.timesteps, spans, strict=True))
-        times = [(table.hold, "hold"), (table.duration, "duration")]
-        if table.sample is not None:  # it divides the others
-            times = [(table.sample, "sample")]
+        # `sample` divides the others.
+        times = [(hold, "hold"), (duration, "duration")] if sample is None else [(sample, "sample")]
         lengths = [(length, name) for length, name in times if length is not None]
         for (length, name), (step, span) in itertools.product(lengths, pairs):
             if not is_multiple(length, step):
@@ -143,10 +152,10 @@ def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
                 help = "every timestep must end at the same times, or errors cannot be compared"
                 yield diagnose("field-value", span, message, help=help)
         yield from check_unique(pairs, "field-value", "the timestep {} s is named twice")
-        if table.hold is not None and not table.controls:
+        if hold is not None and not table.controls:
             help = "`controls` are the commands, each held for so long"
             yield diagnose("field-missing", node.place("hold"), "`controls` is missing", help=help)
-        if len(table.controls) > 1 and table.hold is None:
+        if len(table.controls) > 1 and hold is None:
             help = "`hold`: seconds for which each command holds"
             yield diagnose("field-missing", node.mark, "`hold` is missing", help=help)
         for item, row in zip(node.items("controls"), table.controls, strict=True):
@@ -155,7 +164,6 @@ def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
                 message = f"this command has {len(row)} numbers, and the first one has {first}"
                 help = "give one number for every actuator"
                 yield diagnose("field-value", item.mark, message, help=help)
-        hold, duration = table.hold, table.duration
         if hold is not None and duration is not None and len(table.controls) > 1:
             used_commands = -(-duration * (1 - _TOLERANCE) // hold)
             if used_commands < len(table.controls):
@@ -168,18 +176,3 @@ def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
             message = f"no hard case with a closed form is called `{shorten(table.closed_form)}`"
             help = did_you_mean(table.closed_form, CLOSED_FORMS)
             yield diagnose("field-value", node.place("reference"), message, help=help)
-
-
-def _check_times(node: ObjectNode, table: ScenarioTable) -> Iterator[Diagnostic]:
-    sample, duration = table.sample, table.duration
-    if sample is None:
-        return
-    for name, length in (("duration", duration), ("hold", table.hold)):
-        if length is not None and not is_multiple(length, sample):
-            message = f"`{name}` ({length:g} s) is not a multiple of `sample` ({sample:g} s)"
-            help = "the state is looked at in even steps, and a command changes at such a look"
-            yield diagnose("field-value", node.place(name), message, help=help)
-    if duration is not None and duration / sample > MOST_SAMPLES * (1 + _TOLERANCE):
-        message = f"`sample` makes {duration / sample:.3g} looks at the state"
-        help = f"{MOST_SAMPLES} are the most: look less often"
-        yield diagnose("field-value", node.place("sample"), message, help=help)

@@ -75,21 +75,15 @@ def parse_document(
         edits = tuple(Edit(source.span(place, place + 1), "") for place in places)
         help = Fix("delete it; readers would see `\ufffd`", edits=edits, safe=True)
         state.report(diagnose("control-character", source.span(at, at + 1), message, help=help))
-    state.diagnostics += _check_order(document)
-    return Parsed(document, sort_diagnostics(state.diagnostics))
-
-
-def _check_order(document: model.Document) -> Iterator[Diagnostic]:
-    """Report code and outputs that readers would see otherwise than they run and are compared."""
-    for block in model.document_blocks(document):
+    for block in model.document_blocks(document):  # readers would see it otherwise than it runs
         match block:
             case model.Recording():
-                place = block.body_span
+                state.diagnostics += find_reordering(block.body_span, is_code=True)
             case model.Script() | model.PlainCode() | model.CodeBlock() | model.Mjcf():
-                place = block.span
+                state.diagnostics += find_reordering(block.span, is_code=True)
             case _:
-                continue
-        yield from find_reordering(place, is_code=True)
+                pass
+    return Parsed(document, sort_diagnostics(state.diagnostics))
 
 
 def find_reordering(place: Span, *, is_code: bool) -> Iterator[Diagnostic]:

@@ -167,17 +167,14 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
         else:
             value = info.slice(*match.span(match.lastindex or 0)) if match[2] else None
             if value is not None and match[3]:
-                value = _unescape(value)
+                escapes = [(m.start(), m.start(1)) for m in _ESCAPE.finditer(value.text)]
+                starts = [0, *(b for _, b in escapes)]
+                rests = zip(starts, [*(a for a, _ in escapes), len(value.text)], strict=True)
+                value = Excerpt.join([value.slice(a, b) for a, b in rests])
             key, span = info.span(*match.span(1)), info.span(*match.span())
             words.append(Word(span, match[1], key, value))
         at = end
     return Parsed(tuple(words), tuple(diagnostics))
-
-
-def _unescape(value: Excerpt) -> Excerpt:
-    escapes = [(match.start(), match.start(1)) for match in _ESCAPE.finditer(value.text)]
-    starts, ends = [0, *(b for _, b in escapes)], [*(a for a, _ in escapes), len(value.text)]
-    return Excerpt.join([value.slice(a, b) for a, b in zip(starts, ends, strict=True)])
 
 
 INDENTED_FENCE = re.compile(r"\s*(`{3,}|~{3,})[ \t]*([\w+-]*)[^`\n]*")

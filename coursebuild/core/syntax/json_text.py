@@ -200,7 +200,12 @@ class _Reader:
         elif text.lstrip("+-") in _NOT_FINITE:
             message, help = f"JSON has no `{text}`", "write a finite number"
         elif text[0] in "+-.0123456789":
-            message, help = f"`{nodes.shorten(text)}` is not a number of JSON", _number_help(text)
+            message, help = f"`{nodes.shorten(text)}` is not a number of JSON", ""
+            for read in (lambda: int(text, 0), lambda: int(text), lambda: float(text)):
+                with contextlib.suppress(ValueError):
+                    value = str(read())
+                    help = "" if "n" in value else write(value)  # inf, nan
+                    break
         else:
             self.offset = start
             self.fail_expecting("a value")
@@ -325,13 +330,3 @@ _QUOTED = re.compile(
 def _backslash_help(command: str) -> str:
     help = f"to write a backslash, double it: `\\\\{command}`"
     return Fix(help, "\\\\", "\\", safe=True)
-
-
-def _number_help(text: str) -> str:
-    for read in (lambda: int(text, 0), lambda: int(text), lambda: float(text)):
-        try:
-            value = read()
-        except ValueError:
-            continue
-        return "" if "n" in str(value) else write(str(value))  # inf, nan
-    return ""

@@ -277,8 +277,10 @@ def check_numerals(
             may_be_range = first and (last[0] != "0" or len(first) == len(last))
             if may_be_range and int(first) < int(last) and not (first == "0" and has_unit):
                 continue
-            if match["comma"] and not _is_alone_with_comma(content.source.text):
-                continue
+            if match["comma"]:  # a mistake if it is the only one, and others have points
+                whole = content.source.text
+                if len(re.findall(_COMMA, whole)) != 1 or len(re.findall(_POINT, whole)) < 3:
+                    continue
             message = f"`{number}` cannot be read as a number or a unit"
             help = "a number is written as in `0.5` or `1e-5`, a range as in `3–5`; put what is "
             help += "neither into backticks"
@@ -287,8 +289,3 @@ def check_numerals(
             fix = Fix(help, new if is_decimal and new != number else None)
             span = content.span(at + match.start(), at + match.end())
             yield diagnose("number-form", span, message, help=fix)
-
-
-def _is_alone_with_comma(text: str) -> bool:
-    """Whether a document has one decimal with a comma before a unit, and others with points."""
-    return len(re.findall(_COMMA, text)) == 1 and len(re.findall(_POINT, text)) > 2

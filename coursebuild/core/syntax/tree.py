@@ -58,9 +58,6 @@ class TextReader:
         self.inlines = partial(
             read_inlines, state=state, references=references, balance=self.balance
         )
-        self._scan_tokens()
-
-    def _scan_tokens(self) -> None:
         for i, token in enumerate(self.tokens):
             if token.type == "heading_open" and self.tokens[i + 1].content.endswith("}"):
                 name = read_attributes(trim(token.text)).value.id

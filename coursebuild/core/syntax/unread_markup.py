@@ -387,8 +387,17 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
         message = f"`{kind.text}` is not a known kind of block"
         help = propose(kind.text, likely, kinds)
         yield diagnose("fence-kind-near", kind.span(), message, help=help)
-    elif not package and (diagnostic := _check_unread_json(fence)) is not None:
-        yield diagnostic
+    elif (
+        not package
+        and _OBJECT.match(fence.body.text)
+        and not (kind.text and _is_language(kind.text))
+    ):
+        message, place = "nothing reads a block without a kind, and this one holds JSON", fence.head
+        if kind.text:
+            message = f"nothing reads a block of kind `{kind.text}`: its JSON is shown as code"
+            place = kind.span()
+        help = "a lab is of kind `lab`, a quiz of kind `quiz`; JSON to be shown is of kind `json`"
+        yield diagnose("fence-unread", place, message, help=help)
 
 
 def _help_with_foreign(name: str) -> str:
@@ -422,18 +431,6 @@ def _find_misspelt(name: str, kinds: Sequence[str], body: str) -> str | None:
         return likely
     form = _BODIES.get(likely)
     return likely if form is not None and form.match(body) else None
-
-
-def _check_unread_json(fence: Fence) -> Diagnostic | None:
-    """Report a JSON object in a block without a kind, or of one that no highlighter knows."""
-    if not _OBJECT.match(fence.body.text) or (fence.kind and _is_language(fence.kind)):
-        return None
-    help = "a lab is of kind `lab`, a quiz of kind `quiz`; JSON to be shown is of kind `json`"
-    if not fence.kind:
-        message = "nothing reads a block without a kind, and this one holds JSON"
-        return diagnose("fence-unread", fence.head, message, help=help)
-    message = f"nothing reads a block of kind `{fence.kind}`: its JSON is shown as code"
-    return diagnose("fence-unread", kind_of(fence.info).span(), message, help=help)
 
 
 def _is_language(name: str) -> bool:
