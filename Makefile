@@ -1,6 +1,7 @@
 # make site    the environment, the tool, the course in public/ and the manual in docs/public/
 # make quick   the tests that need no browser, no lab engine and no whole site
-# make test    all set-up, then every test of a change
+# make test    all set-up, then the tests of a change, but for those that take long
+# make test-all  with those, as continuous integration runs them
 # make fuzz    inputs that nobody wrote, for TIME seconds
 # make lock    the versions of all packages, and their hashes
 # make help    the rest
@@ -32,7 +33,7 @@ ifneq ($(shell $(BIN)/python -c '' 2>/dev/null && cat $(VENV)/.made),$(CURDIR))
 .PHONY: $(VENV)/.made
 endif
 
-.PHONY: help site pages release-files tag-check version serve quick test test-slow test-oldest fuzz lint format types dist vscode lock npm system clean distclean
+.PHONY: help site pages release-files tag-check version serve quick test test-all test-slow test-oldest fuzz lint format types dist vscode lock npm system clean distclean
 
 help:
 	@echo 'make site       make the environment, install, build the course into public/, the manual into docs/public/'
@@ -41,7 +42,8 @@ help:
 	@echo 'make version    write VERSION=0.2.0 wherever the version stands, before a release'
 	@echo 'make serve      the same, then serve it and rebuild on every change'
 	@echo 'make quick      run the tests that need no browser, no lab engine and no whole site'
-	@echo 'make test       do all set-up and run every test (PYTEST_ARGS=..., WORKERS=$(WORKERS))'
+	@echo 'make test       do all set-up and run the tests, but for those that take long (PYTEST_ARGS=..., WORKERS=$(WORKERS))'
+	@echo 'make test-all   the same with those that take long, as continuous integration does'
 	@echo 'make test-slow  measure pages, look for leaks, try random cases that are new each time'
 	@echo 'make test-oldest  run the quick tests with the oldest packages that the tool may be used with'
 	@echo 'make fuzz       try inputs that nobody wrote for TIME=600 seconds; an hour before a release'
@@ -94,12 +96,15 @@ PYTEST = PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(BIN)/python -m py
 PARALLEL = -n $(WORKERS) --dist worksteal
 
 QUICK = $(PARALLEL) --ignore tests/browser --ignore tests/packaging \
-  -m 'not (browser or engine or site or slow)' $(PYTEST_ARGS)
+  -m 'not (browser or engine or site or long or slow)' $(PYTEST_ARGS)
 
 quick: $(VENV)/.dev npm
 	@$(PYTEST) $(QUICK)
 
 test: $(VENV)/.dev npm system
+	@$(PYTEST) $(PARALLEL) -m 'not (long or slow)' $(PYTEST_ARGS)
+
+test-all: $(VENV)/.dev npm system
 	@$(PYTEST) $(PARALLEL) -m 'not slow' $(PYTEST_ARGS)
 
 # One after the other, since some of them measure; property tests get new examples in every run.

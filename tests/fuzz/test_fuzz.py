@@ -1,4 +1,4 @@
-"""Every target with the inputs that are kept, in `make test`; with new ones in `make test-slow`."""
+"""Every target with kept inputs, in `make test-all`; with new ones in `make test-slow`."""
 
 from __future__ import annotations
 
