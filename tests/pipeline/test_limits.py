@@ -43,6 +43,7 @@ def test_a_line_of_megabytes_is_told_and_not_read(make: Make) -> None:
     assert folder.main("check").status == 0
 
 
+@pytest.mark.long
 def test_a_map_or_model_that_is_too_long_is_told_and_not_read(make: Make) -> None:
     folder = make(GOOD)
     short, long = "<mujoco/>\n", "<mujoco>\n" + "<!-- -->\n" * 30_000 + "</mujoco>\n"
@@ -64,6 +65,7 @@ def test_a_map_or_model_that_is_too_long_is_told_and_not_read(make: Make) -> Non
     assert "make more courses of it" in result.out
 
 
+@pytest.mark.site
 def test_a_killed_check_leaves_no_compiler_and_the_next_one_its_folder_no_more(make: Make) -> None:
     folder = make(GOOD)
     endless = '<replicate count="300000000"><geom size="1"/></replicate>'
@@ -90,6 +92,7 @@ def test_a_script_gets_the_memory_that_the_course_allows(make: Make) -> None:
     assert "error[script-failed]" in result.out and "MemoryError" in result.out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "piece", ["<b>", "</b>", "<b></i>", "<a href=x", "- <p>\n", "[x](y) `", "<script>\n", "<title>"]
 )
@@ -100,6 +103,7 @@ def test_reading_takes_as_long_as_the_text_whatever_is_broken_in_it(piece: str) 
     assert processor_time_growth(read, 250) < 24
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("quotes", ["> ", "> 1. "])
 def test_containers_that_hold_too_many_lines_together_are_told_and_read_no_further(
     quotes: str,

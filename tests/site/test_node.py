@@ -20,8 +20,9 @@ ENGINE = [path for path in FILES if "from './helpers.mjs'" in path.read_text("ut
 PLAIN = [path for path in FILES if path not in ENGINE]
 
 
+@pytest.mark.site
 @pytest.mark.parametrize(
-    "files", [pytest.param(ENGINE, marks=pytest.mark.engine), PLAIN], ids=["engine", "plain"]
+    "files", [pytest.param(ENGINE, marks=pytest.mark.long), PLAIN], ids=["engine", "plain"]
 )
 def test_files_pass_under_node(files: list[Path]) -> None:
     """All in one process, which starts and warms up once."""

@@ -19,6 +19,8 @@ from support.surveys import (
     scene,
 )
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("world", ["", "<!-- nothing -->", "<geom size='1'/>"])
 def test_nothing_that_moves(world: str) -> None:
