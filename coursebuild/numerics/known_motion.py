@@ -232,7 +232,9 @@ def _check_exact(
         raise SceneError(subject, exact.span, help)
     # What is left after the law of the last two: the formula is known no better, unless it is
     # nearer to the engine with contacts as they are: it may be of their softness too.
-    rest = min(gaps[0], max(0.0, gaps[2] - (gaps[1] - gaps[2])))
+    rest = max(0.0, gaps[2] - (gaps[1] - gaps[2]))
+    if gaps[0] < rest:
+        return ROUNDING.at_least(gap).at_least(second.floor)
     return ROUNDING.at_least(Sizes(rest, rest, 0.0)).at_least(second.floor)
 
 
