@@ -226,6 +226,8 @@ def mark_luck(
                 work = "shorter timesteps" if dear.timestep < setting.timestep else ""
             elif dear == replace(setting, iterations=dear.iterations):
                 work = "more iterations" if dear.iterations > setting.iterations else ""
+            elif dear == replace(setting, cone=own_row.setting.cone):
+                luck = luck or _luck_of_cone(row, rival, quantity)
             if luck or not work or row.status != "ok":
                 continue
             known_until = math.inf if row.parted is None else (1 - _WORTH_SAYING) * row.parted
@@ -235,6 +237,21 @@ def mark_luck(
                 luck = f"its error rises with {work}"
         marked_rows.append(replace(row, lucky=luck))
     return tuple(marked_rows)
+
+
+def _luck_of_cone(row: WorkPrecisionRow, rival: WorkPrecisionRow, quantity: Quantity) -> str:
+    """Why a smaller error than under the scene's own cone is luck; empty where it is none.
+
+    Where the model under that cone errs no less, it has cancelled with the error of the timestep.
+    """
+
+    def is_less(error: float | None, than: float | None) -> bool:
+        return error is not None and than is not None and error * (1 + ERROR_SLACK) < than
+
+    if row.model_error is None or not is_less(quantity.value_of(row), quantity.value_of(rival)):
+        return ""
+    is_nearer = rival.model_error is None or is_less(row.model_error, rival.model_error)
+    return "" if is_nearer else "in small steps that cone errs no less"
 
 
 def verdict(
@@ -278,19 +295,19 @@ def verdict(
     are_unresolved = max(own_place.error, better_place.error) <= quantity.least
     if are_unresolved and {is_noticeable, noticeable[row.dominated_by]} != {False}:
         text = "no setting can be called better: the reference resolves no error of "
-        text += f"{setting_text(better.setting)}, or of the scene's own setting"
+        text += f"{setting_text(better.setting, row.setting)}, or of the scene's own setting"
         return RowVerdict(False, None, None, None, is_noticeable, text + remark)
     ratios = (
         better_place.cost.value / own_place.cost.value,
         better_place.error / own_place.error if own_place.error else 1.0,
     )
-    if min(ratios) > 1 - _WORTH_SAYING or not holds(better.setting):
-        text = (
-            f"no difference that holds: {setting_text(better.setting)} {_describe_ratios(*ratios)}"
-        )
-        text += " here, which is within what such runs differ by"
+    name, is_small = setting_text(better.setting, row.setting), min(ratios) > 1 - _WORTH_SAYING
+    if is_small or not holds(better.setting):
+        text = f"no difference that holds: {name} {_describe_ratios(*ratios)} here"
+        text += ", which is within what such runs differ by" if is_small else ""
+        text += "" if is_small else ", but is no better from starts nearby"
         return RowVerdict(True, None, None, None, is_noticeable, text + remark)
-    text = f"{setting_text(better.setting)} is better: it {_describe_ratios(*ratios)}"
+    text = f"{name} is better: it {_describe_ratios(*ratios)}"
     if are_unresolved:
         text += ", as far as the reference resolves"
     elif better_place.error <= quantity.least:
@@ -307,7 +324,8 @@ def _describe_lucky(rows: Rows, own_place: FrontPoint, quantity: Quantity) -> st
     place, row = min(better, key=lambda pair: pair[0].cost.value)
     cost = place.cost.value / own_place.cost.value
     ratios = _describe_ratios(cost, place.error / own_place.error if own_place.error else 1.0)
-    return f"no difference that holds: {setting_text(row.setting)} {ratios} here, but {row.lucky}"
+    name = setting_text(row.setting, next(r.setting for r in rows if r.own))
+    return f"no difference that holds: {name} {ratios} here, but {row.lucky}"
 
 
 def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
@@ -341,11 +359,12 @@ def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> R
 
 
 def _describe_ratios(cost: float, error: float) -> str:
-    cheap = f"takes {cost:.2g} of the time" if cost < 1 / 1.005 else "takes no more time"
+    cheap = "takes no more time" if cost <= 1.005 else "takes about as long"
+    if cost < 1 / 1.005:
+        cheap = f"takes {cost:.2g} of the time"
+    exact = "errs no more" if error <= 1.005 else "errs hardly more"
     if error < 1 / (1 + ERROR_SLACK):
         exact = f"errs {1 / error:.2g} times less" if 1 / error < 1e4 else "errs far less"
-    else:
-        exact = "errs no more"
     return f"{cheap} and {exact}"
 
 
@@ -357,8 +376,10 @@ def _describe_error(
     least: float,
 ) -> str:
     """Whether the own error is seen, and where it is, the cheapest setting with one that is not."""
+    if not error:
+        return "; the scene's own setting makes no error"
     if error < 1:
-        size = f"{'less than ' if 0 < error <= least else ''}{error:.2g}"
+        size = f"{'less than ' if error <= least else ''}{error:.2g}"
         return f"; the scene's own error cannot be seen: it is {size} of what an eye can tell"
     text = f"; the scene's own error can be seen: it is {error:.2g} times what an eye can tell"
     unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost and not r.lucky]
@@ -366,8 +387,10 @@ def _describe_error(
         return text
     if unseen:
         cost, first = min((r.cost.value, n) for n, r in enumerate(unseen) if r.cost)
-        name, times = setting_text(unseen[first].setting), f"{cost / own_row.cost.value:.2g}"
-        text += f"; the cheapest without one that is seen is {name}, at {times} times its cost"
+        name = setting_text(unseen[first].setting, own_row.setting)
+        times = cost / own_row.cost.value
+        share = f"{times:.2g} times" if abs(times - 1) > ERROR_SLACK else "about"
+        text += f"; the cheapest without one that is seen is {name}, at {share} its cost"
     elif all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None):
         text += ", and that of every other setting too"
     return text

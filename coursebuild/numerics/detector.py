@@ -92,7 +92,7 @@ class Peaks(Struct, frozen=True):
             and self.velocity <= setup.velocity_bound
             and self.energy <= setup.energy_bound
             and self.penetration <= setup.penetration_bound
-            and self.sunk <= 1.0
+            and self.sunk <= setup.sunk_bound
         )
 
 
@@ -166,17 +166,20 @@ def judge(
     if peaks.finite and not peaks.energy <= setup.energy_bound:
         text = f"energy reached {peaks.energy:.3g} J, where {setup.energy_bound:.3g} J can be"
         symptoms.append((RunStatus.SLOW_GROWTH, text))
-    depth_ratio = max(peaks.penetration / setup.penetration_bound, peaks.sunk)
+    depth_ratio = max(peaks.penetration / setup.penetration_bound, peaks.sunk / setup.sunk_bound)
     if not depth_ratio <= 1.0:
-        first, second, time = peaks.overlap
-        names = "bodies"
-        if max(first, second) >= 0:
-            names = " and ".join(_body_of(model, geom) for geom in (first, second))
+        names, time = overlap_names(model, peaks), peaks.overlap[2]
         share = f"{depth_ratio:.3g}" if depth_ratio >= 1.005 else "just over 1"
         text = f"{names} lie {share} times as deep in each other as they may, at {time:.3g} s"
         symptoms.append((RunStatus.DIVERGED, text))
     worst = max((status for status, _ in symptoms), key=list(RunStatus).index, default=RunStatus.OK)
     return RunJudgement(worst, tuple(text for _, text in symptoms))
+
+
+def overlap_names(model: Any, peaks: Peaks) -> str:
+    """What the two bodies are called that lie deepest in each other."""
+    geoms = peaks.overlap[:2]
+    return " and ".join(_body_of(model, geom) for geom in geoms) if max(geoms) >= 0 else "bodies"
 
 
 def _body_of(model: Any, geom: int) -> str:

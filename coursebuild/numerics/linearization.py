@@ -5,7 +5,8 @@
    care of their own, and every integrator is treated alike.
 2. At rest, the largest timestep up to which its spectral radius is at most one is the limit of
    linear theory. A rest that is unstable by itself (an inverted pendulum) says nothing of a
-   timestep, nor does one to which nothing pulls back; there is no theory then.
+   timestep, nor does one to which nothing pulls back, or about which forces have another law on
+   either side (a muscle at no activation); there is no theory then.
 3. Along a periodic motion the product of these derivatives grows as the largest Floquet multiplier
    to the power of the periods. Where that is one, a difference may still grow in proportion to
    time, since another amplitude has another period. So the limit is passed where it grows to more
@@ -50,6 +51,9 @@ _RELAXING, _POLISHING, _GRID = 20_000, 30, 24
 """Steps and iterations to look for a rest, and timesteps tried in a decade."""
 _END = 1e-30
 """The solver's tolerance: with none at all `discrete` divides nothing by nothing at a rest."""
+_WAYS, _KINK = 8, 0.02
+"""Directions from a rest in which forces are compared with their derivative, and the difference,
+relative to the largest of them, from which on there is none."""
 _STILL = 1e-9
 """The part of the strongest acceleration below which Newton's method goes on."""
 _LONGEST_ORBIT, _ORBIT_GRID = 200, 16
@@ -178,6 +182,8 @@ def find_rest(model: Any, scenario: Scenario) -> FixedState | None:
         return None
     nv, na = int(model.nv), int(model.na)
     inner = _force_derivative(variant, data, rest)
+    if _is_kinked(variant, data, rest, inner):
+        return None
     flow = np.zeros((2 * nv + na, 2 * nv + na))
     flow[:nv, nv : 2 * nv], flow[nv:] = np.eye(nv), inner
     rates = np.linalg.eigvals(flow)
@@ -197,6 +203,20 @@ def _accelerations(model: Any, data: Any, state: FixedState, change: Array | Non
 def _force_derivative(model: Any, data: Any, state: FixedState) -> Array:
     step = _NEAR_STEP if state.touches else _STEP
     return _derivative(lambda x: _accelerations(model, data, state, x), _units(model), step)
+
+
+def _is_kinked(model: Any, data: Any, state: FixedState, derivative: Array) -> bool:
+    """Whether forces differ from their derivative by a part of it, in some direction."""
+    step = _NEAR_STEP if state.touches else _STEP
+    middle = _accelerations(model, data, state)
+    for way in np.random.default_rng(4).normal(size=(_WAYS, len(_units(model)))):
+        change = step * way * _units(model)
+        expected = derivative @ change
+        for side in (1.0, -1.0):
+            gap = _accelerations(model, data, state, side * change) - middle - side * expected
+            if np.abs(gap).max(initial=0.0) > _KINK * np.abs(expected).max(initial=0.0):
+                return True
+    return False
 
 
 def _polished(model: Any, data: Any) -> FixedState | None:

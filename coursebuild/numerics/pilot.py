@@ -27,7 +27,7 @@ from coursebuild.numerics import simulation
 from coursebuild.numerics.detector import Peaks, driving_force, update_peaks
 from coursebuild.numerics.problem import STANDARD, Array, Integrator, Setup
 from coursebuild.numerics.reports.scene_report import MeasuredSetting
-from coursebuild.numerics.scene import Scene, SceneError
+from coursebuild.numerics.scene import Scene, SceneError, thickness
 
 NUDGE = 1e-10
 """How far a twin's beginning is off: rad, or relative to the model's extent; velocities per s."""
@@ -42,6 +42,8 @@ _SETTLED = 1e-6
 """A motion has come to rest below this part of its largest kinetic energy."""
 _EXCESS = 0.1
 """The share of the largest kinetic energy above what there can be, from which it is nonsense."""
+_DEEPER = 1.25
+"""How many times deeper than in small steps bodies may lie in each other."""
 _PEAK_INTERVAL = 8
 """Steps from one look at how large the state is to the next."""
 
@@ -94,7 +96,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
         twins.append(twin)
         nudge_sizes.append(float(np.max(np.abs(position / errors), initial=0.0)))
     look = _Observer(variant)
-    peaks = Peaks()
+    peaks, half_thickness = Peaks(), thickness(variant)
     times, steps_per_sample = scenario.times, scenario.steps(step)
     gaps = np.full((len(twins), len(times)), np.nan)
     for index, command in enumerate(scenario.commands(scenario.sample)):
@@ -104,7 +106,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
             simulation.advance(variant, data)
             look(data)
             if number % _PEAK_INTERVAL == 0 or number == steps_per_sample - 1:
-                peaks = update_peaks(data, peaks)
+                peaks = update_peaks(data, peaks, half_thickness)
         if not peaks.finite:
             raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
         for twin, gap in zip(twins, gaps, strict=True):
@@ -247,6 +249,7 @@ def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
     setup = Setup(
         scenario=scenario,
         position_bound=2 * peaks.position + room * max(extent, 1.0) + round_and_round,
+        sunk_bound=max(1.0, _DEEPER * peaks.sunk),
     )
     if (bound := scene.declaration.energy_bound) is not None:
         return replace(setup, energy_bound=bound, energy=peaks.energy, kinetic=peaks.kinetic)

@@ -216,6 +216,9 @@ class Setup(Struct, frozen=True, kw_only=True):
     """The most kinetic energy in small steps, J."""
     penetration_bound: float = float("inf")
     """Deepest contact of a run that is not lost, m."""
+    sunk_bound: float = 1.0
+    """The same relative to the half thickness of the thinner body: more than 1 where contacts are
+    so soft that middles lie in each other in small steps too."""
 
 
 class Problem(Setup, frozen=True, kw_only=True):

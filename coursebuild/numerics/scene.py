@@ -42,6 +42,9 @@ EXACT_SCRIPT = exact.__file__
 """The script that evaluates a course's exact motion."""
 LONGEST = 10_000_000
 """The most steps of a scenario at its shortest timestep: more would take hours."""
+_STILL, _OFF_RATE = 1e-6, 0.02
+"""m/s or rad/s: what is slower counts as this fast where velocities are compared; by how much they
+may be off the rates of positions, relative to the fastest."""
 
 
 class SceneError(Exception):
@@ -71,6 +74,29 @@ class ExactMotion(Struct, frozen=True, eq=False):
     """Its file."""
     states: Callable[[Array, Array, Array], ExactStates]
     """Times (n,) in s, and `qpos` and `qvel` of the beginning → what it says of the times."""
+
+    def check_velocities(self, model: Any, times: Array, begin: tuple[Array, Array]) -> None:
+        """Check that velocities are the rates of positions; a `SceneError` where they are not.
+
+        They are compared on the nearer side of a time: there may be a hit on the other.
+        """
+        step = 1e-4 * float(times[0])
+        looks = np.ravel([times - step, times, times + step], order="F")
+        for qpos, qvel in self.states(looks, *begin).motions.values():
+            if qvel is None:
+                continue
+            rates = np.empty((len(looks) - 1, int(model.nv)))
+            for rate, now, later in zip(rates, qpos[:-1], qpos[1:], strict=True):
+                mujoco.mj_differentiatePos(model, rate, step, now, later)
+            sides, velocities = np.array([rates[::3], rates[1::3]]), qvel[1::3]
+            fastest = np.maximum(np.abs(sides).max(axis=(0, 1)), np.abs(velocities).max(axis=0))
+            gaps = np.abs(sides - velocities).min(axis=0) / np.maximum(fastest, _STILL)
+            if not gaps.max(initial=0.0) <= _OFF_RATE:
+                time, dof = np.unravel_index(int(gaps.argmax()), gaps.shape)
+                message = f"`{self.span.path}` gives velocities that are not the rates of positions"
+                help = f"number {dof} is {velocities[time, dof]:.3g} at {times[time]:.6g} s"
+                help += f", where the positions give {sides[0, time, dof]:.3g}"
+                raise SceneError(message, self.span, help)
 
 
 class Scene(Struct, frozen=True):

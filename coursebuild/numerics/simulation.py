@@ -272,27 +272,29 @@ def invariants(model: Any, scratch: Any, qpos: Array, qvel: Array) -> Array:
     return np.concatenate([scratch.energy, scratch.subtree_angmom[0]])
 
 
-def refsafe_active(model: Any) -> bool:
+def refsafe_active(model: Any, *, contact: bool = True) -> bool:
     """Whether MuJoCo may soften a constraint because the timestep is long: see `refsafe_from`."""
-    return float(model.opt.timestep) * (1 - 1e-12) > refsafe_from(model)
+    return float(model.opt.timestep) * (1 - 1e-12) > refsafe_from(model, contact=contact)
 
 
-def refsafe_from(model: Any) -> float:
+def refsafe_from(model: Any, *, contact: bool = True) -> float:
     """The timestep beyond which MuJoCo may soften a constraint, s; infinite where there is none.
 
     Unless `refsafe` is off it raises time constants to two timesteps: that is stable, and another
     model. It concerns geoms that can touch, equalities, limits and dry friction.
+
+    `contact`: whether anything touches in the motion that is asked about.
     """
     if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_REFSAFE):
         return math.inf
     flags = int(model.opt.disableflags)
     can_touch = (model.geom_contype | model.geom_conaffinity) != 0
-    if flags & int(mujoco.mjtDisableBit.mjDSBL_CONTACT) or model.ngeom < 2:
-        can_touch = np.zeros(model.ngeom, dtype=bool)
+    contact = contact and not flags & int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    can_touch &= contact and model.ngeom > 1
     constants = np.concatenate(
         [
             model.geom_solref[can_touch, 0],
-            model.pair_solref[:, 0],
+            model.pair_solref[:, 0] if contact else [],
             model.eq_solref[:, 0],
             model.jnt_solref[model.jnt_limited != 0, 0],
             model.dof_solref[model.dof_frictionloss > 0, 0],

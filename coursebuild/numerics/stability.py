@@ -366,6 +366,8 @@ def run_trial(
         except mujoco.FatalError:  # MuJoCo does not run it
             return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan)
         count, now = stop, update_peaks(data, Peaks(), thickness)
+        if not count:  # before the first step MuJoCo has computed no energy: it says 0
+            now = replace(now, energy=-math.inf)
         energy = max(energy, now.energy)
         if count <= _TRANSIENT:
             fastest = max(limits.velocity_bound, now.velocity)

@@ -20,7 +20,7 @@ from msgspec.structs import asdict, replace
 
 from coursebuild.numerics import known_motion, measure, simulation
 from coursebuild.numerics.costs import Clock, costs, mark_luck, verdict
-from coursebuild.numerics.detector import driving_force
+from coursebuild.numerics.detector import driving_force, overlap_names
 from coursebuild.numerics.pilot import (
     Pilot,
     horizon_error,
@@ -190,10 +190,16 @@ def _holds(
     model, pilot = basis.model, basis.pilot
     scene, scenario = pilot.scene, pilot.scene.scenario
     places = [next(row for row in rows if row.setting == s) for s in (better, basis.baseline)]
-    for position, velocity in nudges(model, 2 * (_QUICK_STARTS if quick else _STARTS), _NEARBY):
+    starts = nudges(model, 2 * (_QUICK_STARTS if quick else _STARTS), _NEARBY)
+    part = max(better.timestep, basis.baseline.timestep) / (_PARTS * (len(starts) + 1))
+    fine = simulation.without_sleep(with_setting(model, replace(basis.baseline, timestep=part)))
+    for number, (position, velocity) in enumerate(starts, 1):
         data = simulation.initial_data(scenario, model)
         mujoco.mj_integratePos(model, data.qpos, position, 1.0)
-        start = {"qpos": tuple(data.qpos), "qvel": tuple(data.qvel + velocity)}
+        data.qvel[:] += velocity
+        if pilot.jumps:
+            simulation.advance(fine, data, _PARTS * number)
+        start = {"qpos": tuple(data.qpos), "qvel": tuple(data.qvel)}
         nudged_scenario = replace(scenario, **start)
         setup = replace(pilot.setup, scenario=nudged_scenario)
         near = replace(pilot, scene=replace(scene, scenario=nudged_scenario), setup=setup)
@@ -220,8 +226,10 @@ def _holds(
     return True
 
 
-_NEARBY = 1e-4
-"""How far starts nearby are off: rad, or relative to the extent; velocities per s."""
+_NEARBY, _PARTS = 1e-4, 8
+"""How far starts nearby are off: rad, or relative to the extent; velocities per s. Where something
+is hit, they are also later by parts of a timestep, in so many steps each: where in a step a hit
+falls is luck."""
 _STARTS, _QUICK_STARTS = 2, 1
 """From how many random directions starts nearby come, each to both sides."""
 
@@ -263,12 +271,16 @@ def _notes(
         notes.append(f"no run that begins 1e-10 away comes to be off by {error}: it is not chaotic")
     if int(model.opt.enableflags) & mujoco.mjtEnableBit.mjENBL_SLEEP:
         notes.append("nothing sleeps in the reference, so errors hold what sleep changes")
+    if pilot.peaks.sunk > 1:
+        names = overlap_names(model, pilot.peaks)
+        notes.append(f"{names} are so soft that the middle of one comes to lie in the other")
     if drivers := driving_force(model, pilot.scene.scenario):
         notes.append(f"energy is not judged: {drivers}")
     states = np.abs(np.hstack([reference.states.qpos, reference.states.qvel, reference.states.act]))
     if np.any((states > 0) & (states < np.finfo(np.float64).tiny)):
         notes.append("the state holds subnormal numbers, with which processors are slow")
-    refsafe_limit = simulation.refsafe_from(model) if pilot.constrained else math.inf
+    limit = simulation.refsafe_from(model, contact=pilot.contact)
+    refsafe_limit = limit if pilot.constrained else math.inf
     if any(
         (row.searched[1] if row.largest is None else row.largest) > refsafe_limit for row in largest
     ):
@@ -319,7 +331,7 @@ def _measure_setting(
         "reasons": (),
         "penetration": 0.0,
         "model_error": cone.model_error,
-        "refsafe": pilot.constrained and simulation.refsafe_active(variant),
+        "refsafe": pilot.constrained and simulation.refsafe_active(variant, contact=pilot.contact),
         "steps": steps,
         "evaluations": steps * scene_report.step_evaluations(setting.integrator),
         "lucky": "",

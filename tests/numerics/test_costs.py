@@ -298,9 +298,32 @@ def test_fewer_iterations_that_err_less_are_luck() -> None:
     assert few.lucky == "its error rises with more iterations" and not few.front and many.front
     judgement = verdict((few, many), [False, False])
     assert judgement.on_front and judgement.text.startswith(
-        "no difference that holds: Euler at 2 ms, Newton, 1 iteration, elliptic cone takes 0.8 of "
-        "the time and errs 1.4 times less here, but its error rises with more iterations; "
+        "no difference that holds: Euler at 2 ms, 1 iteration takes 0.8 of the time and errs 1.4 "
+        "times less here, but its error rises with more iterations; "
     )
+
+
+def test_an_error_that_the_model_error_of_another_cone_cancels_is_luck() -> None:
+    """The errors of a rolling ball against rolling: the cone's own error has the other sign."""
+    for model_error, luck in ((0.006, "in small steps that cone errs no less"), (0.001, "")):
+        elliptic, pyramidal = (
+            row(
+                "Euler",
+                0.002,
+                cost=1.0,
+                seen=error,
+                own=cone == "elliptic",
+                cone=cone,
+                model_error=least_error,
+            )
+            for cone, error, least_error in (
+                ("elliptic", 1.55, 0.003),
+                ("pyramidal", 1.04, model_error),
+            )
+        )
+        rows = front(mark_luck((elliptic, pyramidal), {}))
+        assert rows[1].lucky == luck
+        assert (verdict(rows, [True, True]).better is None) is bool(luck)
 
 
 def test_verdicts_claim_only_what_holds() -> None:
@@ -317,7 +340,20 @@ def test_verdicts_claim_only_what_holds() -> None:
     text = verdict(front(large), [False] * 2, Quantity("seen", "", 1e-6)).text
     assert "errs 1e+03 times less, or more: " in text
     judgement = verdict(front(large), [False] * 2, holds=lambda s: s.integrator != "RK4")
-    assert judgement.better is None and "no difference that holds" in judgement.text
+    assert judgement.better is None and judgement.text.startswith(
+        "no difference that holds: RK4 at 8 ms takes 0.5 of the time and errs 1e+03 times less "
+        "here, but is no better from starts nearby; "
+    )
+
+
+def test_verdicts_say_no_less_and_no_more_than_the_table() -> None:
+    slightly_worse = verdict(rows_with_front((1, 0.97), (0.6, 1.01)), [False, True]).text
+    assert "takes 0.6 of the time and errs hardly more; " in slightly_worse
+    as_dear = verdict(rows_with_front((1, 3.5), (1.02, 0.04)), [True, False]).text
+    assert "it takes about as long and errs 88 times less; " in as_dear
+    assert as_dear.endswith("without one that is seen is RK4 at 10 ms, at about its cost")
+    exact = verdict(rows_with_front((1, 0.0), (2, 1e-9)), [False, False]).text
+    assert exact.endswith("; the scene's own setting makes no error")
 
 
 def test_what_is_not_resolved_makes_no_setting_better() -> None:

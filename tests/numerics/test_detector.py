@@ -213,6 +213,8 @@ def test_refsafe_is_told() -> None:
     ):
         model = compile_model(all_problems()[name].mjcf, Integrator.EULER, timestep)
         assert refsafe_active(model) is active, (name, timestep)
+    stack = compile_model(all_problems()["stack-1"].mjcf, Integrator.EULER, 2.1e-3)
+    assert not refsafe_active(stack, contact=False), "where nothing touches, nothing is softened"
     for attributes in ('limited="true" range="-1 1"', 'frictionloss="1"'):
         joint = f"<joint type='slide' {attributes}/>"
         text = f"<mujoco><worldbody><body>{joint}<geom size='.1'/></body></worldbody></mujoco>"

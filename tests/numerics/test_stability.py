@@ -14,7 +14,12 @@ from msgspec.structs import replace
 from coursebuild.core.model.scenarios import Declarations, DeclaredScenario
 from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.measurement import english
-from coursebuild.features.bench.scenario_view import missed_islands, stable_cells, stable_title
+from coursebuild.features.bench.scenario_view import (
+    missed_islands,
+    stable_again,
+    stable_cells,
+    stable_title,
+)
 from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.linearization import Theory, find_rest, find_theory
 from coursebuild.numerics.pilot import run_pilot
@@ -182,6 +187,10 @@ def test_what_the_gaps_between_timesteps_may_hide_is_said() -> None:
         "below half the limit."
     ]
     assert missed_islands(english(), [replace(row, tries=())]) == []
+    assert stable_again(english(), row).startswith("some are stable again, from ")
+    assert stable_again(english(), replace(row, islands=(0.05,) * 2)) == (
+        "one is stable again: 50 ms"
+    )
 
 
 def test_a_table_says_all_times_over_which_its_timesteps_are_stable() -> None:
@@ -225,6 +234,28 @@ def test_energies_of_a_first_run_that_gains_energy_bound_nothing() -> None:
     setup = run_pilot(model, scene).setup
     assert (setup.energy, setup.kinetic) == pytest.approx((energy, energy), rel=1e-6)
     assert setup.energy_bound == pytest.approx(11 * energy, rel=1e-6)
+
+
+def test_what_hangs_at_rest_gains_no_energy() -> None:
+    """Before the first step MuJoCo has computed none: 0 J would be more than there can be."""
+    mjcf = """<mujoco><option timestep="0.01"/><worldbody><body><joint axis="0 1 0"/>
+    <inertial pos="0 0 -1" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+    assert {row.gain for row in rows_of(mjcf, search=(0.02, 0.08)).values()} == {None}
+
+
+def test_a_rest_about_which_forces_have_two_laws_has_no_theory() -> None:
+    """A muscle activates in other times than it deactivates; a post just touches a plane.
+
+    A mean of both sides would give limits all the same, with digits that mean nothing.
+    """
+    muscle = """<joint name="j" type="slide" stiffness="60" damping="2"/><geom size=".1"/></body>
+    </worldbody><actuator><muscle joint="j" force="50" lengthrange="-.4 .4"/></actuator>"""
+    post = """<joint type="slide" axis="0 0 1" stiffness="9"/><joint axis="0 1 0" stiffness="9"/>
+    <geom type="cylinder" size=".1 .5"/></body><geom type="plane" size="1 1 1"/></worldbody>"""
+    head = '<mujoco><option gravity="0 0 0"/><worldbody><body pos="0 0 .5">'
+    for rest in (muscle, post):
+        model = mujoco.MjModel.from_xml_string(f"{head}{rest}</mujoco>")
+        assert find_rest(model, Scenario(1.0, 0.1)) is None
 
 
 ARM = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>

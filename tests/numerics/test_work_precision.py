@@ -302,6 +302,43 @@ def test_a_cone_that_is_better_from_starts_nearby_too() -> None:
     assert report.rows[report.verdict.better].setting.cone == "elliptic"
 
 
+STOP = """<mujoco><option timestep="0.004"/><worldbody>{}<body>
+  <joint type="slide" axis="0 0 1" {}/><geom size=".1" mass="1" contype="{}"/>
+</body></worldbody></mujoco>"""
+FALL = '[[scenario]]\nname = "a"\nqpos = [{}]\nduration = 0.48\nsample = 0.016\n'
+FALL += "timesteps = [0.004]\nsearch = [0.004, 0.008]\n"
+
+
+def test_what_hangs_on_where_in_a_step_a_hit_falls_is_luck() -> None:
+    """Here a smaller error of RK4, at the same cost; a part of a step later there is none."""
+    model = mujoco.MjModel.from_xml_string(STOP.format("", 'limited="true" range="0 9"', 0))
+    (scene,) = scenes(model, parse_declared(FALL.format(0.116)), quick=True)
+    ticks = itertools.count(step=2_000_000)
+    text = measure_scenario(model, scene, quick=True, clock=ticks.__next__).verdict.text
+    assert text.startswith("no difference that holds: RK4 at 4 ms takes no more time and errs ")
+    assert "here, but is no better from starts nearby; " in text
+
+
+def test_contacts_so_soft_that_a_ball_sinks_in_are_no_divergence() -> None:
+    floor = '<geom type="plane" size="1 1 1" solref="0.2 1"/>'
+    model = mujoco.MjModel.from_xml_string(STOP.format(floor, "", 1))
+    (report,) = measure(model, FALL.format(0.5), quick=True)
+    assert {line.status for line in report.rows} == {"ok"}
+    note = "the world and a body without a name are so soft that the middle of one comes to lie "
+    assert note + "in the other" in report.notes
+
+
+def test_refsafe_is_not_told_of_what_never_touches() -> None:
+    """A weld with a stiffness of its own, and geoms that could touch."""
+    model = mujoco.MjModel.from_xml_string("""<mujoco><option timestep="0.02" gravity="0 0 0"/>
+      <worldbody><geom size=".1" pos="9 0 0"/><body name="a"><freejoint/><geom size=".1"/></body>
+      </worldbody><equality><weld body1="a" solref="-400 -40"/></equality></mujoco>""")
+    text = '[[scenario]]\nname = "a"\nqpos = [0.2, 0, 0, 1, 0, 0, 0]\nduration = 0.6\n'
+    (report,) = measure(model, text + "search = [0.02, 0.03]\n", quick=True)
+    assert not any(line.refsafe for line in report.rows)
+    assert not any("refsafe" in note for note in report.notes)
+
+
 TURNTABLE = """<mujoco><option timestep="0.004" integrator="{}"/><worldbody><body>
   <joint axis="0 0 1"/><joint axis="0 1 0"/><geom size=".05" pos="0 0 -1" mass="1"/>
 </body></worldbody></mujoco>"""

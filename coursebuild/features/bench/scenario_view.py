@@ -267,7 +267,7 @@ def stable_title(words: Strings, rows: Sequence[StableRow]) -> str:
     time, energy = " – ".join(dict.fromkeys(times)), rows[0].energy
     if energy is None:
         return words("measured.stable", time=time)
-    return words("measured.stable_energy", time=time, energy=f"{energy:.3g}")
+    return words("measured.stable_energy", time=time, energy=grids.factor(energy))
 
 
 def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:
@@ -284,7 +284,7 @@ def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:
         step, energy = row.gain
         bound = "≤ " if step <= row.searched[0] else ""  # the shortest that was tried gains too
         time = bound + seconds_text(step, 2)
-        gain = words("measured.gained", time=time, energy=f"{energy:.2g}")
+        gain = words("measured.gained", time=time, energy=grids.factor(energy, 2))
     return (
         largest,
         _theory(words, row.theory, has_theory=bool(row.formula)),
@@ -307,6 +307,8 @@ def stable_again(words: Strings, row: StableRow) -> str:
     if row.islands is None:
         return ""
     first, last = (seconds_text(float(f"{step:.3g}")) for step in row.islands)
+    if first == last:
+        return words("measured.island", time=first)
     return words("measured.islands", first=first, last=last)
 
 

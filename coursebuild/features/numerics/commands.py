@@ -114,7 +114,7 @@ def stability(
 ) -> Measurement[CaseReport]:
     """Measure the cases of these names, or all without names; `record` writes them down."""
     own_models, built_in = _split(options, names)
-    problems = _select_problems(built_in) if built_in or not own_models else []
+    problems = _select_problems(options, built_in) if built_in or not own_models else []
     measurement: Measurement[CaseReport] = Measurement(())
     if problems:
         measurement = _CaseRun(options).all(problems)
@@ -164,7 +164,7 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
     own_models, built_in = _split(options, names)
     measurement: Measurement[CaseReport] = Measurement(())
     if built_in or not own_models:
-        problems = _select_problems(built_in)
+        problems = _select_problems(options, built_in)
         recorded = read_record(options.root, STABILITY)
         if isinstance(recorded, ReportFailure):
             measurement = Measurement((), failures=(recorded,))
@@ -233,17 +233,18 @@ def measure_part(root: Path, data: bytes) -> bytes:
         return b""
 
 
-def _select_problems(names: tuple[str, ...]) -> list[str]:
+def _select_problems(options: Options, names: tuple[str, ...]) -> list[str]:
     """The names of all problems that these names mean; of all problems without names."""
     problem_names = tuple(all_problems())
     selection = set() if names else set(problem_names)
     for name in names:
         matches = {p for p in problem_names if p == name or p.startswith(f"{name}-")}
         if not matches:
-            suggestion = nearest(name, problem_names)
+            models = {path.stem for path in (options.root / "models").rglob("*.xml")}
+            suggestion = nearest(name, (*problem_names, *models))
             all_of_them = "known: " + ", ".join(problem_names)
             help = all_of_them if suggestion is None else f"did you mean `{suggestion}`?"
-            raise UsageError(f"no hard case is called `{name}`", help=help)
+            raise UsageError(f"no hard case or model is called `{name}`", help=help)
         selection |= matches
     return [problem for problem in problem_names if problem in selection]
 

@@ -185,6 +185,11 @@ class ModelReader(Struct, frozen=True):
     opaque: str = ""
     """Why it may use everything; empty where it does not."""
 
+    @property
+    def doubt(self) -> str:
+        """That it may notice, and why where it may use everything."""
+        return f"{self.path} may notice" + (f": {self.opaque}" if self.opaque else "")
+
     def notices(
         self, names: Collection[str], kinds: Collection[str], change: Collection[str]
     ) -> bool:

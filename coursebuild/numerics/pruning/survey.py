@@ -380,7 +380,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             fixable=not unfixed,
             unfixed=unfixed,
             kept=reason,
-            doubt=f"{reader.path} may notice" if reader is not None else "",
+            doubt="" if reader is None else reader.doubt,
             shown=comparison.shown,
             starts=len(trials.runs),
             in_rest=bool(trials.absences),

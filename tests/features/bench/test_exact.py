@@ -171,6 +171,53 @@ def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(course: P
         assert "contacts as they are" in diagnostic.help, values
 
 
+def test_velocities_of_an_exact_motion_with_contact_are_rates_of_its_positions(
+    course: Path,
+) -> None:
+    """Against an engine whose contacts are soft only places are compared."""
+    write(course / "models" / "ball.xml", BOUNCE)
+    toml = '[[scenario]]\nname = "slide"\nqvel = [1, 0]\nduration = 0.4\nsample = 0.02\n'
+    slide = SLIDE.format(friction=0.5, height=0)[:-1] + ", [{} * (qvel[0] - 4.905 * stop), 0]\n"
+    assert report(course, slide.format(1), toml).reference == "closed"
+    diagnostic = mistake(course, slide.format(0.9), toml)
+    assert diagnostic.message.endswith("gives velocities that are not the rates of positions")
+    assert diagnostic.help == "number 0 is 0.812 at 0.02 s, where the positions give 0.902"
+
+
+SOFT = """\
+<mujoco>
+  <option timestep="0.002" gravity="0 0 0"/>
+  <default><geom condim="1" solref="-1000 -20" solimp="0.9 0.9 0.001"/></default>
+  <worldbody>
+    <geom type="plane" size="5 5 .1"/>
+    <body pos="0 0 .1"><freejoint/><geom size=".1" mass="1"/></body>
+  </worldbody>
+</mujoco>
+"""
+REBOUND = """\
+from math import atan, cos, exp, pi, sin
+
+
+def motion(time, qpos, qvel):
+    t = min(time, (pi - atan(0.75)) / 30)  # until nothing pushes any more
+    z = qvel[2] / 30 * exp(-10 * t) * sin(30 * t)
+    v = qvel[2] * exp(-10 * t) * (cos(30 * t) - sin(30 * t) / 3)
+    return [0, 0, 0.1 + z + v * (time - t), 1, 0, 0, 0]
+"""
+
+
+def test_an_exact_motion_of_soft_contacts_is_known_as_well_as_the_engine_agrees(
+    course: Path,
+) -> None:
+    """Stiffer contacts tend to something else, which says nothing of this motion."""
+    write(course / "models" / "ball.xml", SOFT)
+    toml = '[[scenario]]\nname = "hit"\nqvel = [0, 0, -0.5, 0, 0, 0]\nduration = 0.2\n'
+    scenario = report(course, REBOUND, toml + "sample = 0.02\n")
+    assert scenario.reference == "closed" and scenario.floor < 1e-4
+    own_row = next(row for row in scenario.rows if row.own)
+    assert own_row.position is not None and own_row.position[0] > 2 * scenario.floor
+
+
 def test_errors_are_resolved_down_to_the_floor_of_an_exact_motion_with_friction(
     course: Path,
 ) -> None:

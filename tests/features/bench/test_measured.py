@@ -157,7 +157,7 @@ def test_the_page_of_the_hard_cases(site: dict[str, str]) -> None:
     assert "3 A &lt;top&gt;" in words and "5 Damped spring" in words
     assert words.index("5 Damped spring") > words.index("3 A &lt;top&gt;")
     assert (
-        "References: the oscillator; Bulirsch–Stoer. They differ by "
+        "References: the oscillator; Bulirsch–Stoer. The motion is known to "
         "1 × 10<sup>−13</sup> in position and 4 × 10<sup>−13</sup> in velocity."
     ) in words
     assert "Euler 200 ms 200.1 ms 250 60 from 1 ms −0.050 % diverged 1.50" in words

@@ -61,11 +61,11 @@ def test_stability_prints_text_and_then_json_without_measuring_again(
 def test_stability_of_a_family_and_of_an_unknown_case(course: Path, capsys: Capture) -> None:
     assert main(["-C", str(course), "stability", "tumbling-bocks"]) == 2
     message = capsys.readouterr().err
-    assert "no hard case is called `tumbling-bocks`; did you mean `tumbling-box`?" in message
+    assert "case or model is called `tumbling-bocks`; did you mean `tumbling-box`?" in message
     assert main(["-C", str(course), "stability", "nope"]) == 2
     message = capsys.readouterr().err
     assert message.startswith(
-        "coursebuild: no hard case is called `nope`; known: tumbling-box, pendulum-hinge-90, "
+        "coursebuild: no hard case or model is called `nope`; known: tumbling-box, pendulum-hin"
     )
     assert run(course, "flat", "millimetre") == 0
     out = capsys.readouterr().out
@@ -81,6 +81,8 @@ def test_model_of_the_course_is_a_case_if_something_is_known_of_it(
     (course / "models" / "drop.xml").write_text(
         f"<mujoco><worldbody><body>{joint}{geom}</body></worldbody></mujoco>"
     )
+    assert run(course, "drap") == 2
+    assert capsys.readouterr().err.endswith("is called `drap`; did you mean `drop`?\n")
     assert run(course, "drop") == 2
     assert capsys.readouterr().err == (
         "coursebuild: no theory is known for `drop`; "
