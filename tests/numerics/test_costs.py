@@ -354,6 +354,9 @@ def test_verdicts_say_no_less_and_no_more_than_the_table() -> None:
     assert as_dear.endswith("without one that is seen is RK4 at 10 ms, at about its cost")
     exact = verdict(rows_with_front((1, 0.0), (2, 1e-9)), [False, False]).text
     assert exact.endswith("; the scene's own setting makes no error")
+    resting = verdict(rows_with_front((1, 0.0), (0.1, 0.0)), [False, False])
+    assert resting.better is None and not resting.on_front
+    assert resting.text == "no setting can be called better: none errs, as where nothing moves"
 
 
 def test_what_is_not_resolved_makes_no_setting_better() -> None:

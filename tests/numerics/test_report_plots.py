@@ -201,6 +201,11 @@ def test_work_that_is_the_same_on_every_machine_has_plots_of_its_own(narrow: boo
     assert len(work_precision(swing())) == 2, "no solver runs"
 
 
+def test_where_nothing_errs_there_is_no_plot() -> None:
+    none = {"position": (0.0, 0.0), "velocity": (0.0, 0.0), "attitude": (0.0, 0.0), "seen": 0.0}
+    assert work_precision(scenario([row(own=True, **none), row("RK4", **none)])) == ()
+
+
 def test_which_error_is_shown() -> None:
     still = [row(position=(1e-11, 1e-11), attitude=(1e-3, 1e-3))]
     assert main_quantity(scenario(still)).name == "attitude"

@@ -92,10 +92,10 @@ _AMOUNTS = {"cost": "at costs of {}", "evaluations": "with {}", "iterations": "w
 def work_precision(report: ScenarioReport) -> tuple[Chart, ...]:
     """The charts of error against cost, evaluations, and where a solver runs, its iterations.
 
-    None where no row has an error.
+    None where no row errs.
     """
     quantity = main_quantity(report)
-    if quantity is None:
+    if quantity is None or not any(quantity.value_of(row) for row in report.rows):
         return ()
     return tuple(
         _chart(report, quantity, work, works)

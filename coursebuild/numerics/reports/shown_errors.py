@@ -120,10 +120,12 @@ def front(rows: Rows, quantity: Quantity = SEEN) -> tuple[WorkPrecisionRow, ...]
     """Rows that say whether they are on the front, and otherwise which row dominates them.
 
     A row is dominated where another costs no more and errs no more, and is clearly better in one of
-    the two. A lucky row is on no front, and dominates none.
+    the two. A lucky row is on no front, and dominates none. Where none errs there is no front.
     """
     points = ((n, front_point(row, quantity)) for n, row in enumerate(rows))
     places = {n: point for n, point in points if point is not None}
+    if not any(place.error for place in places.values()):
+        places = {}
     better = {
         n: [m for m, rival in places.items() if not rows[m].lucky and rival.beats(own_place)]
         for n, own_place in places.items()
