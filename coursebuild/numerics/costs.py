@@ -279,7 +279,7 @@ def verdict(
     if row.parted is not None:
         text = _verdict_of_chaos(rows, row, horizon_error)
         return RowVerdict(False, None, None, None, is_noticeable, text)
-    if not any(quantity.value_of(other) for other in rows):
+    if not any(map(quantity.value_of, rows)):
         text = "no setting can be called better: none errs, as where nothing moves"
         return RowVerdict(False, None, None, None, is_noticeable, text)
     if own_place is None:
