@@ -120,13 +120,7 @@ def run(arguments: argparse.Namespace) -> int:
         server = PreviewServer(host, port, live_course.session, tuple(arguments.embed))
     except OSError as error:
         message = f"port {port} of {host} cannot be used: {error.strerror or error}"
-        is_taken, help = error.errno == EADDRINUSE, ""
-        for number in range(port + 1, min(port + 100, 65536)) if is_taken else ():
-            with contextlib.suppress(OSError), socket.create_server((host, number)):
-                option = "" if host == "127.0.0.1" else f" --host {host}"
-                help = f"`coursebuild serve{option} --port {number}`"
-                break
-        raise UsageError(message, help=help) from None
+        raise UsageError(message, help=_propose_port(host, port, error)) from None
     links = server.links
     preview = {"host": host, "port": server.access.port, "links": links, "process": os.getpid()}
     # For what is given in other terminals; now, while this process has no threads.
@@ -153,6 +147,14 @@ def run(arguments: argparse.Namespace) -> int:
             commands.close()
         server.stop()
         live_course.close()
+
+
+def _propose_port(host: str, port: int, error: OSError) -> str:
+    for number in range(port + 1, min(port + 100, 65536)) if error.errno == EADDRINUSE else ():
+        with contextlib.suppress(OSError), socket.create_server((host, number)):
+            option = "" if host == "127.0.0.1" else f" --host {host}"
+            return f"`coursebuild serve{option} --port {number}`"
+    return ""
 
 
 # --- commands for other terminals

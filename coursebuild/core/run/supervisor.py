@@ -218,15 +218,7 @@ class _Supervisor:
                 )
                 process.returncode = 0  # `RunningScript` reaps it
                 return RunningScript(process.pid, (out, err), None, job["timeout"], self.awake)
-            if os.getpid() == _FIRST:  # in a sandbox, all that is shared is a file's
-                fd = os.open(environment["TMPDIR"], os.O_TMPFILE | os.O_RDWR)
-                try:
-                    os.ftruncate(fd, _NOTES_BYTES)
-                    shared = mmap.mmap(fd, _NOTES_BYTES)
-                finally:
-                    os.close(fd)
-            else:
-                shared = mmap.mmap(-1, _NOTES_BYTES)
+            shared = _shared_memory(environment["TMPDIR"])
             gc.freeze()  # else a script's garbage collector would touch, and so copy, our memory
             pid = os.fork()
             if pid == 0:
@@ -287,6 +279,17 @@ def _sibling_names(job: Job) -> frozenset[str]:
         with contextlib.suppress(OSError):
             names.update(name.partition(".")[0] for name in os.listdir(folder))  # noqa: PTH208
     return frozenset(names)
+
+
+def _shared_memory(folder: str) -> mmap.mmap:
+    if os.getpid() != _FIRST:
+        return mmap.mmap(-1, _NOTES_BYTES)
+    fd = os.open(folder, os.O_TMPFILE | os.O_RDWR)  # in a sandbox, all that is shared is a file's
+    try:
+        os.ftruncate(fd, _NOTES_BYTES)
+        return mmap.mmap(fd, _NOTES_BYTES)
+    finally:
+        os.close(fd)
 
 
 def _read_notes(shared: mmap.mmap | None, overflow: str) -> bytes:

@@ -260,30 +260,12 @@ def drift_diagnostic(
         return diagnose("output-drift", recording.caption_span, message, help=f"run {update}")
     changes = verdict.changes
     first, *rest = sorted(changes, key=lambda change: change.span.start)
-    notes = []
-    for change in rest[:_MAX_NOTES]:  # unlike a label, a note must quote what is recorded
-        text = _label(change)
-        if change.kind is DriftKind.MISSING:
-            first_line = change.recorded.split("\n")[0]
-            text = f"recorded {quote(first_line, _WIDTH)}; {text}"
-        elif change.kind is not DriftKind.EXTRA and change.recorded.strip():
-            numeric = change.kind is not DriftKind.TEXT or _is_same_value(change)
-            show = shorten if numeric else quote
-            text = f"recorded {show(change.recorded, _WIDTH)}; {text}"
-        notes.append(Note(text, change.span))
+    notes = [Note(_describe_difference(change), change.span) for change in rest[:_MAX_NOTES]]
     if len(rest) > _MAX_NOTES:
         rest_count = len(rest) - _MAX_NOTES
         noun = "difference" if rest_count == 1 else "differences"
         notes.append(Note(f"and {rest_count} more {noun}"))
-    for dependent in dependents:
-        binding, change = dependent.binding, dependent.change
-        recorded, printed = _single_number(change.recorded), _single_number(change.printed)
-        text = "a line that changed"
-        if recorded is not None and printed is not None and change.kind is not DriftKind.MISSING:
-            numbers = (n for n in BoundText.of(binding.text).numbers if shows(n, recorded))
-            holds = ", and still holds" if any(shows(n, printed) for n in numbers) else ""
-            text = f"{recorded.text}, which this run printed as {printed.text}{holds}"
-        notes.append(Note(f"`{binding.text}` depends on {text}", binding.text_span))
+    notes += (Note(_describe_dependence(d), d.binding.text_span) for d in dependents)
     help = f"if the change is intended, run {update}"
     fraction = re.match(r",(\d+)", first.span.source.text[first.span.end : first.span.end + 40])
     if any("\x1b" in change.recorded and "\x1b" not in change.printed for change in changes):
@@ -350,3 +332,26 @@ def closeness(change: Change) -> str:
         return error
     agree = {0: "no digit agrees", 1: "1 digit agrees"}
     return f"{error}, {agree.get(change.digits, f'{change.digits} digits agree')}"
+
+
+def _describe_difference(change: Change) -> str:
+    """A further difference, for a note: unlike a label it must quote what is recorded."""
+    if change.kind is DriftKind.MISSING:
+        first = change.recorded.split("\n")[0]
+        return f"recorded {quote(first, _WIDTH)}; {_label(change)}"
+    if change.kind is DriftKind.EXTRA or not change.recorded.strip():
+        return _label(change)
+    numeric = change.kind is not DriftKind.TEXT or _is_same_value(change)
+    recorded = shorten(change.recorded, _WIDTH) if numeric else quote(change.recorded, _WIDTH)
+    return f"recorded {recorded}; {_label(change)}"
+
+
+def _describe_dependence(dependent: bindings.DependentBinding) -> str:
+    change = dependent.change
+    lead = f"`{dependent.binding.text}` depends on "
+    recorded, printed = _single_number(change.recorded), _single_number(change.printed)
+    if recorded is None or printed is None or change.kind is DriftKind.MISSING:
+        return lead + "a line that changed"
+    numbers = [n for n in BoundText.of(dependent.binding.text).numbers if shows(n, recorded)]
+    holds = ", and still holds" if any(shows(n, printed) for n in numbers) else ""
+    return f"{lead}{recorded.text}, which this run printed as {printed.text}{holds}"

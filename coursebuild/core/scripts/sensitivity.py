@@ -149,14 +149,7 @@ def sensitivity(
     standing = _standing(compared, base, moved_runs)
     if standing is not Standing.MEASURED:
         return Sensitivity(path, owner, standing)
-    reason_unhalved = "" if finer_runs else "it was not run with shorter timesteps"
-    for run, part in zip(finer_runs, ("half", "a quarter of"), strict=False):
-        if run.outcome is not Outcome.OK:
-            reason_unhalved = f"it does not run to its end with {part} the timestep"
-            break
-        if run.trace is None or not run.trace.is_perturbed:
-            reason_unhalved = "no step of it can be halved"
-            break
+    reason_unhalved = _reason_unhalved(finer_runs)
     usable_runs = () if reason_unhalved else finer_runs
     findings = [
         finding
@@ -170,6 +163,18 @@ def sensitivity(
     flips = tuple(finding for finding in findings if isinstance(finding, Flip))
     size = amplification(moved_runs)
     return Sensitivity(path, owner, standing, numbers, size, reason_unhalved, doubts, flips)
+
+
+def _reason_unhalved(runs: Sequence[ScriptRun]) -> str:
+    """Why runs with shorter steps show nothing, in words; else empty."""
+    if not runs:
+        return "it was not run with shorter timesteps"
+    for run, part in zip(runs, ("half", "a quarter of"), strict=True):
+        if run.outcome is not Outcome.OK:
+            return f"it does not run to its end with {part} the timestep"
+        if run.trace is None or not run.trace.is_perturbed:
+            return "no step of it can be halved"
+    return ""
 
 
 def is_worth_moving(course: Course, recordings: Iterable[Recording], base: ScriptRun) -> bool:
