@@ -42,7 +42,7 @@ _SETTLED = 1e-6
 """A motion has come to rest below this part of its largest kinetic energy."""
 _EXCESS = 0.1
 """The share of the largest kinetic energy above what there can be, from which it is nonsense."""
-_DEEPER = 1.25
+DEEPER = 1.25
 """How many times deeper than in small steps bodies may lie in each other."""
 _PEAK_INTERVAL = 8
 """Steps from one look at how large the state is to the next."""
@@ -249,7 +249,7 @@ def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
     setup = Setup(
         scenario=scenario,
         position_bound=2 * peaks.position + room * max(extent, 1.0) + round_and_round,
-        sunk_bound=max(1.0, _DEEPER * peaks.sunk),
+        sunk_bound=max(1.0, DEEPER * peaks.sunk),
     )
     if (bound := scene.declaration.energy_bound) is not None:
         return replace(setup, energy_bound=bound, energy=peaks.energy, kinetic=peaks.kinetic)

@@ -24,10 +24,19 @@ from numpy.typing import NDArray
 
 from coursebuild.core.model.scenarios import Declarations, DeclaredScenario
 from coursebuild.numerics.detector import Peaks, RunJudgement, judge, update_peaks
-from coursebuild.numerics.pilot import NUDGE, nudges
-from coursebuild.numerics.problem import Array, Scenario
+from coursebuild.numerics.pilot import DEEPER, NUDGE, nudges
+from coursebuild.numerics.problem import Array, Scenario, Setup
 from coursebuild.numerics.scene import Scene, scenes, thickness
-from coursebuild.numerics.simulation import STATE, advance, full_state, initial_data
+from coursebuild.numerics.simulation import (
+    STATE,
+    advance,
+    advance_watching,
+    full_state,
+    initial_data,
+    integrator_of,
+    with_integrator,
+    without_sleep,
+)
 
 Places: TypeAlias = NDArray[np.int64]
 IndexMap: TypeAlias = Mapping[str, Places]
@@ -213,9 +222,29 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
             advance(model, twin)
             gauge.look(data, twin)
             horizon = float(data.time) if gauge.seen > ALIKE else horizon
-    judgement = judge(model, data, steps_made * scene.timestep, peaks)
+    bound = _sunk_bound(model, scene) if peaks.sunk > 1 else 1.0
+    setup = Setup(scenario=scene.scenario, sunk_bound=bound)
+    judgement = judge(model, data, steps_made * scene.timestep, peaks, setup)
     observations = frozenset(touching), constrained, displacements, speeds, horizon
     return WatchedRun(scene, judgement, *observations)
+
+
+_FINER = 8
+"""How many times shorter the steps are that tell a soft contact from a lost run."""
+
+
+def _sunk_bound(model: Any, scene: Scene) -> float:
+    """How deep bodies may lie in each other, as `Peaks.sunk`: little deeper than in small steps."""
+    step = scene.timestep / _FINER
+    fine = without_sleep(with_integrator(model, integrator_of(model), step))
+    data, peaks, half_thickness = initial_data(scene.scenario, fine), Peaks(), thickness(fine)
+    for command in scene.scenario.commands(scene.timestep):
+        if command:
+            data.ctrl[:] = command
+        peaks, _ = advance_watching(fine, data, _FINER, peaks, half_thickness, interval=_FINER)
+        if not peaks.finite:
+            return 1.0
+    return max(1.0, DEEPER * peaks.sunk)
 
 
 def nearby_scenes(model: Any, run: WatchedRun, count: int) -> Iterator[Scene]:
