@@ -253,7 +253,10 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
 
     def _is_unread(self, item: Item) -> bool:
         names = {item.name} | {node.get("class") or "" for e in item.removals for node in e.walk()}
-        return self._find_noticing_reader(names - {""}, _views([item]), ()) is None
+        reader = self._find_noticing_reader(names - {""}, _views([item]), ())
+        if reader is not None:
+            self._reject([item], None, reader.doubt)
+        return reader is None
 
     def _find_noticing_reader(
         self, names: Collection[str], kinds: Collection[str], change: Collection[str]
@@ -276,9 +279,9 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             return False
         sleeps = int(self.text.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
         may_sleep = sleeps or any(reader.touches({"enableflags"}) for reader in self.readers)
-        if may_sleep and "tree_sleep_policy" in change:
-            return False
-        if self._find_noticing_reader((), kinds, change) is not None:
+        # One step from a random state tells more than scenarios that do not go there.
+        state_fields = {"qpos", "qvel"} | ({"tree_sleep_policy"} if may_sleep else set())
+        if change & state_fields or self._find_noticing_reader((), kinds, change) is not None:
             return False
         result = self.trials.compare(trial, self.trials.whole)
         return result is not None and result.identical

@@ -32,6 +32,16 @@ def test_actuators_that_nobody_commands() -> None:
     assert '<key name="up" qpos="1 0" ctrl="0 0 0 0 0 0"/>' in fixed_text(survey)
 
 
+def test_proof_holds_in_states_that_no_scenario_passes_through() -> None:
+    """MuJoCo compensates gravity by actuators only where there is one; at rest nothing shows it."""
+    text = scene(
+        """<body name="arm" pos="0 0 1" gravcomp="1"><joint name="h" actuatorgravcomp="true"
+          axis="0 1 0"/><geom size=".05" pos="0 0 -.3"/></body>""",
+        rest='<actuator><motor name="idle" joint="h"/></actuator>',
+    )
+    assert "actuator-idle" not in findings_by_kind(run_survey(text))
+
+
 def test_scenarios_that_number_commands_keep_actuators_from_being_changed() -> None:
     rest = '<actuator><motor name="push" joint="pivot"/></actuator>'
     survey = run_survey(scene(rest=rest), numbered_kinds=["actuator-idle"])
