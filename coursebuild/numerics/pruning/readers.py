@@ -128,7 +128,9 @@ _OPAQUE = frozenset(
     " locals setattr vars Function Object Reflect"
     # the file of the model, or names of things
     " from_zip fromfile genfromtxt glob iterdir listdir load loadtxt memmap modules open read_bytes"
-    " read_text rglob scandir st_size walk MjSpec MjvScene Renderer rollout".split(" ")
+    " read_text rglob scandir st_size walk MjSpec MjvScene Renderer rollout"
+    # what takes a whole model, among MuJoCo's own modules
+    " experimental mjx sysid usd viewer".split(" ")
 )
 _THING = re.compile(r"""\w+\s*\.\s*(\w+)\(\s*(?:"[^"\\]*"|'[^'\\]*')\s*\)(?:\s*\.\s*(\w+))?""")
 """An access to one thing by its complete name, and the attribute that is read from it."""
@@ -188,7 +190,7 @@ class ModelReader(Struct, frozen=True):
     @property
     def doubt(self) -> str:
         """That it may notice, and why where it may use everything."""
-        return f"{self.path} may notice" + (f": {self.opaque}" if self.opaque else "")
+        return f"{self.path} may notice" + (f" ({self.opaque})" if self.opaque else "")
 
     def notices(
         self, names: Collection[str], kinds: Collection[str], change: Collection[str]

@@ -122,7 +122,7 @@ def test_a_finding_is_kept_with_a_reason(course: Path, capsys: Capture) -> None:
     declarations.write_text('[[keep]]\nfinding = "sensor-unread time"\nreason = "shown in class"\n')
     assert run(course) == 0
     out = capsys.readouterr().out
-    assert "    kept: shown in class\n" in out and "nothing in it is useless" in out
+    assert "    kept: shown in class\n" in out and "nothing else in it is proved useless" in out
     assert run(course, "--fix") == 0
     assert (course / "models" / "swing.xml").read_text() == MODEL
     declarations.write_text('[[keep]]\nfinding = "sensor-unread tim"\nreason = "shown in class"\n')

@@ -50,6 +50,8 @@ HOSTILE = {
     "format field": ("sensor", 'print("{0.sensordata}".format(data))'),
     "pattern": ("sensor", "match data:\n    case object(sensordata=s): print(s)"),
     "function handed on": ("sensor", 'print([f(n).data for f in (data.sensor,) for n in ("at",)])'),
+    "MuJoCo's viewer": ("actuator", "from mujoco import viewer\nviewer.launch(model)"),
+    "MuJoCo's module": ("sensor", "from mujoco import mjx\nmjx.put_model(model)"),
     "unknown package": ("sensor", "import observe\nobserve.everything(model, data)"),
     "name2id": ("sensor", 'i = mujoco.mj_name2id(model, 20, "hip" + "_l")\nprint(i)'),
     "id of another": ("sensor", 'print(model.sensor("at").id)'),
@@ -119,6 +121,8 @@ def test_what_a_script_names_stays_and_the_rest_goes() -> None:
         finding.kind: names(finding) for finding in survey.report.findings if finding.is_fault
     }
     assert names_by_kind.pop("contact-off") == []
+    reasons = {(t.kind, *t.places): t.reason for t in survey.report.tried}
+    assert reasons["sensor-unread", "hip_l"] == "examples/a.py may notice"
     assert names_by_kind == {
         "energy-flag": ["energy"],
         "sensor-unread": ["hip_r", "spin", "at", "felt"],

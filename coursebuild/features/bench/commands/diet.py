@@ -326,21 +326,22 @@ def _summary(report: DietReport, style: Style) -> list[str]:
     findings = [finding for finding in report.findings if finding.is_fault]
     fixable = [finding for finding in findings if finding.fixable]
     lines: list[str] = []
-    if not report.ok:
+    if findings:
         text = plural(len(findings), "finding") + " not explained"
         if fixable:
             text += f", {len(fixable)} of them for `coursebuild diet {report.model} --fix`"
         lines += style.wrap(text, "  ", RED)
-        for first in findings[:1]:
-            name = first.places[0].name if len(first.places) == 1 else ""
-            key = f"{first.kind} {name}".strip()
-            quote = "'" if '"' in key else '"'
-            text = f"give the reason for what you keep in models/{report.model}.toml: "
-            text += f"[[keep]] finding = {quote}{key}{quote}, reason = …"
-            lines += style.wrap(text, "  ", FAINT)
-    elif all(finding.kept for finding in report.findings):
-        lines.append("  " + style.paint("nothing in it is useless", GREEN))
-    else:
+        first = findings[0]
+        name = first.places[0].name if len(first.places) == 1 else ""
+        key = f"{first.kind} {name}".strip()
+        quote = "'" if '"' in key else '"'
+        text = f"give the reason for what you keep in models/{report.model}.toml: "
+        text += f"[[keep]] finding = {quote}{key}{quote}, reason = …"
+        lines += style.wrap(text, "  ", FAINT)
+    elif report.ok and all(finding.kept for finding in report.findings):
+        text = f"nothing {'else ' if report.findings else ''}in it is proved useless"
+        lines.append("  " + style.paint(text, GREEN))
+    elif report.ok:
         text = "nothing in it is proved useless; what is named above was not needed in what was run"
         lines += style.wrap(text, "  ", GREEN)
     if report.slim is not None and len(findings) > 1:
