@@ -34,7 +34,7 @@ VIEWS: dict[str, str] = {
 """Words by which one thing is asked for, such as `mat` and `material`, each with its kind."""
 _POINTERS = frozenset(("model", "pbase", "parena", "pstack", "signature", "threadpool", "timer"))
 """Fields in which two equal states may differ."""
-_LISTS = re.compile(r"n?names(_map)?|n?paths|nbuffer|narena|name_\w+adr|n?bvh.*")
+_LISTS = re.compile(r"n?names(_map)?|n?paths|nbuffer|narena|name_\w+adr|\w+_pathadr|n?bvh.*")
 """Fields that list the names, paths and boxes of all things, or give sizes of memory."""
 _COMPUTED_IF = {
     "flg_rnepost": ("cacc", "cfrc_ext", "cfrc_int"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import struct
 import time
 
 import pytest
@@ -109,11 +110,15 @@ def test_a_geom_that_nothing_can_reach_is_not_idle_too() -> None:
 
 def test_an_asset_is_called_after_its_file() -> None:
     mesh = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
-    head = '<asset><mesh file="one.obj"/><mesh file="two.obj"/></asset>'
+    hills = struct.pack("<2i4f", 2, 2, 0, 1, 0, 1)
+    head = """<asset><mesh file="one.obj"/><mesh file="two.obj"/>
+    <hfield file="hills.bin" size="1 1 1 1"/></asset>"""
     world = PENDULUM.replace("</body>", '<geom type="mesh" mesh="one" mass="0"/></body>')
-    files = {PATH: scene(world, head=head), "models/one.obj": mesh, "models/two.obj": mesh}
-    survey = run_survey(files)
-    assert names(findings_by_kind(survey)["unused-mesh"]) == ["two"]
+    files = {"models/one.obj": mesh, "models/two.obj": mesh, "models/hills.bin": hills}
+    text = scene(world, head=head)
+    assert names(findings_by_kind(run_survey(files | {PATH: text}))["unused-mesh"]) == ["two"]
+    text = text.replace('<mesh file="two.obj"/>', "")
+    assert names(findings_by_kind(run_survey(files | {PATH: text}))["unused-hfield"]) == ["hills"]
 
 
 def test_classes_that_no_element_is_of() -> None:
