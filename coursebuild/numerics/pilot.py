@@ -263,13 +263,13 @@ def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
 
 
 def longer_setup(model: Any, pilot: Pilot, span: float) -> Setup:
-    """The setup for a longer span (s), where a motion may fall farther, or go on to grow."""
+    """The setup for a longer span (s), where a motion may fall farther, go on to grow, or hit."""
     scene = pilot.scene
     duration = math.ceil(span / scene.scenario.sample * (1 - 1e-12)) * scene.scenario.sample
     longer_scene = replace(scene, scenario=replace(scene.scenario, duration=duration))
     for integrator in (Integrator.RK4, simulation.integrator_of(model)):
         variant = simulation.with_integrator(model, integrator, min(scene.timesteps))
-        run = simulation.simulate(Setup(scenario=longer_scene.scenario), variant)
+        run = simulation.simulate(Setup(scenario=longer_scene.scenario), variant, thickness(model))
         position, velocity, kinetic = (
             float(np.abs(values).max(initial=0.0))
             for values in (run.states.qpos, run.states.qvel, run.energy[:, 1])
@@ -280,6 +280,7 @@ def longer_setup(model: Any, pilot: Pilot, span: float) -> Setup:
                 position=max(position, pilot.peaks.position),
                 velocity=max(velocity, pilot.peaks.velocity),
                 kinetic=max(kinetic, pilot.peaks.kinetic),
+                sunk=max(run.sunk, pilot.peaks.sunk),
             )
             return _bounds(model, longer_scene, peaks)
     return pilot.setup

@@ -224,6 +224,8 @@ class Run(Struct, frozen=True):
     """(n + 1, 3) kg m²/s: angular, of everything about its centre of mass, in the world's frame."""
     penetration: float
     """Deepest contact at those times, m."""
+    sunk: float
+    """The same as `Peaks.sunk`."""
     judgement: RunJudgement
 
 
@@ -249,7 +251,7 @@ def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
         peaks = replace(peaks, penetration=max(peaks.penetration, deepest_contact(scratch)))
     judgement = judge(model, data, steps * step, peaks, setup)
     states = EngineStates(times, qpos, qvel, act)
-    return Run(states, table[:, :2], table[:, 2:], peaks.penetration, judgement)
+    return Run(states, table[:, :2], table[:, 2:], peaks.penetration, peaks.sunk, judgement)
 
 
 def run_steps(

@@ -22,7 +22,7 @@ from coursebuild.features.bench.scenario_view import (
 )
 from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.linearization import Theory, find_rest, find_theory
-from coursebuild.numerics.pilot import run_pilot
+from coursebuild.numerics.pilot import longer_setup, run_pilot
 from coursebuild.numerics.problem import STANDARD, Integrator, Scenario, Setup
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.problems.oscillators import rk4_factor, rk4_limit
@@ -241,6 +241,18 @@ def test_what_hangs_at_rest_gains_no_energy() -> None:
     mjcf = """<mujoco><option timestep="0.01"/><worldbody><body><joint axis="0 1 0"/>
     <inertial pos="0 0 -1" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
     assert {row.gain for row in rows_of(mjcf, search=(0.02, 0.08)).values()} == {None}
+
+
+def test_what_sinks_in_after_the_scenario_is_not_lost_in_longer_runs() -> None:
+    """A ball falls for 0.45 s, then into a floor so soft that its middle is below the surface."""
+    mjcf = """<mujoco><worldbody><geom type="plane" size="1 1 1" solref="0.2 1"/><body pos="0 0 1">
+    <freejoint/><geom size=".05" mass="1"/></body></worldbody></mujoco>"""
+    model, source = mujoco.MjModel.from_xml_string(mjcf), Source("m.xml", mjcf)
+    table = DeclaredScenario("s", span=source.span(0, 0), duration=0.4)
+    (scene,) = scenes(model, Declarations("m", source, (table,)))
+    pilot = run_pilot(model, scene)
+    bounds = [longer_setup(model, pilot, span).sunk_bound for span in (0.4, 0.8)]
+    assert bounds[0] == 1.0 and bounds[1] > 2.0, "it sinks by more than its diameter"
 
 
 def test_a_rest_about_which_forces_have_two_laws_has_no_theory() -> None:
