@@ -89,7 +89,7 @@ def test_two_motions_of_the_course_are_told_apart(course: Path) -> None:
     exact = EXACT.format(velocity=", qvel - 9.81 * time") + "\n\n" + EQUATIONS
     assert report(course, exact.format("")).floor < 1e-11
     message = mistake(course, exact.format(" * (1 + 1e-5)")).message
-    assert message == "`models/ball.exact.py`, `acceleration`, is not this scene's motion"
+    assert message == "`models/ball.exact.py`, `acceleration`, is not the motion of `fall`"
 
 
 PENDULUM = """\
@@ -167,7 +167,7 @@ def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(course: P
     assert scenario.stable[0].theory == 0.01
     for values in ({"friction": 0.6, "height": 0}, {"friction": 0.5, "height": "time"}):
         diagnostic = mistake(course, SLIDE.format(**values), toml)
-        assert "is not this scene's motion" in diagnostic.message, values
+        assert "is not the motion of `" in diagnostic.message, values
         assert "contacts as they are" in diagnostic.help, values
 
 
@@ -201,7 +201,7 @@ def test_an_exact_motion_with_contact_that_is_off_by_a_hundred_thousandth_is_ref
     scenario = report(course, ROLLED.format(g=9.81), toml)
     assert scenario.reference == "closed" and scenario.floor < 1e-5
     diagnostic = mistake(course, ROLLED.format(g=9.81 * (1 + 1e-5)), toml)
-    assert "is not this scene's motion" in diagnostic.message
+    assert "is not the motion of `" in diagnostic.message
     assert "4, 8, 16" in diagnostic.help, "where the softness of contacts hides it no longer"
 
 
@@ -266,7 +266,7 @@ def test_errors_are_resolved_down_to_the_floor_of_an_exact_motion_with_friction(
 
 def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:
     cases = {
-        EXACT.format(velocity="").replace("/ 2", "/ 3"): "is not this scene's motion",
+        EXACT.format(velocity="").replace("/ 2", "/ 3"): "is not the motion of `",
         "def motion(time, qpos, qvel):\n    return [1, 2]\n": "gives numbers of coordinates that",
         "x = 1\n": "gives no motion: KeyError: 'motion'",
         "import sys\n\nsys.exit()\n": "gives no motion: ",
