@@ -38,10 +38,10 @@ def far_bodies(
 ) -> list[Item]:
     """Bodies that the scene is not about.
 
-    It is about trees of bodies that are driven or couple with others, are set in motion, or
-    contain a name that code uses; where there are none, about mechanisms rather than single free
-    bodies; where there are none, about those with names. Where all are alike none is far. Where
-    some actuators get commands, the others drive nothing: at most they hold it.
+    It is about trees of bodies that are driven or couple with others, are placed or set in motion
+    by a scenario, or contain a name that code uses; where there are none, about mechanisms rather
+    than single free bodies; where there are none, about those with names. Where all are alike none
+    is far. Where some actuators get commands, the others drive nothing: at most they hold it.
     """
     model, tree = text.model, text.model.body_treeid
     commanded = commanded_actuators(model, scenarios)
@@ -59,10 +59,11 @@ def far_bodies(
     }  # what is repeated has a number
     ranks: dict[int, int] = {}
     for case in scenarios:
-        velocity = np.array(case.qvel)
-        if not case.qvel and case.keyframe >= 0:
-            velocity = model.key_qvel[case.keyframe]
-        ranks |= dict.fromkeys(model.dof_treeid[np.flatnonzero(velocity)].tolist(), 3)
+        start, off = initial_data(case, model), np.zeros(model.nv)
+        if case.qpos:  # a keyframe places all that there is
+            mujoco.mj_differentiatePos(model, off, 1.0, model.qpos0, start.qpos)
+        is_set = (np.abs(off) > _STILL) | (start.qvel != 0)
+        ranks |= dict.fromkeys(model.dof_treeid[is_set].tolist(), 3)
     roots: dict[Element, list[int]] = {}
     for element, ids in text.things("body"):
         names = {inner.get("name") for inner in element.walk()} - {None, ""}
@@ -95,12 +96,14 @@ def far_bodies(
         if not near:
             break
         far = {element: numbers for element, numbers in far.items() if not numbers & near}
+    subjects = tuple(display_name(element) for element in roots if element not in far)
     return [
         Item(
             "far-body",
             display_name(element),
             element,
             (element, *_users(text, element, _REFERRING)),
+            subjects=subjects,
         )
         for element in far
     ]

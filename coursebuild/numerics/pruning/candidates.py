@@ -44,7 +44,8 @@ class FindingKind(Struct, frozen=True):
     """A kind of findings."""
 
     message: str
-    """What is said of such things: `{}` stands for their noun and names."""
+    """What is said of such things: `{}` or `{0}` stands for their noun and names, `{1}` for the
+    subjects of the scene."""
     noun: str = ""
     view: str = ""
     """The kind of thing that it is to code (`differences.VIEWS`)."""
@@ -117,7 +118,7 @@ KINDS = {
         " body_bvhnum body_bvhadr",
     ),
     "far-body": FindingKind(
-        "what the scene is about moves in the same way without the {}", "body", "Body"
+        "what the scene is about{1} moves in the same way without the {0}", "body", "Body"
     ),
     "contact-idle": FindingKind("contacts are searched for, and nothing touched"),
     "contact-left": FindingKind("contacts are searched for, and without {} nothing touched"),
@@ -158,6 +159,8 @@ class Item(Struct, frozen=True, eq=False):
     """Attributes to take out."""
     edits: tuple[ModelEdit, ...] = ()
     """Other changes of the text."""
+    subjects: tuple[str, ...] = ()
+    """The bodies that the scene is about, where that counts."""
 
 
 def message_of(items: Sequence[Item]) -> str:
@@ -167,7 +170,8 @@ def message_of(items: Sequence[Item]) -> str:
         kind.noun, f"{kind.noun}s"
     )
     noun = f"{kind.noun if len(items) == 1 else plural} " if kind.noun else ""
-    return kind.message.format(noun + name_list([item.name for item in items]))
+    subjects = f" ({name_list(items[0].subjects)})" if items[0].subjects else ""
+    return kind.message.format(noun + name_list([item.name for item in items]), subjects)
 
 
 _FLAGS = ("energy", "fwdinv")

@@ -112,7 +112,7 @@ def test_fix_takes_what_goes_together_and_leaves_what_only_runs_speak_for(
     out = capsys.readouterr().out
     assert "changed models/swing.xml: unused-material, unused-texture" in out
     assert file.read_text() == whole
-    assert "far-body: what the scene is about moves in the same way without the body far" in (
+    assert "far-body: what the scene is about (bob) moves in the same way without the body far" in (
         " ".join(out.split())
     )
 

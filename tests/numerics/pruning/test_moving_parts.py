@@ -7,7 +7,16 @@ import itertools
 import pytest
 
 from coursebuild.numerics.reports.diet_report import MEASURED_LABEL, PROVED_LABEL
-from support.surveys import PENDULUM, field, findings_by_kind, fixed_text, names, run_survey, scene
+from support.surveys import (
+    PENDULUM,
+    field,
+    findings_by_kind,
+    fixed_text,
+    names,
+    parse_declared,
+    run_survey,
+    scene,
+)
 
 pytestmark = pytest.mark.long
 
@@ -153,4 +162,10 @@ def test_what_the_scene_is_about_stays() -> None:
     pendulum = (
         '<body name="p{0}" pos="{0} 0 2"><joint name="{1}" axis="0 1 0"/><geom size=".1"/></body>'
     )
-    assert far(pendulum.format(0, "j") + pendulum.format(9, "k"), rest=push) == ["p9"]
+    pair = scene(pendulum.format(0, "j") + pendulum.format(9, "k"), rest=push)
+    finding = findings_by_kind(run_survey(pair))["far-body"]
+    assert names(finding) == ["p9"] and "is about (p0) moves" in finding.message
+    layout = '[[scenario]]\nname = "go"\nduration = 0.1\nqpos = [0, {}]\n'
+    for angle, is_placed in ((0, False), (0.3, True)):
+        survey = run_survey(pair, declarations=parse_declared(layout.format(angle)))
+        assert ("far-body" not in findings_by_kind(survey)) is is_placed

@@ -316,7 +316,8 @@ def diet_text(reports: Sequence[DietReport], style: Style) -> str:
             place = f"{entry.path}:{entry.line}:{entry.column}"
             text = f"`{entry.finding}` no longer keeps anything: remove the entry ({place})"
             lines += ["", *style.wrap(text, "  ", RED)]
-        lines += ["", *_summary(report, style)]
+        summary = _summary(report, style)
+        lines += ["", *summary] if summary else []
         texts.append("\n".join(lines) + "\n")
     footnote = "".join(line + "\n" for line in style.wrap(_FOOTNOTE, "", FAINT))
     return "\n".join([*texts, footnote])
