@@ -193,7 +193,8 @@ def _check_exact(
 ) -> Sizes:
     """How well a course's exact motion, with its name, is known where no integration says it."""
     exact, name = named_exact
-    subject, gap = f"{name} is not the motion of `{pilot.scene.name}`", _gap(model, states, second.states)
+    subject = f"{name} is not the motion of `{pilot.scene.name}`"
+    gap = _gap(model, states, second.states)
     precision = pilot.scene.declaration.precision or PRECISION
     if second.kind == "ode":
         for part in ("position", "attitude", "velocity"):
