@@ -236,6 +236,33 @@ def test_a_file_of_two_models_is_not_changed(course: Path, capsys: Capture) -> N
     assert (models / "part.xml").read_text() == SHARED_PART
 
 
+def test_other_users_of_a_file_need_what_they_name(course: Path, capsys: Capture) -> None:
+    """Another model, a text in a lesson, and what is measured on a part and read of it."""
+    models, lessons = course / "models", course / "content" / "lessons"
+    materials = "".join(f'<material name="{name}"/>' for name in "abc")
+    sites = "".join(f'<site name="at_{name}"/>' for name in "de")
+    part = "<mujoco><asset>{}</asset><worldbody>{}</worldbody></mujoco>".format
+    (models / "arm.xml").write_text(part(materials, sites))
+    include = '<mujoco>\n  <include file="arm.xml"/>'
+    (models / "swing.xml").write_text(CLEAN.replace("<mujoco>", include))
+    user = f'{include}<worldbody><geom size="1" material="{{}}"/></worldbody></mujoco>'
+    (models / "other.xml").write_text(user.format("a"))
+    (models / "arm.toml").write_text('[[scenario]]\nname = "a"\nmeasure = "site:at_d"\n')
+    lessons.mkdir()
+    (lessons / "1.1-one.md").write_text(f"## A\n\n```mjcf\n{user.format('b')}\n```\n")
+    _, value = values(course, capsys, "swing")
+    findings = value["models"][0]["findings"]
+    faults = {f["kind"]: [p["name"] for p in f["places"]] for f in findings}
+    assert faults == {"unused-material": ["c"], "unused-site": ["at_e"]}
+    attached = """<mujoco><asset><model name="a" file="swing.xml"/></asset><worldbody>
+    <attach model="a" body="bob" prefix="p"/></worldbody></mujoco>"""
+    (lessons / "1.1-one.md").write_text(f"## A\n\n```mjcf\n{attached}\n```\n")
+    status, value = values(course, capsys, "swing")
+    assert status == 0 and {t["reason"] for t in value["models"][0]["tried"]} >= {
+        "content/lessons/1.1-one.md:3 may notice (it attaches models/swing.xml)"
+    }
+
+
 def test_where_a_file_cannot_be_written_none_is(course: Path, capsys: Capture) -> None:
     models = course / "models"
     (models / "part.xml").write_text(SHARED_PART)

@@ -89,7 +89,7 @@ def test_two_motions_of_the_course_are_told_apart(course: Path) -> None:
     exact = EXACT.format(velocity=", qvel - 9.81 * time") + "\n\n" + EQUATIONS
     assert report(course, exact.format("")).floor < 1e-11
     message = mistake(course, exact.format(" * (1 + 1e-5)")).message
-    assert message == "`models/ball.exact.py`, `acceleration`, is not the motion of `fall`"
+    assert message == "`models/ball.exact.py`, `acceleration`, is not the motion of `up`"
 
 
 PENDULUM = """\

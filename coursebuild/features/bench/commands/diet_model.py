@@ -2,7 +2,8 @@
 
 1. Every script of the course that may use the model is a reader; so is every file of code, as
    scripts and labs may use it. A lab draws its model, so it may use all of it, except what code
-   asks for by name or number. Observables that are declared for a model read it too.
+   asks for by name or number. Observables that are declared for a model read it too; so do other
+   models, and texts in lessons, that include or attach one of its files.
 2. Scripts and labs run in a copy of the course with the changed files, and their output is compared
    with that in the course itself. The files that they read show which of them use the model.
 3. A file that another model uses too, or that is not in `models/`, is not changed.
@@ -23,6 +24,7 @@ from typing import Any
 import mujoco
 from msgspec.structs import replace
 
+from coursebuild.core.checks.compiled import mjcf_texts
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import temporary_folder
@@ -30,8 +32,10 @@ from coursebuild.core.files.read import CourseFiles, read_bytes
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model import Course, FeatureBlock, MjcfModel, find_blocks
 from coursebuild.core.model.results import Machine
+from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.run.mjcf import TEXT_PATH, model_files
 from coursebuild.core.scripts.extract import extract
+from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.features.bench.commands.measurement import CannotMeasureError
@@ -56,9 +60,9 @@ _COPIED_FOLDERS = ("content", "models")
 
 
 def readers_of(
-    course: Course | None, root: Path, files: CourseFiles, scene: CourseScene
+    course: Course | None, root: Path, files: CourseFiles, model: str
 ) -> tuple[ModelReader, ...]:
-    """List everything in the course that may use a model."""
+    """List all code in the course that may use a model."""
     if course is None:
         return (ModelReader("content/course.toml", opaque="the course cannot be read"),)
     paths = [path for path in files.files if path.endswith(_CODE)]
@@ -69,8 +73,8 @@ def readers_of(
             texts[path] = read_bytes(root, path).decode("utf-8", "replace")
     texts |= {script.path: script.text for script in extract(course).value}
     modules = {name for path in texts for name in _module_names(path)}
-    users = _find_users({path: text or "" for path, text in texts.items()}, scene.name)
-    blocks = tuple(_block_readers(course, scene.name))
+    users = _find_users({path: text or "" for path, text in texts.items()}, model)
+    blocks = tuple(_block_readers(course, model))
     if not users and not blocks:
         return ()
     return blocks + tuple(
@@ -330,12 +334,68 @@ class DietModel:
 def _find_readers(
     root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
 ) -> tuple[ModelReader, ...]:
-    """List everything in the course that may read a model, its declarations included."""
-    scenarios = scene.declarations.scenarios
+    """List everything in the course that may read a model, or a file of it in another model."""
+    own_files = _included_files(files, scene.model.source)
+    readers = [*readers_of(course, root, files, scene.name)]
+    readers += _declared_readers(scene.declarations)
+    tables = {table.path: table for table in files.declarations}
+    for model in files.models:
+        source = model.source
+        shared = own_files.intersection((source.path, *model_files(root, source.path, source.text)))
+        if not shared or source.path == scene.model.source.path:
+            continue
+        readers += readers_of(course, root, files, model.name)
+        if source.path not in own_files:
+            readers.append(_reference_reader(files, source, source.path, shared))
+        table = tables.get(f"{source.path.removesuffix('.xml')}.toml")
+        declarations = None if table is None else parse_declarations(table).value
+        if declarations is not None:
+            readers += _declared_readers(declarations)
+            keys = {scenario.keyframe for scenario in declarations.scenarios} - {None}
+            names = frozenset(key for key in keys if isinstance(key, str))
+            kinds = frozenset(["Keyframe"] if keys - names else [])
+            readers.append(ModelReader(declarations.source.path, names, kinds=kinds))
+    for mjcf in () if course is None else mjcf_texts(course):
+        if shared := own_files.intersection(model_files(root, TEXT_PATH, mjcf.text)):
+            place = f"{mjcf.place.path}:{mjcf.place.line}"
+            source = Source(TEXT_PATH, mjcf.text)
+            readers.append(_reference_reader(files, source, place, shared))
+    return tuple(readers)
+
+
+_INCLUDED = re.compile(r"<include\s[^>]*?\bfile\s*=\s*[\"']([^\"']+)")
+_REFERENCE = re.compile(r"(?<![\w-])(?!name\s*=)\w+\s*=\s*[\"']([^\"']*)[\"']")
+
+
+def _included_files(files: CourseFiles, source: Source) -> frozenset[str]:
+    """A model's file and those that it may include, which are not told apart by their folders."""
+    included, texts = {source.path}, [source.text]
+    while texts:
+        names = {Path(file).name for file in _INCLUDED.findall(texts.pop())}
+        for part in (model.source for model in files.models):
+            if part.path not in included and Path(part.path).name in names:
+                included.add(part.path)
+                texts.append(part.text)
+    return frozenset(included)
+
+
+def _reference_reader(
+    files: CourseFiles, source: Source, place: str, shared: frozenset[str]
+) -> ModelReader:
+    """What a model, or a text in a lesson, needs of the files that it shares with another one."""
+    attached = shared - _included_files(files, source)  # where names get a prefix
+    ranking = sorted(attached, key=lambda path: (Path(path).name not in source.text, path))
+    opaque = f"it attaches {ranking[0]}" if ranking else ""
+    return ModelReader(place, frozenset(_REFERENCE.findall(source.text)), opaque=opaque)
+
+
+def _declared_readers(declarations: Declarations) -> list[ModelReader]:
+    """What the file beside a model asks of it."""
+    scenarios = declarations.scenarios
     names = {s.observable.name for s in scenarios if s.observable is not None}
     fields = {"energy"} if any("energy" in (s.conserved or ()) for s in scenarios) else set()
     kinds: set[str] = set()
-    for part in (part for sweep in scene.declarations.sweeps for part in sweep.variations):
+    for part in (part for sweep in declarations.sweeps for part in sweep.variations):
         things, _, field = part.parameter.rpartition(".")
         kind, _, name = things.partition(":")
         names |= {name} - {""}
@@ -343,7 +403,6 @@ def _find_readers(
         field = field.partition("[")[0]
         fields |= {field, "pos"} if field in _SHAPES else {field}
     words = frozenset(fields)
-    path = scene.declarations.source.path
-    toml_reader = ModelReader(path, frozenset(names), words, words, kinds=frozenset(kinds))
-    readers = readers_of(course, root, files, scene)
-    return (*readers, toml_reader) if names or fields else readers
+    path = declarations.source.path
+    reader = ModelReader(path, frozenset(names), words, words, kinds=frozenset(kinds))
+    return [reader] if names or fields else []
