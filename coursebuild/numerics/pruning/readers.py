@@ -200,6 +200,7 @@ class ModelReader(Struct, frozen=True):
             not self.names.isdisjoint(names)
             or not self.kinds.isdisjoint(kinds)
             or not self.words.isdisjoint(change)
+            or not {part for _, part in self.parts}.isdisjoint(change)
             or (change and not _NUMBERS.isdisjoint(self.members | {p for _, p in self.parts}))
             or self.touches(_REFERENCES)
         )

@@ -60,6 +60,8 @@ HOSTILE = {
         "mujoco.mj_step(model, data)\nprint(data.subtree_angmom)",
     ),
     "forces at a later contact": ("sensor felt", "print(data.cfrc_ext)"),
+    "forces on a body": ("sensor felt", 'print(data.body("leg").cfrc_ext[2])'),
+    "momentum of a body": ("sensor spin", 'print(data.body("leg").subtree_angmom)'),
     "body as a whole": ("sensor felt", 'print(data.body("leg"))'),
     "geom as a whole": ("material", 'w = model.geom("wall")\nprint(w.pos, w)'),
     "options": ("energy", "print(model.opt)"),
