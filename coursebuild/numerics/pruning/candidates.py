@@ -181,6 +181,7 @@ def unread_elements(text: ModelText, scenarios: Collection[Scenario]) -> list[It
     """Elements that no motion is computed from, in the order of their kinds."""
     keys = [e for e in text.elements if e.tag == "key" and section_of(e) == "keyframe"]
     start_keys = {keys[s.keyframe] for s in scenarios if 0 <= s.keyframe < len(keys)}
+    start_keys.update(keys[:1])  # in which the page of the model begins
     commanded = commanded_actuators(text.model, scenarios)
     items = [
         Item(f"{flag}-flag", flag, element, drops=((element, flag),))

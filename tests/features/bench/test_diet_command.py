@@ -198,12 +198,16 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
     (finding,) = value["models"][0]["findings"]
     assert status == 1 and finding["kind"] == "unused-keyframe"
     assert [place["name"] for place in finding["places"]] == ["rest"]
-    declarations.write_text('[[scenario]]\nname = "a"\nkeyframe = 1\nconserved = ["energy"]\n')
+    declarations.write_text('[[scenario]]\nname = "a"\nkeyframe = 0\nconserved = ["energy"]\n')
     status, value = values(course, capsys)
     findings = {finding["kind"]: finding for finding in value["models"][0]["findings"]}
     assert set(findings) == {"unused-keyframe", "sensor-unread"}
-    assert [place["name"] for place in findings["unused-keyframe"]["places"]] == ["go"]
+    assert [place["name"] for place in findings["unused-keyframe"]["places"]] == ["rest"]
     assert findings["unused-keyframe"]["unfixed"].startswith("scenarios give keyframes by number")
+    declarations.write_text('[[scenario]]\nname = "a"\nkeyframe = "rest"\n')
+    _, value = values(course, capsys)
+    kinds_found = {finding["kind"] for finding in value["models"][0]["findings"]}
+    assert "unused-keyframe" not in kinds_found, "the page of the model begins in the first one"
     sweep = '[[sweep]]\nname = "noise"\nvary = { "sensor:time.cutoff" = [1], "VARIED" = [1] }\n'
     # A ball of this size would hit the wall that the pendulum's cannot reach.
     wall = '<worldbody><geom size=".1" pos="2 0 1"/>'
