@@ -56,6 +56,8 @@ _WAYS, _KINK = 8, 0.02
 relative to the largest of them, from which on there is none."""
 _STILL = 1e-9
 """The part of the strongest acceleration below which Newton's method goes on."""
+_DRIFT = 1e-3
+"""The acceleration, relative to gravity's, beyond which a state is no rest of a step."""
 _LONGEST_ORBIT, _ORBIT_GRID = 200, 16
 """Steps in a period at the shortest timestep that is tried along it, and how many are tried."""
 _PERIODS, _ORBIT_STEPS, _ORBIT_STEP = 8, 1000, 1e-6
@@ -253,15 +255,22 @@ def step_excess(model: Any, rest: FixedState, integrator: Integrator, timestep: 
 
 def rest_limit(
     model: Any, rest: FixedState, integrator: Integrator, search: tuple[float, float]
-) -> float:
+) -> float | None:
     """The first timestep at which a rest is not stable, s; infinite where there is none.
 
+    `None` where a shorter one has another rest, as those have that make contacts softer.
     `search`: the timesteps (s) between which it is looked for.
     """
     unit = 1 + (_NEAR_UNIT if rest.touches else _UNIT)
     low, high = search
     variant = _converged(model, integrator, low)
     data = mujoco.MjData(variant)
+
+    def is_rest(timestep: float) -> bool:
+        variant.opt.timestep = timestep
+        _set(variant, data, rest, np.zeros(2 * model.nv + model.na))
+        advance(variant, data)
+        return bool(np.abs(data.qvel).max(initial=0.0) < _DRIFT * strongest * timestep)
 
     def is_lost(timestep: float) -> bool:
         variant.opt.timestep = timestep
@@ -271,8 +280,10 @@ def rest_limit(
         return not float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0)) <= unit
 
     count = max(2, round(_GRID * math.log10(high / low)) + 1)
-    before = 0.0
+    before, strongest = 0.0, max(1.0, float(np.abs(model.opt.gravity).max()))
     for step in np.geomspace(low, high, count).tolist():
+        if rest.touches and not is_rest(step):
+            return None
         if is_lost(step):
             break
         before = step
@@ -394,7 +405,8 @@ class Theory(Struct, frozen=True, eq=False):
         limit = self.formula(integrator) if self.formula is not None else None
         if limit is None and self.rest is not None:
             wide = search[0] / _SHORTER, search[1] * _LONGER
-            limit = Limit(rest_limit(self.model, self.rest, integrator, wide), AT_REST)
+            timestep = rest_limit(self.model, self.rest, integrator, wide)
+            limit = None if timestep is None else Limit(timestep, AT_REST)
         return limit
 
     def orbital(self, integrator: Integrator) -> float | None:

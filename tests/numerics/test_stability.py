@@ -276,6 +276,24 @@ ARM = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
 SERVO = '<actuator><position joint="j" kp="2e5" kv="1500"/></actuator>'
 
 
+def test_theory_ends_where_longer_steps_have_another_rest() -> None:
+    """Beyond 10 ms contacts are softer, and a block sinks deeper; a servo knows nothing of it."""
+    servo = """<body pos="2 0 1"><joint axis="0 1 0" stiffness="2e4" damping="100"/>
+    <geom size=".1" pos=".3 0 0" mass="1"/></body>"""
+    block = """<geom type="plane" size="1 1 1"/><body pos="0 0 .1"><freejoint/>
+    <geom type="box" size=".1 .1 .1"/></body>"""
+    limits = []
+    for world in (servo, servo + block):
+        model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{world}</worldbody></mujoco>")
+        theory = find_theory(model, Scenario(1.0, 0.05), None, smooth=False)
+        limits.append(
+            [theory.limit(name, (1e-3, 0.05)) for name in (Integrator.RK4, Integrator.EULER)]
+        )
+    (rk4, euler), (rk4_beside, euler_beside) = limits
+    assert rk4_beside is not None and rk4_beside.timestep == pytest.approx(rk4.timestep, rel=1e-3)
+    assert euler.timestep > 0.01 and euler_beside is None
+
+
 def rows_of(mjcf: str, *names: str, **fields: Any) -> dict[str, StableRow]:
     model, source = mujoco.MjModel.from_xml_string(mjcf), Source("m.xml", mjcf)
     table = DeclaredScenario("s", span=source.span(0, 0), duration=2.0, **fields)
