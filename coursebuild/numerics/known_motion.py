@@ -19,6 +19,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from functools import partial
 from typing import Any
 
@@ -33,13 +34,10 @@ from coursebuild.numerics import integrate
 from coursebuild.numerics.cases import closed_motion, floor
 from coursebuild.numerics.measure import (
     Sticks,
-    energy_drift,
-    energy_scale,
     errors,
     find_sticks,
     friction_holds,
     largest_errors,
-    momentum_drift,
     quantity_errors,
     quantity_name,
     visible_error,
@@ -51,10 +49,10 @@ from coursebuild.numerics.scene import ExactMotion, Scene, SceneError
 from coursebuild.numerics.simulation import (
     EngineStates,
     initial_data,
-    invariants,
     motion_of,
     simulate,
     states_of,
+    stiffened,
     with_integrator,
     without_sleep,
 )
@@ -71,14 +69,15 @@ FOREIGN = 1e-3
 PRECISION, _VOTES = 1e-8, 100.0
 """How far a course's exact motion may be off, relative to the largest number in it where this is
 over 1, unless its scenario says; and floors of the integration within which it always may."""
-_STIFFER = (2.0, 4.0)
-"""How many times shorter time constants of contacts are when an exact motion is checked."""
-_APPROACH = 0.8
-"""The part of a difference that twice the stiffness may leave."""
+_STIFFER, _NEEDED = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0), 3
+"""How many times shorter time constants of contacts are when an exact motion is checked; how many
+of them must each come nearer to it than the one before."""
+_APPROACH, _NEAR, _ELSEWHERE = 0.8, 3.0, 5.0
+"""The part of a difference that twice the stiffness may leave; within how many floors of the engine
+an exact motion is the engine's; how many times farther it is from stiff contacts than these moved
+at last, and can be known, where it is another one."""
 _NEARBY_GAP = 2.0
 """How many times farther from the engine an exact motion may be from starts nearby."""
-CONSERVED = 1e-8
-"""The relative change, over the reference, below which a quantity counts as conserved."""
 _STEP = 1e-6
 """s, of the model whose accelerations are integrated: `refsafe` softens nothing then."""
 _TENDS_ELSEWHERE = "the engine with small steps converges to something else"
@@ -116,7 +115,8 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         place, source = declaration.place("reference"), problem.reference.source
         return _with_closed_form(model, reference, states, source, floor(problem), subject, place)
     exact = None if declaration.reference else pilot.scene.exact
-    motions = {} if exact is None else _exact_states(model, pilot, exact, reference)
+    scenario, computed = pilot.scene.scenario, reference.states
+    motions = {} if exact is None else exact.engine_states(model, scenario, computed)
     if exact is None or not motions:
         return reference
     least, gaps = ROUNDING, []
@@ -150,7 +150,8 @@ def find_nearby(
     exact = pilot.scene.exact if declared_reference.kind == "closed" else None
     if exact is None or reference.kind == "ode":
         return reference.states
-    states = next(iter(_exact_states(model, pilot, exact, reference).values()))
+    motions = exact.engine_states(model, pilot.scene.scenario, reference.states)
+    states = next(iter(motions.values()))
     gap = _gap(model, states, reference.states).place
     usual_gap = _gap(model, declared_reference.states, declared_reference.second_states).place
     is_usual = gap <= _NEARBY_GAP * max(usual_gap, reference.floor.place)
@@ -209,50 +210,60 @@ def _check_exact(
         return ROUNDING
     data = initial_data(pilot.scene.scenario, model)
     exact.check_velocities(model, states.times, (data.qpos.copy(), data.qvel.copy()))
-    gaps = [gap.place]
-    for times in _STIFFER:
-        stiffer = with_integrator(model, Integrator.EULER, float(model.opt.timestep))
-        for table_name in ("geom_solref", "pair_solref", "eq_solref", "jnt_solref", "dof_solref"):
-            table = getattr(stiffer, table_name)
-            is_time = table[:, 0] > 0
-            table[is_time, 0] /= times
-            table[~is_time] *= times**2, times
-        stiffer.opt.cone, stiffer.opt.impratio = CONES["elliptic"], model.opt.impratio * times**2
-        stiff = self_reference(stiffer, pilot, quick=quick)
-        count = min(len(states.times), len(stiff.states.times))
-        gaps.append(_gap(model, states.head(count), stiff.states.head(count)).place)
-    if gaps[0] > max(precision, FLOORS * second.floor.place) and not (
-        gaps[2] <= _APPROACH * gaps[1] <= _APPROACH**2 * gaps[0]
-    ):
+    gaps, rest = _stiff_gaps(model, pilot, states, precision, quick=quick)
+    if rest is None:
         far = ", ".join(f"{number:.2g}" for number in gaps)
         help = (
-            f"it is {far} (m or rad) from the engine in small steps with contacts as they are, "
-            "twice and four times as stiff: what is exact is what that tends to"
+            f"it is {far} (m or rad) from the engine in small steps with contacts as they are, and "
+            f"{', '.join(f'{times:g}' for times in _STIFFER[1 : len(gaps)])} times as stiff: "
+            "what is exact is what that tends to"
         )
         raise SceneError(subject, exact.span, help)
-    # What is left after the law of the last two: the formula is known no better, unless it is
-    # nearer to the engine with contacts as they are: it may be of their softness too.
-    rest = max(0.0, gaps[2] - (gaps[1] - gaps[2]))
-    if gaps[0] < rest:
-        return ROUNDING.at_least(gap).at_least(second.floor)
-    return ROUNDING.at_least(Sizes(rest, rest, 0.0)).at_least(second.floor)
+    return Sizes(rest, rest, second.floor.velocity).at_least(ROUNDING)
 
 
-def _exact_states(
-    model: Any, pilot: Pilot, exact: ExactMotion, second: KnownMotion
-) -> dict[str, EngineStates]:
-    """The course's exact motions; where it gives no velocities, with those of the second one."""
-    data, states = initial_data(pilot.scene.scenario, model), second.states
-    motions = exact.states(states.times, data.qpos.copy(), data.qvel.copy()).motions
-    course_states = {
-        name: replace(states, qpos=qpos, qvel=states.qvel if qvel is None else qvel)
-        for name, (qpos, qvel) in motions.items()
-    }
-    shapes = (states.qpos.shape, states.qvel.shape)
-    if any((motion.qpos.shape, motion.qvel.shape) != shapes for motion in course_states.values()):
-        message = f"`{exact.span.path}` gives numbers of coordinates that differ from the model's"
-        raise SceneError(message, exact.span, "they are those of `qpos`, and perhaps of `qvel`")
-    return course_states
+def _stiff_gaps(
+    model: Any, pilot: Pilot, states: EngineStates, precision: float, *, quick: bool
+) -> tuple[list[float], float | None]:
+    """How far a motion is from the engine with what is soft stiffer and stiffer, m or rad.
+
+    And how far it may be off, which is as much as it is from the engine; `None` where the engine
+    tends to something else.
+    """
+    gaps: list[float] = []
+    shifts: list[float] = []
+    rest, stiff_states = np.inf, states
+    for times in _STIFFER:
+        try:
+            stiff = _stiff_limit(model, pilot, times, quick=quick)
+        except SceneError:
+            break  # too stiff for steps of this length
+        count = min(len(stiff_states.times), len(stiff.states.times))
+        shifts.append(_gap(model, stiff_states.head(count), stiff.states.head(count)).place)
+        stiff_states, least = stiff.states, stiff.floor.place
+        gaps.append(_gap(model, states.head(count), stiff_states.head(count)).place)
+        rest = min(rest, max(gaps[-1], least))
+        if gaps[-1] <= max(precision, _NEAR * least):
+            break
+        if len(gaps) > _NEEDED:
+            if gaps[-1] > _ELSEWHERE * max(shifts[-1], least):
+                return gaps, None
+            if shifts[-1] > _APPROACH * shifts[-2]:
+                break  # luck, as of the phase of hits: there is no more to learn
+        elif len(gaps) > 1 and gaps[-1] > _APPROACH * gaps[-2]:
+            return gaps, None
+    return gaps, rest
+
+
+def _stiff_limit(model: Any, pilot: Pilot, times: float, *, quick: bool) -> KnownMotion:
+    """What the engine tends to in small steps with what is soft so many times as stiff."""
+    stiffer = stiffened(model, times)
+    stiffer.opt.cone = CONES["elliptic"]
+    limits = [self_reference(stiffer, pilot, quick=quick)]
+    with contextlib.suppress(SceneError):
+        rk4 = (Integrator.RK4, Integrator.RK4)
+        limits.append(self_reference(stiffer, pilot, rk4, quick=quick))
+    return min(limits, key=lambda limit: limit.floor.place)
 
 
 def _no_integration(reason: str, declaration: DeclaredScenario) -> SceneError:
@@ -282,11 +293,17 @@ def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
     return _combine(model, pilot, "ode", source, states, second, second_states)
 
 
-def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMotion:
+def self_reference(
+    model: Any,
+    pilot: Pilot,
+    integrators: tuple[Integrator, Integrator] = (Integrator.IMPLICITFAST, Integrator.EULER),
+    *,
+    quick: bool = False,
+) -> KnownMotion:
     """Run the engine in small steps, and in steps twice as long under another integrator."""
     step = min(pilot.scene.timesteps) / (QUICK_FINER if quick else FINER)
     runs = []
-    for integrator, length in ((Integrator.IMPLICITFAST, step), (Integrator.EULER, 2 * step)):
+    for integrator, length in zip(integrators, (step, 2 * step), strict=True):
         fine = with_integrator(model, integrator, length)
         fine.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
         fine.opt.iterations = max(100, int(fine.opt.iterations))
@@ -295,8 +312,9 @@ def self_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         if not np.isfinite(run.states.qpos).all():
             raise SceneError(f"it diverges even at {step:g} s a step")
         runs.append(run.states)
-    source = f"the engine itself: implicitfast at {1e6 * step:.6g} µs, Newton's solver"
-    second = f"the same under Euler at {2e6 * step:.6g} µs"
+    names = [integrator.value for integrator in integrators]
+    source = f"the engine itself: {names[0]} at {1e6 * step:.6g} µs, Newton's solver"
+    second = f"the same under {names[1]} at {2e6 * step:.6g} µs"
     return _combine(model, pilot, "self", source, runs[0], second, runs[1])
 
 
@@ -421,29 +439,3 @@ def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[st
             visible = visible_error(model, scene, limit_states, true_states) if gap > least else 0.0
             cones[cone] = Cone(limit, max(gap, least), visible, sticks, is_held)
     return cones
-
-
-def find_conserved(model: Any, pilot: Pilot, reference: KnownMotion) -> tuple[float | None, bool]:
-    """What the author says is conserved, or else what the reference conserves.
-
-    The scale for changes of energy, J, or `None` where energy is not conserved; and whether the
-    angular momentum about the centre of mass is.
-    """
-    scenario = pilot.scene.scenario
-    conserved = pilot.scene.declaration.conserved
-    data, scratch = initial_data(scenario, model), initial_data(scenario, model)
-    states = [
-        (data.qpos, data.qvel),
-        *zip(reference.states.qpos, reference.states.qvel, strict=True),
-    ]
-    table = np.array([invariants(model, scratch, qpos, qvel) for qpos, qvel in states])
-    energies, momenta = table[:, :2], table[:, 2:]
-    scale = energy_scale(energies)
-    if conserved is not None:
-        energy = "energy" in conserved and scale > 0
-        return scale if energy else None, "angular-momentum" in conserved
-    if not pilot.smooth or reference.kind == "self":
-        return None, False
-    drifts = energy_drift(energies), momentum_drift(momenta)
-    is_conserved = [drift is not None and abs(drift) < CONSERVED for drift in drifts]
-    return scale if is_conserved[0] else None, is_conserved[1]

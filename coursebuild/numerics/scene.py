@@ -28,6 +28,7 @@ from coursebuild.core.model.scenarios import (
 )
 from coursebuild.core.text.source import Span
 from coursebuild.numerics.problem import Array, Scenario
+from coursebuild.numerics.simulation import EngineStates, initial_data
 from mjcourse import exact
 
 LOOKS = 100
@@ -97,6 +98,24 @@ class ExactMotion(Struct, frozen=True, eq=False):
                 help = f"number {dof} is {velocities[time, dof]:.3g} at {times[time]:.6g} s"
                 help += f", where the positions give {sides[0, time, dof]:.3g}"
                 raise SceneError(message, self.span, help)
+
+    def engine_states(
+        self, model: Any, scenario: Scenario, states: EngineStates
+    ) -> dict[str, EngineStates]:
+        """Its motions at the times of computed states, whose velocities hold if it gives none."""
+        data = initial_data(scenario, model)
+        motions = self.states(states.times, data.qpos.copy(), data.qvel.copy()).motions
+        own_states = {
+            name: replace(states, qpos=qpos, qvel=states.qvel if qvel is None else qvel)
+            for name, (qpos, qvel) in motions.items()
+        }
+        shapes = (states.qpos.shape, states.qvel.shape)
+        if any((motion.qpos.shape, motion.qvel.shape) != shapes for motion in own_states.values()):
+            message = (
+                f"`{self.span.path}` gives numbers of coordinates that differ from the model's"
+            )
+            raise SceneError(message, self.span, "they are those of `qpos`, and perhaps of `qvel`")
+        return own_states
 
 
 class Scene(Struct, frozen=True):

@@ -47,6 +47,9 @@ from coursebuild.numerics.scene import Scene, thickness
 from coursebuild.numerics.stability import run_trial, stable_rows
 from coursebuild.numerics.sweep import measure_expected
 
+_CONSERVED = 1e-8
+"""The relative change, over the reference, below which a quantity counts as conserved."""
+
 
 class Basis(Struct, frozen=True, eq=False):
     """What is known of a scene before its settings are measured."""
@@ -92,7 +95,7 @@ def measure_scenario(
     cones = known_motion.find_references(model, pilot, quick=quick)
     baseline = own_setting(model, pilot)
     reference = cones[baseline.cone].reference
-    conserved = known_motion.find_conserved(model, pilot, reference)
+    conserved = find_conserved(model, pilot, reference)
     late_energy = measure.mean_late_energy(model, pilot, reference.horizon)
     leasts = zip(
         *(known_motion.least_known(model, scene, cone.reference) for cone in cones.values()),
@@ -144,6 +147,34 @@ def measure_scenario(
         cost_of=cost_of,
         horizon_error=error,
     )
+
+
+def find_conserved(
+    model: Any, pilot: Pilot, reference: known_motion.KnownMotion
+) -> tuple[float | None, bool]:
+    """What the author says is conserved, or else what the reference conserves.
+
+    The scale for changes of energy, J, or `None` where energy is not conserved; and whether the
+    angular momentum about the centre of mass is.
+    """
+    scenario = pilot.scene.scenario
+    conserved = pilot.scene.declaration.conserved
+    data = simulation.initial_data(scenario, model)
+    states = [
+        (data.qpos.copy(), data.qvel.copy()),
+        *zip(reference.states.qpos, reference.states.qvel, strict=True),
+    ]
+    table = np.array([simulation.invariants(model, data, qpos, qvel) for qpos, qvel in states])
+    energies, momenta = table[:, :2], table[:, 2:]
+    scale = measure.energy_scale(energies)
+    if conserved is not None:
+        energy = "energy" in conserved and scale > 0
+        return scale if energy else None, "angular-momentum" in conserved
+    if not pilot.smooth or reference.kind == "self":
+        return None, False
+    drifts = measure.energy_drift(energies), measure.momentum_drift(momenta)
+    is_conserved = [drift is not None and abs(drift) < _CONSERVED for drift in drifts]
+    return scale if is_conserved[0] else None, is_conserved[1]
 
 
 def _measure_settings(

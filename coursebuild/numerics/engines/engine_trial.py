@@ -22,7 +22,7 @@ from msgspec import Struct
 from msgspec.structs import asdict, replace
 
 from coursebuild.numerics.costs import Clock, time_jobs
-from coursebuild.numerics.known_motion import KnownMotion, find_conserved, find_references
+from coursebuild.numerics.known_motion import KnownMotion, find_references
 from coursebuild.numerics.measure import energy_drift, errors
 from coursebuild.numerics.pilot import Pilot, nudges, own_setting, position_distances, run_pilot
 from coursebuild.numerics.problem import Array, Scenario
@@ -41,6 +41,7 @@ from coursebuild.numerics.simulation import (
     simulate,
     with_integrator,
 )
+from coursebuild.numerics.work_precision import find_conserved
 
 
 class Variant(Struct, frozen=True):

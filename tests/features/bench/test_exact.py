@@ -171,6 +171,40 @@ def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(course: P
         assert "contacts as they are" in diagnostic.help, values
 
 
+ROLL = """\
+<mujoco>
+  <option timestep="0.002" cone="elliptic"/>
+  <default><geom friction="0.8"/></default>
+  <worldbody>
+    <geom type="plane" size="5 5 .1" euler="0 20 0"/>
+    <body euler="0 20 0"><body pos="0 0 .1"><joint type="slide" axis="1 0 0"/>
+      <joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/><geom size=".1" mass="1"/></body></body>
+  </worldbody>
+</mujoco>
+"""
+ROLLED = """\
+from math import radians, sin
+
+A = 5 / 7 * {g} * sin(radians(20))
+
+
+def motion(time, qpos, qvel):
+    return [A * time**2 / 2, 0, A * time**2 / 0.2], [A * time, 0, A * time / 0.1]
+"""
+
+
+def test_an_exact_motion_with_contact_that_is_off_by_a_hundred_thousandth_is_refused(
+    course: Path,
+) -> None:
+    write(course / "models" / "ball.xml", ROLL)
+    toml = '[[scenario]]\nname = "roll"\nduration = 1\nsample = 0.04\n'
+    scenario = report(course, ROLLED.format(g=9.81), toml)
+    assert scenario.reference == "closed" and scenario.floor < 1e-5
+    diagnostic = mistake(course, ROLLED.format(g=9.81 * (1 + 1e-5)), toml)
+    assert "is not this scene's motion" in diagnostic.message
+    assert "4, 8, 16" in diagnostic.help, "where the softness of contacts hides it no longer"
+
+
 def test_velocities_of_an_exact_motion_with_contact_are_rates_of_its_positions(
     course: Path,
 ) -> None:
