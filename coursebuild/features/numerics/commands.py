@@ -157,7 +157,8 @@ def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], t
             for scenario in scene.declarations.scenarios
         )
         if not has_theory and not (options.root / exact_file(scene.name)).is_file():
-            help = f"give its motion in {exact_file(scene.name)}, or `expected` or `limits` of a scenario"
+            help = f"give its motion in {exact_file(scene.name)}, "
+            help += "or `expected` or `limits` of a scenario"
             raise UsageError(f"no theory is known for `{scene.name}`", help=help)
     return models, tuple(name for name in names if name not in models)
 

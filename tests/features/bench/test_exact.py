@@ -178,7 +178,8 @@ ROLL = """\
   <worldbody>
     <geom type="plane" size="5 5 .1" euler="0 20 0"/>
     <body euler="0 20 0"><body pos="0 0 .1"><joint type="slide" axis="1 0 0"/>
-      <joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/><geom size=".1" mass="1"/></body></body>
+      <joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/><geom size=".1" mass="1"/>
+    </body></body>
   </worldbody>
 </mujoco>
 """
