@@ -175,7 +175,11 @@ def test_only_digits_on_which_spans_and_starts_agree_are_printed() -> None:
     assert "∘" in map_text(row)
     row = search(lambda start, step, _: start == 1 and step > 500, (1.0, 1000.0))
     assert (row.largest, limit_text(row)) == (None, "500 s – 1000 s")
-    assert limit_text(StableRow("RK4", 0.123456, (0.1, 1.0), None, 1.0, 8, 8, None)) == "120 ms"
+    row = StableRow("RK4", 0.123456, (0.1, 1.0), None, 1.0, 8, 8, None)
+    assert limit_text(row) == "120 ms"
+    assert limit_text(replace(row, bracket=(0.05502, 0.05656))) == "55 ms – 57 ms", "not 60 ms"
+    assert limit_text(replace(row, bracket=(0.01075, 0.010779))) == "10.7 ms", "10.8 ms are lost"
+    assert limit_text(replace(row, bracket=(0.19998, 0.2))) == "200 ms"
 
 
 def test_what_the_gaps_between_timesteps_may_hide_is_said() -> None:
