@@ -247,6 +247,15 @@ def test_what_hangs_at_rest_gains_no_energy() -> None:
     assert {row.gain for row in rows_of(mjcf, search=(0.02, 0.08)).values()} == {None}
 
 
+def test_what_a_weld_sets_in_motion_has_no_energy_to_gain() -> None:
+    """It is a spring whose energy is not counted."""
+    weld = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody>
+    <body name="sled"><joint type="slide" axis="1 0 0"/><geom size=".05" mass="1"/></body>
+    </worldbody><equality><weld body1="sled" relpose="-.3 0 0 1 0 0 0" solref=".1 .5"/></equality>
+    </mujoco>"""
+    assert {row.gain for row in rows_of(weld, search=(0.001, 0.02)).values()} == {None}
+
+
 def test_a_rest_about_which_forces_have_two_laws_has_no_theory() -> None:
     """A muscle activates in other times than it deactivates; a post just touches a plane.
 
