@@ -384,6 +384,21 @@ def test_theory_along_a_period_of_a_spring_is_that_at_rest() -> None:
         assert at_rest is not None and at_rest.timestep == pytest.approx(limit, rel=1e-5)
 
 
+def test_a_motion_that_is_lost_at_every_timestep_if_slowly_has_no_limit_along_its_period() -> None:
+    """Under Euler's method what circles spirals away, at a rate in proportion to the timestep."""
+    mjcf = """<mujoco><worldbody><body><joint type="ball"/>
+    <inertial pos="0 0 -1" mass="1" diaginertia="0.01 0.01 0.01"/></body></worldbody></mujoco>"""
+    model, tilt = mujoco.MjModel.from_xml_string(mjcf), math.pi / 6
+    rate = math.sqrt(9.81 / math.cos(tilt))
+    qpos = (math.cos(tilt / 2), math.sin(tilt / 2), 0.0, 0.0)
+    qvel = (0.0, rate * math.sin(tilt), rate * math.cos(tilt))
+    theory = find_theory(model, Scenario(4.0, 0.02, qpos, qvel), None, smooth=True)
+    assert theory.orbit is not None
+    assert theory.orbit.period == pytest.approx(2 * math.pi / rate, rel=1e-6)
+    assert theory.orbital(Integrator.EULER) == 0.0
+    assert theory.orbital(Integrator.RK4) == pytest.approx(0.7, rel=0.05)
+
+
 def test_energy_that_cannot_be_is_instability() -> None:
     """Of all that a swinging chain has, 0.25 J, it had 300 J after 2,000 steps of 7.5 ms."""
     chain = with_energy_bound(all_problems()["chain-balls"])
