@@ -306,7 +306,9 @@ def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:
         EXACT.format(velocity="").replace("/ 2", "/ 3"): "is not this scene's motion",
         "def motion(time, qpos, qvel):\n    return [1, 2]\n": "gives numbers of coordinates that",
         "x = 1\n": "gives no motion: KeyError: 'motion'",
-        "import sys\n\nsys.exit()\n": "gives no motion: ",
+        "def motion(time, qpos, qvel):\n    return qpos * float('nan')\n": "or not a number",
+        "import sys\n\nsys.exit()\n": "gives no motion: it exits",
+        "def motion(time, qpos, qvel):\n    return [1] * int(1 + time * 9)\n": "coordinates change",
     }
     for text, message in cases.items():
         diagnostic = mistake(course, text)
