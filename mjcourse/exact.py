@@ -43,7 +43,11 @@ def main(file: str, request: str) -> None:
             answer["expected"] = {name: float(value) for name, value in quantities.items()}
         if not answer:
             raise KeyError("motion")
-    json.dump(answer, sys.stdout)
+    try:
+        text = json.dumps(answer, allow_nan=False)
+    except ValueError:
+        raise ValueError("a number that it gives is infinite, or not a number") from None
+    print(text)
 
 
 def integrate(

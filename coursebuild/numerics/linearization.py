@@ -10,7 +10,8 @@
 3. Along a periodic motion the product of these derivatives grows as the largest Floquet multiplier
    to the power of the periods. Where that is one, a difference may still grow in proportion to
    time, since another amplitude has another period. So the limit is passed where it grows to more
-   than four times the size over twice the periods.
+   than four times the size over twice the periods. Where over longer times it grows below the limit
+   too, there is none.
 
 Source: J. Guckenheimer, P. Holmes, Nonlinear Oscillations, Dynamical Systems, and Bifurcations of
 Vector Fields, 1.4 and 1.5.
@@ -62,6 +63,8 @@ _LONGEST_ORBIT, _ORBIT_GRID = 200, 16
 """Steps in a period at the shortest timestep that is tried along it, and how many are tried."""
 _PERIODS, _ORBIT_STEPS, _ORBIT_STEP = 8, 1000, 1e-6
 """Periods and steps, at least, after which growth is compared, and the step of differences."""
+_BELOW, _LONG, _SLOW_GROWTH = 0.8, 4, 16.0
+"""The part of a limit at which, over so many times the time, nothing grows by as much."""
 _ASTRAY = 1e6
 """How far from its beginning, in units, a motion is lost: rounding hides the differences there."""
 
@@ -343,7 +346,7 @@ def _return_time(
 def orbit_limit(model: Any, orbit: FixedState, integrator: Integrator) -> float | None:
     """The first timestep at which a periodic motion is not stable, s; infinite where there is none.
 
-    `None` where it is unstable by itself.
+    `None` where it is unstable by itself; 0 where it is stable at no timestep.
     """
     steps = np.geomspace(orbit.period / _LONGEST_ORBIT, orbit.period / 2, _ORBIT_GRID).tolist()
     if _grows(model, orbit, Integrator.RK4, steps[0]):
@@ -360,16 +363,26 @@ def orbit_limit(model: Any, orbit: FixedState, integrator: Integrator) -> float 
         before, step = (
             (before, middle) if _grows(model, orbit, integrator, middle) else (middle, step)
         )
-    return before
+    # What grows exponentially, if slowly, at every timestep seems to have a limit that is the
+    # shorter the longer one looks.
+    below = _BELOW * before
+    return 0.0 if _grows(model, orbit, integrator, below, _SLOW_GROWTH, _LONG) else before
 
 
-def _grows(model: Any, orbit: FixedState, integrator: Integrator, timestep: float) -> bool:
+def _grows(
+    model: Any,
+    orbit: FixedState,
+    integrator: Integrator,
+    timestep: float,
+    most: float = 4.0,
+    times: int = 1,
+) -> bool:
     """Whether a small difference grows more than in proportion to time along a motion."""
     variant = _converged(model, integrator, timestep)
     data, units = mujoco.MjData(variant), _units(variant)
     units[variant.nv : 2 * variant.nv] /= orbit.period
     in_period = math.ceil(orbit.period / timestep)
-    half = in_period * max(_PERIODS, _ORBIT_STEPS // in_period)
+    half = in_period * max(_PERIODS, _ORBIT_STEPS // in_period) * times
     way = np.random.default_rng(1).normal(size=len(units)) * units
     state, size, sizes = orbit, 0.0, np.empty(2 * half)
     for index in range(2 * half):
@@ -388,7 +401,7 @@ def _grows(model: Any, orbit: FixedState, integrator: Integrator, timestep: floa
         sizes[index] = size
         way = way / length
     gain = sizes[-in_period:].max() - sizes[half - in_period : half].max()
-    return bool(gain > math.log(4.0))
+    return bool(gain > math.log(most))
 
 
 class Theory(Struct, frozen=True, eq=False):

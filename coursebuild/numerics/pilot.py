@@ -113,14 +113,17 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
             if index == 0 or gap[index - 1] < 1:
                 simulation.advance(variant, twin, steps_per_sample)
                 gap[index] = position_distance(variant, data.qpos, twin.qpos, errors)
+    first = simulation.initial_data(scenario, variant)
+    energy = float(simulation.invariants(variant, first, first.qpos, first.qvel)[:2].sum())
     if not (look.constrained or driving_force(model, scenario)):  # most is at the beginning
-        first = simulation.initial_data(scenario, variant)
-        energy = float(simulation.invariants(variant, first, first.qpos, first.qvel)[:2].sum())
         kinetic = peaks.kinetic
         if peaks.energy > energy + _EXCESS * kinetic:  # the integrator itself is lost
             fine = simulation.with_integrator(variant, Integrator.RK4, step)
             kinetic = simulation.simulate(Setup(scenario=scenario), fine).energy[:, 1].max()
         peaks = replace(peaks, energy=energy, kinetic=float(np.fmin(kinetic, peaks.kinetic)))
+    setup = _bounds(variant, scene, peaks)
+    if peaks.energy > energy + _EXCESS * peaks.kinetic:  # as of what a soft weld pulls
+        setup = replace(setup, energy=math.inf)
     horizons, growth_rates = [], []
     for gap, size in zip(gaps, nudge_sizes, strict=True):
         parted = np.flatnonzero(gap >= 1)
@@ -131,7 +134,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
     return Pilot(
         scene=scene,
         peaks=peaks,
-        setup=_bounds(variant, scene, peaks),
+        setup=setup,
         contact=look.contact,
         constrained=look.constrained,
         jumps=look.jumps(variant),

@@ -54,14 +54,20 @@ def with_integrator(model: Any, integrator: Integrator, timestep: float) -> Any:
     return model
 
 
+_SOLREFS = (
+    *("geom_solref", "flex_solref", "pair_solref", "pair_solreffriction", "eq_solref"),
+    *("jnt_solref", "dof_solref", "tendon_solref_lim", "tendon_solref_fri"),
+)
+
+
 def stiffened(model: Any, times: float) -> Any:
     """A copy of a `mjModel` whose contacts, limits, friction and equalities are stiffer.
 
     Their time constants are so many times shorter; under friction slips as much less.
     """
     model = copy.copy(model)
-    for name in ("geom_solref", "pair_solref", "eq_solref", "jnt_solref", "dof_solref"):
-        table = getattr(model, name)
+    tables = [getattr(model, name) for name in _SOLREFS]
+    for table in (*tables, model.opt.o_solref[None]):
         is_time = table[:, 0] > 0
         table[is_time, 0] /= times
         table[~is_time] *= times**2, times

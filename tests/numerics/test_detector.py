@@ -12,11 +12,14 @@ from msgspec.structs import replace
 
 from coursebuild.numerics.cases import measure
 from coursebuild.numerics.detector import Peaks, RunStatus, driving_force, judge
+from coursebuild.numerics.linearization import find_theory
+from coursebuild.numerics.pilot import longer_setup, run_pilot
 from coursebuild.numerics.problem import Integrator, Scenario, Setup
 from coursebuild.numerics.problems import all_problems
-from coursebuild.numerics.scene import thickness
+from coursebuild.numerics.scene import scenes, thickness
 from coursebuild.numerics.simulation import advance, compile_model, refsafe_active, simulate
 from coursebuild.numerics.stability import attempt
+from support.surveys import parse_declared
 
 SPRING = """
 <mujoco>
@@ -97,6 +100,17 @@ def test_bodies_deep_in_each_other_are_named_with_the_time() -> None:
     (reason,) = run.judgement.reasons
     assert reason.startswith("torso and a part of leg lie ")
     assert " times as deep in each other as they may, at 0." in reason and reason.endswith(" s")
+
+
+def test_what_sinks_in_after_the_scenario_is_not_lost_in_longer_runs() -> None:
+    """A ball falls for 0.45 s, then into a floor so soft that its middle is below the surface."""
+    mjcf = """<mujoco><worldbody><geom type="plane" size="1 1 1" solref="0.2 1"/><body pos="0 0 1">
+    <freejoint/><geom size=".05" mass="1"/></body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(mjcf)
+    (scene,) = scenes(model, parse_declared('[[scenario]]\nname = "s"\nduration = 0.4\n'))
+    pilot = run_pilot(model, scene)
+    bounds = [longer_setup(model, pilot, span).sunk_bound for span in (0.4, 0.8)]
+    assert bounds[0] == 1.0 and bounds[1] > 2.0, "it sinks by more than its diameter"
 
 
 def test_no_error_is_given_for_a_run_that_was_lost() -> None:
@@ -220,3 +234,21 @@ def test_refsafe_is_told() -> None:
         text = f"<mujoco><worldbody><body>{joint}<geom size='.1'/></body></worldbody></mujoco>"
         assert refsafe_active(compile_model(text, Integrator.EULER, 0.011)), attributes
         assert not refsafe_active(compile_model(text, Integrator.EULER, 0.009)), attributes
+
+
+def test_theory_ends_where_longer_steps_have_another_rest() -> None:
+    """Beyond 10 ms contacts are softer, and a block sinks deeper; a servo knows nothing of it."""
+    servo = """<body pos="2 0 1"><joint axis="0 1 0" stiffness="2e4" damping="100"/>
+    <geom size=".1" pos=".3 0 0" mass="1"/></body>"""
+    block = """<geom type="plane" size="1 1 1"/><body pos="0 0 .1"><freejoint/>
+    <geom type="box" size=".1 .1 .1"/></body>"""
+    limits = []
+    for world in (servo, servo + block):
+        model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{world}</worldbody></mujoco>")
+        theory = find_theory(model, Scenario(1.0, 0.05), None, smooth=False)
+        limits.append(
+            [theory.limit(name, (1e-3, 0.05)) for name in (Integrator.RK4, Integrator.EULER)]
+        )
+    (rk4, euler), (rk4_beside, euler_beside) = limits
+    assert rk4_beside is not None and rk4_beside.timestep == pytest.approx(rk4.timestep, rel=1e-3)
+    assert euler.timestep > 0.01 and euler_beside is None

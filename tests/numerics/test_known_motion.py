@@ -10,8 +10,9 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.course import CLOSED_FORMS
-from coursebuild.numerics.known_motion import KnownMotion, find_reference
+from coursebuild.numerics.known_motion import KnownMotion, find_reference, self_reference
 from coursebuild.numerics.pilot import run_pilot
+from coursebuild.numerics.problem import Integrator
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.scene import SceneError, scenes
 from support.surveys import NO_DECLARATIONS, parse_declared
@@ -125,6 +126,37 @@ def test_commands_and_activations_are_integrated() -> None:
     exact = np.where(times <= 0.2 + 1e-9, rising, then)
     assert reference.kind == "ode"
     assert np.max(np.abs(reference.states.act[:, 0] - exact)) < 1e-12
+
+
+ATWOOD = """\
+<mujoco>
+  <option timestep="0.001"/>
+  <default><geom contype="0" conaffinity="0"/><joint type="slide" axis="0 0 1"/></default>
+  <worldbody>
+    <geom name="wheel" type="cylinder" size="0.1 0.02" pos="0 0 2" euler="90 0 0"/>
+    <site name="aside" pos="0 0 2.3"/>
+    <body pos="-0.1 0 1"><joint/><geom size="0.05" mass="2"/><site name="left"/></body>
+    <body pos="0.1 0 1"><joint/><geom size="0.05" mass="1"/><site name="right"/></body>
+  </worldbody>
+  <tendon>
+    <spatial limited="true" range="0 2.3141592653589793" solimplimit="0.95 0.95 0.001">
+      <site site="left"/><geom geom="wheel" sidesite="aside"/><site site="right"/>
+    </spatial>
+  </tendon>
+</mujoco>
+"""
+
+
+def test_two_runs_that_agree_by_luck_do_not_bound_a_reference() -> None:
+    """When the rope, just taut, begins to pull is a matter of rounding."""
+    model = mujoco.MjModel.from_xml_string(ATWOOD)
+    text = '[[scenario]]\nname = "a"\nduration = 0.1\nsample = 0.01\n'
+    (scene,) = scenes(model, parse_declared(text))
+    reference = self_reference(model, run_pilot(model, scene), (Integrator.RK4,) * 3)
+    # An impedance of 0.95 leaves a twentieth of the acceleration; the rope is critically damped.
+    phase, rest = reference.states.times / 0.02, -2 * 9.81 * 0.05 * 0.02**2
+    exact = rest * (1 - (1 + phase) * np.exp(-phase))
+    assert np.abs(reference.states.qpos.sum(axis=1) - exact).max() < 3 * reference.floor.place
 
 
 def test_an_author_may_choose() -> None:

@@ -22,7 +22,7 @@ from coursebuild.features.bench.scenario_view import (
 )
 from coursebuild.numerics.detector import RunStatus
 from coursebuild.numerics.linearization import Theory, find_rest, find_theory
-from coursebuild.numerics.pilot import longer_setup, run_pilot
+from coursebuild.numerics.pilot import run_pilot
 from coursebuild.numerics.problem import STANDARD, Integrator, Scenario, Setup
 from coursebuild.numerics.problems import all_problems
 from coursebuild.numerics.problems.oscillators import rk4_factor, rk4_limit
@@ -175,7 +175,11 @@ def test_only_digits_on_which_spans_and_starts_agree_are_printed() -> None:
     assert "∘" in map_text(row)
     row = search(lambda start, step, _: start == 1 and step > 500, (1.0, 1000.0))
     assert (row.largest, limit_text(row)) == (None, "500 s – 1000 s")
-    assert limit_text(StableRow("RK4", 0.123456, (0.1, 1.0), None, 1.0, 8, 8, None)) == "120 ms"
+    row = StableRow("RK4", 0.123456, (0.1, 1.0), None, 1.0, 8, 8, None)
+    assert limit_text(row) == "120 ms"
+    assert limit_text(replace(row, bracket=(0.05502, 0.05656))) == "55 ms – 57 ms", "not 60 ms"
+    assert limit_text(replace(row, bracket=(0.01075, 0.010779))) == "10.7 ms", "10.8 ms are lost"
+    assert limit_text(replace(row, bracket=(0.19998, 0.2))) == "200 ms"
 
 
 def test_what_the_gaps_between_timesteps_may_hide_is_said() -> None:
@@ -243,16 +247,13 @@ def test_what_hangs_at_rest_gains_no_energy() -> None:
     assert {row.gain for row in rows_of(mjcf, search=(0.02, 0.08)).values()} == {None}
 
 
-def test_what_sinks_in_after_the_scenario_is_not_lost_in_longer_runs() -> None:
-    """A ball falls for 0.45 s, then into a floor so soft that its middle is below the surface."""
-    mjcf = """<mujoco><worldbody><geom type="plane" size="1 1 1" solref="0.2 1"/><body pos="0 0 1">
-    <freejoint/><geom size=".05" mass="1"/></body></worldbody></mujoco>"""
-    model, source = mujoco.MjModel.from_xml_string(mjcf), Source("m.xml", mjcf)
-    table = DeclaredScenario("s", span=source.span(0, 0), duration=0.4)
-    (scene,) = scenes(model, Declarations("m", source, (table,)))
-    pilot = run_pilot(model, scene)
-    bounds = [longer_setup(model, pilot, span).sunk_bound for span in (0.4, 0.8)]
-    assert bounds[0] == 1.0 and bounds[1] > 2.0, "it sinks by more than its diameter"
+def test_what_a_weld_sets_in_motion_has_no_energy_to_gain() -> None:
+    """It is a spring whose energy is not counted."""
+    weld = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody>
+    <body name="sled"><joint type="slide" axis="1 0 0"/><geom size=".05" mass="1"/></body>
+    </worldbody><equality><weld body1="sled" relpose="-.3 0 0 1 0 0 0" solref=".1 .5"/></equality>
+    </mujoco>"""
+    assert {row.gain for row in rows_of(weld, search=(0.001, 0.02)).values()} == {None}
 
 
 def test_a_rest_about_which_forces_have_two_laws_has_no_theory() -> None:
@@ -274,24 +275,6 @@ ARM = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
 <joint name="j" axis="0 1 0" {}/><inertial pos="0 0 0" mass="10" diaginertia="13.33 13.33 13.33"/>
 </body></worldbody>{}</mujoco>"""
 SERVO = '<actuator><position joint="j" kp="2e5" kv="1500"/></actuator>'
-
-
-def test_theory_ends_where_longer_steps_have_another_rest() -> None:
-    """Beyond 10 ms contacts are softer, and a block sinks deeper; a servo knows nothing of it."""
-    servo = """<body pos="2 0 1"><joint axis="0 1 0" stiffness="2e4" damping="100"/>
-    <geom size=".1" pos=".3 0 0" mass="1"/></body>"""
-    block = """<geom type="plane" size="1 1 1"/><body pos="0 0 .1"><freejoint/>
-    <geom type="box" size=".1 .1 .1"/></body>"""
-    limits = []
-    for world in (servo, servo + block):
-        model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{world}</worldbody></mujoco>")
-        theory = find_theory(model, Scenario(1.0, 0.05), None, smooth=False)
-        limits.append(
-            [theory.limit(name, (1e-3, 0.05)) for name in (Integrator.RK4, Integrator.EULER)]
-        )
-    (rk4, euler), (rk4_beside, euler_beside) = limits
-    assert rk4_beside is not None and rk4_beside.timestep == pytest.approx(rk4.timestep, rel=1e-3)
-    assert euler.timestep > 0.01 and euler_beside is None
 
 
 def rows_of(mjcf: str, *names: str, **fields: Any) -> dict[str, StableRow]:
@@ -399,6 +382,21 @@ def test_theory_along_a_period_of_a_spring_is_that_at_rest() -> None:
         assert theory.orbital(integrator) == pytest.approx(limit, rel=0.01), integrator
         at_rest = theory.limit(integrator, (1e-4, 0.005))  # far beyond what runs are tried with
         assert at_rest is not None and at_rest.timestep == pytest.approx(limit, rel=1e-5)
+
+
+def test_a_motion_that_is_lost_at_every_timestep_if_slowly_has_no_limit_along_its_period() -> None:
+    """Under Euler's method what circles spirals away, at a rate in proportion to the timestep."""
+    mjcf = """<mujoco><worldbody><body><joint type="ball"/>
+    <inertial pos="0 0 -1" mass="1" diaginertia="0.01 0.01 0.01"/></body></worldbody></mujoco>"""
+    model, tilt = mujoco.MjModel.from_xml_string(mjcf), math.pi / 6
+    rate = math.sqrt(9.81 / math.cos(tilt))
+    qpos = (math.cos(tilt / 2), math.sin(tilt / 2), 0.0, 0.0)
+    qvel = (0.0, rate * math.sin(tilt), rate * math.cos(tilt))
+    theory = find_theory(model, Scenario(4.0, 0.02, qpos, qvel), None, smooth=True)
+    assert theory.orbit is not None
+    assert theory.orbit.period == pytest.approx(2 * math.pi / rate, rel=1e-6)
+    assert theory.orbital(Integrator.EULER) == 0.0
+    assert theory.orbital(Integrator.RK4) == pytest.approx(0.7, rel=0.05)
 
 
 def test_energy_that_cannot_be_is_instability() -> None:

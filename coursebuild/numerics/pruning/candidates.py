@@ -339,7 +339,8 @@ def inner_geoms(text: ModelText) -> list[Item]:
 
 def contact_of_rest(text: ModelText, items: Sequence[Item]) -> list[Item]:
     """Contact as a whole, together with items without which nothing may touch any more."""
-    if not items:
+    can_touch = text.model.nflex or next(iterate_pairs(text.model), None)
+    if not items or not can_touch:
         return []
     removals = tuple(element for item in items for element in item.removals)
     drops = tuple(drop for item in items for drop in item.drops)

@@ -221,7 +221,11 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Mod
 
     `course_modules`: modules that are readers themselves, so that importing one is harmless.
     """
-    names = frozenset(next(filter(None, match), "") for match in _TEXT.findall(text))
+    # A text in which fields are filled in holds others: what is asked for there counts as well.
+    accesses = (match[0] for p in (_RESET, _THING, _WHOLE) for match in p.finditer(text))
+    names = frozenset(
+        next(filter(None, match), "") for part in (text, *accesses) for match in _TEXT.findall(part)
+    )
     rest, filled = _FORMAT_CALL.subn(r"\1(", _RESET.sub("", text))
     parts = {(VIEWS[view], part) for view, part in _THING.findall(rest) if view in VIEWS}
     rest = _THING.sub(lambda match: "named" if match[1] in VIEWS else match[0], rest)

@@ -162,7 +162,8 @@ def limit_text(row: StableRow) -> str:
     """A largest stable timestep with the digits on which theory and all runs agree, or a range.
 
     Theory at rest counts up to a tenth above: else the motion is lost far from rest. Where limits
-    have islands, no digit is finer than the gaps between timesteps that were tried.
+    have islands, no digit is finer than the gaps between timesteps that were tried. A single number
+    is never above them all: whoever takes it would lose the run.
     """
     assert row.largest is not None or row.bracket is not None
     if row.bracket is None:  # recorded before runs were compared
@@ -172,11 +173,16 @@ def limit_text(row: StableRow) -> str:
         low = min(low, high / max(1.0, widest_gaps([row])[0]))
     if row.theory and row.theory < high * (1 + _TOGETHER):
         low, high = min(low, row.theory), max(high, row.theory)
-    if low <= 0 or high / low > 1 + _TOGETHER:
+    digits = 0
+    if low > 0:
+        least = max(high - low, low * 10.0**-_MOST_DIGITS)
+        digits = math.floor(math.log10(low)) - math.ceil(math.log10(least) - 1e-9) + 1
+    if digits < 2:
         return f"{seconds_text(low, 2)} – {seconds_text(high, 2)}"
-    least = max(high - low, low * 10.0**-_MOST_DIGITS)
-    digits = math.floor(math.log10(low)) - math.ceil(math.log10(least) - 1e-9) + 1
-    return seconds_text(low, max(1, digits))
+    value = float(f"{low:.{digits}g}")
+    if value > high:
+        value -= 10.0 ** (math.floor(math.log10(low)) + 1 - digits)
+    return seconds_text(value, digits)
 
 
 def widest_gaps(rows: Iterable[StableRow]) -> tuple[float, float]:
@@ -194,7 +200,7 @@ def widest_gaps(rows: Iterable[StableRow]) -> tuple[float, float]:
 
 
 _TOGETHER, _MOST_DIGITS = 0.1, 4
-"""How far apart limits may be, relative, that are given as one number, and its most digits."""
+"""How far theory at rest may be above runs, relative, and the most digits of a limit."""
 _SIGNS = "·∘•"
 """Of a timestep in a map: none, some or all of its runs were lost."""
 

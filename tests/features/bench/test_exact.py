@@ -79,7 +79,7 @@ def test_equations_of_motion_are_integrated(course: Path) -> None:
     scenario = report(course, EQUATIONS.format(""))
     assert scenario.reference == "closed" and scenario.floor < 1e-11
     help = mistake(course, EQUATIONS.format(" * (1 + 1e-5)")).help
-    assert help.startswith("it errs by 7.8e-06 in position: two integrations of the model agree")
+    assert help.startswith("in the scenario `up` it errs by 7.8e-06 in position: two integrations")
     loose = report(course, EQUATIONS.format(" * (1 + 1e-5)"), TOML + "precision = 1e-4\n")
     assert 1e-6 < loose.floor < 1e-4, "and no error is given that is not known"
 
@@ -89,7 +89,7 @@ def test_two_motions_of_the_course_are_told_apart(course: Path) -> None:
     exact = EXACT.format(velocity=", qvel - 9.81 * time") + "\n\n" + EQUATIONS
     assert report(course, exact.format("")).floor < 1e-11
     message = mistake(course, exact.format(" * (1 + 1e-5)")).message
-    assert message == "`models/ball.exact.py`, `acceleration`, is not the motion of `up`"
+    assert message == "`models/ball.exact.py`, `acceleration`, is not this scene's motion"
 
 
 PENDULUM = """\
@@ -167,7 +167,7 @@ def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(course: P
     assert scenario.stable[0].theory == 0.01
     for values in ({"friction": 0.6, "height": 0}, {"friction": 0.5, "height": "time"}):
         diagnostic = mistake(course, SLIDE.format(**values), toml)
-        assert "is not the motion of `" in diagnostic.message, values
+        assert "is not this scene's motion" in diagnostic.message, values
         assert "contacts as they are" in diagnostic.help, values
 
 
@@ -178,7 +178,8 @@ ROLL = """\
   <worldbody>
     <geom type="plane" size="5 5 .1" euler="0 20 0"/>
     <body euler="0 20 0"><body pos="0 0 .1"><joint type="slide" axis="1 0 0"/>
-      <joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/><geom size=".1" mass="1"/></body></body>
+      <joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/><geom size=".1" mass="1"/>
+    </body></body>
   </worldbody>
 </mujoco>
 """
@@ -201,7 +202,7 @@ def test_an_exact_motion_with_contact_that_is_off_by_a_hundred_thousandth_is_ref
     scenario = report(course, ROLLED.format(g=9.81), toml)
     assert scenario.reference == "closed" and scenario.floor < 1e-5
     diagnostic = mistake(course, ROLLED.format(g=9.81 * (1 + 1e-5)), toml)
-    assert "is not the motion of `" in diagnostic.message
+    assert "is not this scene's motion" in diagnostic.message
     assert "4, 8, 16" in diagnostic.help, "where the softness of contacts hides it no longer"
 
 
@@ -252,6 +253,42 @@ def test_an_exact_motion_of_soft_contacts_is_known_as_well_as_the_engine_agrees(
     assert own_row.position is not None and own_row.position[0] > 2 * scenario.floor
 
 
+ROPE = """\
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody>
+    <body><joint name="j" type="slide" axis="0 0 1"/><geom size="0.1" mass="1"/></body>
+  </worldbody>
+  <tendon>
+    <fixed limited="true" range="0 9" solimplimit="0.9 0.9 0.001">
+      <joint joint="j" coef="1"/>
+    </fixed>
+  </tendon>
+</mujoco>
+"""
+STRETCHED = """\
+from math import exp
+
+
+def motion(time, qpos, qvel):
+    gone, rest = exp(-time / 0.02), -0.1 * 9.81 * 0.02**2
+    return [rest - rest * (1 + time / 0.02) * gone], [rest * time / 0.02**2 * gone]
+"""
+
+
+def test_an_exact_motion_is_that_of_a_soft_rope_or_of_one_that_does_not_stretch(
+    course: Path,
+) -> None:
+    write(course / "models" / "ball.xml", ROPE)
+    toml = '[[scenario]]\nname = "hang"\nduration = 0.1\nsample = 0.01\n'
+    stiff = "def motion(time, qpos, qvel):\n    return [0], [0]\n"
+    for exact in (STRETCHED, stiff):
+        scenario = report(course, exact, toml)
+        assert scenario.reference == "closed" and scenario.floor < 1e-5
+    diagnostic = mistake(course, STRETCHED.replace("0.02", "0.03"), toml)
+    assert "is not this scene's motion" in diagnostic.message
+
+
 def test_errors_are_resolved_down_to_the_floor_of_an_exact_motion_with_friction(
     course: Path,
 ) -> None:
@@ -266,10 +303,12 @@ def test_errors_are_resolved_down_to_the_floor_of_an_exact_motion_with_friction(
 
 def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:
     cases = {
-        EXACT.format(velocity="").replace("/ 2", "/ 3"): "is not the motion of `",
+        EXACT.format(velocity="").replace("/ 2", "/ 3"): "is not this scene's motion",
         "def motion(time, qpos, qvel):\n    return [1, 2]\n": "gives numbers of coordinates that",
         "x = 1\n": "gives no motion: KeyError: 'motion'",
-        "import sys\n\nsys.exit()\n": "gives no motion: ",
+        "def motion(time, qpos, qvel):\n    return qpos * float('nan')\n": "or not a number",
+        "import sys\n\nsys.exit()\n": "gives no motion: it exits",
+        "def motion(time, qpos, qvel):\n    return [1] * int(1 + time * 9)\n": "coordinates change",
     }
     for text, message in cases.items():
         diagnostic = mistake(course, text)

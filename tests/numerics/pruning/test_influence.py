@@ -118,6 +118,18 @@ def test_limbs_that_rest_and_that_code_names_are_welded() -> None:
     assert findings["contact-left"].difference < ALIKE and "far-body" not in findings
 
 
+def test_where_nothing_can_touch_contacts_are_not_what_is_saved() -> None:
+    """A wheel that rests goes; that nothing touches without it is no merit of its."""
+    wheels = scene(
+        """<body name="a"><joint name="a"/><geom size=".1" contype="0" conaffinity="0"/></body>
+    <body name="b"><joint name="b"/><geom size=".1" contype="0" conaffinity="0"/></body>""",
+        rest='<actuator><motor joint="a"/></actuator><equality><joint joint1="b"/></equality>',
+    )
+    declarations = parse_declared('[[scenario]]\nname = "go"\nduration = 0.1\ncontrols = [[1]]\n')
+    findings = findings_by_kind(run_survey(wheels, declarations=declarations, lesson='"a", "b"'))
+    assert names(findings["resting-joint"]) == ["b"] and "contact-left" not in findings
+
+
 @pytest.mark.slow
 def test_humanoid_of_which_one_arm_moves_gets_as_quick_as_by_hand() -> None:
     """By hand, with three joints alone and no contact, a similar one got 3.2 times as quick."""

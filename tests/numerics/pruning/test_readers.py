@@ -39,6 +39,11 @@ HOSTILE = {
     "concatenation": ("sensor", 'print([data.sensor("hip_" + s).data for s in "lr"])'),
     "f-string": ("sensor", 's = "r"\nprint(data.sensor(f"hip_{s}").data)'),
     "raw f-string": ("sensor", 's = "r"\nprint(fr"{data.sensordata}")'),
+    "name in an f-string": ("sensor hip_l", "print(f\"{data.sensor('hip_l').data}\"[:0])"),
+    "name in an f-string of prose": (
+        "site tip_r",
+        "print(f\"it's {data.site('tip_r').xpos}\"[:0])",
+    ),
     "f-string before a text": ("sensor", 'print(f"{model}", data.sensordata, "x")'),
     "triple f-string": ("sensor", "print(f'''it's {data.sensordata}''', \"x\")"),
     "letters of another width": ("sensor", "print(data.\uff53ensordata)"),

@@ -19,7 +19,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model.results import ScriptJob
+from coursebuild.core.model.results import Outcome, ScriptJob
 from coursebuild.core.model.scenarios import DeclaredSweep
 from coursebuild.core.run.script_environment import one_processor
 from coursebuild.core.run.script_server import ScriptServer
@@ -167,7 +167,11 @@ def _exact_motion(root: Path, scene: CourseScene) -> ExactMotion | None:
                     motions[name] = (qpos, rest[0] if rest else None)
         except (msgspec.DecodeError, ValueError):
             last = run.stderr.strip().splitlines()[-1:] or [run.outcome.value]
-            message = f"`{path}` gives no motion: {last[0]}"
+            reasons = {
+                Outcome.OK: "its numbers of coordinates change" if run.stdout else "it exits",
+                Outcome.TIMEOUT: f"it takes longer than {_SECONDS:g} s",
+            }
+            message = f"`{path}` gives no motion: {reasons.get(run.outcome, last[0])}"
             help = "define `motion(time, qpos, qvel)` there, for the positions at a time in s"
             raise SceneError(message, span, help) from None
         return ExactStates(motions, answer.expected)
