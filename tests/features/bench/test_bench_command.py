@@ -77,7 +77,8 @@ def test_ctrl_c_ends_bench_and_leaves_no_litter(course: Path) -> None:
             assert process.poll() is None
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=300)
-    assert process.returncode == 130, err
+    # Python ends by the signal itself if that came while an import executed a text.
+    assert process.returncode in (130, -signal.SIGINT), err
     assert err.endswith("interrupted\n")
     assert out == ""
     assert sorted(path.name for path in course.iterdir()) == [".coursebuild", "content", "models"]
