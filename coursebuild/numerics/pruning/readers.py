@@ -247,8 +247,8 @@ def read_code(path: str, text: str, course_modules: Collection[str] = ()) -> Mod
         reasons += [f"it imports {name}" for name in modules if name not in harmless]
         reasons += ["it matches patterns by position"] if _POSITIONAL.search(text) else []
         reasons += ["it uses `bind`"] if "bind" in members else []  # to any element of a spec
-    elif match := _SCRIPT.search(code):
-        reasons.append(f"it lists what exists: `{match[0]}`")
+    elif _SCRIPT.search(code):
+        reasons.append("it lists what exists")
     kinds = {VIEWS[word] for word in members if word in VIEWS}
     # Things and structures that code may print whole, or hand on. One that only has a name is
     # looked at by its attributes, which are words themselves.
