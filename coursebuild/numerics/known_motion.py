@@ -217,7 +217,7 @@ def _check_exact(
         help = (
             f"{clause} is {far} (m or rad) from the engine in small steps with contacts as they "
             f"are, and {', '.join(f'{times:g}' for times in _STIFFER[1 : len(gaps)])} times as "
-            "stiff: what is exact is what that tends to, or as near to it as `precision` says"
+            "stiff: an exact motion is what that tends to; `precision` says how far it may be off"
         )
         raise SceneError(subject, exact.span, help)
     return Sizes(rest, rest, second.floor.velocity).at_least(ROUNDING)
@@ -238,6 +238,8 @@ def _stiff_gaps(
         try:
             stiff = _stiff_limit(model, pilot, times, quick=quick)
         except SceneError:
+            if len(gaps) < _NEEDED:  # nothing would be checked
+                raise
             break  # too stiff for steps of this length
         count = min(len(stiff_states.times), len(stiff.states.times))
         shifts.append(_gap(model, stiff_states.head(count), stiff.states.head(count)).place)
