@@ -94,33 +94,43 @@ class Column(Struct, frozen=True):
     title: str
     cells: tuple[str, ...]
     rank: int = 0
-    """Where there is no room for all, columns of higher rank are left out; 0 never is."""
+    """Where there is no room for all, columns of higher rank come later; 0 is in every table."""
     left: bool = False
     """Whether its cells are aligned left, as words are; numbers are aligned right."""
 
 
-def table(columns: Sequence[Column], width: int | None = None) -> list[str]:
-    """The titles and rows of columns with text as lines, no wider than `width` where possible."""
-    filled_columns = [
-        (column, [column.title, *map(visible, column.cells)])
-        for column in columns
-        if any(cell.strip() for cell in column.cells)
-    ]
-    widths = [max(map(cells, texts)) for _, texts in filled_columns]
-    visible_columns = {
-        n for n, (column, _) in enumerate(filled_columns) if width is None or column.rank == 0
-    }
-    for n in sorted(range(len(filled_columns)), key=lambda n: (filled_columns[n][0].rank, n)):
-        candidate = visible_columns | {n}
-        if width is None or sum(widths[m] + len(_GAP) for m in candidate) - len(_GAP) <= width:
-            visible_columns = candidate
-    padded_columns: list[list[str]] = []
-    for n in sorted(visible_columns):
-        column, texts = filled_columns[n]
-        pads = (" " * (widths[n] - cells(text)) for text in texts)
-        pairs = zip(texts, pads, strict=True)
+def table(columns: Sequence[Column]) -> list[str]:
+    """The titles and rows of columns with text as lines."""
+    padded_columns = []
+    for column in filter(_is_filled, columns):
+        texts = [column.title, *map(visible, column.cells)]
+        width = max(map(cells, texts))
+        pairs = [(text, " " * (width - cells(text))) for text in texts]
         padded_columns.append([text + pad if column.left else pad + text for text, pad in pairs])
     return [_GAP.join(row).rstrip() for row in zip(*padded_columns, strict=True)]
+
+
+def fit(columns: Sequence[Column], width: int) -> list[list[Column]]:
+    """Share columns out among tables no wider than `width`, where possible."""
+    shared = [n for n, column in enumerate(columns) if not column.rank]
+    rest = [n for n, column in enumerate(columns) if column.rank and _is_filled(column)]
+    rest.sort(key=lambda n: columns[n].rank)
+    groups: list[list[Column]] = []
+    while rest or not groups:
+        group, full_rank = shared + rest[:1], 0
+        for n in rest[1:]:
+            lines = table([columns[m] for m in (*group, n)])
+            if columns[n].rank != full_rank and max(map(cells, lines)) <= width:
+                group.append(n)
+            else:  # the next ones of its rank stay with it
+                full_rank = columns[n].rank
+        rest = [n for n in rest if n not in group]
+        groups.append([columns[n] for n in sorted(group)])
+    return groups
+
+
+def _is_filled(column: Column) -> bool:
+    return any(cell.strip() for cell in column.cells)
 
 
 # --- the terminal

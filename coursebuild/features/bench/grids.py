@@ -37,7 +37,7 @@ class Grid(Struct, frozen=True):
     left: tuple[int, ...]
     """Columns of words, set left; numbers are set right."""
     minor: tuple[int, ...] = ()
-    """Columns that are left out first if there is no room for all."""
+    """Columns that come last if there is no room for all."""
     highlights: tuple[int, ...] = ()
     """Rows that stand out."""
     parts: tuple[FigurePart, ...] = ()

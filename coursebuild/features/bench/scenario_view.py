@@ -406,7 +406,7 @@ def _engine_table(words: Strings, scenario: EngineScenario, label: str) -> grids
         *((words("measured.worlds", n=n), [_cost_text(row, n) for row in rows]) for n in counts),
         (words("measured.remark"), [remark(row) for row in rows]),
     ]
-    minor = tuple(words(f"measured.{name}") for name in ("velocity", "compile"))
+    minor = tuple(words(f"measured.{name}") for name in ("velocity", "energy", "compile"))
     return grids.grid(label, columns, words=(words("measured.remark"),), minor=minor)
 
 

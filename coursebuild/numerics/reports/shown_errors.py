@@ -217,7 +217,7 @@ def map_text(row: StableRow) -> str:
 
 def seconds_text(value: float, digits: int = 6) -> str:
     """A short time with its unit."""
-    for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")):
+    for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")):
         if value >= size * 0.9999995:
             return f"{float(f'{value / size:.{digits}g}'):.{max(digits, 6)}g} {unit}"
     return f"{value:.{digits}g} s"

@@ -22,7 +22,7 @@ from coursebuild.numerics.reports import Interval
 from coursebuild.numerics.reports.records import Departure, RecordCheck
 from coursebuild.numerics.reports.scene_report import FigureLine, RowVerdict
 from coursebuild.report import Style
-from coursebuild.report.text import Column, cells, table
+from coursebuild.report.text import Column, cells, fit, table
 from support.bench_reports import awkward, row, scenario, scene
 from support.fixture_cases import check_text
 
@@ -98,22 +98,33 @@ def test_names_cannot_change_the_terminal() -> None:
     assert "名前" in text
 
 
-def test_a_table_keeps_what_has_room_where_wide_characters_take_two_cells() -> None:
+def test_what_a_table_has_no_room_for_comes_in_the_next() -> None:
+    """Wide characters take two cells."""
     columns = [
         Column("name", ("a", "名前"), 0, left=True),
         Column("wide", ("x" * 30, "y"), 1, left=True),
         Column("n", ("1", "22"), 2),
         Column("none", ("", " "), 0),
+        Column("m", ("3", "4"), 1),
     ]
-    assert table(columns, 80) == [
-        "name  wide                             n",
-        "a     xxxxxxxxxxxxxxxxxxxxxxxxxxxxxx   1",
-        "名前  y                               22",
+
+    def tables(width: int) -> list[list[str]]:
+        return [table(group) for group in fit(columns, width)]
+
+    whole = [
+        "name  wide                             n  m",
+        "a     xxxxxxxxxxxxxxxxxxxxxxxxxxxxxx   1  3",
+        "名前  y                               22  4",
     ]
-    assert table(columns, 40) == table(columns, 80)
-    assert table(columns, 39)[2] == "名前  y"
-    assert table(columns, 20) == ["name   n", "a      1", "名前  22"]
-    assert table(columns, 1) == ["name", "a", "名前"]
+    assert tables(80) == tables(43) == [whole]
+    wide, thin = (
+        ["name  wide", "a     " + "x" * 30, "名前  y"],
+        ["name   n", "a      1", "名前  22"],
+    )
+    assert tables(38) == tables(20) == [wide, ["name   n  m", "a      1  3", "名前  22  4"]]
+    assert tables(10) == [wide, ["name  m", "a     3", "名前  4"], thin]
+    assert tables(40)[1:] == [thin]
+    assert [table(group) for group in fit(columns[:1], 1)] == [["name", "a", "名前"]]
 
 
 @given(value=st.floats())

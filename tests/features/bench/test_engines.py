@@ -181,6 +181,19 @@ def test_the_text_of_a_report() -> None:
     assert "When it began, about 3.2 other programs wanted to run" in words
 
 
+def test_no_column_is_left_out_where_the_terminal_is_narrow() -> None:
+    lines = engines_text([report()], Style(width=60)).splitlines()
+    start = lines.index("    Engine                Position (m or rad)")
+    assert [line.strip() for line in lines[start::5]][:5] == [
+        "Engine                Position (m or rad)",
+        "Engine                From MuJoCo (rad, or of the extent)",
+        "Engine                 1 world  64 worlds  4096 worlds",
+        "Engine                Velocity (m/s or rad/s)",
+        "Engine                Energy drift  To compile",
+    ]
+    assert lines[start + 11] == "    MJX, 32 bits, A Card  9 µs ×12  1 µs ×1.2            –"
+
+
 def test_the_pages_show_a_report(make: Make) -> None:
     reports = Reports(engines={"box": report()})
     files = make("## A\n\n```bench box show=engines\n```\n").site(reports=reports)

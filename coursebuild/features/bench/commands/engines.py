@@ -297,7 +297,8 @@ def engines_text(reports: Sequence[EngineReport], style: Style) -> str:
             lines += ["", _INDENT + style.paint(visible(view.title), BOLD)]
             for text in view.description:
                 lines += style.wrap(plain_text(text), 2 * _INDENT)
-            lines += ["", *(f"{2 * _INDENT}{line}" for line in grid_lines(view.table, style)[1:])]
+            _, *grid_text = grid_lines(view.table, style)
+            lines += ["", *(f"{2 * _INDENT}{line}".rstrip() for line in grid_text)]
             for note in view.notes:
                 lines += style.wrap(note, 2 * _INDENT, YELLOW)
         texts.append("\n".join(lines) + "\n")

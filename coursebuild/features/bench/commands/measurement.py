@@ -41,6 +41,7 @@ from coursebuild.report.text import (
     Column,
     Style,
     diagnostic_paragraphs,
+    fit,
     table,
     visible,
 )
@@ -322,22 +323,29 @@ def plain_text(text: str) -> str:
 def grid_lines(grid: Grid, style: Style, marks: Sequence[tuple[str, str]] = ()) -> list[str]:
     """Write a table of numbers under its label, not wider than the terminal.
 
-    `marks` holds what stands before each row, and the row's colour. Without marks, remarks stand
-    below, each with its row's name.
+    `marks` holds what stands before each row, and the row's colour. Such a table is long, and says
+    for which columns there is no room. Without marks these follow below, and then remarks, each
+    with its row's name.
     """
+    style = replace(style, width=max(style.width, 60) - 4)
     columns = [Column("", tuple(mark for mark, _ in marks), left=True)] if marks else []
     for n, (title, *cells) in enumerate(zip(grid.head, *grid.rows, strict=True)):
         if not n or n not in grid.left:
             rank = 0 if not n else 2 if n in grid.minor else 1
             columns.append(Column(title, tuple(map(plain_text, cells)), rank, left=not n))
-    head, *rows = table(columns, max(style.width, 60) - 4)
+    groups = fit(columns, style.width)
+    lines = [style.paint(visible(grid.label), FAINT)]
+    for number, group in enumerate(groups[:1] if marks else groups):
+        head, *rows = table(group)
+        if marks:
+            rows = [style.paint(row, code) for row, (_, code) in zip(rows, marks, strict=True)]
+        lines += [""] * (number > 0) + [style.paint(head, FAINT)]
+        for part, numbered_rows in grid.bodies:
+            lines += [] if part is None else [style.paint(visible(part.title), FAINT)]
+            lines += [rows[n] for n, _ in numbered_rows]
     if marks:
-        rows = [style.paint(row, code) for row, (_, code) in zip(rows, marks, strict=True)]
-    lines = [style.paint(visible(grid.label), FAINT), style.paint(head, FAINT)]
-    for part, numbered_rows in grid.bodies:
-        lines += [] if part is None else [style.paint(visible(part.title), FAINT)]
-        lines += [rows[number] for number, _ in numbered_rows]
-    if marks:
-        return lines
+        titles = "; ".join(column.title for group in groups[1:] for column in group if column.rank)
+        text = f"no room for: {titles}. --format json has all" if titles else ""
+        return lines + style.wrap(text, code=FAINT)
     remarks = ((row[0], row[n]) for row in grid.rows for n in grid.left[1:])
     return [*lines, *(f"{visible(name)}: {text}" for name, text in remarks if text)]
