@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.drawing.scales import text_width
 from coursebuild.numerics.reports import Interval
+from coursebuild.numerics.reports.chart import line_look, outline
 from coursebuild.numerics.reports.report_plots import plot_svgs, work_precision
 from coursebuild.numerics.reports.scene_report import ScenarioReport
 from coursebuild.numerics.reports.shown_errors import main_quantity, quantities
@@ -104,6 +105,11 @@ def test_the_key_says_what_there_is_and_nothing_else() -> None:
         *("the scene’s own: Euler at 2 ms", "run lost"),
     ]
     assert texts(parse_plot(scenario([row(front=True)])))[-1] == "on the Pareto front"
+
+
+def test_eight_lines_differ_in_dash_and_mark() -> None:
+    assert len({line_look(number) for number in range(8)}) == 8
+    assert len({outline(number, 0, 0, 1) for number in range(8)}) == 8
 
 
 def test_the_own_setting_is_ringed_also_where_it_was_lost() -> None:

@@ -28,11 +28,12 @@ from coursebuild.core.drawing.scales import (
 )
 from coursebuild.numerics.reports import Interval
 
-_DASHES = ("", "7 3", "2 3", "10 3 2 3", "1 4", "5 2 1 2 1 2", "12 4")
+_DASHES = ("", "7 3", "2 3", "10 3 2 3", "1 4", "5 2 1 2 1 2", "12 4", "6 6")
+"""One more than colours, as are the marks, so that the eighth line is not the first again."""
 _LIGHT = ("#0072b2", "#b34d00", "#00795a", "#a8467f", "#7a6a00", "#2b6f9e", "#1e1e1c")
 """Okabe and Ito's, darker on paper."""
-_MARK_CORNERS = (0, 4, 4, 3, 3, 5, 6)
-_MARK_ANGLES = (0.0, 45.0, 0.0, -90.0, 90.0, -90.0, 0.0)
+_MARK_CORNERS = (0, 4, 4, 3, 3, 5, 6, 3)
+_MARK_ANGLES = (0.0, 45.0, 0.0, -90.0, 90.0, -90.0, 0.0, 0.0)
 SIZE, TICK_SIZE = 12.0, 11.0
 """Of letters, in the units of the drawing."""
 MARK, SMALL = 4.2, 2.9
@@ -88,7 +89,7 @@ def line_look(number: int) -> str:
 
 
 def outline(number: int, x: float, y: float, size: float) -> str:
-    """The path of a mark: circle, square, diamond, triangles up and down, pentagon, hexagon.
+    """The path of a mark: circle, square, diamond, pentagon, hexagon, or one of three triangles.
 
     All of about the same area; `size` is the radius of the circle.
     """
