@@ -22,7 +22,6 @@ runs once (`RunStore.claim`). So the command need not wait for the preview.
 from __future__ import annotations
 
 import argparse
-import atexit
 import contextlib
 import functools
 import gc
@@ -393,7 +392,6 @@ def _run(request: dict[str, Any], files: list[int]) -> int:
     except BaseException:
         sys.excepthook(*sys.exc_info())
         status = FAILURE
-    atexit._run_exitfuncs()
     for output in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):
             if output is not None:
