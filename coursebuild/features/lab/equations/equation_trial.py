@@ -119,14 +119,10 @@ def _attempts(config: Mapping[str, Any]) -> list[_Attempt]:
     attempts = {start: _Attempt(start)}
 
     def add(values: tuple[float, ...], entry: Entry) -> _Attempt:
-        changed = [c for c, a, b in zip(controls, values, start, strict=True) if a != b]
-        texts = (
-            f"{c['label']} = {value:g}"
-            for c, value, before in zip(controls, values, start, strict=True)
-            if value != before
-        )
-        labels = frozenset(c["label"] for c in changed)
-        return attempts.setdefault(values, _Attempt(values, ", ".join(texts), entry, labels))
+        pairs = zip(controls, zip(values, start, strict=True), strict=True)
+        changed = {control["label"]: value for control, (value, old) in pairs if value != old}
+        text = ", ".join(f"{label} = {value:g}" for label, value in changed.items())
+        return attempts.setdefault(values, _Attempt(values, text, entry, frozenset(changed)))
 
     for i, control in enumerate(controls):
         options = [value for _, value in control["options"]]
