@@ -19,9 +19,8 @@ from msgspec import Struct
 
 from coursebuild.core.files.errors import require
 from coursebuild.core.model import Course, Recording, find_blocks
-from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedError
+from coursebuild.core.run.v8 import LimitError, ScriptError, V8Engine
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.features.lab.engines.browser import V8Engine
 from coursebuild.features.lab.engines.native import EQUATION_TRIAL, asset_path
 from coursebuild.features.lab.equations import reference
 from coursebuild.features.lab.model import PLOT, Entry, Lab
@@ -87,15 +86,14 @@ class EquationReply(Struct, frozen=True):
 class EquationEngine(V8Engine):
     """The page's code for labs without an engine."""
 
+    def __init__(self, memory: int) -> None:
+        super().__init__(memory, lambda: (asset_path(EQUATION_TRIAL),))
+
     def run(self, request: dict[str, Any], seconds: float) -> list[reference.CurveRun]:
         """Run the attempts of a lab; those that do not end raise `LimitError` or `ScriptError`."""
-        if self._stopped:
-            raise StoppedError
-        if self._isolate is None:
-            script = asset_path(EQUATION_TRIAL).read_text(encoding="utf-8")
-            self._isolate = Isolate(script, memory=self._memory)
+        isolate = self._running_isolate()
         try:
-            text = self._isolate.call("tryCurves", json.dumps(request), seconds)
+            text = isolate.call("tryCurves", json.dumps(request), seconds)
         except (LimitError, ScriptError):
             self.close()
             raise
