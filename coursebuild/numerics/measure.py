@@ -16,7 +16,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias
 
@@ -283,15 +283,8 @@ def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
     """The declared quantity of a scenario at every sample: (n, d)."""
     quantity = scene.declaration.observable
     assert quantity is not None
-    data = initial_data(scene.scenario, model)
     values = []
-    commands = scene.scenario.commands(scene.scenario.sample)
-    rows = zip(states.qpos, states.qvel, states.act, commands, strict=False)
-    for qpos, qvel, act, command in rows:
-        data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
-        if command:
-            data.ctrl[:] = command
-        mujoco.mj_forward(model, data)
+    for data in _samples(model, scene, states):
         match quantity.kind:
             case "body":
                 values.append(data.body(quantity.name).xpos.copy())
@@ -300,6 +293,19 @@ def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
             case _:
                 values.append(data.sensor(quantity.name).data.copy())
     return np.array(values)
+
+
+def _samples(model: Any, scene: Scene, states: EngineStates) -> Iterator[Any]:
+    """`mjData` at every sample of a motion, with its command, and all that follows from these."""
+    data = initial_data(scene.scenario, model)
+    commands = scene.scenario.commands(scene.scenario.sample)
+    rows = zip(states.qpos, states.qvel, states.act, commands, strict=False)
+    for qpos, qvel, act, command in rows:
+        data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
+        if command:
+            data.ctrl[:] = command
+        mujoco.mj_forward(model, data)
+        yield data
 
 
 def quantity_errors(model: Any, scene: Scene, states: EngineStates, exact: EngineStates) -> Array:
@@ -337,14 +343,8 @@ def friction_holds(model: Any, scene: Scene, states: EngineStates, sticks: Stick
     """Whether friction is below its limit at all that sticks, at every sample of these states."""
     model = with_integrator(model, Integrator.EULER, scene.timestep)
     model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    data, force = initial_data(scene.scenario, model), np.zeros(6)
-    commands = scene.scenario.commands(scene.scenario.sample)
-    rows = zip(states.qpos, states.qvel, states.act, commands, sticks, strict=False)
-    for qpos, qvel, act, command, pairs in rows:
-        data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
-        if command:
-            data.ctrl[:] = command
-        mujoco.mj_forward(model, data)
+    force = np.zeros(6)
+    for data, pairs in zip(_samples(model, scene, states), sticks, strict=False):
         loads = {pair: np.zeros(2) for pair in pairs}  # friction over its coefficient, and pressure
         for number, contact in enumerate(data.contact[: data.ncon]):
             pair = (int(contact.geom[0]), int(contact.geom[1]))

@@ -127,16 +127,15 @@ def advance_watching(
     thickness: Array | None = None,
     *,
     interval: int = _LOOK_INTERVAL,
-    setup: Setup | None = None,
 ) -> tuple[Peaks, int]:
-    """Make so many steps; stop once the state is not finite, or out of the bounds of a setup.
+    """Make so many steps; stop once the state is not finite.
 
     Returns the updated `peaks` and the number of steps made. Only one state per `interval` is
     looked at, which suffices: what shoots up takes longer to come back.
     """
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     steps_made = 0
-    while steps_made < steps and (peaks.finite if setup is None else peaks.is_within(setup)):
+    while steps_made < steps and peaks.finite:
         part = min(interval, steps - steps_made)
         advance(model, data, part)
         steps_made += part

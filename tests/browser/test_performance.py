@@ -79,8 +79,9 @@ COPY = """(number) => {
 COME_AND_GO = fixture_text("scripts/come_and_go.js")
 
 
-DRAW = """(n) => new Promise((done) => {
-  const next = () => (n-- > 0 ? requestAnimationFrame(next) : done())
+DRAW_PICTURES = """(n) => new Promise((done) => {
+  const begun = performance.now()
+  const next = () => (n-- > 0 ? requestAnimationFrame(next) : done(performance.now() - begun))
   next()
 })"""
 
@@ -102,7 +103,7 @@ def memory_in_use(page: Page, session: CDPSession) -> MemoryUse:
     samples = []
     for _ in range(8):
         session.send("HeapProfiler.collectGarbage")
-        page.evaluate(DRAW, 10)
+        page.evaluate(DRAW_PICTURES, 10)
         metrics = session.send("Performance.getMetrics")["metrics"]
         values = {metric["name"]: int(metric["value"]) for metric in metrics}
         memory, end = worker.evaluate("() => self.engineMemory()")
@@ -153,11 +154,6 @@ BURDEN = """(ms) => {
   }
   requestAnimationFrame(work)
 }"""
-DRAW_PICTURES = """(n) => new Promise((done) => {
-  const begun = performance.now()
-  const next = () => (n-- > 0 ? requestAnimationFrame(next) : done(performance.now() - begun))
-  next()
-})"""
 
 
 def run(context: BrowserContext, base: str) -> tuple[Page, list[str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tomllib
 from pathlib import Path
 from typing import NamedTuple
@@ -11,11 +10,8 @@ import pytest
 
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
+from support.markdown_files import commonmark_examples
 from support.plain_html import check_formatting, plain_html
-
-ROOT = Path(__file__).parents[2]
-SPECIFICATION = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"
-EXAMPLE = re.compile(r"^`{32} example\n(.*?)^\.\n(.*?)^`{32}$", re.MULTILINE | re.DOTALL)
 
 
 class Example(NamedTuple):
@@ -26,13 +22,9 @@ class Example(NamedTuple):
 
 @pytest.fixture(scope="module")
 def examples() -> list[Example]:
-    if not SPECIFICATION.is_file():
-        pytest.fail(f"no {SPECIFICATION.relative_to(ROOT)}: run `npm ci` in {ROOT / 'site'}")
-    text = SPECIFICATION.read_text(encoding="utf-8").replace("→", "\t")
-    matches = EXAMPLE.findall(text)
     return [
         Example(i, markdown, normalize_tags(html))
-        for i, (markdown, html) in enumerate(matches, start=1)
+        for i, (markdown, html) in enumerate(commonmark_examples(), start=1)
     ]
 
 

@@ -13,7 +13,8 @@ import struct
 import tomllib
 import zlib
 from collections.abc import Iterator
-from pathlib import Path
+
+from support.fixture_cases import fixture_text
 
 FAR = "http://far.test"
 """The address that the files ask."""
@@ -60,9 +61,7 @@ def _insert(text: str) -> str:
     return text
 
 
-_CASES = tomllib.loads(
-    Path(__file__).parents[1].joinpath("fixtures/hostile_svg.toml").read_text("utf-8")
-)
+_CASES = tomllib.loads(fixture_text("hostile_svg.toml"))
 _INSIDE = {name: _insert(text) for name, text in _CASES["hostile"].items()} | {
     f"{kind}: {css.replace('{FAR}', 'FAR')}": _insert(whole.format(css=css))
     for kind, whole in (

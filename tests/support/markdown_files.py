@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
+import pytest
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
@@ -95,3 +96,12 @@ def write_files(root: Path, fences: Iterable[Fence]) -> None:
             assert not target.exists(), f"{path} is given twice"
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(fence.text, encoding="utf-8")
+
+
+def commonmark_examples() -> list[tuple[str, str]]:
+    """The examples of the CommonMark specification: Markdown and HTML."""
+    path = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"
+    if not path.is_file():
+        pytest.fail(f"no {path.relative_to(ROOT)}: run `npm ci` in {ROOT / 'site'}")
+    text = path.read_text(encoding="utf-8").replace("→", "\t")
+    return re.findall(r"^`{32} example\n(.*?)^\.\n(.*?)^`{32}$", text, re.MULTILINE | re.DOTALL)

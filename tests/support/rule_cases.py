@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
+import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.engine.shared_place import shared_place
@@ -169,3 +170,9 @@ class Workshop:
         )
         diagnostics = [*course_load.diagnostics, *model_diagnostics, *lab_diagnostics]
         return judge(course_load.value, diagnostics).diagnostics
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
+    with Workshop(tmp_path_factory.mktemp("workshop")) as workshop:
+        yield workshop

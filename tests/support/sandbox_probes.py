@@ -42,9 +42,7 @@ class Excess(Struct, frozen=True):
     timeout: float = 60.0
 
 
-_CASES = tomllib.loads(
-    Path(__file__).parents[1].joinpath("fixtures/sandbox.toml").read_text(encoding="utf-8")
-)
+_CASES = tomllib.loads(fixture_text("sandbox.toml"))
 CALLS: dict[str, int] = {
     name: numbers[platform.machine() != "x86_64"] for name, numbers in _CASES["calls"].items()
 }

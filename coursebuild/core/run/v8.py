@@ -17,7 +17,7 @@ import re
 import resource
 import threading
 import time
-from collections.abc import Coroutine, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -37,8 +37,8 @@ several times slower; so it recompiles at once, in the same thread. Of the two c
 JavaScript the slower one is off: typesetting a course is over before it pays, and takes a fifth
 less without it; the code of labs runs as fast with the other. That one compiles a function only
 after 2,000 calls: as early as V8 does by default, it took a quarter of the time of typesetting."""
-_MEMORY = 128 << 20
-"""Bytes of JavaScript objects."""
+_MEMORY = 128
+"""MiB of JavaScript objects."""
 _ADDRESSES = 1 << 40
 """Bytes of addresses that V8 needs to start; it reserves most of them and uses few."""
 _START_SECONDS = 20.0
@@ -106,7 +106,7 @@ class Isolate:
     Close it: a process that ends with V8 running may hang.
     """
 
-    def __init__(self, *scripts: str, memory: int = _MEMORY) -> None:
+    def __init__(self, *scripts: str, memory: int = _MEMORY << 20) -> None:
         start()
         from py_mini_racer import mini_racer
 
@@ -227,14 +227,15 @@ async def _end_tasks() -> None:
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
-class MathEngine:
-    """Typesets formulas; a context manager. May be used by several threads, one at a time."""
+class V8Engine:
+    """Scripts in V8, started when they are first needed; a context manager."""
 
-    def __init__(self) -> None:
+    def __init__(self, memory: int, scripts: Callable[[], Iterable[Path]]) -> None:
+        """`memory`: MiB of JavaScript objects; WebAssembly's memory comes on top."""
+        self._memory = memory << 20
+        self._scripts = scripts
         self._isolate: Isolate | None = None
-        self._mathml: dict[Formula, str] = {}
-        """Of formulas typeset before: half of those of a text stand in another one, too."""
-        self._lock = threading.Lock()
+        self._stopped = False
 
     def __enter__(self) -> Self:
         return self
@@ -247,6 +248,36 @@ class MathEngine:
         if self._isolate is not None:
             self._isolate.close()
             self._isolate = None
+
+    def stop(self) -> None:
+        """End what runs, and what comes after, by a `StoppedError`; called from another thread."""
+        self._stopped = True
+        if (isolate := self._isolate) is not None:
+            isolate.stop()
+
+    def _running_isolate(self) -> Isolate:
+        if self._stopped:
+            raise StoppedError
+        isolate = self._isolate or self._start()
+        if self._stopped:  # before there was anything to stop
+            raise StoppedError
+        return isolate
+
+    def _start(self) -> Isolate:
+        scripts = (path.read_text(encoding="utf-8") for path in self._scripts())
+        self._isolate = Isolate(*scripts, memory=self._memory)
+        return self._isolate
+
+
+class MathEngine(V8Engine):
+    """Typesets formulas. May be used by several threads, one at a time."""
+
+    def __init__(self) -> None:
+        typeset = Path(__file__).with_name("typeset.js")
+        super().__init__(_MEMORY, lambda: (assets_dir() / "temml" / "temml.min.js", typeset))
+        self._mathml: dict[Formula, str] = {}
+        """Of formulas typeset before: half of those of a text stand in another one, too."""
+        self._lock = threading.Lock()
 
     def typeset(self, formulas: Sequence[Formula]) -> list[str | MathError]:
         """The MathML of each formula, or why there is none; no macro outlives its formula.
@@ -272,11 +303,7 @@ class MathEngine:
         request = json.dumps([{"tex": f.tex, "display": f.display} for f in formulas])
         seconds = _BATCH_SECONDS if len(formulas) > 1 else _SINGLE_SECONDS
         try:
-            if self._isolate is None:
-                temml = assets_dir() / "temml" / "temml.min.js"
-                scripts = (temml, Path(__file__).with_name("typeset.js"))
-                self._isolate = Isolate(*(path.read_text(encoding="utf-8") for path in scripts))
-            replies = json.loads(self._isolate.call("typeset", request, seconds))
+            replies = json.loads(self._running_isolate().call("typeset", request, seconds))
             for formula, reply in zip(formulas, replies, strict=True):
                 if isinstance(reply, str):
                     yield reply

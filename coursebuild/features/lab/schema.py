@@ -247,15 +247,11 @@ class CommonLab(Struct, frozen=True):
     dock: Annotated[bool, Meta(description="stays beside the text on wide screens")] = False
 
 
-class SimLab(Struct, frozen=True, forbid_unknown_fields=True):
+class SimLab(CommonLab, frozen=True, forbid_unknown_fields=True):
     """A live MuJoCo simulation; `model` or `xml` is required."""
 
     model: Annotated[Text | None, Meta(description="the name of a model in models/")] = None
     xml: Annotated[Text | None, Meta(description="the model itself, as MJCF")] = None
-    title: Annotated[str, Meta(description="the caption; plain text")] = ""
-    note: Annotated[OptionalBlocks, Meta(description="Markdown under the lab")] = ""
-    height: Annotated[Height, Meta(description="of a picture 480 px wide, in px")] = 300
-    dock: Annotated[bool, Meta(description="stays beside the text on wide screens")] = False
     key: Annotated[
         Annotated[int, Meta(ge=0)] | Text | None,
         Meta(description="the keyframe to start and reset from: its index or name"),
@@ -393,15 +389,12 @@ class Tolerance(Struct, frozen=True, forbid_unknown_fields=True):
     ] = None
 
 
-class EquationLab(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class EquationLab(CommonLab, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What both kinds have."""
 
     plots: tuple[EquationPlot, ...] = ()
 
-    title: Annotated[str, Meta(description="the caption; plain text")] = ""
-    note: Annotated[OptionalBlocks, Meta(description="Markdown under the lab")] = ""
     height: Annotated[Height, Meta(description="of a plot 480 px wide, in px")] = 260
-    dock: Annotated[bool, Meta(description="stays beside the text on wide screens")] = False
     where: Annotated[
         dict[str, Formula], Meta(description="names for numbers and expressions, in order")
     ] = {}

@@ -8,7 +8,6 @@ elsewhere: of each rule in `fixtures/rules`, of each parser in `tests/core/synta
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,18 +15,13 @@ import pytest
 from coursebuild.pipeline.check import check
 from support.fixture_cases import Case, read_cases
 from support.rule_cases import Layout, Workshop
+from support.rule_cases import workshop as workshop
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "mistakes"
 MARK = "‸"
 FILES = sorted(FIXTURES.glob("*.md"))
 SITE = pytest.mark.site
 TIERS = {"labs": pytest.mark.engine, "mjcf": SITE, "scripts": SITE, "together": SITE}
-
-
-@pytest.fixture(scope="module")
-def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
-    with Workshop(tmp_path_factory.mktemp("workshop")) as workshop:
-        yield workshop
 
 
 def take_marks(layout: Layout) -> list[tuple[str, int, int]]:

@@ -35,6 +35,7 @@ from coursebuild.report import Style, diagnostic_text
 from coursebuild.report.text import visible
 from support.fixture_cases import Case, read_cases, rewrite
 from support.rule_cases import Layout, Workshop
+from support.rule_cases import workshop as workshop
 
 _OTHER_GROUP = "Sources, names, numbers and time"
 """The section of the rules that features bring."""
@@ -123,12 +124,6 @@ class HurriedEngine:
 def command_of(case: Case) -> str:
     match = re.search(r"\[((?:check|update|build|export)[\w -]*)\]", case.title)
     return match[1] if match else "check"
-
-
-@pytest.fixture(scope="module")
-def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
-    with Workshop(tmp_path_factory.mktemp("workshop")) as workshop:
-        yield workshop
 
 
 def print_diagnostics(case: Case, root: Path, workshop: Workshop) -> str:

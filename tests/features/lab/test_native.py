@@ -17,10 +17,10 @@ import pytest
 
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
 from support.lab_values import BALL, Bench, make_lab
+from support.model_files import TETRAHEDRON
 
 pytestmark = pytest.mark.engine
 
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 HEAP = """<mujoco><option timestep="0.002" integrator="{}"/>
 <worldbody><geom type="plane" size="2 2 .1"/>
 <body pos="0 0 .3"><freejoint/><geom type="box" size=".1 .1 .1"/></body>

@@ -28,12 +28,10 @@ from coursebuild.core.text.source import Source
 from coursebuild.features.markdown import markdown_href
 from coursebuild.features.markdown.writer import DocumentWriter
 from support.fixture_cases import check_lines, check_text, fixture_text
+from support.markdown_files import commonmark_examples
 from support.plain_html import PlainWriter, plain_html
 from support.rendered_course import Make
 
-ROOT = Path(__file__).parents[3]
-SPECIFICATION = ROOT / "site" / "node_modules" / "commonmark-spec" / "spec.txt"
-EXAMPLE = re.compile(r"^`{32} example\n(.*?)^\.\n(.*?)^`{32}$", re.MULTILINE | re.DOTALL)
 DIFFERENT = {39: "a line's end that is written as a character reference becomes one"}
 
 
@@ -85,7 +83,7 @@ def meaning(markdown: str) -> str:
 
 
 def test_the_examples_of_commonmark_mean_the_same() -> None:
-    examples = EXAMPLE.findall(SPECIFICATION.read_text(encoding="utf-8").replace("→", "\t"))
+    examples = commonmark_examples()
     assert len(examples) == 652
     failures = [
         f"{number}: {text!r} became {rewrite(text)!r}"

@@ -10,11 +10,11 @@ import contextlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.run.child import LIMITS
-from coursebuild.core.run.v8 import Heartbeat, Isolate, LimitError, ScriptError, StoppedError
+from coursebuild.core.run.v8 import Heartbeat, Isolate, LimitError, ScriptError, V8Engine
 from coursebuild.core.text.source import Source
 from coursebuild.features.lab.compile import LabCode, compile_lab
 from coursebuild.features.lab.engines.native import (
@@ -33,42 +33,14 @@ _PATIENCE = 5.0
 _PIECES = Path(__file__).with_name("pieces.js")
 
 
-class V8Engine:
-    """Code of the page in V8, started when it is first needed."""
-
-    def __init__(self, memory: int) -> None:
-        """`memory`: MiB of JavaScript objects; WebAssembly's memory comes on top."""
-        self._memory = memory << 20
-        self._isolate: Isolate | None = None
-        self._stopped = False
-
-    def close(self) -> None:
-        """Free V8's memory; the engine can be used again."""
-        if self._isolate is not None:
-            self._isolate.close()
-            self._isolate = None
-
-    def stop(self) -> None:
-        """End what runs, and what comes after, by a `StoppedError`; called from another thread."""
-        self._stopped = True
-        if (isolate := self._isolate) is not None:
-            isolate.stop()
-
-
 class LabEngine(V8Engine):
-    """Runs trials, one after the other; a context manager for use in one thread."""
+    """Runs trials, one after the other, in one thread."""
 
     def __init__(self, memory: int = LIMITS.memory, patience: float = _PATIENCE) -> None:
         """`patience`: seconds of processor time that a trial may take without progress."""
-        super().__init__(memory)
+        super().__init__(memory, lambda: (asset_path(TRIAL), _PIECES))
         self._patience = patience
         self.version = ""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def check_code(self, pieces: Sequence[LabCode]) -> list[str | None]:
         """Say of each piece of code why it cannot be part of a lab; `None` if it can."""
@@ -123,17 +95,8 @@ class LabEngine(V8Engine):
         failure = {"entry": entry, "kind": kind, "message": message, "at": None}
         return {"version": self.version, "main": None, "tried": [], "failures": [failure]}
 
-    def _running_isolate(self) -> Isolate:
-        if self._stopped:
-            raise StoppedError
-        isolate = self._isolate or self._start()
-        if self._stopped:  # before there was anything to stop
-            raise StoppedError
-        return isolate
-
     def _start(self) -> Isolate:
-        scripts = (path.read_text(encoding="utf-8") for path in (asset_path(TRIAL), _PIECES))
-        self._isolate = isolate = Isolate(*scripts, memory=self._memory)
+        isolate = super()._start()
         try:
             isolate.fill("wasm", asset_path(WASM).read_bytes())
             isolate.call("boot", "", _START_SECONDS)

@@ -19,9 +19,8 @@ from msgspec import Struct
 
 from coursebuild.core.files.errors import require
 from coursebuild.core.model import Course, Recording, find_blocks
-from coursebuild.core.run.v8 import Isolate, LimitError, ScriptError, StoppedError
+from coursebuild.core.run.v8 import LimitError, ScriptError, V8Engine
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.features.lab.engines.browser import V8Engine
 from coursebuild.features.lab.engines.native import EQUATION_TRIAL, asset_path
 from coursebuild.features.lab.equations import reference
 from coursebuild.features.lab.model import PLOT, Entry, Lab
@@ -87,15 +86,14 @@ class EquationReply(Struct, frozen=True):
 class EquationEngine(V8Engine):
     """The page's code for labs without an engine."""
 
+    def __init__(self, memory: int) -> None:
+        super().__init__(memory, lambda: (asset_path(EQUATION_TRIAL),))
+
     def run(self, request: dict[str, Any], seconds: float) -> list[reference.CurveRun]:
         """Run the attempts of a lab; those that do not end raise `LimitError` or `ScriptError`."""
-        if self._stopped:
-            raise StoppedError
-        if self._isolate is None:
-            script = asset_path(EQUATION_TRIAL).read_text(encoding="utf-8")
-            self._isolate = Isolate(script, memory=self._memory)
+        isolate = self._running_isolate()
         try:
-            text = self._isolate.call("tryCurves", json.dumps(request), seconds)
+            text = isolate.call("tryCurves", json.dumps(request), seconds)
         except (LimitError, ScriptError):
             self.close()
             raise
@@ -119,14 +117,10 @@ def _attempts(config: Mapping[str, Any]) -> list[_Attempt]:
     attempts = {start: _Attempt(start)}
 
     def add(values: tuple[float, ...], entry: Entry) -> _Attempt:
-        changed = [c for c, a, b in zip(controls, values, start, strict=True) if a != b]
-        texts = (
-            f"{c['label']} = {value:g}"
-            for c, value, before in zip(controls, values, start, strict=True)
-            if value != before
-        )
-        labels = frozenset(c["label"] for c in changed)
-        return attempts.setdefault(values, _Attempt(values, ", ".join(texts), entry, labels))
+        pairs = zip(controls, zip(values, start, strict=True), strict=True)
+        changed = {control["label"]: value for control, (value, old) in pairs if value != old}
+        text = ", ".join(f"{label} = {value:g}" for label, value in changed.items())
+        return attempts.setdefault(values, _Attempt(values, text, entry, frozenset(changed)))
 
     for i, control in enumerate(controls):
         options = [value for _, value in control["options"]]
