@@ -14,6 +14,7 @@ import {
   formatReadout,
   formatTime,
   superscript,
+  withUnit,
 } from '../js/lab/page/numbers.js'
 import { LONGEST, readLink, writeLink } from '../js/lab/page/share.js'
 import { spread } from '../js/lab/page/spread.js'
@@ -69,6 +70,11 @@ test('a slider shows as many digits as its steps need', () => {
   ]) {
     assert.equal(digitsOfStep(step), digits, String(step))
   }
+})
+
+test('a unit stands apart from its number, and a degree does not', () => {
+  const texts = [withUnit('5', 'kg'), withUnit('5', '°'), withUnit('5', '°C'), withUnit('5', '')]
+  assert.deepEqual(texts, ['5\u00a0kg', '5°', '5\u00a0°C', '5'])
 })
 
 test('a script takes the values of the controls, and dollars stay dollars', () => {

@@ -68,6 +68,13 @@ test('misspelt words are set right, and it is said', async () => {
   assert.deepEqual(await titles('qzxwv'), [])
 })
 
+test('a word that may be two others is taken for the one of more pages', async () => {
+  const texts = ['A fraction.', 'Some friction.', 'More friction.']
+  const pages = texts.map((text) => ({ title: 'On', sections: [['', '', 0, [['t', text]], '']] }))
+  const { words } = await findPages('frction', indexed(pages).source)
+  assert.deepEqual(words.map(({ instead }) => instead), ['friction'])
+})
+
 test('a beginning of a word finds it, a short one in titles only', async () => {
   assert.equal(await first('equa'), 'Mass and inertia')
   assert.deepEqual(await titles('equ'), [])

@@ -73,6 +73,17 @@ def test_on_a_desk_picture_curves_and_controls_share_a_screen(
         assert plot and view_below and plot["y"] > view_below["y"] + view_below["height"]
 
 
+def test_a_plot_grows_with_the_size_of_texts(browsers: Mapping[str, Browser], base: str) -> None:
+    larger = "document.documentElement.style.fontSize = '32px'"
+    with browsers["plain"].new_context() as context:
+        context.add_init_script(f"addEventListener('DOMContentLoaded', () => {{ {larger} }})")
+        page, _ = watch_page(context)
+        page.goto(base + PAGE)
+        plot = lab(page, SWING, None).locator(".lab-live .lab-plot").first
+        expect(plot).to_have_css("height", "340px")
+        expect(plot.locator(".u-over")).to_have_css("top", "36px")
+
+
 COLOURED = """canvas => {
   const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height)
   let count = 0

@@ -109,6 +109,13 @@ def test_a_long_contents_list_follows_the_reader(page: Page, base: str) -> None:
     becomes(page, lambda: toc.evaluate("node => node.scrollTop"), 0)
 
 
+def test_the_lessons_of_the_level_are_whole_beside_a_long_list(page: Page, base: str) -> None:
+    page.goto(base + FORMULAS)
+    lessons = page.locator(".level-nav")
+    expect(lessons).to_be_visible()
+    becomes(page, lambda: lessons.evaluate("node => node.scrollHeight - node.clientHeight"), 0)
+
+
 def test_the_list_stays_under_the_hands_of_the_keyboard(page: Page, base: str) -> None:
     page.goto(base + FORMULAS)
     link = page.locator(".toc").get_by_role("link", name="Part 25", exact=True)

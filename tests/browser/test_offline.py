@@ -222,13 +222,13 @@ def test_several_courses_on_one_origin(
 def test_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> None:
     page, console = watch_page(context)
     page.goto(f"{host.url}offline/")
-    see(page, "files of the course are here.")
+    see(page, "files to be kept are here.")
     expect(page.get_by_label("all text and pictures")).to_be_checked()
     expect(page.locator(".keep")).to_contain_text("MB")
     page.get_by_label("everything, with all simulations").check()
     file_list = json.loads((host.folder / "files.json").read_text())
     total = sum(len(file_list[group]["files"]) for group in ("shell", "text", "rest"))
-    see(page, f"{total} of {total} files of the course are here.")
+    see(page, f"{total} of {total} files to be kept are here.")
     expect(page.locator(".keep-status")).to_have_attribute("role", "status")
     page.get_by_label("nothing", exact=True).check()
     see(page, "Nothing of the course is kept here.")
@@ -238,7 +238,7 @@ def test_reader_chooses_what_is_kept(context: BrowserContext, host: Host) -> Non
     becomes(page, lambda: page.evaluate(NOTHING_KEPT), [0, 0])
     page.goto(f"{host.url}offline/")
     page.get_by_label("what you have read").check()
-    see(page, "files of the course are here.")
+    see(page, "files to be kept are here.")
     expect(page.get_by_label("what you have read")).to_be_checked()
     assert console == []
 
@@ -249,7 +249,7 @@ def test_last_report_stands_where_the_store_opens_after_it(
     page, console = watch_page(context)
     page.add_init_script(SLOW_STORE)
     page.goto(f"{host.url}offline/")
-    see(page, "files of the course are here.")
+    see(page, "files to be kept are here.")
     assert console == []
 
 

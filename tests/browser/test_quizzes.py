@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
+from support.built_sites import Site
 from support.lab_page import becomes
 from support.quiz_page import (
     MCQ,
@@ -129,6 +130,15 @@ def test_number_is_judged_and_told_what_is_wrong_with_it(lesson: Page) -> None:
     expect(verdict_part).to_contain_text("So much.")
     field.press_sequentially("1")
     expect(verdict_part).to_be_empty()
+
+
+def test_help_for_a_number_speaks_of_a_unit_only_where_there_is_one(
+    page: Page, sites: Mapping[str, Site]
+) -> None:
+    page.goto(sites["full"].url("lessons/A.1-models-and-questions.html"))
+    question(page, 2).scroll_into_view_if_needed()
+    expect(page.locator(".quiz-entry-help").first).to_have_text(re.compile(r"use another one\.$"))
+    expect(page.locator(".quiz-entry-help").nth(1)).to_have_text(re.compile(r"2\*pi/3\.$"))
 
 
 def test_prediction_is_committed_to_before_its_simulation_opens(lesson: Page) -> None:

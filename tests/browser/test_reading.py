@@ -78,6 +78,20 @@ def test_wide_things_scroll_in_themselves(open_page: OpenPage) -> None:
     wait_for_condition(page, lambda: output.evaluate("b => b.scrollLeft") > 0)
 
 
+def test_the_end_of_a_long_line_of_code_keeps_clear_of_the_edge(open_page: OpenPage) -> None:
+    for width in (360, 1000):
+        page = open_page(width=width)
+        box = page.locator(".script pre:has(code)").first
+        room = """box => {
+          const text = document.createRange()
+          text.selectNodeContents(box.querySelector('code'))
+          box.scrollLeft = 1e6
+          return box.getBoundingClientRect().right - text.getBoundingClientRect().right
+        }"""
+        box.evaluate("box => box.querySelector('code').prepend('#'.repeat(300))")
+        assert box.evaluate(room) >= 12, width
+
+
 def test_code_in_a_callout_is_as_wide_as_elsewhere(open_page: OpenPage) -> None:
     page = open_page()
 

@@ -185,7 +185,7 @@ def keeps_the_standards(browser: Browser, site: Site, paths: list[str], closely:
                 until(page, "document.documentElement.scrollWidth <= innerWidth")
             page.set_viewport_size(WINDOW)
         page.goto(site.url(site.kinds()["offline"]))
-        expect(page.get_by_text("files of the course are here.")).to_be_visible()
+        expect(page.get_by_text("files to be kept are here.")).to_be_visible()
         foreign = [url for url in requests if not url.startswith((site.host.url, "blob:", "data:"))]
         assert failures + foreign + [text for text in console if "404" not in text] == []
         assert len(requests) > 3 * len(paths)

@@ -90,6 +90,18 @@ def test_what_is_not_resolved_is_a_band() -> None:
         assert ("under 10⁻¹⁰: not resolved by the reference" in labels) is expected
 
 
+def test_what_is_below_the_scale_is_said_away_from_the_runs() -> None:
+    rows = [row("RK4", h, position=(max(h**4, 1e-5),) * 2) for h in (0.1, 0.03, 0.01, 0.003, 0.001)]
+    root = parse_plot(scenario(rows, floor=1e-16))
+    (note,) = (text for text in root.iter("text") if (text.text or "").startswith("not resolved:"))
+    half = text_width(note.text or "", 11) / 2
+    for path in root.iter("path"):
+        if path.findtext("title"):
+            x, y = map(float, PLACE.findall(path.attrib["d"])[0])
+            is_apart = abs(x - float(note.attrib["x"])) > half
+            assert is_apart or not -2 < float(note.attrib["y"]) - y < 18
+
+
 def test_from_where_on_an_error_is_visible() -> None:
     for *errors, expected in ((30.0, 0.02, True), (5.0, 2.0, True), (1e5, 1e3, False)):
         rows = [row("RK4", 0.01 / (n + 1), seen=error) for n, error in enumerate(errors)]

@@ -9,9 +9,11 @@ Colours are put together by the formulas of CSS Color 4 and 5 (compositing, `col
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import pytest
@@ -221,6 +223,13 @@ def test_marks_and_lines(theme: str) -> None:
         if least < 4.5:
             failures.append((value, round(least, 2)))
     assert failures == []
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_lines_of_a_plot_are_told_apart(theme: str) -> None:
+    shades = [colour for name in TRACES for colour in colours(name, theme)]
+    near = [(a, b) for a, b in combinations(shades, 2) if math.dist(a, b) < 0.24]
+    assert near == []
 
 
 def test_figures_of_the_course() -> None:

@@ -53,6 +53,11 @@ _UNIT = re.compile(rf"{_GROUP}(?:{_OPERATOR}{_GROUP})*")
 _UNIT_NAME = re.compile(_WORD)
 
 
+def with_unit(number: str, unit: str) -> str:
+    """Return a number's text with its unit; only the degree stands at the digits."""
+    return f"{number}{unit}" if unit in ("", "°") else f"{number} {unit}"
+
+
 class Unit(Struct, frozen=True):
     """The size of a unit in base units of the SI, and its dimension."""
 

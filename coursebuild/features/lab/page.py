@@ -38,6 +38,7 @@ from coursebuild.core.pages.marks import (
 from coursebuild.core.pages.renderer import Renderer, Strings
 from coursebuild.core.pages.typography import number
 from coursebuild.core.pages.urls import Place
+from coursebuild.core.text.units import with_unit
 from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
 from coursebuild.features.lab.reply import LabRecord, PublishedLab
@@ -202,11 +203,11 @@ def _values(words: Strings, control: Control) -> str:
     match control:
         case Slider():
             ends = words("lab.between", min=number(control.min), max=number(control.max))
-            ends = f"{ends} {control.unit}".rstrip()
+            ends = with_unit(ends, control.unit)
             values = (
                 words("lab.step", range=ends, step=number(control.step)) if control.step else ends
             )
-            initial = f"{number(control.value, control.digits)} {control.unit}".rstrip()
+            initial = with_unit(number(control.value, control.digits), control.unit)
         case Select():
             values = words.join(label for label, _ in control.options)
             initial = next(label for label, value in control.options if value == control.start)

@@ -81,7 +81,8 @@ class Parity(Struct, frozen=True, kw_only=True):
             return "lab.parity.whole", steps
         steps["same"] = str(self.first - 1)
         if self.relative > 0:
-            return "lab.parity.within", steps | {"difference": f"{self.relative:.0e}"}
+            key = "lab.parity.within" if self.first > 1 else "lab.parity.close"
+            return key, steps | {"difference": f"{self.relative:.0e}"}
         return "lab.parity.begun", steps
 
 

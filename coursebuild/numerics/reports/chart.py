@@ -30,8 +30,8 @@ from coursebuild.numerics.reports import Interval
 
 _DASHES = ("", "7 3", "2 3", "10 3 2 3", "1 4", "5 2 1 2 1 2", "12 4", "6 6")
 """One more than colours, as are the marks, so that the eighth line is not the first again."""
-_LIGHT = ("#0072b2", "#b34d00", "#00795a", "#a8467f", "#7a6a00", "#2b6f9e", "#1e1e1c")
-"""Okabe and Ito's, darker on paper."""
+_LIGHT = ("#0072b2", "#b34d00", "#00795a", "#a8467f", "#7a6a00", "#5b3fb0", "#1e1e1c")
+"""Okabe and Ito's, darker on paper; of their two blues one is violet."""
 _MARK_CORNERS = (0, 4, 4, 3, 3, 5, 6, 3)
 _MARK_ANGLES = (0.0, 45.0, 0.0, -90.0, 90.0, -90.0, 0.0, 0.0)
 SIZE, TICK_SIZE = 12.0, 11.0
@@ -54,7 +54,7 @@ class Entry(NamedTuple):
     """An entry of the key: the meaning of a mark or a line."""
 
     kind: str
-    """`line`, `front`, `beaten`, `other`, `own` or `lost`."""
+    """`line`, `front`, `beaten`, `other`, `own` or `lost`; `note`, which has no mark."""
     text: str
     number: int | None = None
     """The number of a line."""
@@ -156,7 +156,7 @@ def key(entries: Iterable[Entry], left: float, top: float, width: float) -> tupl
             parts.append(ring(middle, level, 6))
         elif entry.kind == "lost":
             parts.append(cross(middle, level, INK))
-        else:
+        elif entry.kind != "note":
             full = INK if entry.kind == "front" else PAPER
             look = f'fill="{full}" stroke="{INK}" stroke-width="1.5"'
             d = outline(0, middle, level, SMALL if entry.kind == "other" else MARK)
@@ -317,20 +317,30 @@ def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
         yield label(x.end - 6, at, text, f'text-anchor="end" {FINE} {HALO}')
     elif chart.least > 0:
         text = f"not resolved: under {number_text(chart.least)}, below this scale"
-        yield label(x.end - 6, y.start - 5, text, f'text-anchor="end" {FINE} {HALO}')
+        place = _roomiest(chart, x, y, text, (y.start - 5, y.end + 12))
+        yield label(*place, text, f'text-anchor="middle" {FINE} {HALO}')
     if chart.unit_label and y.low < 0 < y.high:
         look = 'stroke="currentColor" stroke-dasharray="1 3" stroke-width="1.2"'
         yield path(f"M{x.start:.1f} {y(1.0):.1f}H{x.end:.1f}", look)
-        half = text_width(chart.unit_label, TICK_SIZE) / 2
-        left, right, at = x.start + 6 + half, x.end - 6 - half, y(1.0) - 4
-        places = [_place(point, x, y) for line in chart.lines for point in line.points]
+        place = _roomiest(chart, x, y, chart.unit_label, (y(1.0) - 4,))
+        yield label(*place, chart.unit_label, f'text-anchor="middle" {FINE} {HALO}')
 
-        def room(middle: float) -> float:
-            gaps = [max(abs(px - middle) / (half + RING), abs(py - at) / SIZE) for px, py in places]
-            return min(gaps, default=0.0)
 
-        middle = right if room(right) > room(left) else left
-        yield label(middle, at, chart.unit_label, f'text-anchor="middle" {FINE} {HALO}')
+def _roomiest(
+    chart: Chart, x: Scale, y: Scale, text: str, heights: Iterable[float]
+) -> tuple[float, float]:
+    """The middle of a text, at either side and one of the heights, furthest from all runs."""
+    half = text_width(text, TICK_SIZE) / 2
+    runs = [_place(point, x, y) for line in chart.lines for point in line.points]
+
+    def room(place: tuple[float, float]) -> float:
+        gaps = [
+            max(abs(px - place[0]) / (half + RING), abs(py - place[1]) / SIZE) for px, py in runs
+        ]
+        return min(gaps, default=0.0)
+
+    sides = (x.start + 6 + half, x.end - 6 - half)
+    return max(((side, at) for at in heights for side in sides), key=room)
 
 
 def _place(point: Point, x: Scale, y: Scale) -> tuple[float, float]:

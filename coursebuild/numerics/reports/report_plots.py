@@ -377,8 +377,8 @@ def engine_svg(report: EngineScenario, *, name: str, narrow: bool = False) -> st
     chart = Chart(
         title=f"{report.title or report.name}: time of a step by the number of worlds",
         text=text,
-        axes=("worlds simulated at once", "time of a step over worlds (µs)"),
+        axes=("worlds simulated at once", "time of a step per world (µs)"),
         lines=tuple(lines),
-        marks=(Entry("front", "lowest of at least 8 rounds"),),
+        marks=(Entry("note", "lowest of at least 8 rounds"),),
     )
     return chart_svg(chart, name, NARROW_SIZE if narrow else WIDE_SIZE)

@@ -62,7 +62,8 @@ export class Numeric extends Entry {
   constructor(question) {
     const { element, words } = question
     const unit = element.querySelector(':scope > .question-how .unit')
-    super(question, words('quiz.live.number'), { help: words('quiz.live.number_help'), unit })
+    const help = unit ? `${words('quiz.live.number_help')} ${words('quiz.live.unit_help')}` : words('quiz.live.number_help')
+    super(question, words('quiz.live.number'), { help, unit })
     this.unit = unit
     this.expected = {
       answer: Number(element.dataset.answer),

@@ -127,10 +127,15 @@ async function respell(word, source, thorough) {
     candidates = likelyTerms(word.whole, await Promise.all(everyShard.map(source.spelling)))
   }
   const shards = await Promise.all(candidates.map(([term]) => source.shard(shardOf(listing, term))))
-  candidates.forEach(([term, mistakes], index) => {
-    if (shards[index].has(term)) add(word, term, shards[index].get(term), MISSPELT[mistakes])
-  })
-  if (thorough && candidates.length > 0) word.instead = candidates[0][0]
+  const found = candidates
+    .map(([term, mistakes], index) => ({ term, mistakes, line: shards[index].get(term) }))
+    .filter(({ line }) => line)
+  for (const { term, mistakes, line } of found) add(word, term, line, MISSPELT[mistakes])
+  if (!thorough || found.length === 0) return
+  // Of terms that are as likely, the word is taken for the one of most pages.
+  const likeliest = found.filter(({ term, mistakes }) => mistakes === found[0].mistakes && term[0] === found[0].term[0])
+  const often = ({ line }) => readPages(line).length
+  word.instead = likeliest.sort((a, b) => often(b) - often(a))[0].term
 }
 
 function add(word, term, line, fit) {

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.text.source import Excerpt, Source, Span
-from coursebuild.core.text.units import check_unit, find_unit
+from coursebuild.core.text.units import check_unit, find_unit, with_unit
 
 
 @pytest.mark.parametrize(
@@ -105,6 +105,11 @@ def messages(unit: str) -> list[str]:
 
 def test_valid_units() -> None:
     assert {unit: messages(unit) for unit in (*USUAL_UNITS, *RARE_UNITS) if messages(unit)} == {}
+
+
+def test_only_the_degree_stands_at_its_number() -> None:
+    texts = [with_unit("5", unit) for unit in ("kg", "°", "°C", "")]
+    assert texts == ["5 kg", "5°", "5 °C", "5"]
 
 
 def test_wrong_units_are_reported_with_the_likely_one() -> None:

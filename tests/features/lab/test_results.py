@@ -177,6 +177,7 @@ def test_parity_in_words() -> None:
         (None, 0.0, f"{whole} over 100 steps"),
         (31, 0.0, f"{whole} for 30 of 100 steps"),
         (31, 2.2e-12, f"{whole} for 30 of 100 steps, then within 2e-12"),
+        (1, 2.2e-12, "within 2e-12 of native MuJoCo over 100 steps"),
     ):
         key, values = Parity(steps=100, first=first, relative=relative).describe()
         assert english(key, **values) == text

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from coursebuild.core.drawing.scales import Scale, separate_labels, typeset_number
 from coursebuild.core.drawing.scales import markup_text as _text
+from coursebuild.core.text.units import with_unit
 from coursebuild.features.lab.equations.reference import CurveRun
 from coursebuild.features.lab.model import ODE, Lab
 from coursebuild.features.lab.picture.draw import Floor, FreeCamera, draw, round_length
@@ -124,7 +125,7 @@ def equation_record(lab: Lab, config: dict[str, Any], run: CurveRun) -> LabRecor
         for readout, value in zip(lab.fields.readouts, run.readouts, strict=True)
     )
     axis, at = config["axis"], run.end if lab.kind == ODE else config["axis"]["at"]
-    place = f"{axis['name']} = {typeset_number(f'{at:.4g}')} {axis['unit']}".rstrip()
+    place = f"{axis['name']} = {with_unit(typeset_number(f'{at:.4g}'), axis['unit'])}"
     size = (round(_WIDE), round(_HEIGHT) * len(plots))
     return LabRecord(size, None, at, readouts, run.end, tuple(plots), place)
 

@@ -1,7 +1,7 @@
 /** The controls of a lab: sliders, lists, buttons, and which overlays are drawn. */
 
 import { freshId, h } from './dom.js'
-import { digitsOfStep, formatNumber } from './numbers.js'
+import { digitsOfStep, formatNumber, withUnit } from './numbers.js'
 
 const STEPS = 200 // of a slider without a step
 const SIGNS = { momentum: 'p', angularMomentum: 'L', forces: 'F' }
@@ -37,7 +37,7 @@ function button({ label }, press) {
 function slider({ label, unit, min, max, step, digits }, set) {
   const id = freshId('slider')
   const places = digits ?? digitsOfStep(step)
-  const text = (value) => `${formatNumber(value, places).trim()}${unit ? `\u00a0${unit}` : ''}`
+  const text = (value) => withUnit(formatNumber(value, places).trim(), unit)
   const output = h('output', { class: 'lab-value', for: id })
   const field = h('input', { type: 'range', id })
   Object.assign(field, { min: String(min), max: String(max), step: String(step ?? (max - min) / STEPS) })

@@ -12,7 +12,7 @@ import { buildControls, buildReadouts } from './controls.js'
 import { h } from './dom.js'
 import { GoalView } from './goal.js'
 import { Notices } from './notices.js'
-import { formatNumber, formatReadout } from './numbers.js'
+import { formatNumber, formatReadout, withUnit } from './numbers.js'
 import { copyLink, writeLink } from './share.js'
 import { watchSight } from './sight.js'
 import { buildTransport } from './transport.js'
@@ -38,7 +38,7 @@ export class Desk {
     const { min, max } = config.axis
     const isNatural = config.kind === 'ode' && max - min >= NATURAL[0] && max - min <= NATURAL[1]
     this.rate = isNatural && !config.play ? 1 : (max - min) / (config.play ?? LENGTH)
-    this.unit = config.axis.unit ? `\u00a0${config.axis.unit}` : ''
+    this.unit = withUnit('', config.axis.unit)
     this.digits = Math.min(10, Math.max(0, 3 - Math.ceil(Math.log10(max - min))))
     this.tick = (now) => this.advance(now)
     this.build()

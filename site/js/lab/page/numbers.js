@@ -44,6 +44,9 @@ export function digitsOfStep(step) {
   return 10
 }
 
+/** A number's text and its unit; only the degree stands at the digits. */
+export const withUnit = (text, unit) => (unit ? `${text}${unit === '°' ? '' : '\u00a0'}${unit}` : text)
+
 /** Simulated time, in hundredths of a second. */
 export function formatTime(seconds) {
   return `${seconds < 0 ? MINUS : ''}${Math.abs(seconds).toFixed(2)}`

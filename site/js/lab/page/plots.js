@@ -11,9 +11,9 @@ import { palette, watchTheme } from './palette.js'
 import { spanOf } from './span.js'
 import { spread } from './spread.js'
 
-const HEIGHT = 170 // CSS pixels
+const HEIGHT = 170 // CSS pixels where texts have their usual size
 const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3], [4, 4], [12, 3]]
-const FONT = 12 // CSS pixels; whole, since uPlot scales only the digits next to `px`
+const FONT = Math.round(0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize)) // CSS pixels; whole, since uPlot scales only the digits next to `px`
 const GAP = 6
 const LINE = FONT + GAP
 const LINEAR = 1 // uPlot's kinds of scales
@@ -32,7 +32,7 @@ export class Plot {
     this.element = h('figure', { class: 'lab-plot', role: 'img', 'aria-label': `${this.caption}: ${names(config)}` })
     this.chart = null
     this.dirty = false
-    this.element.style.setProperty('--height', `${config.height ?? HEIGHT}px`)
+    this.element.style.setProperty('--height', `${(config.height ?? HEIGHT) / 16}rem`)
     this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width, contentRect.height))
     this.resizer.observe(this.element)
     this.unwatch = watchTheme(() => this.recolour())
@@ -154,27 +154,29 @@ export class Plot {
     const [top, bottom] = [bbox.top, bbox.top + bbox.height]
     const pixels = refLines.map(({ y }) => Math.round(valToPos(y, 'y', true))).map((pixel) => (pixel < top || pixel > bottom ? null : pixel))
     const places = spread(pixels.map((pixel) => pixel && pixel - (2 + FONT / 2) * ratio), FONT * ratio, 0, bottom)
-    pixels.forEach((pixel, i) => {
-      if (pixel === null) return
-      const { label } = refLines[i]
-      ctx.save()
-      ctx.strokeStyle = this.colours.text
-      ctx.lineWidth = ratio
-      ctx.setLineDash([2 * ratio, 3 * ratio])
-      ctx.beginPath()
+    ctx.save()
+    ctx.strokeStyle = ctx.fillStyle = this.colours.text
+    ctx.lineWidth = ratio
+    ctx.setLineDash([2 * ratio, 3 * ratio])
+    ctx.beginPath()
+    for (const pixel of pixels) {
+      if (pixel === null) continue
       ctx.moveTo(bbox.left, pixel)
       ctx.lineTo(bbox.left + bbox.width, pixel)
-      ctx.stroke()
-      if (label) {
-        ctx.font = scaleFont(font, ratio)
-        ctx.fillStyle = this.colours.text
-        const isLeft = end > ctx.measureText(label).width + 2 * GAP * ratio
-        ctx.textAlign = isLeft ? 'left' : 'right'
-        ctx.textBaseline = 'middle'
-        ctx.fillText(label, bbox.left + (isLeft ? GAP * ratio : bbox.width), places[i])
-      }
-      ctx.restore()
+    }
+    ctx.stroke()
+    ctx.font = scaleFont(font, ratio)
+    ctx.textAlign = 'left'
+    ctx.textBaseline = 'middle'
+    pixels.forEach((pixel, i) => {
+      const { label } = refLines[i]
+      if (pixel === null || !label) return
+      const { width } = ctx.measureText(label)
+      const left = bbox.left + (end > width + 2 * GAP * ratio ? GAP * ratio : bbox.width - width)
+      ctx.clearRect(left, places[i] - (FONT / 2) * ratio, width, FONT * ratio) // no other line crosses it
+      ctx.fillText(label, left, places[i])
     })
+    ctx.restore()
   }
 
   drawLabels(chart, font) {
