@@ -76,8 +76,7 @@ def multiply(left: Dimension, right: Dimension, power: Fraction | int = 1) -> Di
 @functools.lru_cache(maxsize=256)
 def find_unit(text: str) -> Unit | None:
     """The unit of a text such as `N m/rad`; `None` if neither we nor Pint know it."""
-    plain = re.sub("[⁰¹²³⁴-⁹⁻]+", lambda m: "^" + m[0].translate(_SUPERSCRIPTS), text.strip())
-    unit = _parse_product(re.sub(r"\s*[ ·⋅*]\s*", "*", plain))
+    unit = _parse_product(_plain(text))
     if unit is not None:
         return unit
     try:
@@ -86,6 +85,11 @@ def find_unit(text: str) -> Unit | None:
         return Unit(Fraction(repr(float(base.magnitude))), tuple(powers))
     except Exception:  # Pint does not document what its parser raises
         return None
+
+
+def _plain(text: str) -> str:
+    plain = re.sub("[⁰¹²³⁴-⁹⁻]+", lambda m: "^" + m[0].translate(_SUPERSCRIPTS), text.strip())
+    return re.sub(r"\s*[ ·⋅*]\s*", "*", plain)
 
 
 def _parse_product(text: str) -> Unit | None:
@@ -122,6 +126,23 @@ def _registry() -> Any:
     registry: Any = pint.UnitRegistry(cache_folder=None)
     registry.define("@alias turn = rev")
     return registry
+
+
+def leading_units(text: str) -> frozenset[Unit | str]:
+    """What the unit may be with which a text begins: of `N m, at rest` N or N m; else nothing."""
+    units: set[Unit | str] = set()
+    product = ""
+    for word in text.split()[:4]:
+        bare = word.rstrip(".,;:!?)]”")
+        name = _NAMES.get(bare, bare).replace("deg", "°")
+        product = f"{product}*{name}" if product else name
+        unit = _parse_product(_plain(product)) or (name if product in COMMON else None)
+        if unit is None:  # in `l 2.0 T 2.8` and `m = 2 n = 3` it is a name
+            return frozenset() if re.match(r"[=:\d.+-]", word) else frozenset(units)
+        units.add(unit)
+        if bare != word:
+            break
+    return frozenset(units)
 
 
 def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
