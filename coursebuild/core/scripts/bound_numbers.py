@@ -14,7 +14,7 @@ from coursebuild.core.scripts.lines import MappedText, Side, plain_text, replace
 from coursebuild.core.scripts.numbers import Number, round_like, scan, scan_prose, within_half_unit
 from coursebuild.core.scripts.tables import RowCell, table_rows
 from coursebuild.core.text.source import Excerpt, Span
-from coursebuild.core.text.units import leading_units
+from coursebuild.core.text.units import units_at
 
 Locate = Callable[[int, int], Span]
 _STRAY = re.compile(r"[-+*/.,:;=_]+|-?[eE][-+]+\d*|[-+][eE]\d*")
@@ -148,17 +148,18 @@ class BoundText(Struct, frozen=True):
         ends = [*(number.start for number in self.numbers[1:]), len(self.text)]
         texts = [self.text[n.end : end] for n, end in zip(self.numbers, ends, strict=True)]
         texts[-1] = texts[-1] if texts[-1].strip() else following
-        shown = list(map(leading_units, texts))
+        shown = list(map(units_at, texts))
         wrong: tuple[str, str] | None = None
         for window in filter(self.shows, self.windows(lines) if any(shown) else ()):
-            tails = [window.line.text[number.end :] for number in window.numbers]
-            printed = list(map(leading_units, tails))
+            line = window.line.text
+            printed = [units_at(line, number.end) for number in window.numbers]
             pairs = zip(shown, printed, strict=True)
             at = [i for i, (a, b) in enumerate(pairs) if a and b and a.isdisjoint(b)]
             if not at:
                 return None
-            words = window.numbers[at[0]].text, tails[at[0]].split()[0].rstrip(".,;:)]")
-            wrong = " ".join(words), texts[at[0]].split()[0].rstrip(".,;:!?)")
+            number = window.numbers[at[0]]
+            unit_text = line[number.end :].split()[0].rstrip(".,;:)]")
+            wrong = f"{number.text} {unit_text}", texts[at[0]].split()[0].rstrip(".,;:!?)")
         return wrong
 
     @property

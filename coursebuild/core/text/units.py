@@ -128,17 +128,21 @@ def _registry() -> Any:
     return registry
 
 
-def leading_units(text: str) -> frozenset[Unit | str]:
-    """What the unit may be with which a text begins: of `N m, at rest` N or N m; else nothing."""
+def units_at(line: str, start: int = 0) -> frozenset[Unit | str]:
+    """What the unit at a place of a line may be, of `N m, at rest` N or N m; nothing for others.
+
+    In `l 2.0 T 2.8` and `m = 2 n = 3` it is a name.
+    """
+    name_sign = r"[=:\d.+-]" if line[:1].isalpha() else "[=:]"
     units: set[Unit | str] = set()
     product = ""
-    for word in text.split()[:4]:
+    for word in line[start:].split()[:4]:
         bare = word.rstrip(".,;:!?)]”")
         name = _NAMES.get(bare, bare).replace("deg", "°")
         product = f"{product}*{name}" if product else name
         unit = _parse_product(_plain(product)) or (name if product in COMMON else None)
-        if unit is None:  # in `l 2.0 T 2.8` and `m = 2 n = 3` it is a name
-            return frozenset() if re.match(r"[=:\d.+-]", word) else frozenset(units)
+        if unit is None:
+            return frozenset() if re.match(name_sign, word) else frozenset(units)
         units.add(unit)
         if bare != word:
             break
