@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from fractions import Fraction
 from typing import Any, TypeAlias
 
@@ -147,6 +147,17 @@ def units_at(line: str, start: int = 0) -> frozenset[Unit | str]:
         if bare != word:
             break
     return frozenset(units)
+
+
+def conversions(units: Collection[Unit | str], others: Collection[Unit | str]) -> set[float]:
+    """By what a number may be multiplied if one of `others` replaces its unit; 1 without units."""
+    if not units and not others:
+        return {1.0}
+    ratios = {1.0} if {*units} & {*others} else set[float]()
+    for a in (unit for unit in units if isinstance(unit, Unit)):
+        same = (b for b in others if isinstance(b, Unit) and a.dimension == b.dimension)
+        ratios |= {float(a.size / b.size) for b in same}
+    return ratios
 
 
 def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
