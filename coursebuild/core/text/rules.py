@@ -136,7 +136,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "figure-unreadable": "A drawn figure cannot be shown.",
         "figure-drift": "A recorded figure differs from what its script draws now.",
         "image-remote": "An image, a video or a frame is on another host.",
-        "image-forbidden": "An SVG contains something that is not allowed.",
+        "image-forbidden": "A picture is not what its name says, or holds what is not allowed.",
         "image-alt": "An image has no alternative text.",
     },
     "Links and bound numbers": {
