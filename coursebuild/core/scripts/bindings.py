@@ -207,8 +207,8 @@ def _check(
     bound_text = BoundText.of(binding.text)
     lines = [line for verdict in steady for line in outputs.lines(verdict)]
     if _holds(bound_text, lines):
-        wrong_unit = _wrong_unit(binding, bound_text, path, lines)
-        return lines if wrong_unit is None else wrong_unit
+        mismatch = _wrong_unit(binding, bound_text, path, lines)
+        return lines if mismatch is None else mismatch
     partial = any(
         v.comparison.ellipsis or isinstance(v.recording.body, model.Table) for v in steady
     )
@@ -301,8 +301,8 @@ def _mismatch(
     elif stray and replace(bound_text, before="", after="").is_in(lines):
         message = f"`{path}` printed no `{stray}` beside the number in `{binding.text}`"
         help = Fix(f"remove the `{stray}`", "", stray)
-    elif wrong := _wrong_unit(binding, replace(bound_text, before="", after=""), path, lines):
-        return wrong
+    elif mismatch := _wrong_unit(binding, replace(bound_text, before="", after=""), path, lines):
+        return mismatch
     else:
         label, better = _propose(bound_text, lines, list(map(PrintedLine, before)))
         message = f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown"

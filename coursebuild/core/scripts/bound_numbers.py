@@ -148,19 +148,19 @@ class BoundText(Struct, frozen=True):
         ends = [*(number.start for number in self.numbers[1:]), len(self.text)]
         texts = [self.text[n.end : end] for n, end in zip(self.numbers, ends, strict=True)]
         texts[-1] = texts[-1] if texts[-1].strip() else following
-        shown = list(map(units_at, texts))
-        wrong: tuple[str, str] | None = None
-        for window in filter(self.shows, self.windows(lines) if any(shown) else ()):
+        shown_units = list(map(units_at, texts))
+        difference: tuple[str, str] | None = None
+        for window in filter(self.shows, self.windows(lines) if any(shown_units) else ()):
             line = window.line.text
-            printed = [units_at(line, number.end) for number in window.numbers]
-            pairs = zip(shown, printed, strict=True)
+            printed_units = [units_at(line, number.end) for number in window.numbers]
+            pairs = zip(shown_units, printed_units, strict=True)
             at = [i for i, (a, b) in enumerate(pairs) if a and b and a.isdisjoint(b)]
             if not at:
                 return None
             number = window.numbers[at[0]]
             unit_text = line[number.end :].split()[0].rstrip(".,;:)]")
-            wrong = f"{number.text} {unit_text}", texts[at[0]].split()[0].rstrip(".,;:!?)")
-        return wrong
+            difference = f"{number.text} {unit_text}", texts[at[0]].split()[0].rstrip(".,;:!?)")
+        return difference
 
     @property
     def stray(self) -> str:

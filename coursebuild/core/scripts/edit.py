@@ -274,8 +274,8 @@ def _update_table(
         span = table.span if not edits else edits[0].span
         return refusal(span, "the table cannot be made to match what the script prints")
     if not edits:
-        wrong = next(unit_changes(table, matches, matcher), None)
-        return refusal(wrong.span, "units are not replaced", HEADER_HELP) if wrong else None
+        change = next(unit_changes(table, matches, matcher), None)
+        return refusal(change.span, "units are not replaced", HEADER_HELP) if change else None
     whole = edits[0].span.to(edits[-1].span)
     at = whole.start
     ranges = ((edit.span.start - at, edit.span.end - at, edit.text) for edit in edits)

@@ -117,9 +117,9 @@ def unit_changes(
     for column, places in sorted(printed.items()):
         header = _cell_text(table.header[column], ())
         unit = _HEADER_UNIT.search(header.text)
-        shown = frozenset() if unit is None else units_at(unit[1])
+        shown_units = frozenset() if unit is None else units_at(unit[1])
         units = [units_at(line, end) for line, end in places]
-        if unit is not None and shown and all(u and u.isdisjoint(shown) for u in units):
+        if unit is not None and shown_units and all(u and u.isdisjoint(shown_units) for u in units):
             span = Span(table.span.source, *header.origin(*unit.span(1)))
             word = places[0][0][places[0][1] :].split()[0].rstrip(".,;:)]")
             yield Change(DriftKind.TEXT, span, unit[1], word)

@@ -151,14 +151,14 @@ def units_at(line: str, start: int = 0) -> frozenset[Unit | str]:
     return frozenset(units)
 
 
-def conversions(units: Collection[Unit | str], others: Collection[Unit | str]) -> set[float]:
-    """By what a number may be multiplied if one of `others` replaces its unit; 1 without units."""
-    if not units and not others:
+def conversions(units: Collection[Unit | str], targets: Collection[Unit | str]) -> set[float]:
+    """By what a number may be multiplied if one of `targets` replaces its unit; 1 without units."""
+    if not units and not targets:
         return {1.0}
-    ratios = {1.0} if {*units} & {*others} else set[float]()
+    ratios = {1.0} if {*units} & {*targets} else set[float]()
     for a in (unit for unit in units if isinstance(unit, Unit)):
-        same = (b for b in others if isinstance(b, Unit) and a.dimension == b.dimension)
-        ratios |= {float(a.size / b.size) for b in same}
+        sizes = (b.size for b in targets if isinstance(b, Unit) and a.dimension == b.dimension)
+        ratios |= {float(a.size / size) for size in sizes}
     return ratios
 
 

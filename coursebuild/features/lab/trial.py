@@ -363,8 +363,8 @@ class _LabTrial(Struct, frozen=True):
             return diagnostics
         names = verdict.references(self.lab)
         replies = browser.look_up([name.path for name in names], mjb, self.seconds)
-        found = verdict.name_diagnostics(names, replies)
-        return [*found, *verdict.parameter_diagnostics(self.lab)]
+        unknown_names = verdict.name_diagnostics(names, replies)
+        return [*unknown_names, *verdict.parameter_diagnostics(self.lab)]
 
     def _run_trial(self, module: LabModule, mjb: bytes, key: str) -> bytes:
         """Run the trial, and replace its recorded states by their comparison with a native run."""

@@ -143,9 +143,9 @@ def _check_answer(question: NumericQuestion) -> Iterator[Diagnostic]:
     numbers = [n for n in scan_prose(text) if n.is_finite]
     if any(abs(float(n.value) - question.answer) <= question.tolerance for n in numbers):
         return
-    asked, results = units_at(question.unit), list[Number]()
+    answer_units, results = units_at(question.unit), list[Number]()
     for number in numbers:
-        sizes = conversions(units_at(text[number.end :].replace("$", " ")), asked)
+        sizes = conversions(units_at(text[number.end :].replace("$", " ")), answer_units)
         values = [float(number.value) * size for size in sizes]
         if any(abs(value - question.answer) <= question.tolerance for value in values):
             return
