@@ -231,7 +231,7 @@ def _wrong_unit(
     binding: model.NumberBinding, bound_text: BoundText, path: str, lines: Sequence[PrintedLine]
 ) -> Diagnostic | None:
     source, end = binding.span.source, binding.span.end
-    units = bound_text.wrong_unit(lines, source.text[end : end + 40])
+    units = bound_text.wrong_unit(lines, binding.unit or source.text[end : end + 40])
     if units is None:
         return None
     message = f"`{path}` printed `{units[0]}`, and here it is followed by `{units[1]}`"

@@ -126,7 +126,8 @@ def read_meaning(
     if value is not None and _NUMBER.fullmatch(value.text) and not {"out", "given"} <= {*values}:
         script = value_text(values.get("out")) or None
         origin = None if "out" in values else source or ""
-        number = NumberBinding(braces.span(), value.text, value.span(), script, origin)
+        unit = value_text(values.get("unit"))
+        number = NumberBinding(braces.span(), value.text, value.span(), script, origin, unit)
     elif "value" in values or "out" in values:
         text = "" if value is None else value.text
         reason = f"`{text}` is no value of a symbol"

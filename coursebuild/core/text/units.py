@@ -43,6 +43,7 @@ _NAMES = dict(
 )
 _PLAIN_UNITS = frozenset(COMMON) - frozenset("min d h C F H T l L".split())
 """Without those that behind a number may well be a name, as in `0.2 min, 0.9 max`."""
+_QUOTIENT = re.compile(r"[^\W\d_]+/[^\W\d_]+")
 _PRODUCT_UNITS = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
 
 _WORD = r"(?:°C|[^\W\d_⁰¹²³⁴-⁹]+|[°%‰])"
@@ -143,6 +144,7 @@ def units_at(line: str, start: int = 0) -> frozenset[Unit | str]:
         name = _NAMES.get(bare, bare).replace("deg", "°")
         product = f"{product}*{name}" if product else name
         unit = _parse_product(_plain(product)) or (name if product in _PLAIN_UNITS else None)
+        unit = unit or (find_unit(product) if _QUOTIENT.fullmatch(product) else None)
         if unit is None:
             return frozenset() if re.match(name_sign, word) else frozenset(units)
         units.add(unit)
