@@ -361,13 +361,18 @@ def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> R
     return RowVerdict(False, better, None, None, None, text)
 
 
+def _two_digits(number: float) -> str:
+    """A factor with two digits and no exponent where zeros do: `610`."""
+    return f"{float(f'{number:.2g}'):g}"
+
+
 def _describe_ratios(cost: float, error: float) -> str:
     cheap = "takes no more time" if cost <= 1.005 else "takes about as long"
     if cost < 1 / 1.005:
         cheap = f"takes {cost:.2g} of the time"
     exact = "errs no more" if error <= 1.005 else "errs hardly more"
     if error < 1 / (1 + ERROR_SLACK):
-        exact = f"errs {1 / error:.2g} times less" if 1 / error < 1e4 else "errs far less"
+        exact = f"errs {_two_digits(1 / error)} times less" if 1 / error < 1e4 else "errs far less"
     return f"{cheap} and {exact}"
 
 
@@ -384,7 +389,8 @@ def _describe_error(
     if error < 1:
         size = f"{'less than ' if error <= least else ''}{error:.2g}"
         return f"; the scene's own error cannot be seen: it is {size} of what an eye can tell"
-    text = f"; the scene's own error can be seen: it is {error:.2g} times what an eye can tell"
+    times_seen = _two_digits(error)
+    text = f"; the scene's own error can be seen: it is {times_seen} times what an eye can tell"
     unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost and not r.lucky]
     if own_row.cost is None:
         return text
@@ -392,7 +398,7 @@ def _describe_error(
         cost, first = min((r.cost.value, n) for n, r in enumerate(unseen) if r.cost)
         name = setting_text(unseen[first].setting, own_row.setting)
         times = cost / own_row.cost.value
-        share = f"{times:.2g} times" if abs(times - 1) > ERROR_SLACK else "about"
+        share = f"{_two_digits(times)} times" if abs(times - 1) > ERROR_SLACK else "about"
         text += f"; the cheapest without one that is seen is {name}, at {share} its cost"
     elif all(n for r, n in zip(rows, noticeable, strict=True) if r.seen is not None):
         text += ", and that of every other setting too"

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import time
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -214,8 +215,25 @@ def write_figures(
     return remarks, failures
 
 
+_SIGNATURES = {
+    ".png": rb"\x89PNG",
+    ".jpg": rb"\xff\xd8\xff",
+    ".jpeg": rb"\xff\xd8\xff",
+    ".gif": rb"GIF8[79]a",
+    ".webp": rb"RIFF....WEBP",
+}
+"""How pictures begin."""
+
+
 def check_drawings(course: Course, options: Options) -> Iterator[Diagnostic]:
-    """Judge the files in SVG, which are published as they are."""
+    """Judge the pictures, which are published as they are: what they are, and all of an SVG."""
+    for path in course.files:
+        kind = path[path.rfind(".") :].lower()
+        begins = _SIGNATURES.get(kind, b"")
+        if begins and not re.match(begins, read_recorded(options.root, path) or b"", re.DOTALL):
+            message = f"`{path}` is no picture of the kind that its name says"
+            help = "save it again in this format, or rename it"
+            yield diagnose("image-forbidden", Source(path, "").span(0, 0), message, help=help)
     if course.html == "trusted":
         return
     for path in course.files:

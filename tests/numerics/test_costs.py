@@ -338,10 +338,10 @@ def test_verdicts_claim_only_what_holds() -> None:
     large = (small[0], row("RK4", 0.008, cost=0.5, seen=1e-6))
     assert verdict(front(large), [False] * 2).better == 1
     text = verdict(front(large), [False] * 2, Quantity("seen", "", 1e-6)).text
-    assert "errs 1e+03 times less, or more: " in text
+    assert "errs 1000 times less, or more: " in text
     judgement = verdict(front(large), [False] * 2, holds=lambda s: s.integrator != "RK4")
     assert judgement.better is None and judgement.text.startswith(
-        "no difference that holds: RK4 at 8 ms takes 0.5 of the time and errs 1e+03 times less "
+        "no difference that holds: RK4 at 8 ms takes 0.5 of the time and errs 1000 times less "
         "here, but is no better from starts nearby; "
     )
 

@@ -179,7 +179,7 @@ def page(course: Course, id: str, text: str) -> None:
 
 
 def picture(course: Course, id: str, text: str) -> None:
-    course.folder.write("content/images/dot.png", text.encode())
+    course.folder.write("content/images/dot.png", b"\x89PNG" + text.encode())
 
 
 def breakage(course: Course, id: str, text: str) -> None:

@@ -65,6 +65,8 @@ class NumberBinding(Located, frozen=True):
     """The path given by `{out=…}`; `None`: the script of the nearest recorded output above."""
     source: str | None = None
     """Its source from `{given="…"}`, perhaps empty; `None` where a script has printed it."""
+    unit: str = ""
+    """That of a symbol whose value it is."""
 
 
 LABEL_KINDS = {

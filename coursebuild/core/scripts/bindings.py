@@ -207,7 +207,8 @@ def _check(
     bound_text = BoundText.of(binding.text)
     lines = [line for verdict in steady for line in outputs.lines(verdict)]
     if _holds(bound_text, lines):
-        return lines
+        mismatch = _wrong_unit(binding, bound_text, path, lines)
+        return lines if mismatch is None else mismatch
     partial = any(
         v.comparison.ellipsis or isinstance(v.recording.body, model.Table) for v in steady
     )
@@ -224,6 +225,18 @@ def _check(
         help = "remove `{out}`, or narrow `volatile` so that this number is compared"
         return diagnose("binding-volatile", binding.text_span, message, help=help)
     return _mismatch(binding, path, lines, before)
+
+
+def _wrong_unit(
+    binding: model.NumberBinding, bound_text: BoundText, path: str, lines: Sequence[PrintedLine]
+) -> Diagnostic | None:
+    source, end = binding.span.source, binding.span.end
+    units = bound_text.wrong_unit(lines, binding.unit or source.text[end : end + 40])
+    if units is None:
+        return None
+    message = f"`{path}` printed `{units[0]}`, and here it is followed by `{units[1]}`"
+    help = "write the unit that is printed, or let the script convert the number"
+    return diagnose("binding-mismatch", binding.text_span, message, help=help)
 
 
 def _holds(bound_text: BoundText, lines: Sequence[PrintedLine]) -> bool:
@@ -288,6 +301,8 @@ def _mismatch(
     elif stray and replace(bound_text, before="", after="").is_in(lines):
         message = f"`{path}` printed no `{stray}` beside the number in `{binding.text}`"
         help = Fix(f"remove the `{stray}`", "", stray)
+    elif mismatch := _wrong_unit(binding, replace(bound_text, before="", after=""), path, lines):
+        return mismatch
     else:
         label, better = _propose(bound_text, lines, list(map(PrintedLine, before)))
         message = f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown"

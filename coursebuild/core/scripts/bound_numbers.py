@@ -14,6 +14,7 @@ from coursebuild.core.scripts.lines import MappedText, Side, plain_text, replace
 from coursebuild.core.scripts.numbers import Number, round_like, scan, scan_prose, within_half_unit
 from coursebuild.core.scripts.tables import RowCell, table_rows
 from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.units import units_at
 
 Locate = Callable[[int, int], Span]
 _STRAY = re.compile(r"[-+*/.,:;=_]+|-?[eE][-+]+\d*|[-+][eE]\d*")
@@ -136,6 +137,30 @@ class BoundText(Struct, frozen=True):
         if any(map(self.has_context, equal_windows)):  # nearly always, so look here first
             return True
         return not self.stray and any(map(self.shows, self.windows(lines)))
+
+    def wrong_unit(self, lines: Sequence[PrintedLine], following: str) -> tuple[str, str] | None:
+        """A printed number with its unit, and the text beside it here, if that is another unit.
+
+        `following` is what stands behind the binding.
+        """
+        if not self.numbers:
+            return None
+        ends = [*(number.start for number in self.numbers[1:]), len(self.text)]
+        texts = [self.text[n.end : end] for n, end in zip(self.numbers, ends, strict=True)]
+        texts[-1] = texts[-1] if texts[-1].strip() else following
+        shown_units = list(map(units_at, texts))
+        difference: tuple[str, str] | None = None
+        for window in filter(self.shows, self.windows(lines) if any(shown_units) else ()):
+            line = window.line.text
+            printed_units = [units_at(line, number.end) for number in window.numbers]
+            pairs = zip(shown_units, printed_units, strict=True)
+            at = [i for i, (a, b) in enumerate(pairs) if a and b and a.isdisjoint(b)]
+            if not at:
+                return None
+            number = window.numbers[at[0]]
+            unit_text = line[number.end :].split()[0].rstrip(".,;:)]")
+            difference = f"{number.text} {unit_text}", texts[at[0]].split()[0].rstrip(".,;:!?)")
+        return difference
 
     @property
     def stray(self) -> str:

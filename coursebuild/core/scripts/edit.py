@@ -38,7 +38,13 @@ from coursebuild.core.scripts.lines import (
     same_number,
 )
 from coursebuild.core.scripts.numbers import round_like
-from coursebuild.core.scripts.tables import RowCell, TableMatcher, table_rows
+from coursebuild.core.scripts.tables import (
+    HEADER_HELP,
+    RowCell,
+    TableMatcher,
+    table_rows,
+    unit_changes,
+)
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -238,7 +244,8 @@ def _update_table(
     printed = Side.of(stdout, filters)
     if comparison.mode is model.Mode.VOLATILE:
         comparison = model.Comparison()
-    matches = TableMatcher(table_rows(table, filters), printed, comparison).match()
+    matcher = TableMatcher(table_rows(table, filters), printed, comparison)
+    matches = matcher.match()
     rows: list[tuple[RowCell, ...]] = []
     edits: list[Edit] = []
     for match in matches:
@@ -267,7 +274,8 @@ def _update_table(
         span = table.span if not edits else edits[0].span
         return refusal(span, "the table cannot be made to match what the script prints")
     if not edits:
-        return None
+        change = next(unit_changes(table, matches, matcher), None)
+        return refusal(change.span, "units are not replaced", HEADER_HELP) if change else None
     whole = edits[0].span.to(edits[-1].span)
     at = whole.start
     ranges = ((edit.span.start - at, edit.span.end - at, edit.text) for edit in edits)

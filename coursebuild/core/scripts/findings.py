@@ -28,7 +28,7 @@ from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.lines import ELLIPSIS, LineMatcher, Side
 from coursebuild.core.scripts.numbers import Number, only_number, scan, within_tolerance
-from coursebuild.core.scripts.tables import TableMatcher, table_rows
+from coursebuild.core.scripts.tables import HEADER_HELP, TableMatcher, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.source import Excerpt
 
@@ -272,6 +272,10 @@ def drift_diagnostic(
         help = "what is recorded has the colour codes of a terminal: remove them"
     elif fraction and f"{first.recorded}.{fraction[1]}" == first.printed:
         help = f"Python prints a decimal point: write `{first.printed}`"
+    elif (
+        isinstance(body := recording.body, Table) and first.span.start < body.rows[0][0].span.start
+    ):
+        help = HEADER_HELP
     message = f"recorded output differs from this run ({classes(changes)})"
     return diagnose(
         "output-drift", first.span, message, label=_label(first), help=help, notes=notes

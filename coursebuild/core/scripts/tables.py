@@ -1,7 +1,8 @@
 """Recorded tables: does each row stand in a line of the output?
 
 1. A body row's cells, as plain text, must stand in order in one printed line, white space folded;
-   each row in a line further down than the row before. The header row and all other lines are free.
+   each row in a line further down than the row before. All other lines are free. A header is, too,
+   but for a unit in brackets, which is not another one than is printed behind the numbers.
 2. Cells match whole words and whole numbers only: `4` not in `14`. Numbers match by the
    comparison's mode.
 3. Where a row has no such line, rows and lines are aligned; a row that fits a line except for its
@@ -35,7 +36,10 @@ from coursebuild.core.scripts.lines import (
 )
 from coursebuild.core.scripts.numbers import Number, relative_error
 from coursebuild.core.text.source import Span
+from coursebuild.core.text.units import units_at
 
+_HEADER_UNIT = re.compile(r"[(\[]([^()\[\]]+)[)\]]\Z")
+HEADER_HELP = "write the unit that is printed, or put the columns in order"
 _ALIKE_WEIGHT = 6
 _PLACES = 64
 
@@ -85,7 +89,9 @@ def compare_table(
     """The verdict on a recorded table."""
     rows, printed = table_rows(table, comparison.filters), Side.of(stdout, comparison.filters)
     changes: list[Change] = []
-    for match in TableMatcher(rows, printed, comparison).match():
+    matcher = TableMatcher(rows, printed, comparison)
+    matches = matcher.match()
+    for match in matches:
         if match.line < 0:
             first, last = match.row[0].cell.span, match.row[-1].cell.span
             changes.append(Change(DriftKind.MISSING, first.to(last), _row_text(match.row), ""))
@@ -93,7 +99,30 @@ def compare_table(
             if not same_number(old, new, comparison):
                 span = cell.span(old)
                 changes.append(number_change(span, span.text, new.text, (old, new)))
+    if not changes:
+        changes += unit_changes(table, matches, matcher)
     return Verdict(recording, comparison, "drift" if changes else "verified", tuple(changes))
+
+
+def unit_changes(
+    table: model.Table, matches: Iterable[RowMatch], matcher: TableMatcher
+) -> Iterator[Change]:
+    """Units in the brackets of a header that are not those printed behind the column's numbers."""
+    columns = {id(cell): at for row in table.rows for at, cell in enumerate(row)}
+    printed: dict[int, list[tuple[str, int]]] = {}
+    for match in matches:
+        for cell, _, number in matcher.pairs(match.row, match.line):
+            place = matcher.lines[match.line], number.end
+            printed.setdefault(columns[id(cell.cell)], []).append(place)
+    for column, places in sorted(printed.items()):
+        header = _cell_text(table.header[column], ())
+        unit = _HEADER_UNIT.search(header.text)
+        shown_units = frozenset() if unit is None else units_at(unit[1])
+        units = [units_at(line, end) for line, end in places]
+        if unit is not None and shown_units and all(u and u.isdisjoint(shown_units) for u in units):
+            span = Span(table.span.source, *header.origin(*unit.span(1)))
+            word = places[0][0][places[0][1] :].split()[0].rstrip(".,;:)]")
+            yield Change(DriftKind.TEXT, span, unit[1], word)
 
 
 def _row_text(row: Sequence[RowCell]) -> str:
@@ -122,19 +151,23 @@ class TableMatcher:
         for row, line in zip(self.rows, lines, strict=True):
             if line < 0 or self._matches(row, line):
                 matches.append(RowMatch(row, line, ()))
-                continue
-            canonical = self._canonical_line(line)
-            pairs = tuple(
-                (cell, recorded, printed)
-                for cell, place in zip(
-                    row, _nearest_places(row, canonical, self._numbers_match), strict=True
-                )
-                for recorded, printed in zip(
-                    cell.canonical.numbers, canonical.numbers_at(cell.canonical, place), strict=True
-                )
-            )
-            matches.append(RowMatch(row, line, pairs))
+            else:
+                matches.append(RowMatch(row, line, self.pairs(row, line)))
         return tuple(matches)
+
+    def pairs(
+        self, row: tuple[RowCell, ...], line: int
+    ) -> tuple[tuple[RowCell, Number, Number], ...]:
+        """Each number of a row that fits a line, with its cell and the printed one."""
+        canonical = self._canonical_line(line)
+        places = _nearest_places(row, canonical, self._numbers_match)
+        return tuple(
+            (cell, recorded, printed)
+            for cell, place in zip(row, places, strict=True)
+            for recorded, printed in zip(
+                cell.canonical.numbers, canonical.numbers_at(cell.canonical, place), strict=True
+            )
+        )
 
     def find_matching_lines(self) -> list[int] | None:
         """A line for each row, in order, if all of them match."""

@@ -41,6 +41,9 @@ LABEL = re.compile(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 missing."""
 _LAST_LABEL = re.compile(r"(?:^|(?<=\s))\{#[^{}$\n]{0,200}\}?$")
 _PAIR = re.compile(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
+_MISQUOTED = re.compile(
+    r"""[^\s={}"]+=([“”„‟‘’‚‛«»'`])[^{}"“”„‟‘’‚‛«»'`\n]*([“”„‟‘’‚‛«»'`])(?=[\s}]|$)"""
+)
 _SPACES = re.compile(r"\s+")
 _NUMBER = re.compile(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
 
@@ -52,6 +55,17 @@ _VALUE_HELP = 'write `value=9.81 given="its source"`, or `value=9.81 out=example
 def collapse_spaces(text: str) -> str:
     """A text on one line, with one space for each run of white space."""
     return _SPACES.sub(" ", text).strip()
+
+
+def check_quotes(text: Excerpt, start: int, rule: str) -> tuple[Diagnostic, int] | None:
+    """The diagnostic of a value in other quotes than `"`, and where it ends; `None` without."""
+    match = _MISQUOTED.match(text.text, start)
+    if match is None:
+        return None
+    places = [text.span(*match.span(group)) for group in (1, 2)]
+    help = Fix('write `"`', edits=tuple(Edit(place, '"') for place in places), safe=True)
+    message = f"`{match[1]}` does not quote a value"
+    return diagnose(rule, places[0], message, help=help), match.end()
 
 
 def read_pairs(
@@ -70,6 +84,8 @@ def read_pairs(
             message = f"`{collapse_spaces(rest.text)}` cannot be read"
             return diagnose(rule, rest.span(), message, help=help)
         key, span = pair[1], braces.span(*pair.span(1))
+        if misquoted := check_quotes(braces, pair.start(1), rule):
+            return misquoted[0]
         if key not in keys:
             suggestion = did_you_mean(key, keys)
             if len(keys) == 1:
@@ -110,7 +126,8 @@ def read_meaning(
     if value is not None and _NUMBER.fullmatch(value.text) and not {"out", "given"} <= {*values}:
         script = value_text(values.get("out")) or None
         origin = None if "out" in values else source or ""
-        number = NumberBinding(braces.span(), value.text, value.span(), script, origin)
+        unit = value_text(values.get("unit"))
+        number = NumberBinding(braces.span(), value.text, value.span(), script, origin, unit)
     elif "value" in values or "out" in values:
         text = "" if value is None else value.text
         reason = f"`{text}` is no value of a symbol"

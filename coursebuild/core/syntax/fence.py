@@ -17,7 +17,7 @@ from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
 
 from coursebuild.core.model import Block, CodeBlock, Inline
-from coursebuild.core.syntax.attributes import split_label
+from coursebuild.core.syntax.attributes import check_quotes, split_label
 from coursebuild.core.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
@@ -138,7 +138,10 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
         match = _WORD.match(text, at)
         assert match is not None
         end = match.end()
-        if spaced_word := _SPACED_OPTION.match(text, at):
+        if misquoted := check_quotes(info, at, "fence-info"):
+            diagnostic, end = misquoted
+            diagnostics.append(diagnostic)
+        elif spaced_word := _SPACED_OPTION.match(text, at):
             equals, end = spaced_word.start(spaced_word.lastindex or 0), spaced_word.end()
             message = "there is a space beside the `=` of a key"
             spaced = info.span(at, end)

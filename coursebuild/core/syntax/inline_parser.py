@@ -80,7 +80,7 @@ def _code_span(state: rules_inline.StateInline, silent: bool) -> bool:
 
 _CITED = r"(?:[^\[\]{}@;]*\s)?@(?:[\w.:/+-]*\w)(?:[^\S\n]*,[^\[\]{};@]*)?\s*"
 _LEAVES = {
-    "citation": re.compile(rf"\[({_CITED}(?:;{_CITED})*)\](?![\[({{:])"),
+    "citation": re.compile(rf"\[({_CITED}(?:;{_CITED})*)\](?![\[({{])"),
     "footnote_ref": re.compile(r"\[\^([^\s\[\]]+)\]"),
 }
 

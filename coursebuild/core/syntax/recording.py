@@ -12,6 +12,7 @@ from decimal import Decimal
 from coursebuild.core import model
 from coursebuild.core.model.blocks import volatile_pattern
 from coursebuild.core.model.course import Words
+from coursebuild.core.syntax.attributes import split_label
 from coursebuild.core.syntax.fence import Fence, FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.unread_markup import is_known_kind
@@ -21,7 +22,7 @@ from coursebuild.core.text.source import Excerpt, Span
 
 FIGURE, TABLE, OUTPUT_KIND = "Figure:", "Table:", "output"
 _BODY_KINDS = ("text", OUTPUT_KIND)
-_FIRST_WORD = re.compile(r"([^\s:*`]{3,12})(?![^\s:])[^\S\n]*(:?)")
+_FIRST_WORD = re.compile(r"([^\s:,*`]{3,12})(?![^\s:,])[^\S\n]*(:?)")
 _NEAR_CAPTION = re.compile(
     r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
     re.IGNORECASE | re.DOTALL,
@@ -64,6 +65,7 @@ def find_misspelt_caption(
 
     One that consists of the name may lack the colon. Words in `unlike` are not misspelt.
     """
+    content = split_label(content)[0]
     match = _FIRST_WORD.match(content.text)
     is_alone = match is not None and match.end() == len(content.text)
     if match is None or not (is_alone or match[2] or content.text.endswith(":")):
@@ -75,7 +77,8 @@ def find_misspelt_caption(
     message = f"`{content.text[: match.end()].rstrip()}` is not a caption"
     place = content.span(0, len(match[0].rstrip()))
     is_safe = is_name or propose(match[1], word, names).safe
-    fix = Fix(f"did you mean `{word}:`?", f"{word}:", safe=is_safe)
+    new = word if content.text.startswith(",", match.end()) else f"{word}:"
+    fix = Fix(f"did you mean `{new}`?", new, safe=is_safe)
     return diagnose("recording-misspelt", place, message, help=fix)
 
 

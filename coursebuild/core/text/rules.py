@@ -136,7 +136,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "figure-unreadable": "A drawn figure cannot be shown.",
         "figure-drift": "A recorded figure differs from what its script draws now.",
         "image-remote": "An image, a video or a frame is on another host.",
-        "image-forbidden": "An SVG contains something that is not allowed.",
+        "image-forbidden": "A picture is not what its name says, or holds what is not allowed.",
         "image-alt": "An image has no alternative text.",
     },
     "Links and bound numbers": {
@@ -226,7 +226,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "lab-expect": "A claim of a lab does not hold.",
         "lab-goal": "The goal of a lab is reached by doing nothing, or not by its log.",
         "lab-parity": "A lab runs differently in the browser than in native MuJoCo or SciPy.",
-        "lab-endless": "The equations of a lab take too many steps, or its events do not end.",
+        "lab-endless": "Equations take too many steps, or an event has no end or never happens.",
         "lab-points": "Printed numbers do not lie on the curve of a lab.",
         "lab-far": "What moves is small in the picture of a lab.",
         "lab-reset": "A reset does not restore the initial state of a lab.",

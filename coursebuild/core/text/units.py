@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from fractions import Fraction
 from typing import Any, TypeAlias
 
@@ -41,6 +41,9 @@ _NAMES = dict(
     hertz=Hz newton=N minute=min hour=h kelvin=K volt=V ampere=A percent=%
     """.split()
 )
+_PLAIN_UNITS = frozenset(COMMON) - frozenset("min d h C F H T l L".split())
+"""Without those that behind a number may well be a name, as in `0.2 min, 0.9 max`."""
+_QUOTIENT = re.compile(r"[^\W\d_]+/[^\W\d_]+")
 _PRODUCT_UNITS = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
 
 _WORD = r"(?:°C|[^\W\d_⁰¹²³⁴-⁹]+|[°%‰])"
@@ -81,8 +84,7 @@ def multiply(left: Dimension, right: Dimension, power: Fraction | int = 1) -> Di
 @functools.lru_cache(maxsize=256)
 def find_unit(text: str) -> Unit | None:
     """The unit of a text such as `N m/rad`; `None` if neither we nor Pint know it."""
-    plain = re.sub("[⁰¹²³⁴-⁹⁻]+", lambda m: "^" + m[0].translate(_SUPERSCRIPTS), text.strip())
-    unit = _parse_product(re.sub(r"\s*[ ·⋅*]\s*", "*", plain))
+    unit = _parse_product(_plain(text))
     if unit is not None:
         return unit
     try:
@@ -91,6 +93,11 @@ def find_unit(text: str) -> Unit | None:
         return Unit(Fraction(repr(float(base.magnitude))), tuple(powers))
     except Exception:  # Pint does not document what its parser raises
         return None
+
+
+def _plain(text: str) -> str:
+    plain = re.sub("[⁰¹²³⁴-⁹⁻]+", lambda m: "^" + m[0].translate(_SUPERSCRIPTS), text.strip())
+    return re.sub(r"\s*[ ·⋅*]\s*", "*", plain)
 
 
 def _parse_product(text: str) -> Unit | None:
@@ -127,6 +134,39 @@ def _registry() -> Any:
     registry: Any = pint.UnitRegistry(cache_folder=None)
     registry.define("@alias turn = rev")
     return registry
+
+
+def units_at(line: str, start: int = 0) -> frozenset[Unit | str]:
+    """What the unit at a place of a line may be, of `N m, at rest` N or N m; nothing for others.
+
+    In `l 2.0 T 2.8` and `m = 2 n = 3` it is a name.
+    """
+    name_sign = r"[=:\d.+-]" if line[:1].isalpha() else "[=:]"
+    units: set[Unit | str] = set()
+    product = ""
+    for word in line[start:].split()[:4]:
+        bare = word.rstrip(".,;:!?)]”")
+        name = _NAMES.get(bare, bare).replace("deg", "°")
+        product = f"{product}*{name}" if product else name
+        unit = _parse_product(_plain(product)) or (name if product in _PLAIN_UNITS else None)
+        unit = unit or (find_unit(product) if _QUOTIENT.fullmatch(product) else None)
+        if unit is None:
+            return frozenset() if re.match(name_sign, word) else frozenset(units)
+        units.add(unit)
+        if bare != word:
+            break
+    return frozenset(units)
+
+
+def conversions(units: Collection[Unit | str], targets: Collection[Unit | str]) -> set[float]:
+    """By what a number may be multiplied if one of `targets` replaces its unit; 1 without units."""
+    if not units and not targets:
+        return {1.0}
+    ratios = {1.0} if {*units} & {*targets} else set[float]()
+    for a in (unit for unit in units if isinstance(unit, Unit)):
+        sizes = (b.size for b in targets if isinstance(b, Unit) and a.dimension == b.dimension)
+        ratios |= {float(a.size / size) for size in sizes}
+    return ratios
 
 
 def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:

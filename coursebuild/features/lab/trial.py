@@ -363,7 +363,8 @@ class _LabTrial(Struct, frozen=True):
             return diagnostics
         names = verdict.references(self.lab)
         replies = browser.look_up([name.path for name in names], mjb, self.seconds)
-        return list(verdict.name_diagnostics(names, replies))
+        unknown_names = verdict.name_diagnostics(names, replies)
+        return [*unknown_names, *verdict.parameter_diagnostics(self.lab)]
 
     def _run_trial(self, module: LabModule, mjb: bytes, key: str) -> bytes:
         """Run the trial, and replace its recorded states by their comparison with a native run."""
@@ -387,7 +388,7 @@ class _LabTrial(Struct, frozen=True):
 
     def _compare_natively(self, main: dict[str, Any], mjb: bytes) -> dict[str, Any]:
         run = main["parity"]
-        if main["diverged"]:
+        if main["diverged"] and run["steps"]:
             run["steps"] -= 1  # the last state, which is not finite, may differ
         if run["steps"] == 0:
             return {"unrepeated": "it takes no step"}

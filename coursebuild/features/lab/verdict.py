@@ -328,6 +328,35 @@ def assignment_diagnostics(lab: Lab) -> Iterator[Diagnostic]:
             yield diagnose("lab-code", place, message, help=help)
 
 
+def parameter_diagnostics(lab: Lab) -> Iterator[Diagnostic]:
+    """Report what is read from `ctx` though nothing sets it; nothing if `ctx` is used whole."""
+    names = {getattr(control, "param", None) or "" for control in lab.fields.controls}
+    code, reads = dict(lab.code), list[tuple[Excerpt, Node]]()
+    for piece in (piece for piece in pieces(lab) if piece.entry in code):
+        text = code[piece.entry]
+        for node in walk(parse(text.text)):
+            if node.type != "identifier" or text_of(node) != "ctx":
+                continue
+            member = node.parent
+            name = None if member is None else member.child_by_field_name("property")
+            if member is None or name is None or member.parent is None:
+                return
+            outer, sign = member.parent, member.parent.child_by_field_name("operator")
+            is_left = outer.child_by_field_name("left") == member
+            sets = outer.type in ("assignment_expression", "for_in_statement")
+            sets = is_left and (sets or (sign is not None and text_of(sign) in ("??=", "||=")))
+            is_target = piece.form == "target" and text_of(member) == text.text.strip()
+            if sets or is_target or outer.type.endswith("_pattern"):
+                names.add(text_of(name))
+            else:
+                reads.append((text, name))
+    for text, name in reads:
+        if text_of(name) not in names:
+            message = f"nothing in this lab sets `ctx.{text_of(name)}`"
+            help = did_you_mean(text_of(name), names - {""})
+            yield diagnose("lab-name", _place_in(text, name), message, help=help)
+
+
 _CHANGES = ("assignment_expression", "augmented_assignment_expression", "update_expression")
 _CONDITIONALS = ("if_statement", "while_statement", "do_statement")
 

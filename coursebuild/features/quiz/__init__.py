@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
@@ -25,7 +26,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import Mathml, Outcome, ScriptRun
 from coursebuild.core.scripts.lines import LineMatcher, MappedText, apply_filters
-from coursebuild.core.scripts.numbers import scan_prose
+from coursebuild.core.scripts.numbers import Number, scan_prose
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -37,6 +38,7 @@ from coursebuild.core.text.diagnostics import (
     is_one_edit,
 )
 from coursebuild.core.text.source import Excerpt
+from coursebuild.core.text.units import conversions, units_at
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.relations import check_steps
 from coursebuild.features.quiz.model import ChoiceQuestion, NumericQuestion, Quiz
@@ -125,16 +127,29 @@ def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | Non
     return Parsed(None, tuple(diagnostics))
 
 
+_RESULT = re.compile(r"\d[^=≈$]*[=≈]\s*\Z")
+"""Before a number that a formula computes from others."""
+
+
 def _check_answer(question: NumericQuestion) -> Iterator[Diagnostic]:
-    """Report an answer that is a number of its explanation, but for two digits swapped."""
+    """Report an answer to which its explanation does not come, or with two digits swapped."""
     text = " ".join(
-        inline.tex.text if isinstance(inline, Math) else getattr(inline, "text", "")
+        f"${inline.tex.text}$" if isinstance(inline, Math) else getattr(inline, "text", "")
         for block in walk_blocks(question.explain)
         for inline in walk_inlines(block_inlines(block))
     )
-    numbers = [n for n in scan_prose(text.replace("\\cdot", "·")) if n.is_finite]
+    text = re.sub(r"\\(?:mathrm|text)\s*\{?([^{}$]*)\}?", r"\1", text.replace("\\approx", "≈"))
+    text = re.sub(r"\\[ ,;:]|~", " ", text.replace("\\cdot", "·"))
+    numbers = [n for n in scan_prose(text) if n.is_finite]
     if any(abs(float(n.value) - question.answer) <= question.tolerance for n in numbers):
         return
+    answer_units, results = units_at(question.unit), list[Number]()
+    for number in numbers:
+        sizes = conversions(units_at(text[number.end :].replace("$", " ")), answer_units)
+        values = [float(number.value) * size for size in sizes]
+        if any(abs(value - question.answer) <= question.tolerance for value in values):
+            return
+        results += [number] if values and _RESULT.search(text[: number.start]) else []
     answer = question.answer_text
     swaps = {
         answer[:n] + answer[n + 1] + answer[n] + answer[n + 2 :]
@@ -142,7 +157,7 @@ def _check_answer(question: NumericQuestion) -> Iterator[Diagnostic]:
         if answer[n : n + 2].isdigit() and sum(map(str.isdigit, answer)) > 2
     }
     for number in numbers:
-        if number.text in swaps - {answer}:
+        if number in results or number.text in swaps - {answer}:
             message = f"the explanation says {number.text}, and not {answer}"
             help = "if both are right, write the answer in the explanation as well"
             yield diagnose("quiz-answer", question.answer_span, message, help=help)

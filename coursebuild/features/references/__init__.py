@@ -176,6 +176,8 @@ def check_sources(course: Course, documents: Collection[Document]) -> Iterator[D
             yield diagnose("source-unused", work.span, message, help=help)
         elif message := check_identifier(work):
             help = "add the `doi` or `isbn` of the work, by which readers find it"
+            if work.field("doi") or work.isbn:
+                help = "copy it once more from the work"
             yield diagnose("source-identifier", work.span, message, help=help)
     if course.citation_style is not None:
         try:

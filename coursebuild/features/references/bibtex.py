@@ -166,7 +166,7 @@ def check_identifier(work: Work) -> str:
     if doi and not work.doi:
         return f"`{doi}` is not a DOI"
     if isbn and not _is_isbn(isbn):
-        return f"`{work.isbn}` is not an ISBN: its last digit does not fit"
+        return f"`{work.isbn}` is not an ISBN: its digits do not fit together"
     if doi or isbn or (work.kind in _WEB and work.field("url")):
         return ""
     return f"`{work.key}` has no DOI or ISBN"

@@ -46,6 +46,11 @@ _FAILURES = {
     ),
 }
 """Rule, text and help of each way in which a solution ends too soon."""
+_NEVER = "the event never happens, whatever is tried"
+_NEVER_HELP = (
+    "a sign may be wrong, or the end too early; otherwise let a claim of `expect` set controls by "
+    "which it happens"
+)
 _CLAIM_HELP = "if that is intended, claim so: `expect` with `diverges`"
 
 
@@ -220,6 +225,11 @@ def run_trial(engine: EquationEngine, config: dict[str, Any], seconds: float) ->
             label = f"while trying: {attempt.description}" if attempt.description else ""
             labelled = msgspec.structs.replace(finding, label=label)
             findings.setdefault((finding.rule, finding.entry), labelled)
+    happened = {event["index"] for run in runs for event in run.events}
+    for i in range(0 if findings else len(config["events"])):
+        if i not in happened:
+            finding = CurveFinding("lab-endless", ("events", i, "when"), _NEVER, help=_NEVER_HELP)
+            findings[finding.rule, finding.entry] = finding
     return EquationReply(tuple(findings.values()), len(attempts), worst, runs[0])
 
 
