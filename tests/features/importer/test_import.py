@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.cli import main
+from support.model_files import png
 from support.sandboxes import require_sandbox
 
 HERE = Path(__file__).parent
@@ -219,9 +220,10 @@ def test_single_file_is_imported_with_what_it_names(
 ) -> None:
     """Nothing else in its folder is read, and no picture in it is written where its name says."""
     monkeypatch.chdir(tmp_path)
-    for name in ("other.md", "model.xml", "img/x.png", ".env", "README.md"):
+    for name in ("other.md", "model.xml", "img/y.png", ".env", "README.md"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("# Read me\n\nA `<mujoco/>`\n")
+    (tmp_path / "img" / "x.png").write_bytes(png())
     (tmp_path / "img" / "out.png").symlink_to("/etc/passwd")
     (tmp_path / "linked.ipynb").symlink_to("beats.ipynb")
     text = (
