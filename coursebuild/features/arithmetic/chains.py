@@ -68,12 +68,12 @@ def _check_formula(
     decimal = _COMMA.sub(r"\1.\2  ", tex)  # as long, for the places of mistakes
     if _DECIMAL_COMMA.search(tex):
         return _check_statements(decimal, symbols, unit)
-    found = _check_statements(tex, symbols, unit)
-    if decimal != tex and any(comparison.kind == "wrong" for comparison in found):
-        other = _check_statements(decimal, symbols, unit)
-        if all(comparison.kind != "wrong" for comparison in other):
+    comparisons = _check_statements(tex, symbols, unit)
+    if decimal != tex and any(comparison.kind == "wrong" for comparison in comparisons):
+        as_decimals = _check_statements(decimal, symbols, unit)
+        if all(comparison.kind != "wrong" for comparison in as_decimals):
             return (FormulaComparison("unread", 0, len(tex), "`{,}` may be a decimal point"),)
-    return found
+    return comparisons
 
 
 def _check_statements(
