@@ -46,6 +46,8 @@ _RELATION = re.compile(r"[=<>≈≤≥≠]|\\(?:approx|sim|le|ge|ne|ll|gg)")
 _COMMA = re.compile(r"([0-9]+)\{,\}([0-9]+)")
 _DECIMAL_COMMA = re.compile(r"(?<![0-9.])0\{,\}[0-9]|[0-9]\{,\}(?:[0-9]{1,2}|[0-9]{4,})(?![0-9])")
 """A comma that parts no thousands."""
+_ARABIC = {zero + n: str(n) for zero in (0x660, 0x6F0) for n in range(10)} | {0x66B: "."}
+"""Digits and the decimal sign, as they are written in Arabic and Persian."""
 _ORDER = {"<": operator.lt, ">": operator.gt, "≤": operator.le, "≥": operator.ge, "≠": operator.ne}
 
 
@@ -56,6 +58,7 @@ def check_arithmetic(
 
     `unit`: what follows the formula in the text.
     """
+    tex = tex.translate(_ARABIC)
     if not _RELATION.search(tex) or not (symbols or re.search("[0-9]", tex)):
         return ()
     return _check_formula(tex, symbols, unit)

@@ -61,7 +61,7 @@ def test_correct_arithmetic_passes_and_symbols_are_not_checked() -> None:
     assert failures == []
 
 
-def test_a_comma_in_braces_is_a_decimal_point_where_it_can_part_no_thousands() -> None:
+def test_numbers_are_read_as_other_languages_write_them() -> None:
     kinds = {
         r"1{,}5 + 1 = 2{,}5": "holds",
         r"1{,}5 + 1 = 2{,}6": "wrong",
@@ -71,6 +71,11 @@ def test_a_comma_in_braces_is_a_decimal_point_where_it_can_part_no_thousands() -
         r"2\pi\sqrt{10/98.1} \approx 2{,}006": "unread",
         r"1{,}250 + 1 = 1{,}251": "holds",
         r"1{,}250 + 1 = 1{,}252": "wrong",
+    }
+    arabic = str.maketrans("0123456789.", "".join(map(chr, [*range(0x660, 0x66A), 0x66B])))
+    kinds |= {
+        tex.translate(arabic): kind
+        for tex, kind in (("1.5 + 1 = 2.5", "holds"), ("1 + 1 = 3", "wrong"))
     }
     for tex, kind in kinds.items():
         assert [comparison.kind for comparison in check_arithmetic(tex)] == [kind], tex
