@@ -328,7 +328,9 @@ def _name_failures(offer: Any, feature: str = "", field: str = "") -> Any:
             expected = _RESULTS.get(field, object)
             if not isinstance(result, expected):
                 got = type(result).__name__
-                raise TypeError(f"it returned a value of the type {got}, no {expected.__name__}")
+                raise TypeError(
+                    f"it returned a value of the type {got} instead of {expected.__name__}"
+                )
         return iterate(result) if isgenerator(result) else result
 
     return call
