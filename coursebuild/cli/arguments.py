@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import TextIO
 
 from msgspec.structs import replace
@@ -143,6 +144,10 @@ def report_text(report: Report, form: str, options: Options) -> str:
         if not report.diagnostics:
             return ""
         report = replace(report, scripts=(), labs=(), remarks=(), sensitivity=None)
+    # A workflow names its checkout, of which the course may be a folder.
+    place = os.path.relpath(options.root, os.environ.get("GITHUB_WORKSPACE") or options.root)
+    if place != os.curdir and not place.startswith(os.pardir):
+        report = replace(report, folder=f"{Path(place).as_posix()}/")
     return render_report(report, form, style_of(sys.stdout))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 
 from msgspec.structs import replace
@@ -89,7 +90,9 @@ def run(arguments: argparse.Namespace) -> int:
     # Other formats say how long it took, which the report of before would not.
     if arguments.format != "text" or arguments.long or _special_options(arguments):
         options = options_of(arguments)
-        return print_report(work(options), arguments.format, options)
+        with contextlib.redirect_stdout(sys.stderr):  # what a feature prints is not of the report
+            report = work(options)
+        return print_report(report, arguments.format, options)
     return shared.run_unless_unchanged(arguments, ("examples",), work)
 
 

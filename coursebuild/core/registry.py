@@ -12,8 +12,9 @@ from contextlib import contextmanager
 from importlib.metadata import EntryPoint, entry_points
 from inspect import isgenerator
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
+from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -37,7 +38,7 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
-from coursebuild.core.text.rules import RULES
+from coursebuild.core.text.rules import RULES, Severity
 from coursebuild.core.text.source import Span
 
 GROUP = "coursebuild.features"
@@ -120,6 +121,9 @@ def find_clash(candidate: Feature, installed: Iterable[Feature]) -> str:
     odd = [kind.name for kind in candidate.pages if not _PAGE_NAME.fullmatch(kind.name)]
     if odd:
         return f"a page cannot be called `{odd[0]}`: use small letters, digits and `-`"
+    for rule in candidate.rules:
+        if rule.severity not in get_args(Severity):
+            return f"the severity of `{rule.name}` is neither `error` nor `warning`"
     core_rules = RULES.keys() - _names(_of_course, "rules")
     for field, core_names, message in (
         ("rules", core_rules, "there is already a rule `{}`"),
@@ -292,6 +296,13 @@ def installed_features() -> tuple[Feature, ...]:
     return _register(map(_name_failures, available))
 
 
+_RESULTS: dict[str, type] = {
+    **{"draw": Markup, "markdown": str},
+    **dict.fromkeys(("check", "check_runs", "check_models", "files", "make"), Iterable),
+}
+"""What functions of features return, by their fields."""
+
+
 def _name_failures(offer: Any, feature: str = "", field: str = "") -> Any:
     """A feature, or a part of it, whose functions say whose they are where they raise."""
     if isinstance(offer, Feature | FenceKind | PageKind | ModelPart | Exporter | Trials):
@@ -314,6 +325,12 @@ def _name_failures(offer: Any, feature: str = "", field: str = "") -> Any:
 
         with _named_failure(subject, arguments):
             result = offer(*arguments, **keywords)
+            expected = _RESULTS.get(field, object)
+            if not isinstance(result, expected):
+                got = type(result).__name__
+                raise TypeError(
+                    f"it returned a value of the type {got} instead of {expected.__name__}"
+                )
         return iterate(result) if isgenerator(result) else result
 
     return call
@@ -323,7 +340,10 @@ def _name_failures(offer: Any, feature: str = "", field: str = "") -> Any:
 def _named_failure(subject: str, arguments: Iterable[object]) -> Iterator[None]:
     """Note with an exception what has failed, and for which text; its traceback shows the note."""
     try:
-        yield
+        try:
+            yield
+        except SystemExit as error:  # the command would end here, with any status
+            raise RuntimeError("a feature cannot end a command") from error
     except Exception as error:
         places = []
         for argument in arguments:

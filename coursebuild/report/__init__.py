@@ -121,7 +121,9 @@ def to_sarif(report: Report) -> str:
     run = {
         "tool": {"driver": {"name": "coursebuild", "rules": rules}},
         "columnKind": "unicodeCodePoints",
-        "results": [_result(d, rule_names.index(d.rule)) for d in report.diagnostics],
+        "results": [
+            _result(d, rule_names.index(d.rule), report.folder) for d in report.diagnostics
+        ],
     }
     value = {
         "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
@@ -131,16 +133,16 @@ def to_sarif(report: Report) -> str:
     return json_text(value)
 
 
-def _result(d: Diagnostic, rule: int) -> dict[str, Any]:
+def _result(d: Diagnostic, rule: int, folder: str) -> dict[str, Any]:
     result: dict[str, Any] = {
         "ruleId": d.rule,
         "ruleIndex": rule,
         "level": d.severity,
         "message": {"text": _message(d)},
-        "locations": [_location(d.span)],
+        "locations": [_location(d.span, folder)],
     }
     related_locations = [
-        {**_location(note.span), "message": {"text": note.message}}
+        {**_location(note.span, folder), "message": {"text": note.message}}
         for note in d.notes
         if note.span is not None
     ]
@@ -157,7 +159,7 @@ def _result(d: Diagnostic, rule: int) -> dict[str, Any]:
         fix = {
             "description": {"text": d.help or f"write `{d.edits[0].text}`"},
             "artifactChanges": [
-                {"artifactLocation": _artifact(path), "replacements": replacements}
+                {"artifactLocation": _artifact(folder + path), "replacements": replacements}
                 for path, replacements in changes.items()
             ],
             "properties": {"safe": d.safe},
@@ -166,8 +168,9 @@ def _result(d: Diagnostic, rule: int) -> dict[str, Any]:
     return result
 
 
-def _location(span: Span) -> dict[str, Any]:
-    return {"physicalLocation": {"artifactLocation": _artifact(span.path), "region": _region(span)}}
+def _location(span: Span, folder: str) -> dict[str, Any]:
+    artifact = _artifact(folder + span.path)
+    return {"physicalLocation": {"artifactLocation": artifact, "region": _region(span)}}
 
 
 def _artifact(path: str) -> dict[str, str]:
@@ -194,7 +197,7 @@ def _message(d: Diagnostic) -> str:
 def to_annotations(report: Report) -> str:
     """One workflow command for each diagnostic; CI services show it beside the changed lines."""
     return "".join(
-        f"::{d.severity} file={_escape_property(d.span.path)},"
+        f"::{d.severity} file={_escape_property(report.folder + d.span.path)},"
         f"line={d.span.line},col={d.span.column},"
         f"endLine={d.span.end_line},endColumn={d.span.end_column},"
         f"title={_escape_property(d.rule)}::{_escape_data(_message(d))}\n"

@@ -75,6 +75,8 @@ class Report(Struct, frozen=True):
     its root; `None` where they are not known."""
     sensitivity: tuple[Sensitivity, ...] | None = None
     """Which printed digits hold; `None` where that was not measured."""
+    folder: str = ""
+    """Where the course lies in the repository, for services that know only this: `lectures/`."""
 
     @property
     def ok(self) -> bool:

@@ -101,6 +101,14 @@ def test_a_test_fails_with_the_mistakes_in_its_text(course: Folder) -> None:
     assert run(course, "--coursebuild", "-W", "error", "content", "-k", "two and page")[0] == 1
 
 
+def test_each_test_says_why_nothing_could_be_checked(course: Folder) -> None:
+    course.write("examples", "a file in the place of a folder")
+    status, printed = run(course, "--coursebuild", "content", "models", "-v")
+    assert status == 1
+    assert outcomes(printed) == dict.fromkeys(parts(course), "FAILED")
+    assert printed.count("\ncoursebuild: examples") == len(list(parts(course)))
+
+
 def test_what_is_not_chosen_does_not_run(course: Folder) -> None:
     status, printed = run(course, "--coursebuild", "content", "-k", "hello")
     assert (status, "1 passed, 5 deselected" in printed) == (0, True)

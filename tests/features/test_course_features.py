@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import pydoc
 import re
 from collections.abc import Callable
@@ -74,6 +75,9 @@ BROKEN = {
     "raise SystemExit\n": " fails at line 1: SystemExit: ",
     SHOUT.replace('"shout",\n    f', '"quiz",\n    f'): ": two features are called `quiz`",
     SHOUT.replace('Rule("shout"', 'Rule("output-drift"'): ": there is already a rule",
+    SHOUT.replace('"error"', '"Error"'): (
+        ": the severity of `shout` is neither `error` nor `warning`"
+    ),
     SHOUT.replace('name="shout",\n    f', 'name="shout",\n    check=print,\n    f'): (
         ": it would see no `shout` of the course: its block has no `summary`"
     ),
@@ -254,6 +258,16 @@ FAILURES = {
         ":3",
     ),
     "Markup(f": ("1 / 0 or Markup(f", "`draw` of the feature `shout`", ":3"),
+    "draw=lambda page, block: Markup": (
+        "draw=lambda page, block: str",
+        "`draw` of the feature `shout`",
+        ":3",
+    ),
+    "markdown=lambda writer, block: ": (
+        "markdown=lambda writer, block: exit(0) if True else ",
+        "`markdown` of the feature `shout`",
+        ":3",
+    ),
     "    rules=": (
         "    check=lambda course, documents: (1 / 0 for _ in documents),\n    rules=",
         "`check` of the feature `shout`",
@@ -263,13 +277,23 @@ FAILURES = {
 
 
 @pytest.mark.site
+def test_what_a_feature_prints_is_not_in_a_report(course: Folder) -> None:
+    course.write("features/shout.py", SHOUT + '\nprint("here")\n')
+    result = course.run("check", "--format", "json")
+    assert json.loads(result.out)["summary"]["ok"]
+    assert "here\n" in result.err
+
+
+@pytest.mark.site
 def test_a_feature_that_fails_is_named_with_the_lesson(course: Folder) -> None:
     summary = "    text: str\n\n    def summary(self):\n        return self\n"
     code = SHOUT.replace("    text: str\n", summary)
     for old, (new, subject, line) in FAILURES.items():
         assert old in code
         course.write("features/shout.py", code.replace(old, new, 1))
-        error = course.run("build").err
+        result = course.run("build")
+        assert result.status == 1
+        error = result.err
         last_lines = error[error.rindex("\nTraceback") :]
         assert f"this is {subject}" in last_lines
         assert f"for {course.lesson()}{line}\n" in last_lines, error

@@ -56,6 +56,17 @@ def test_status_and_report_tell_whether_the_course_is_right(make: Make) -> None:
         assert (result.status, result.out.partition(": ")[0]) == (1, "error[map-missing]"), command
 
 
+@pytest.mark.parametrize(("form", "key"), [("github", "file="), ("sarif", '"uri": "')])
+def test_services_get_paths_in_the_repository(
+    make: Make, monkeypatch: pytest.MonkeyPatch, form: str, key: str
+) -> None:
+    folder = make("See [a model](model:nosuch).\n")
+    assert f"{key}{folder.lesson()}" in folder.main("check", "--format", form).out
+    monkeypatch.setenv("GITHUB_WORKSPACE", str(folder.root.parent))
+    path = f"{key}{folder.root.name}/{folder.lesson()}"
+    assert path in folder.main("check", "--format", form).out
+
+
 def test_commands_one_after_the_other_leave_a_process_as_it_was(make: Make) -> None:
     """The garbage collector is set as before, and no file stays open."""
     course = make(GOOD)

@@ -24,6 +24,7 @@ What a binding that does not hold is told (`_mismatch`):
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left
 from collections.abc import Hashable, Iterable, Sequence
 from decimal import Context, Decimal
@@ -295,6 +296,7 @@ def _mismatch(
     """The diagnostic of a binding that none of these lines bears out; `before` as in `_check`."""
     bound_text = BoundText.of(binding.text)
     stray, label = bound_text.stray, ""
+    pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", binding.text)
     if not bound_text.numbers:
         message = f"`{binding.text}` is not in the output of `{path}`"
         help = "write it as it is printed, or remove `{out}`"
@@ -303,6 +305,9 @@ def _mismatch(
         help = Fix(f"remove the `{stray}`", "", stray)
     elif mismatch := _wrong_unit(binding, replace(bound_text, before="", after=""), path, lines):
         return mismatch
+    elif pointed != binding.text and BoundText.of(pointed).is_in(lines):
+        message = f"`{binding.text}` is two numbers, as outputs have a decimal point"
+        help = Fix(f"write `{pointed}`", pointed)
     else:
         label, better = _propose(bound_text, lines, list(map(PrintedLine, before)))
         message = f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown"

@@ -186,9 +186,13 @@ InterpreterPath: TypeAlias = Annotated[
 ]
 
 
+_LETTERS = str.maketrans({"æ": "ae", "œ": "oe", "ø": "o", "ł": "l", "đ": "d", "ı": "i"})
+
+
 def slug_of(text: str) -> str:
     """A name for files and addresses: lower-case words of ASCII joined by hyphens."""
-    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
+    text = text.casefold().translate(_LETTERS)  # ß is ss then
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     return "-".join(re.findall("[a-z0-9]+", plain)) or "untitled"
 
 

@@ -43,6 +43,11 @@ from coursebuild.features.arithmetic.statements import FormulaSide, Statement, r
 from coursebuild.features.arithmetic.tex import CONSTANTS, Expression, NotUnderstood
 
 _RELATION = re.compile(r"[=<>≈≤≥≠]|\\(?:approx|sim|le|ge|ne|ll|gg)")
+_COMMA = re.compile(r"([0-9]+)\{,\}([0-9]+)")
+_DECIMAL_COMMA = re.compile(r"(?<![0-9.])0\{,\}[0-9]|[0-9]\{,\}(?:[0-9]{1,2}|[0-9]{4,})(?![0-9])")
+"""A comma that parts no thousands."""
+_ARABIC = {zero + n: str(n) for zero in (0x660, 0x6F0) for n in range(10)} | {0x66B: "."}
+"""Digits and the decimal sign, as they are written in Arabic and Persian."""
 _ORDER = {"<": operator.lt, ">": operator.gt, "≤": operator.le, "≥": operator.ge, "≠": operator.ne}
 
 
@@ -53,6 +58,7 @@ def check_arithmetic(
 
     `unit`: what follows the formula in the text.
     """
+    tex = tex.translate(_ARABIC)
     if not _RELATION.search(tex) or not (symbols or re.search("[0-9]", tex)):
         return ()
     return _check_formula(tex, symbols, unit)
@@ -60,6 +66,20 @@ def check_arithmetic(
 
 @functools.lru_cache(maxsize=1024)
 def _check_formula(
+    tex: str, symbols: tuple[SymbolQuantity, ...], unit: str
+) -> tuple[FormulaComparison, ...]:
+    decimal = _COMMA.sub(r"\1.\2  ", tex)  # as long, for the places of mistakes
+    if _DECIMAL_COMMA.search(tex):
+        return _check_statements(decimal, symbols, unit)
+    comparisons = _check_statements(tex, symbols, unit)
+    if decimal != tex and any(comparison.kind == "wrong" for comparison in comparisons):
+        as_decimals = _check_statements(decimal, symbols, unit)
+        if all(comparison.kind != "wrong" for comparison in as_decimals):
+            return (FormulaComparison("unread", 0, len(tex), "`{,}` may be a decimal point"),)
+    return comparisons
+
+
+def _check_statements(
     tex: str, symbols: tuple[SymbolQuantity, ...], unit: str
 ) -> tuple[FormulaComparison, ...]:
     statements = read_statements(tex)

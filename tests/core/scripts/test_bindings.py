@@ -143,6 +143,18 @@ def test_text_next_to_the_number_narrows_the_choice() -> None:
     assert find_mistake("`E 6.1`{out}", wide_columns) is None
 
 
+def test_a_decimal_comma_is_named() -> None:
+    mistake = find_mistake("`6,64`{out}")
+    assert mistake is not None
+    assert (mistake.message.partition(",")[2], mistake.help) == (
+        "64` is two numbers, as outputs have a decimal point",
+        "write `6.64`",
+    )
+    mistake = find_mistake("`0.0138, 0.0169`{out}")
+    assert mistake is not None
+    assert "two numbers" not in mistake.message
+
+
 def test_the_nearest_output_above_counts() -> None:
     text = (
         script() + output("x 1.5\n") + "\n`1.5`{out} `2.5`{out}\n\n" + output("x 2.5\n")

@@ -61,6 +61,28 @@ def test_correct_arithmetic_passes_and_symbols_are_not_checked() -> None:
     assert failures == []
 
 
+def test_numbers_are_read_as_other_languages_write_them() -> None:
+    kinds = {
+        r"1{,}5 + 1 = 2{,}5": "holds",
+        r"1{,}5 + 1 = 2{,}6": "wrong",
+        r"\frac18 = 0{,}125": "holds",
+        r"0{,}5 + 1{,}250 = 1{,}751": "wrong",
+        r"2\pi\sqrt{1/9{,}81} \approx 2{,}006\ \mathrm s": "holds",
+        r"2\pi\sqrt{10/98.1} \approx 2{,}006": "unread",
+        r"1{,}250 + 1 = 1{,}251": "holds",
+        r"1{,}250 + 1 = 1{,}252": "wrong",
+    }
+    arabic = str.maketrans("0123456789.", "".join(map(chr, [*range(0x660, 0x66A), 0x66B])))
+    kinds |= {
+        tex.translate(arabic): kind
+        for tex, kind in (("1.5 + 1 = 2.5", "holds"), ("1 + 1 = 3", "wrong"))
+    }
+    for tex, kind in kinds.items():
+        assert [comparison.kind for comparison in check_arithmetic(tex)] == [kind], tex
+    (comparison,) = check_arithmetic("1{,}5 + 1 = 2{,}6")
+    assert comparison.start == len("1{,}5 + 1 = ")
+
+
 def test_sides_without_a_numeral_are_compared_with_each_other() -> None:
     (comparison,) = check_arithmetic(r"\sqrt{2} = \sqrt{2.01}")
     assert comparison.message == "1.414213562 and 1.417744688 are not the same"

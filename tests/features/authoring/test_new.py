@@ -67,6 +67,7 @@ def test_new_lesson_is_checked_and_built_as_it_is(make: Make) -> None:
     folder = make(FIRST, SECOND)
     for arguments, path in (
         (("1.10", 'Über "alles" \\ 50 %'), "content/lessons/1.10-uber-alles-50.md"),
+        (("1.4", "Maße in Łódź"), "content/lessons/1.4-masse-in-lodz.md"),
         (("1.3", "力学", "--slug", "lixue"), "content/lessons/1.3-lixue.md"),
         (("1.2.1", "A\tB\x7f"), "content/lessons/1.2.1-a-b.md"),
     ):
@@ -76,7 +77,7 @@ def test_new_lesson_is_checked_and_built_as_it_is(make: Make) -> None:
     result = folder.main("check")
     assert (result.status, result.out.count("warning")) == (0, 0), result.out
     ids = [line[6:-1] for line in folder.text(MAP).splitlines() if line.startswith("id = ")]
-    assert ids[1:] == ["1.1", "1.2", "1.2.1", "1.3", "1.10"]
+    assert ids[1:] == ["1.1", "1.2", "1.2.1", "1.3", "1.4", "1.10"]
 
 
 REFUSED_COMMANDS = [
@@ -95,11 +96,13 @@ REFUSED_COMMANDS = [
     ("level a/b T", f"{MAP} cannot have a level a/b: "),
     ("page There --id A/b", f"{MAP} cannot have a page A/b: "),
     ("page There", "there is already a file content/pages/there.md"),
+    ("page 力学", "`力学` makes no name for a file; choose one with `--id`"),
     ("page \udcff", "the title is not UTF-8"),
     ("lesson 1 T", f"{MAP} cannot have a lesson 1: "),
     ("lesson 1./../x T", f"{MAP} cannot have a lesson 1./../x: "),
     ("lesson 1.3 T --slug A/b", f"{MAP} cannot have a lesson 1.3: "),
     ("lesson 1.3 \udcff", "the title is not UTF-8"),
+    ("lesson 1.3 مقدمة", "`مقدمة` makes no name for a file; choose one with `--slug`"),
     ("lesson 1.7 there", "there is already a file content/lessons/1.7-there.md"),
     ("model ../x", "`../x` is not a name for a model: use letters, digits, `_` and `-`"),
     ("model there", "there is already a file models/there.xml"),

@@ -120,7 +120,7 @@ def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
             help += f"; in other levels {', '.join(f'`{id}`' for id in ids[:-1])}"
         raise UsageError("a lesson needs an id and a title", help=help)
     _check_text(title)
-    slug = arguments.slug or slug_of(title)
+    slug = arguments.slug or _name_from(title, "--slug")
     new_map = with_lesson(course, id, slug, title)
     return [
         FileChange(course.map.path, course.map.text.encode(), new_map.encode()),
@@ -145,13 +145,20 @@ def _new_level(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
 def _new_page(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     course, title = load_course(root, code="none"), arguments.title
     _check_text(title)
-    id = arguments.id or slug_of(title)
+    id = arguments.id or _name_from(title, "--id")
     path = f"content/pages/{id}.md"
     new_map = with_page(course, id, title, path)
     return [
         FileChange(course.map.path, course.map.text.encode(), new_map.encode()),
         FileChange(path, None, _LESSON.encode()),
     ]
+
+
+def _name_from(title: str, option: str) -> str:
+    slug = slug_of(title)
+    if slug == slug_of(""):
+        raise UsageError(f"`{title}` makes no name for a file", help=f"choose one with `{option}`")
+    return slug
 
 
 def _check_text(title: str) -> None:
