@@ -297,8 +297,13 @@ def installed_features() -> tuple[Feature, ...]:
 
 
 _RESULTS: dict[str, type] = {
-    **{"draw": Markup, "markdown": str},
-    **dict.fromkeys(("check", "check_runs", "check_models", "files", "make"), Iterable),
+    "draw": Markup,
+    "markdown": str,
+    "check": Iterable,
+    "check_runs": Iterable,
+    "check_models": Iterable,
+    "files": Iterable,
+    "make": Iterable,
 }
 """What functions of features return, by their fields."""
 
