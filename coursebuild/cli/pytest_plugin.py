@@ -11,8 +11,6 @@ configuration, it does nothing.
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 import warnings
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,6 +20,7 @@ from xml.etree import ElementTree
 import pytest
 
 from coursebuild.core.files.course_root import MAP, find_course_root
+from coursebuild.core.run import gate
 from coursebuild.core.text.characters import without_commands
 
 _PAGE, _MAP, _MODEL = "page", "map", "model"
@@ -106,14 +105,14 @@ class CourseTests:
 
     def _check(self, names: Iterable[str]) -> dict[str, list[tuple[str, str]]]:
         check = ("-m", "coursebuild", "-C", str(self.root), "check", "--format", "junit")
-        command = [sys.executable, *check, *names]
-        result = subprocess.run(command, capture_output=True, encoding="utf-8")
-        if not result.stdout:  # no test has a result, and all say why
-            message = result.stderr
+        command = gate.python_command(*check, *names)
+        result = gate.finish(command, gate.environment(*gate.TOOL))
+        if not result.output:  # no test has a result, and all say why
+            message = result.errors.decode("utf-8", "replace")
             return defaultdict(lambda: [("failure", message)])
         owners = {name: path for path, tests in self.tests.items() for name in tests}
         results: dict[str, list[tuple[str, str]]] = defaultdict(list)
-        for case in ElementTree.fromstring(result.stdout).iter("testcase"):
+        for case in ElementTree.fromstring(result.output).iter("testcase"):
             name = case.get("name", "")
             for part in case:
                 text = part.text or f"{name}: {part.get('message')}"

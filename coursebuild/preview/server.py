@@ -22,10 +22,8 @@ import os
 import re
 import secrets
 import shlex
-import shutil
 import socket
 import socketserver
-import subprocess
 import threading
 import time
 from collections.abc import Mapping
@@ -39,6 +37,7 @@ from urllib.parse import parse_qs, urlsplit
 import msgspec
 
 from coursebuild.core.files.errors import reason
+from coursebuild.core.run import gate
 from coursebuild.preview.answers import PREFIX, TEXT, Access, Answers, digest
 from coursebuild.preview.messages import accept, page_news
 from coursebuild.preview.session import Session
@@ -332,24 +331,21 @@ def open_in_editor(session: Session, place: str) -> str:
         part.format(file=file, line=span.line, column=span.column)
         for part in _EDITORS[_name(words[0])].split()
     ]
+    variables = gate.environment(*gate.DESKTOP)
     try:
-        null = subprocess.DEVNULL
-        process = subprocess.Popen(
-            [*words, *arguments], stdin=null, stdout=null, stderr=null, start_new_session=True
-        )
-        status = process.wait(_PATIENCE)
+        status = gate.start([*words, *arguments], variables, bound=False).wait(_PATIENCE)
     except OSError as error:
         return f"{words[0]} cannot be started: {reason(error)}"
-    except subprocess.TimeoutExpired:  # it is open
+    except gate.StillRunningError:  # it is open
         return ""
     return f"{words[0]} ended with status {status}" if status else ""
 
 
 def _find_editor() -> list[str]:
     for command in (os.environ.get("VISUAL"), os.environ.get("EDITOR"), *_EDITORS):
-        words = shlex.split(command or "")
-        if words and _name(words[0]) in _EDITORS and shutil.which(words[0]):
-            return words
+        program, *options = shlex.split(command or "") or [""]
+        if _name(program) in _EDITORS and (place := gate.find_program(program)):
+            return [place, *options]
     return []
 
 

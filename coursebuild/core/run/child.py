@@ -13,16 +13,15 @@ import os
 import resource
 import selectors
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 from typing import Any, Self
 
-from coursebuild.core.engine.lifetime import bound_command
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model import Limits
+from coursebuild.core.run import gate
 from coursebuild.core.run.script_environment import clean_environment
 
 LIMITS = Limits()
@@ -48,7 +47,7 @@ class JsonChild:
         self._seconds = self._limit = seconds
         self._resources = contextlib.ExitStack()
         self._folder = ""
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: gate.Process | None = None
         self._interrupted = False
         self.timed_out = False
         """Whether the last request that was not answered took too long."""
@@ -101,7 +100,7 @@ class JsonChild:
     def death(self) -> str:
         """What ended the child, after it gave no answer."""
         assert self._process is not None
-        with contextlib.suppress(subprocess.TimeoutExpired):
+        with contextlib.suppress(gate.StillRunningError):
             self._process.wait(1.0)
         status = self._process.returncode
         self.stop()
@@ -113,17 +112,16 @@ class JsonChild:
             return f"crashed ({signal.Signals(-status).name})"
         return f"ended with status {status}"
 
-    def _start(self) -> subprocess.Popen[bytes]:
+    def _start(self) -> gate.Process:
         self._folder = self._folder or self._resources.enter_context(temporary_folder())
         with tempfile.TemporaryFile() as errors:
-            self._process = process = subprocess.Popen(
-                bound_command([self._python, "-E", "-P", self._script]),
-                cwd=self._folder,
-                env=clean_environment(os.environ),
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
+            self._process = process = gate.start(
+                gate.python_command(self._script, program=self._python),
+                clean_environment(os.environ),
+                folder=self._folder,
+                stdin=gate.PIPE,
+                stdout=gate.PIPE,
                 stderr=errors,
-                start_new_session=True,
             )
             if self._read_line(_START) != b"ready":
                 self.stop()

@@ -24,8 +24,6 @@ import os
 import platform
 import re
 import shutil
-import signal
-import subprocess
 import sys
 import tempfile
 import venv
@@ -36,12 +34,12 @@ from pathlib import Path
 import msgspec
 
 from coursebuild.core.engine.digests import file_state
-from coursebuild.core.engine.lifetime import bound_command
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import folder_lock
 from coursebuild.core.files.trust import TEMPORARY, state_folder
 from coursebuild.core.model.results import OutputFile
+from coursebuild.core.run import gate
 from coursebuild.core.run.script_environment import (
     Interpreter,
     engine_version,
@@ -250,12 +248,22 @@ def _has_pip() -> bool:
 def _install_command(python: str) -> list[str]:
     plain = ["--no-deps", "--only-binary", ":all:"]
     if _has_pip():
-        pip = [sys.executable, "-m", "pip", "--python", python, "install"]
+        pip = gate.python_command("-m", "pip", "--python", python, "install")
         return [*pip, "--no-input", "--progress-bar", "off", *plain]
-    if uv := shutil.which("uv"):
-        return [uv, "pip", "install", "--python", python, "--no-progress", *plain]
+    if uv := gate.find_program("uv"):
+        return [uv, "pip", "install", *_uv_settings(), "--python", python, "--no-progress", *plain]
     message = "this Python has no pip, and there is no uv, so nothing can be installed"
     raise EffectError(message, help="run `python -m ensurepip`")
+
+
+def _uv_settings() -> tuple[str, ...]:
+    """Let uv obey the user's settings, or the machine's, and none in a folder that it works in."""
+    home = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")  # noqa: PTH111
+    places = (f"{home}/uv/uv.toml", "/etc/uv/uv.toml")
+    for file in map(Path, (os.environ.get("UV_CONFIG_FILE", ""), *places)):
+        if file.is_absolute() and file.is_file():
+            return "--config-file", str(file)
+    return ("--no-config",)
 
 
 def _create_environment(prefix: Path, engine: str) -> None:
@@ -282,7 +290,7 @@ def _create_environment(prefix: Path, engine: str) -> None:
             requirements = needs - installed
         lines = (f"import site; site.addsitedir({folder!r})\n" for folder in site_folders())
         (_packages(new) / "packages_of_here.pth").write_text("".join(lines))
-        status, output = _run([python, "-E", "-P", "-c", f"import {_ENGINE}"])
+        status, output = _run(gate.python_command("-c", f"import {_ENGINE}", program=python))
         if status:
             message = "cannot be imported together with the other installed packages"
             last_line = ["no reason", *_lines(output)][-1]
@@ -313,26 +321,11 @@ def _lines(output: str) -> list[str]:
 
 
 def _run(command: Sequence[str]) -> tuple[int, str]:
-    """Run a program: its status and output; an interrupt ends it with its children."""
-    # Variables for this process's Python, such as warnings as errors, would disturb an installer's.
-    excluded = ("PYTHON", "PIP_TARGET", "PIP_PREFIX", "PIP_PYTHON")
-    outer = {name: value for name, value in os.environ.items() if not name.startswith(excluded)}
+    """Run a program: its status and output."""
+    # What says where to install would disturb an installer that is told so.
+    places = ("PIP_TARGET", "PIP_PREFIX", "PIP_PYTHON", "UV_PYTHON", "UV_SYSTEM_PYTHON")
     ours = {"PIP_USER": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1", "LC_ALL": "C.UTF-8"}
-    with subprocess.Popen(
-        bound_command(command),
-        env={"PIP_RETRIES": "1", **outer, **ours},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        encoding="utf-8",
-        errors="backslashreplace",
-        start_new_session=True,
-    ) as process:
-        try:
-            output, _ = process.communicate()
-        except BaseException:
-            with contextlib.suppress(OSError):
-                os.killpg(process.pid, signal.SIGKILL)
-            raise
-    return process.returncode, output
+    variables = {"PIP_RETRIES": "1", **gate.environment(*gate.INSTALLERS), **ours}
+    variables = {name: value for name, value in variables.items() if name not in places}
+    done = gate.finish(command, variables, stderr=gate.TO_OUTPUT)
+    return done.status, done.output.decode("utf-8", "backslashreplace")

@@ -20,8 +20,6 @@ from __future__ import annotations
 import contextlib
 import os
 import platform
-import shutil
-import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -30,6 +28,7 @@ from msgspec import Struct
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob, Trace
+from coursebuild.core.run import gate
 from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.script_environment import Interpreter, library_folder
 from coursebuild.core.run.script_worker import PROCESSES, SUPERVISOR_MEMORY, SandboxWatch
@@ -91,7 +90,7 @@ def find_sandbox(root: Path) -> Sandbox:
 def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[SandboxPart, ...]]:
     """The sandbox of this machine, and its parts; none, and those up to the first that lacks."""
     bubblewrap, system_call_filter = "Bubblewrap", "a filter of system calls"
-    program, machine = shutil.which("bwrap"), platform.machine()
+    program, machine = gate.find_program("bwrap"), platform.machine()
     if program is None:
         problem = "needs Bubblewrap, but there is no program `bwrap`"
         help = "install it, for example with `apt-get install bubblewrap`"
@@ -115,17 +114,18 @@ def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[SandboxPart, ...]
 def _find_scope() -> tuple[str, ...]:
     """The command that starts another in a control group, where systemd can make one."""
     unified, systemd = Path("/sys/fs/cgroup/cgroup.controllers"), Path("/run/systemd/system")
-    program = shutil.which("systemd-run")
+    program = gate.find_program("systemd-run")
     if program is None or not systemd.is_dir() or not unified.exists():
         return ()
     manager = "--system" if os.geteuid() == 0 else "--user"
     limit = f"--property=TasksMax={16 * PROCESSES}"
     scope = (program, manager, "--scope", "--quiet", "--collect", limit)
     trial = [*scope, "--property=MemoryMax=1G", "--", "true"]
-    with contextlib.suppress(OSError, subprocess.SubprocessError):
-        subprocess.run(trial, capture_output=True, check=True, timeout=10.0)
-        return scope
-    return ()
+    try:
+        trial_run = gate.finish(trial, gate.environment("DBUS_SESSION_BUS_ADDRESS"), seconds=10.0)
+    except OSError:  # also where it takes too long
+        return ()
+    return () if trial_run.status else scope
 
 
 def _try_sandbox(sandbox: Sandbox, root: Path) -> str:
@@ -133,11 +133,9 @@ def _try_sandbox(sandbox: Sandbox, root: Path) -> str:
     trial = [sys.executable, "-I", "-S", "-c", _TRIAL]
     places = visible_places(str(root), library_folder(), None)
     command, environment = sandbox.command(trial, {}, places)
-    pipe = subprocess.PIPE
+    pipe = gate.PIPE
     try:
-        process = subprocess.Popen(
-            command, env=environment, stdin=pipe, stdout=pipe, stderr=pipe, text=True
-        )
+        process = gate.start(command, environment, stdin=pipe, stdout=pipe, stderr=pipe)
     except OSError as error:
         return f"does not work here, Bubblewrap says: {error}"
     with process:
@@ -148,10 +146,10 @@ def _try_sandbox(sandbox: Sandbox, root: Path) -> str:
         watch.close()
         _, errors = process.communicate()
     if not state:
-        output = errors.strip().removeprefix("bwrap: ")
+        output = errors.decode("utf-8", "replace").strip().removeprefix("bwrap: ")
         return f"does not work here, Bubblewrap says: {output or 'nothing'}"
     for (fault, value), actual in zip(_FAULTS, state, strict=True):
-        if actual != value:
+        if actual != value.encode():
             return f"does not work here: {fault}"
     unseen = "does not work here: its memory and processes cannot be seen in /proc"
     return "" if is_watched else unseen

@@ -12,7 +12,6 @@ import json
 import os
 import platform
 import re
-import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -25,6 +24,7 @@ from coursebuild.core.files.course_root import DECISIVE, read_regular
 from coursebuild.core.files.errors import EffectError, lacking, reason
 from coursebuild.core.model import Course, NamedPath
 from coursebuild.core.model.results import Machine
+from coursebuild.core.run import gate
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 
 _SAYS_NOTHING = tuple("PATH HOME USER LOGNAME VIRTUAL_ENV CONDA_PREFIX".split())
@@ -284,12 +284,12 @@ def one_processor() -> Iterator[None]:
 def cpu_name() -> str:
     """What the processor calls itself; empty where it does not say."""
     if platform.system() == "Darwin":
-        command = ["sysctl", "-n", "machdep.cpu.brand_string"]
-        with contextlib.suppress(OSError, subprocess.SubprocessError):
-            process = subprocess.run(command, capture_output=True, timeout=10, check=False)
-            return _tidy(process.stdout.decode("utf-8", "replace"))
+        command = ["/usr/sbin/sysctl", "-n", "machdep.cpu.brand_string"]
+        with contextlib.suppress(OSError):
+            output = gate.finish(command, gate.environment(), seconds=10.0).output
+            return _tidy(output.decode("utf-8", "replace"))
         return ""
-    return find_cpu_name(_read(_INFO)) or _tidy(platform.processor())
+    return find_cpu_name(_read(_INFO)) or platform.machine()  # `processor` would start `uname`
 
 
 def find_cpu_name(text: str) -> str:

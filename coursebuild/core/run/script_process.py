@@ -86,12 +86,16 @@ class PreloadedPackages:
                 continue
             before = set(sys.modules)
             try:
+                # MuJoCo's import starts Python, perhaps in the course's folder (see `gate`).
+                os.environ["PYTHONSAFEPATH"] = "1"
                 for name in _IMPORTS[package]:
                     importlib.import_module(name)
             except ModuleNotFoundError as error:  # a script that asks for it says so
                 self.is_broken = self.is_broken or error.name != package
             except BaseException:
                 self.is_broken = True
+            finally:
+                del os.environ["PYTHONSAFEPATH"]
             new = [
                 n for n in sys.modules if n not in before and n.partition(".")[0] not in excluded
             ]

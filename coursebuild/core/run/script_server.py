@@ -26,6 +26,7 @@ from msgspec.structs import replace
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
+from coursebuild.core.run.gate import Enclose
 from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.run_record import read_records
 from coursebuild.core.run.sandbox import (
@@ -42,7 +43,7 @@ from coursebuild.core.run.script_environment import (
     wanted_packages,
 )
 from coursebuild.core.run.script_process import Job
-from coursebuild.core.run.script_worker import Enclose, Worker
+from coursebuild.core.run.script_worker import Worker
 from coursebuild.core.run.watching import STDERR_KEPT
 
 OnStart: TypeAlias = Callable[[str], object]

@@ -13,20 +13,16 @@ import contextlib
 import os
 import re
 import signal
-import subprocess
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from multiprocessing.connection import wait
-from typing import TypeAlias
 
 import msgspec
 from msgspec import Struct
 
 from coursebuild.core.model.results import Outcome
-from coursebuild.core.run import supervisor
+from coursebuild.core.run import gate, supervisor
 
-Enclose: TypeAlias = Callable[[Sequence[str], Mapping[str, str]], tuple[list[str], dict[str, str]]]
-"""Makes, of a command and its environment, those that run it in a sandbox."""
 _MAX_REPORT_SIZE = 256 << 20
 """Bytes that a report may have."""
 _START = 60.0
@@ -60,7 +56,12 @@ class Worker:
     """
 
     def __init__(
-        self, environment: Mapping[str, str], python: str, *, fork: bool, enclose: Enclose | None
+        self,
+        environment: Mapping[str, str],
+        python: str,
+        *,
+        fork: bool,
+        enclose: gate.Enclose | None,
     ) -> None:
         self.environment = environment
         self.job: int | None = None
@@ -74,17 +75,15 @@ class Worker:
         self.reports, report_writer = os.pipe()
         self.jobs: int | None = job_writer
         command = [python, supervisor.PROGRAM, str(job_reader), str(report_writer), str(int(fork))]
-        if enclose is not None:
-            command, environment = enclose(command, environment)
         try:
-            self._process = subprocess.Popen(
+            self._process = gate.start(
                 command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
+                environment,
+                stdout=gate.PIPE,
+                stderr=gate.PIPE,
                 pass_fds=(job_reader, report_writer),
-                env=dict(environment),
-                start_new_session=True,  # Ctrl-C is for this process, which then ends it
+                bound=False,  # it sees its input close, and then ends what it runs
+                enclose=enclose,
             )
         except BaseException:
             os.close(job_writer)

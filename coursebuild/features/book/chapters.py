@@ -13,14 +13,10 @@ the same bytes.
 from __future__ import annotations
 
 import base64
-import contextlib
 import functools
 import os
 import posixpath
 import re
-import shutil
-import signal
-import subprocess
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from html import unescape
@@ -37,6 +33,7 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import ExportContext
 from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, parse_html, to_html
 from coursebuild.core.pages.renderer import direction
+from coursebuild.core.run import gate
 from coursebuild.core.text.characters import visible
 
 _DROPPED_ELEMENTS = frozenset(
@@ -317,7 +314,7 @@ def pdf_file(context: ExportContext) -> OutputFile:
     """
     choice = os.environ.get(_BROWSER_PATH, "")
     candidates = [choice] if choice else [*_BROWSERS, _MAC_BROWSER]
-    program = next(filter(None, map(shutil.which, candidates)), None)
+    program = next(filter(None, map(gate.find_program, candidates)), None)
     if program is None:
         message = f"`{choice}`, which {_BROWSER_PATH} names, is not a program" if choice else ""
         raise EffectError(
@@ -356,36 +353,19 @@ def _print(program: str, folder: Path, html: str) -> bytes:
     options = [*_BROWSER_OPTIONS, f"--user-data-dir={folder / 'profile'}", f"--print-to-pdf={pdf}"]
     if os.geteuid() == 0:  # Chromium refuses to start otherwise
         options.append("--no-sandbox")
-    names = ("PATH", "LANG", "LC_ALL", "LD_LIBRARY_PATH")
-    environment = {name: os.environ[name] for name in names if name in os.environ}
-    environment |= {"HOME": str(folder), "TMPDIR": str(folder), "TZ": "UTC"}
+    variables = gate.environment(HOME=str(folder), TMPDIR=str(folder), TZ="UTC")
     try:
-        process = subprocess.Popen(
-            [program, *options, page.as_uri()],
-            env=environment,
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            start_new_session=True,
-        )
-    except OSError as error:
-        raise EffectError(f"{program} cannot be started: {reason(error)}") from None
-    try:
-        _, errors = process.communicate(timeout=_SECONDS)
-    except subprocess.TimeoutExpired:
+        printing = gate.finish([program, *options, page.as_uri()], variables, seconds=_SECONDS)
+    except TimeoutError:
         raise EffectError(
             f"{program} has not printed the course in {_SECONDS} s",
             help="print the page of `coursebuild export page` in parts",
         ) from None
-    finally:
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+    except OSError as error:
+        raise EffectError(f"{program} cannot be started: {reason(error)}") from None
     data = pdf.read_bytes() if pdf.is_file() else b""
     if not data.startswith(b"%PDF-"):
-        lines = errors.decode(errors="replace").strip().splitlines()
-        cause = lines[-1][:300] if lines else f"its status is {process.returncode}"
+        cause = printing.last_line()[:300] or f"its status is {printing.status}"
         raise EffectError(
             f"{program} did not print the course: {cause}",
             help="where its sandbox cannot start, as in some containers, print the page of "

@@ -7,8 +7,7 @@ import contextlib
 import functools
 import io
 import json
-import subprocess
-import tarfile
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from html import escape
 from itertools import zip_longest
@@ -29,6 +28,7 @@ from coursebuild.core.pages.html_xml import elements_with
 from coursebuild.core.pages.marks import code_span, escape_text, fence, table
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import feature_trials
+from coursebuild.core.run import gate
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import text_diff
 from coursebuild.core.scripts.extract import extract
@@ -337,20 +337,63 @@ def _open_base(root: Path, name: str) -> Iterator[tuple[str, Path]]:
     if (Path(name) / MAP).is_file():
         yield f"`{name}`", Path(name).resolve()
         return
-    commit = _git(root, "rev-parse", "--verify", "--quiet", "--end-of-options", name + "^{commit}")
+    git = _Git(root)
+    commit = git.ask("rev-parse", "--verify", "--quiet", "--end-of-options", name + "^{commit}")
     if not commit:
         raise UsageError(f"`{name}` is neither a folder with a course nor a Git revision here")
-    since = (_git(root, "merge-base", commit.decode().strip(), "HEAD") or commit).decode().strip()
+    since = git.ask("merge-base", commit.decode().strip(), "HEAD") or commit
+    revision = since.decode().strip()
     with temporary_folder() as folder:
-        with tarfile.open(fileobj=io.BytesIO(_git(root, "archive", since))) as archive:
-            archive.extractall(folder, filter="data")
-        yield f"`{name}` ({since[:7]})", Path(folder).resolve()
+        git.copy_tree(revision, Path(folder))
+        yield f"`{name}` ({revision[:7]})", Path(folder).resolve()
 
 
-def _git(root: Path, *arguments: str) -> bytes:
-    """Return what git prints; nothing if it fails."""
-    try:
-        process = subprocess.run(["git", *arguments], cwd=root, capture_output=True)
-    except OSError as error:
-        raise EffectError(f"git cannot be run: {reason(error)}") from None
-    return process.stdout if process.returncode == 0 else b""
+class _Git:
+    """Reads objects of a repository.
+
+    What its configuration could run has no part in that: no filter, hook, pager or transport.
+    """
+
+    def __init__(self, root: Path) -> None:
+        program = gate.find_program("git")
+        if program is None:
+            raise EffectError("git cannot be run: there is no such program")
+        self._command = [program, "--no-pager", "-c", "core.fsmonitor=false", "-C", str(root)]
+
+    def ask(self, *arguments: str, stdin: bytes = b"") -> bytes:
+        """What git prints; nothing if it fails."""
+        # A repository that holds only a part of its objects would fetch the others.
+        alone = {"GIT_NO_LAZY_FETCH": "1", "GIT_ALLOW_PROTOCOL": "none", "GIT_OPTIONAL_LOCKS": "0"}
+        environment = gate.environment(**alone)
+        try:
+            answer = gate.finish([*self._command, *arguments], environment, stdin=stdin)
+        except OSError as error:
+            raise EffectError(f"git cannot be run: {reason(error)}") from None
+        return answer.output if answer.status == 0 else b""
+
+    def copy_tree(self, revision: str, folder: Path) -> None:
+        """Write the files of a revision, of the course's folder alone, into a folder."""
+        wanted = []
+        for entry in self.ask("ls-tree", "-r", "-z", revision).split(b"\0")[:-1]:
+            head, _, name = entry.partition(b"\t")
+            mode, kind, digest = head.split()
+            path = os.fsdecode(name)
+            if kind == b"blob" and not {"", ".", "..", ".git"} & {*path.split("/")}:
+                wanted.append((mode == b"120000", path, digest))
+        wanted.sort()  # links come last, so that no file is written through one
+        names = b"".join(b"%s\n" % digest for *_, digest in wanted)
+        contents = io.BytesIO(self.ask("cat-file", "--batch", stdin=names))
+        try:
+            for is_link, path, _ in wanted:
+                *_, size = contents.readline().split()
+                data = contents.read(int(size) + 1)[:-1]
+                target = folder / path
+                target.parent.mkdir(parents=True, exist_ok=True)
+                if not target.parent.resolve().is_relative_to(folder.resolve()):
+                    continue  # no repository holds that of itself
+                if is_link:
+                    target.symlink_to(os.fsdecode(data))
+                else:
+                    target.write_bytes(data)
+        except OSError as error:
+            raise EffectError(f"{revision[:7]} cannot be copied: {reason(error)}") from None

@@ -10,8 +10,6 @@ import contextlib
 import os
 import select
 import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +17,7 @@ from typing import Any
 
 from coursebuild import __version__
 from coursebuild.core.engine.tool import code_digest
+from coursebuild.core.run import gate
 from coursebuild.core.run.script_environment import conditions, engine_version, package_version
 from coursebuild_cluster.child import frame_message, read_message
 from coursebuild_cluster.course_copy import BlobStore
@@ -89,10 +88,16 @@ class _Child:
 
     def __init__(self, folder: Path) -> None:
         module = "coursebuild_cluster.child"
-        command = [sys.executable, "-P", "-m", module, str(folder), str(os.getpid())]
-        pipe = subprocess.PIPE
+        command = gate.python_command("-m", module, str(folder), str(os.getpid()))
         # A session of its own: Ctrl-C in the terminal of a worker is for the worker.
-        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, start_new_session=True)
+        self._process = gate.start(
+            command,
+            gate.environment(*gate.TOOL),
+            stdin=gate.PIPE,
+            stdout=gate.PIPE,
+            stderr=gate.OWN,
+            bound=False,
+        )
 
     def ask(self, request: bytes, is_unwanted: Callable[[], bool]) -> bytes | None:
         """The answer to a request; `None` where the process died or nobody waits for it."""
@@ -114,7 +119,7 @@ class _Child:
         self._process.terminate()
         try:
             self._process.wait(_GRACE)
-        except subprocess.TimeoutExpired:
+        except gate.StillRunningError:
             self._process.kill()
             self._process.wait()
         for stream in (self._process.stdin, self._process.stdout):

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import os
 import re
+import subprocess
 import tomllib
+import venv
 from pathlib import Path
 
 import pytest
 
 from coursebuild import __version__
+from coursebuild.core.run.packages import site_folders
 from support.scratch_course import ROOT, Folder
 
 REPORT = """\
@@ -178,12 +181,23 @@ def test_doctor_says_what_a_sandbox_lacks(tmp_path: Path) -> None:
 def test_doctor_fails_where_a_course_cannot_be_built(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     folder.tmp.mkdir()
-    folder.write("broken/mujoco/__init__.py", "raise ImportError('no library')\n")
-    result = folder.run("doctor", env={"PYTHONPATH": f"{folder.root}/broken:{ROOT}"})
-    assert (result.status, result.err) == (1, "")
-    assert re.search(r"^broken   MuJoCo [\d.]+: ImportError: no library$", result.out, re.MULTILINE)
-    assert (
-        "\n         help: install coursebuild again, into an environment of its own\n" in result.out
+    # An environment with the packages of this one, in which MuJoCo is broken
+    venv.create(folder.root / "broken", symlinks=True)
+    (packages,) = (folder.root / "broken/lib").glob("python3.*/site-packages")
+    (packages / "mujoco").mkdir()
+    (packages / "mujoco/__init__.py").write_text("raise ImportError('no library')\n")
+    (packages / "others.pth").write_text("\n".join(map(str, [*site_folders(), ROOT])))
+    result = subprocess.run(
+        [folder.root / "broken/bin/python", "-m", "coursebuild", "doctor"],
+        cwd=folder.root,
+        env=folder.environment(),
+        capture_output=True,
+        text=True,
     )
+    assert (result.returncode, result.stderr) == (1, "")
+    probe = r"^broken   MuJoCo [\d.]+: ImportError: no library$"
+    assert re.search(probe, result.stdout, re.MULTILINE)
+    help = "\n         help: install coursebuild again, into an environment of its own\n"
+    assert help in result.stdout
     result = folder.main("doctor", "-C", "no/such")
     assert (result.status, result.err) == (2, "coursebuild: there is no folder no/such\n")

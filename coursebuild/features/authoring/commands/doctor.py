@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -24,6 +23,7 @@ from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import try_lock
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.files.trust import FOLDER, find_store, store_key
+from coursebuild.core.run import gate
 from coursebuild.core.run.packages import environment_prefix
 from coursebuild.core.run.sandbox import examine_sandbox
 from coursebuild.core.run.script_environment import engine_version, python_version
@@ -197,16 +197,11 @@ def _sandbox(folder: Path) -> Iterator[Probe]:
 
 
 def _try_code(code: str, **environment: str) -> str:
+    variables = gate.environment(*gate.DESKTOP, **environment)
     try:
-        process = subprocess.run(
-            [sys.executable, "-c", code],
-            env=os.environ | environment,
-            capture_output=True,
-            timeout=_SECONDS,
-        )
-    except subprocess.TimeoutExpired:
-        return f"it takes longer than {_SECONDS} s"
-    lines = process.stderr.decode("utf-8", "replace").strip().splitlines()
-    if process.returncode == 0:
+        trial = gate.finish(gate.python_command("-c", code), variables, seconds=_SECONDS)
+    except TimeoutError as error:
+        return str(error)
+    if trial.status == 0:
         return ""
-    return lines[-1] if lines else f"the process ended with status {process.returncode}"
+    return trial.last_line() or f"the process ended with status {trial.status}"

@@ -6,8 +6,6 @@ import argparse
 import os
 import re
 import shlex
-import shutil
-import subprocess
 from pathlib import Path
 
 from coursebuild import __version__
@@ -15,6 +13,7 @@ from coursebuild.cli.output import CLEAN, USAGE, fail, write
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.resources import locked_requirements
 from coursebuild.core.files.write import FileChange, change_files, undo_changes
+from coursebuild.core.run import gate
 from coursebuild.core.syntax.course_schema import json_schema
 from coursebuild.pipeline.options import Progress, check_path
 from coursebuild.report.values import plural
@@ -89,14 +88,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _make_repository(root: Path) -> bool:
     """Make a Git repository of the course, where there is Git, and no repository around it."""
-    git = shutil.which("git")
+    git = gate.find_program("git")
     if git is None or any((folder / ".git").exists() for folder in (root, *root.parents)):
         return False
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     command = [git, "-c", "init.defaultBranch=main", "init", "--quiet", str(root)]
-    process = subprocess.run(
-        command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True
-    )
-    if process.returncode:
-        Progress().say(f"no Git repository was made: {process.stderr.strip()}")
-    return process.returncode == 0
+    made = gate.finish(command, gate.environment())
+    if made.status:
+        errors = made.errors.decode("utf-8", "replace").strip()
+        Progress().say(f"no Git repository was made: {errors}")
+    return made.status == 0
