@@ -28,6 +28,9 @@ def main(arguments: list[str] | tuple[str, ...] | None = None) -> int:
             reconfigure(encoding="utf-8", errors="replace")
     if sys.platform == "win32":
         return say(USAGE, "coursebuild runs on Linux and macOS; on Windows, install it in WSL")
+    if alone:
+        # Of what libraries start, as Dask does, no Python looks for modules in the course either.
+        os.environ["PYTHONSAFEPATH"] = "1"
     try:
         from coursebuild.cli.unchanged import previous_output, split_directory
 

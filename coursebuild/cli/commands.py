@@ -18,6 +18,7 @@ import importlib
 import re
 import resource
 import signal
+import sys
 import threading
 from typing import TYPE_CHECKING, NoReturn
 
@@ -96,7 +97,7 @@ def run(directory: str | None, words: list[str], *, alone: bool) -> int:
             if limit < _FILES_NEEDED:
                 text = f"only {limit} files may be open at a time, and {_FILES_NEEDED} are needed"
                 return fail(FAILURE, text, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
-            return _choose_command(directory, words)
+            return _choose_command(directory, words, alone=alone)
         except UsageError as error:
             return fail(USAGE, str(error))
         except EffectError as error:
@@ -119,7 +120,7 @@ def run(directory: str | None, words: list[str], *, alone: bool) -> int:
         return say(128 + number, _SIGNALS[number])
 
 
-def _choose_command(directory: str | None, words: list[str]) -> int:
+def _choose_command(directory: str | None, words: list[str], *, alone: bool) -> int:
     match words:
         case []:
             return say(USAGE, _overview().rstrip())
@@ -153,10 +154,23 @@ def _choose_command(directory: str | None, words: list[str]) -> int:
             or "`coursebuild help` lists them"
         )
         raise UsageError(f"there is no command `{name}`", help=help)
+    if alone:
+        leave_to_apart(command)
     with contextlib.ExitStack() as resources:  # what has been started by the arguments ends here
-        namespace = argparse.Namespace(root=directory, words=tuple(words), resources=resources)
+        namespace = argparse.Namespace(
+            root=directory, words=tuple(words), resources=resources, alone=alone
+        )
         arguments = parser_of(command).parse_args(rest, namespace)
         return int(importlib.import_module(command.module).run(arguments))
+
+
+def leave_to_apart(command: Command) -> None:
+    """Let `apart` take the place of this process, before a command is imported that computes."""
+    if command.computes and "mujoco" not in sys.modules:
+        from coursebuild.core.run import gate
+
+        process = gate.module_command("coursebuild.cli.apart", *sys.argv[1:])
+        gate.become(process, gate.environment(*gate.TOOL, *gate.COMPUTING))
 
 
 def known_commands(*, installed: bool = True) -> dict[str, Command]:

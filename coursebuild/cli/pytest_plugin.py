@@ -104,8 +104,8 @@ class CourseTests:
         return self._results[test]
 
     def _check(self, names: Iterable[str]) -> dict[str, list[tuple[str, str]]]:
-        check = ("-m", "coursebuild", "-C", str(self.root), "check", "--format", "junit")
-        command = gate.python_command(*check, *names)
+        check = ("-C", str(self.root), "check", "--format", "junit")
+        command = gate.module_command("coursebuild", *check, *names)
         result = gate.finish(command, gate.environment(*gate.TOOL))
         if not result.output:  # no test has a result, and all say why
             message = result.errors.decode("utf-8", "replace")

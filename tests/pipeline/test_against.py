@@ -312,6 +312,7 @@ UV = """\
 import os, sys
 pip, install, option, target, progress, *words = sys.argv[1:]
 assert [pip, install, option, progress] == ["pip", "install", "--python", "--no-progress"]
+words.remove("--no-config")
 os.execv(sys.executable, [sys.executable, "-m", pip, option, target, install, *words])
 """
 """A stand-in that installs as uv would."""

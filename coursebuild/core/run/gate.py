@@ -21,6 +21,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import functools
+import importlib.util
 import os
 import shutil
 import signal
@@ -62,12 +63,23 @@ TERM_PROGRAM BROWSER WSL_* WSLENV KDE_* GNOME_* NVIM EMACS*
 """Where the user's windows are."""
 TOOL = ("COURSEBUILD_*", "CI", "GITHUB_*", *NETWORK)
 """What another command of this tool obeys."""
+COMPUTING = ("OMP_*", "OPENBLAS_*", "MKL_*", "MUJOCO_*", "JAX_*", "XLA_*", "CUDA_*", "WARP_*")
+"""How many threads and which devices compute."""
 _COMMON = (
     *"PATH HOME USER LOGNAME SHELL TMPDIR LANG LANGUAGE LC_* TZ TERM COLORTERM".split(),
     *"NO_COLOR FORCE_COLOR COLUMNS LINES XDG_*".split(),
     *DECISIVE,
 )
 """The user, the language, the terminal, and where programs and libraries are."""
+
+
+_RUN_MODULE = """
+import os, runpy, sys
+places, module = sys.argv[1:3]
+sys.path[:0] = [place for place in places.split(os.pathsep) if place not in sys.path]
+del sys.argv[1:3]
+runpy.run_module(module, run_name="__main__", alter_sys=True)
+"""
 
 
 class Completed(Struct, frozen=True):
@@ -115,6 +127,14 @@ def python_command(*arguments: str, program: str = sys.executable) -> list[str]:
     A file that is run does not bring its folder along.
     """
     return [program, "-E", "-P", *arguments]
+
+
+def module_command(module: str, *arguments: str) -> list[str]:
+    """The command that runs a module of a package, found where this process has it from."""
+    packages = ("coursebuild", module.partition(".")[0])
+    files = (importlib.util.find_spec(package) for package in packages)
+    places = {str(Path(spec.origin).parents[1]) for spec in files if spec and spec.origin}
+    return python_command("-c", _RUN_MODULE, os.pathsep.join(sorted(places)), module, *arguments)
 
 
 def start(

@@ -251,7 +251,7 @@ def _install_command(python: str) -> list[str]:
         pip = gate.python_command("-m", "pip", "--python", python, "install")
         return [*pip, "--no-input", "--progress-bar", "off", *plain]
     if uv := gate.find_program("uv"):
-        return [uv, "pip", "install", *_uv_settings(), "--python", python, "--no-progress", *plain]
+        return [uv, "pip", "install", "--python", python, "--no-progress", *plain, *_uv_settings()]
     message = "this Python has no pip, and there is no uv, so nothing can be installed"
     raise EffectError(message, help="run `python -m ensurepip`")
 

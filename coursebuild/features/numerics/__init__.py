@@ -242,6 +242,7 @@ FEATURE = Feature(
             name="stability",
             summary="measure MuJoCo on hard cases and compare with theory",
             module="coursebuild.features.numerics.commands",
+            computes=True,
         ),
     ),
 )

@@ -88,7 +88,7 @@ class _Child:
 
     def __init__(self, folder: Path) -> None:
         module = "coursebuild_cluster.child"
-        command = gate.python_command("-m", module, str(folder), str(os.getpid()))
+        command = gate.module_command(module, str(folder), str(os.getpid()))
         # A session of its own: Ctrl-C in the terminal of a worker is for the worker.
         self._process = gate.start(
             command,
