@@ -29,8 +29,10 @@ def main(arguments: list[str] | tuple[str, ...] | None = None) -> int:
     if sys.platform == "win32":
         return say(USAGE, "coursebuild runs on Linux and macOS; on Windows, install it in WSL")
     if alone:
-        # Of what libraries start, as Dask does, no Python looks for modules in the course either.
+        # What libraries start by themselves, as Dask does, obeys no file of the course either.
         os.environ["PYTHONSAFEPATH"] = "1"
+        places = filter(os.path.isabs, os.environ.get("PATH", os.defpath).split(os.pathsep))
+        os.environ["PATH"] = os.pathsep.join(places)
     try:
         from coursebuild.cli.unchanged import previous_output, split_directory
 

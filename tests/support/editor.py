@@ -6,7 +6,7 @@ import asyncio
 import sys
 import threading
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from typing import Any, TypeVar
 
 from lsprotocol import types
@@ -22,7 +22,8 @@ T = TypeVar("T")
 class Editor:
     """An editor of a course. Places are given as text in which `|` is the cursor."""
 
-    def __init__(self, folder: Folder) -> None:
+    def __init__(self, folder: Folder, command: Sequence[str] = (), **variables: str) -> None:
+        """`command` starts the server, with these variables; by default, this tree's."""
         self.folder = folder
         self.places = Places(folder.root)
         self.texts: dict[str, str] = {}
@@ -36,8 +37,9 @@ class Editor:
         self.client.feature(types.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS)(
             lambda params: self._hear(params)
         )
-        command = [sys.executable, "-m", "coursebuild", "lsp"]
-        self.ask(self.client.start_io(*command, cwd=folder.root, env=folder.environment()))
+        command = command or (sys.executable, "-m", "coursebuild", "lsp")
+        environment = folder.environment(variables)
+        self.ask(self.client.start_io(*command, cwd=folder.root, env=environment))
         params = types.InitializeParams(types.ClientCapabilities(), root_uri=folder.root.as_uri())
         self.ask(self.client.initialize_async(params))
         self.client.initialized(types.InitializedParams())

@@ -19,7 +19,7 @@ function commandOf(setting, folder, { env = process.env, platform = process.plat
     if (!/[\\/]/.test(setting)) return setting;
     return isAbsolute(setting) ? setting : join(folder, setting);
   }
-  const pathFolders = (env.PATH ?? '').split(delimiter).filter(Boolean);
+  const pathFolders = (env.PATH ?? '').split(delimiter).filter(isAbsolute);
   return [join(folder, '.venv', bin), ...pathFolders].map((location) => join(location, name)).find(exists);
 }
 

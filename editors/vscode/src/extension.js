@@ -1,5 +1,6 @@
 // Starts the language server of each open course, and its preview on demand.
 
+const os = require('node:os');
 const path = require('node:path');
 const vscode = require('vscode');
 const { LanguageClient } = require('vscode-languageclient/node');
@@ -44,7 +45,7 @@ async function start(folder) {
   const client = new LanguageClient(
     'coursebuild',
     'coursebuild',
-    { command, args: ['-C', folder, 'lsp'], options: { cwd: folder } },
+    { command, args: ['-C', folder, 'lsp'], options: { cwd: os.homedir() } },
     {
       documentSelector: [
         selector('markdown', '**/*.md'),

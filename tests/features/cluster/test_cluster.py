@@ -15,7 +15,7 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob
-from support.local_cluster import local_cluster
+from support.local_cluster import install_plugin, local_cluster
 from support.sandboxes import require_sandbox
 from support.scratch_course import (
     GOOD,
@@ -92,11 +92,7 @@ SCRIPTS = {
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Where Python finds the package, installed as pip does it."""
-    folder = tmp_path_factory.mktemp("packages")
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    offline = ["--no-deps", "--no-build-isolation", "--no-index", "--target", str(folder)]
-    subprocess.run([*pip, *offline, str(ROOT / "plugins/cluster")], check=True)
-    return f"{folder}:{ROOT}"
+    return install_plugin(tmp_path_factory.mktemp("packages"))
 
 
 @pytest.fixture(scope="module")

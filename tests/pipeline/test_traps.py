@@ -1,0 +1,167 @@
+"""Nothing that lies in a course's folder runs by accident, whichever command is given there."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from coursebuild.cli.commands import known_commands
+from coursebuild.core.registry import features
+from support.editor import Editor
+from support.local_cluster import install_plugin
+from support.scratch_course import Folder, kill_at_end, processes
+from support.traps import TrapFolder, tool
+
+COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "bench": (("bench", "--quick"),),
+    "build": (("build",), ("build", "--sandbox")),
+    "check": (
+        ("check",),
+        ("check", "--sandbox", "--strict"),
+        ("check", "--fix"),
+        ("check", "--sensitivity"),
+        ("check", "--truth"),
+        ("check", "--against", "3.9.1"),
+    ),
+    "completion": (("completion", "bash"), ("completion", "bash", "--", "bench", "-")),
+    "diet": (("diet", "--quick"),),
+    "diff": (("diff", "HEAD"),),
+    "doctor": (("doctor",),),
+    "explain": (("explain", "link-text"), ("explain", "1.1"), ("explain", "models/box.xml")),
+    "export": tuple(
+        ("export", exporter.name, *(("1.1",) if exporter.of_lesson else ()))
+        for feature in features()
+        for exporter in feature.exporters
+    ),
+    "extract": (("extract",),),
+    "fmt": (("fmt",), ("fmt", "--check")),
+    "help": (("help",), ("help", "bench"), ("--version",)),
+    "import": (("import", "content/lessons", "--out", "../imported"),),
+    "init": (("init", "new"),),
+    "new": (("new", "lesson", "1.2", "B"), ("new", "feature", "x"), ("new", "model", "y")),
+    "rename": (("rename", "1.1", "1.2"),),
+    "schema": (("schema", "course"),),
+    "stability": (("stability", "box", "--quick"),),
+    "undo": (("undo",),),
+    "update": (("update",),),
+}
+"""Each command with the options by which it does something else."""
+STARTED_IN_TESTS_OF_THEIR_OWN = {"lsp", "serve"}
+IN_SUBFOLDERS = [
+    pytest.param(command, id=" ".join(command)) for group in COMMANDS.values() for command in group
+]
+
+
+@pytest.fixture
+def traps(tmp_path: Path, stores: Path) -> TrapFolder:
+    folder = Folder(tmp_path / "a cöurse")
+    traps = TrapFolder(folder)
+    folder.borrow(stores)
+    return traps
+
+
+def variables(**others: str) -> dict[str, str]:
+    """Of a user whose PATH begins with the working folder, and who reaches no package index."""
+    return {"PATH": f".::{os.environ['PATH']}", "PIP_NO_INDEX": "1", "PYTHONPATH": "", **others}
+
+
+def run(traps: TrapFolder, *command: str, **others: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        tool(*command),
+        cwd=traps.folder.root,
+        env=traps.folder.environment(variables(**others)),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+
+
+def test_every_command_is_tried() -> None:
+    assert {*COMMANDS, *STARTED_IN_TESTS_OF_THEIR_OWN} == {*known_commands(), "help"}
+
+
+@pytest.mark.site
+@pytest.mark.parametrize("command", IN_SUBFOLDERS)
+def test_no_trap_runs(traps: TrapFolder, command: tuple[str, ...]) -> None:
+    result = run(traps, *command)
+    assert (traps.ran(), "Traceback" in result.stderr) == ([], False), result.stderr
+    if command[0] in ("build", "check") and "--against" not in command:
+        assert result.stdout.endswith("everything holds\n")  # all that a course needs was started
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("more", [(), ("--sandbox",)], ids=["plain", "sandbox"])
+def test_no_trap_runs_on_a_cluster(
+    traps: TrapFolder, tmp_path: Path, more: tuple[str, ...]
+) -> None:
+    (tmp_path / "packages").mkdir()
+    path = install_plugin(tmp_path / "packages")
+    command = ("check", "--cluster", "local", *more)
+    result = run(traps, *command, PYTHONPATH=path, PYTHONWARNINGS="ignore")
+    assert (traps.ran(), result.stdout.endswith("everything holds\n")) == ([], True), result.stderr
+
+
+@pytest.mark.site
+def test_no_trap_runs_while_a_course_is_served(traps: TrapFolder) -> None:
+    folder = traps.folder
+    process = subprocess.Popen(
+        tool("serve", "--port", "0", "--open"),
+        cwd=folder.root,
+        env=folder.environment(variables(VISUAL="./code")),
+        stdin=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    with kill_at_end(process):  # type: ignore[arg-type]
+        assert process.stderr is not None
+        said = ""
+        while "everything holds" not in said and process.poll() is None:
+            said += process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        said += process.stderr.read()
+        process.wait()
+    assert (traps.ran(), "everything holds" in said) == ([], True), said
+
+
+@pytest.mark.site
+def test_no_trap_runs_in_an_editor(traps: TrapFolder) -> None:
+    folder = traps.folder
+    editor = Editor(folder, tool("lsp"), **variables())
+    try:
+        editor.write(folder.lesson(), folder.text(folder.lesson()))
+        editor.save(folder.lesson())  # from now on scripts run
+        editor.wait_for(lambda: (folder.root / "examples/falls.py").is_file())
+        editor.hover_text(folder.lesson(), "`mujoco.mj_st|ep`")
+    finally:
+        editor.close()
+    assert traps.ran() == []
+
+
+@pytest.mark.site
+def test_no_trap_runs_in_a_run_of_pytest(traps: TrapFolder) -> None:
+    """Its own settings in the folder are obeyed, as pytest's rules are; ours are not sought."""
+    folder = traps.folder
+    for host in ("conftest.py", "setup.cfg", "pyproject.toml"):
+        (folder.root / host).unlink()
+    result = subprocess.run(
+        [sys.executable, "-P", "-m", "pytest", "-q", "--coursebuild", "-p", "no:cacheprovider"],
+        cwd=folder.root,
+        env=folder.environment(variables()),
+        capture_output=True,
+        text=True,
+    )
+    assert traps.ran() == [], result.stdout
+    assert "passed" in result.stdout, result.stdout + result.stderr
+
+
+def test_traps_work(traps: TrapFolder) -> None:
+    """Whoever starts Python in the folder, as the tool must not, runs one."""
+    command = [sys.executable, "-c", "import colorsys"]
+    subprocess.run(command, cwd=traps.folder.root, check=False, capture_output=True)
+    assert "module colorsys" in traps.ran()
+    assert processes(traps.folder) == []

@@ -1,0 +1,139 @@
+"""A course whose folder is full of traps: files that run, or are obeyed, by whoever is careless.
+
+Each writes its name into a file beside the course. A trap in the place of a module does so and
+nothing else: what imports it fails as well.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+from support.scratch_course import GOOD, Folder, course_map
+from support.workflows import git
+
+PROGRAMS = """
+uv pip3 git node npm chromium chromium-headless-shell google-chrome python python3 gvim bwrap sh
+systemd-run sysctl uname fc-list gcc cc ldconfig emacs subl xdg-open
+""".split()
+LESSON = f"""{GOOD}
+Text with `numpy.sqrt`, `mujoco.mj_step` and $x^2$, about the [box](model:box).
+
+```python file=examples/falls.py
+import mujoco
+from mjcourse import model_path
+
+model = mujoco.MjModel.from_xml_path(str(model_path("box")))
+print("bodies", model.nbody)
+```
+
+Output:
+
+```text
+bodies 2
+```
+
+```lab
+{{"model": "box", "title": "A box",
+ "controls": [{{"type": "button", "label": "Kick", "run": "data.qvel[2] += 1"}}],
+ "readouts": [{{"label": "z", "expr": "data.qpos[2]"}}]}}
+```
+"""
+BOX = """<mujoco>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <body pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1" density="1000"/></body>
+  </worldbody>
+</mujoco>
+"""
+SCENARIO = """[[scenario]]
+name = "fall"
+title = "It falls"
+duration = 0.1
+"""
+
+
+class TrapFolder:
+    """The course, and which of its traps have run."""
+
+    def __init__(self, folder: Folder) -> None:
+        self.folder = folder
+        self._marks = folder.root.with_name("marks")
+        folder.write("content/course.toml", course_map(1))
+        folder.write(folder.lesson(), LESSON)
+        folder.write("models/box.xml", BOX)
+        folder.write("models/box.toml", SCENARIO)
+        folder.write(".gitattributes", "* filter=trap diff=trap\n")
+        folder.tmp.mkdir(exist_ok=True)
+        git(folder.root, "init", "--quiet")
+        git(folder.root, "add", ".")
+        git(folder.root, "commit", "--quiet", "-m", "a course")
+        self._set_module_traps()
+        self._set_program_traps()
+        self._set_settings()
+
+    def ran(self) -> list[str]:
+        """The names of the traps that have run."""
+        return sorted({*self._marks.read_text().splitlines()}) if self._marks.exists() else []
+
+    def _code(self, name: str) -> str:
+        """Code that needs no module, each of which may be a trap."""
+        return f"open({str(self._marks)!r}, 'a').write({name!r} + '\\n')\n"
+
+    def _set_module_traps(self) -> None:
+        for name in {*sys.stdlib_module_names, *packages_distributions(), "usercustomize"}:
+            if name.isidentifier() and name not in ("mjcourse", "coursebuild"):
+                self.folder.write(f"{name}.py", self._code(f"module {name}"))
+        for package in ("pip", "coursebuild", "coursebuild_cluster"):
+            for part in ("__init__", "__main__"):
+                self.folder.write(f"{package}/{part}.py", self._code(f"package {package}"))
+        for name in ("sitecustomize", "conftest"):
+            self.folder.write(f"{name}.py", self._code(name))
+
+    def _set_program_traps(self) -> None:
+        for program in PROGRAMS:
+            self._set_program(program)
+
+    def _set_program(self, name: str) -> None:
+        self.folder.write(name, f"#!/bin/sh\necho 'program {name}' >> '{self._marks}'\nexit 1\n")
+        (self.folder.root / name).chmod(0o755)
+
+    def _set_settings(self) -> None:
+        write = self.folder.write
+        index = "http://127.0.0.1:9/simple"
+        write("uv.toml", f'[pip]\nindex-url = "{index}"\n')
+        write("pyproject.toml", f'[tool.uv]\nindex-url = "{index}"\n[tool.uv.pip]\nsystem = true\n')
+        write("pip.conf", f"[global]\nindex-url = {index}\n")
+        write(".npmrc", f"registry={index}\n")
+        write("matplotlibrc", "backend: module://trap_of_matplotlib\n")
+        write("trap_of_matplotlib.py", self._code("matplotlibrc"))
+        write(".env", "PYTHONSTARTUP=sitecustomize.py\n")
+        write("setup.cfg", "[tool:pytest]\naddopts = -p sitecustomize\n")
+        write(".git/info/attributes", "* filter=trap diff=trap\n")
+        order = str(self.folder.root / "git-order")
+        self._set_program("git-order")
+        config = (self.folder.root / ".git/config").read_text()
+        for section, *keys in (
+            (
+                "core",
+                "fsmonitor",
+                "pager",
+                "sshCommand",
+                "editor",
+                "askPass",
+                "alternateRefsCommand",
+            ),
+            ('filter "trap"', "clean", "smudge", "process"),
+            ('diff "trap"', "textconv", "command"),
+            ("pager", "rev-parse", "ls-tree", "cat-file", "archive"),
+            ("alias", "rev-parse", "ls-tree", "cat-file", "merge-base"),
+            ("uploadpack", "packObjectsHook"),
+        ):
+            config += f"[{section}]\n" + "".join(f"\t{key} = {order}\n" for key in keys)
+        write(".git/config", f"{config}[core]\n\thooksPath = .\n")
+
+
+def tool(*arguments: str) -> list[str]:
+    """A command as users give it: by the script that an installer makes."""
+    return [str(Path(sys.executable).with_name("coursebuild")), *arguments]
