@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import functools
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterable
@@ -26,6 +25,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 from benchmarks.attack.foreign import Foreigners  # noqa: E402
 from benchmarks.attack.grounds import Grounds, Killings, Table, Try, Victim  # noqa: E402
 from benchmarks.attack.inputs import Mutants, drawing_tries, probe_tries  # noqa: E402
+from coursebuild.core.run import gate  # noqa: E402
 from support.mortal_commands import Mortals, mortal_commands  # noqa: E402
 from support.scratch_course import command  # noqa: E402
 
@@ -75,19 +75,13 @@ def _build_on(victim: Victim, mortals: Mortals, name: str, oddity: str) -> str:
     words = [sys.executable if word == "python" else word for word in command("build", "-q")]
     shell = f'{oddity} "$@"' if oddity.endswith("-i") else f'{oddity} || exit 77; exec "$@"'
     namespace = ["unshare", "--mount"] if "mount" in oddity else []
-    process = subprocess.run(
-        [*namespace, "bash", "-c", shell, "bash", *words],
-        cwd=folder.root,
-        env=folder.environment(),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        errors="replace",
+    build = gate.finish(
+        [*namespace, "bash", "-c", shell, "bash", *words], folder.environment(), folder=folder.root
     )
-    output = process.stdout + process.stderr
+    output = (build.output + build.errors).decode("utf-8", "replace")
     first = (output.strip() or "-").splitlines()[0]
-    print(f"{name:36}{'built' if process.returncode == 0 else f'told: {first[:70]}'}", flush=True)
-    violation = victim.grounds.find_violation(process.returncode, output)
+    print(f"{name:36}{'built' if build.status == 0 else f'told: {first[:70]}'}", flush=True)
+    violation = victim.grounds.find_violation(build.status, output)
     return violation or victim.find_violation(mortals)
 
 

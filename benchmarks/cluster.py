@@ -17,7 +17,6 @@ import os
 import shutil
 import signal
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -27,6 +26,7 @@ from pathlib import Path
 from distributed import LocalCluster
 
 from coursebuild.core.engine.store import Store
+from coursebuild.core.run import gate
 from coursebuild.features.bench.commands import bench, measuring
 from coursebuild.numerics.reports.records import BENCH
 from coursebuild.pipeline.options import Options
@@ -111,19 +111,19 @@ def run(root: Path, *arguments: str) -> tuple[str, float]:
     return finish(begin(root, *arguments)), time.monotonic() - began
 
 
-def finish(process: subprocess.Popen[str]) -> str:
+def finish(process: gate.Process) -> str:
     """What a command prints; the comparison ends here where it could not do its work."""
-    out, errors = process.communicate()
+    out, errors = (text.decode() for text in process.communicate())
     if process.returncode not in (0, 1):  # 1: an output or a figure differs from what is recorded
         sys.exit(errors.strip() or f"a command ended with status {process.returncode}")
     return out
 
 
-def begin(root: Path, *arguments: str) -> subprocess.Popen[str]:
+def begin(root: Path, *arguments: str) -> gate.Process:
     """Begin a command."""
-    command = [sys.executable, "-m", "coursebuild", "-C", str(root), *arguments]
-    pipe = subprocess.PIPE
-    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True)
+    command = gate.module_command("coursebuild", "-C", str(root), *arguments)
+    environment, pipe = {**os.environ, "PYTHONSAFEPATH": "1"}, gate.PIPE
+    return gate.start(command, environment, stdout=pipe, stderr=pipe, bound=False)
 
 
 def run_and_kill(cluster: LocalCluster, root: Path, *arguments: str, events: int) -> str:

@@ -24,7 +24,6 @@ import os
 import platform
 import re
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -39,6 +38,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from playwright.sync_api import sync_playwright  # noqa: E402
 
+from coursebuild.core.run import gate  # noqa: E402
 from support.chromium import Browsers  # noqa: E402
 from support.static_host import Host  # noqa: E402
 
@@ -130,12 +130,11 @@ def make_course(folder: Path) -> None:
 
 def run(folder: Path, *arguments: str) -> str:
     """Run coursebuild in the scratch course."""
-    command = [sys.executable, "-m", "coursebuild", "-C", str(folder), *arguments]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    process = subprocess.run(command, capture_output=True, text=True, env=environment)
-    if process.returncode != 0:
-        sys.exit(process.stdout + process.stderr)
-    return process.stdout
+    command = gate.module_command("coursebuild", "-C", str(folder), *arguments)
+    done = gate.finish(command, gate.environment(*gate.TOOL))
+    if done.status != 0:
+        sys.exit((done.output + done.errors).decode())
+    return done.output.decode()
 
 
 @dataclass

@@ -326,8 +326,7 @@ def run(
         (kind, seed, number) for number in range(share_of_kind) for seed in seeds for kind in kinds
     ]
     with tempfile.TemporaryDirectory(prefix="mistakes-", ignore_cleanup_errors=True) as top:
-        # Not forked: V8 may run in this process already.
-        context = multiprocessing.get_context("spawn")
+        context = multiprocessing.get_context("fork")  # no V8 runs in this process
         pool = ProcessPoolExecutor(jobs, context, _prepare, (course, Path(top)))
         try:
             for outcome in pool.map(_check, *zip(*tasks, strict=True), chunksize=1):

@@ -23,12 +23,10 @@ import argparse
 import functools
 import http.server
 import json
-import os
 import random
 import resource
 import shutil
 import statistics
-import subprocess
 import sys
 import tempfile
 import threading
@@ -44,6 +42,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 from playwright.sync_api import sync_playwright  # noqa: E402
 
 from benchmarks.generate.wordy import vocabulary, write_wordy  # noqa: E402
+from coursebuild.core.run import gate  # noqa: E402
 from support.chromium import Browsers  # noqa: E402
 
 QUERIES = ("inertia tensor", "gyroscope", "energy drift", "model", "quaternion rotation")
@@ -80,8 +79,10 @@ def build_course(folder: Path, patch: str = "") -> float:
     """Build a course; gives the processor time of it and its children, s."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     command = [sys.executable, "-c", COMMAND.format(patch=patch), "-C", str(folder)]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    subprocess.run([*command, "build", "--quiet"], check=True, env=environment, cwd=ROOT)
+    environment = gate.environment(*gate.TOOL, PYTHONPATH=str(ROOT))
+    build = gate.finish([*command, "build", "--quiet"], environment, bound=False)
+    if build.status:
+        sys.exit(build.errors.decode())
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
@@ -288,7 +289,8 @@ def peer_index(site: Path, folder: Path, program: Path) -> dict[str, float]:
     for _ in range(2):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         start = time.perf_counter()
-        subprocess.run([*command, "lessons/*.html"], check=True, stdout=subprocess.DEVNULL)
+        if gate.finish([*command, "lessons/*.html"], gate.environment(), bound=False).status:
+            sys.exit("the peer fails")
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         runs.append((cpu, time.perf_counter() - start))

@@ -13,7 +13,6 @@ import gc
 import os
 import platform
 import statistics
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -37,6 +36,8 @@ from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.page_writer import draw
 from coursebuild.core.pages.record import record
+from coursebuild.core.run import gate
+from coursebuild.core.run.script_environment import cpu_name
 from coursebuild.core.run.v8 import MathEngine
 from coursebuild.core.syntax import python_syntax
 from coursebuild.core.syntax.document import parse_document
@@ -141,7 +142,9 @@ def measure_scripts(root: Path, repeat: int) -> None:
 
     def bare() -> None:
         for e in runnable:
-            subprocess.run([sys.executable, e.path], cwd=root, capture_output=True, check=True)
+            command, variables = [sys.executable, e.path], {**os.environ}
+            done = gate.finish(command, variables, folder=root, bound=False)
+            assert done.status == 0, done.errors
 
     candidates: dict[str, Callable[[], object]] = {
         "python, one after the other": bare,
@@ -230,7 +233,7 @@ def main() -> None:
     arguments = parser.parse_args()
     root = arguments.course.resolve()
     gc.set_threshold(1_000_000, 50, 50)  # as for a command
-    print(f"{platform.platform()}, {len(os.sched_getaffinity(0))} cores, {platform.processor()}")
+    print(f"{platform.platform()}, {len(os.sched_getaffinity(0))} cores, {cpu_name()}")
     names = ("markdown-it-py", "mujoco", "numpy")
     print(f"Python {platform.python_version()}, " + ", ".join(f"{n} {version(n)}" for n in names))
     measure_parsing(root, arguments.repeat)

@@ -9,8 +9,6 @@ import os
 import re
 import shutil
 import stat
-import subprocess
-import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TypeAlias
@@ -18,6 +16,7 @@ from typing import TypeAlias
 from coursebuild.core.files.examples import MANIFEST
 from coursebuild.core.files.trust import TEMPORARY
 from coursebuild.core.files.write import PREFIX
+from coursebuild.core.run import gate
 from support.mortal_commands import KILLED_STATUS, Mortals
 from support.scratch_course import Folder, block, wait_until_alone
 
@@ -57,7 +56,7 @@ class Grounds:
         os.environ.pop("COURSEBUILD_STORE_KEY", None)
         # Scripts with Matplotlib make folders in the home; these are there before any runs.
         (self.beside / "home/.config/matplotlib").mkdir(parents=True)
-        subprocess.run([sys.executable, "-c", "import matplotlib.font_manager"], check=True)
+        gate.finish(gate.python_command("-c", "import matplotlib.font_manager"), gate.environment())
         self.stores = top / "stores"
         self.stores.mkdir()
         self.before = self._look()
@@ -68,7 +67,7 @@ class Grounds:
         """A folder in which nothing is yet."""
         folder = Folder(self.top / name)
         for path in (folder.root, folder.tmp):
-            subprocess.run(["chmod", "-R", "u+rwx", path], stderr=subprocess.DEVNULL)
+            gate.finish(["chmod", "-R", "u+rwx", str(path)], gate.environment())
             shutil.rmtree(path, ignore_errors=True)
             path.mkdir()
         return folder

@@ -8,12 +8,13 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import subprocess
 import tempfile
 import threading
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+
+from coursebuild.core.run import gate
 
 SAMPLE = 0.02
 """Seconds between two samples of the memory."""
@@ -33,21 +34,18 @@ def time_command(command: Sequence[str], folder: Path, environment: Mapping[str,
     """
     with tempfile.TemporaryFile() as output:
         start = time.perf_counter()
-        process = subprocess.run(
-            command,
-            cwd=folder,
-            env=dict(environment),
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=output,
-            check=False,
-            timeout=LIMIT,
+        process = gate.start(
+            command, environment, folder=folder, stdout=output, stderr=output, bound=False
         )
+        try:
+            status = process.wait(LIMIT)
+        finally:
+            stop(process)
         seconds = time.perf_counter() - start
-        if process.returncode:
+        if status:
             output.seek(0)
             text = output.read().decode(errors="replace")[-2000:]
-            raise CommandError(f"{' '.join(command)}: status {process.returncode}\n{text}")
+            raise CommandError(f"{' '.join(command)}: status {status}\n{text}")
     return seconds
 
 
@@ -56,14 +54,7 @@ def peak_memory(command: Sequence[str], folder: Path, environment: Mapping[str, 
 
     It is sampled, and pages that several processes share count once (Linux: proportional set size).
     """
-    process = subprocess.Popen(
-        command,
-        cwd=folder,
-        env=dict(environment),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    process = gate.start(command, environment, folder=folder, bound=False)
     peak = 0.0
     has_ended = threading.Event()
 
@@ -105,12 +96,12 @@ def proportional_size(pid: int) -> int:
     return 0
 
 
-def stop(process: subprocess.Popen[bytes]) -> None:
+def stop(process: gate.Process) -> None:
     """End a process that leads a session, and all its children."""
     for signal_ in (signal.SIGTERM, signal.SIGKILL):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal_)
-        with contextlib.suppress(subprocess.TimeoutExpired):
+        with contextlib.suppress(gate.StillRunningError):
             process.wait(3)
             break
     with contextlib.suppress(ProcessLookupError):

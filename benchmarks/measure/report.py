@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import platform
-import re
 import statistics
 import time
 from dataclasses import asdict, dataclass, field
@@ -18,6 +17,7 @@ from benchmarks.measure.building import COLD_BUILD, EDIT_BUILD, PEAK_MEMORY, UNC
 from benchmarks.measure.running import Scripts
 from benchmarks.measure.serving import EDIT_TO_SERVED
 from benchmarks.measure.tools import Tool
+from coursebuild.core.run.script_environment import cpu_name
 
 BASE = "coursebuild"
 ROWS = (COLD_BUILD, UNCHANGED_BUILD, EDIT_BUILD, EDIT_TO_SERVED, PEAK_MEMORY)
@@ -96,15 +96,10 @@ def describe(tools: list[Tool], jcache: str | None) -> Report:
 
 def machine() -> dict[str, str]:
     """The machine that the figures hold for."""
-    model = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        match = re.search(r"^model name\s*:\s*(.+)$", cpuinfo.read_text(), re.MULTILINE)
-        model = match[1] if match else model
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     return {
         "date": time.strftime("%Y-%m-%d %H:%M", time.gmtime()) + " UTC",
-        "processor": model,
+        "processor": cpu_name(),
         "cores": str(len(os.sched_getaffinity(0))),
         "memory": f"{memory:.0f} GiB",
         "system": f"{platform.system()} {platform.release()}",

@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -20,6 +19,7 @@ from benchmarks.courses import write_course
 from benchmarks.measure.building import remove
 from benchmarks.measure.process import CommandError, time_command
 from benchmarks.measure.tools import Places, environment, read_version
+from coursebuild.core.run import gate
 
 COMPUTE = """
 import contextlib, io, pathlib, sys, time
@@ -55,10 +55,7 @@ with ScriptServer() as server:
 """The second time the modules that scripts import are loaded already, as in the live preview and
 when `update` runs scripts again."""
 NOTEBOOK_WAYS = ("jupyter-cache, parallel", "jupyter-cache, nothing changed")
-CONSENT = """
-import subprocess, sys
-sys.exit(subprocess.run(sys.argv[1:], input=b"y\\n").returncode)
-"""
+CONSENT = ("sh", "-c", 'echo y | "$@"', "sh")
 """Runs a command and says yes: jupyter-cache asks before it makes its folder."""
 
 
@@ -142,17 +139,12 @@ def touch_lesson(scripts: Scripts) -> None:
 
 def read_numbers(scripts: Scripts, command: list[str]) -> list[float]:
     """The numbers that a command prints."""
-    process = subprocess.run(
-        command,
-        cwd=scripts.folder,
-        env=environment(scripts.places) | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if process.returncode:
-        raise CommandError(process.stderr[-2000:])
-    return [float(word) for word in process.stdout.split()]
+    threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    variables = environment(scripts.places) | threads
+    done = gate.finish(command, variables, folder=scripts.folder, bound=False)
+    if done.status:
+        raise CommandError(done.errors.decode(errors="replace")[-2000:])
+    return [float(word) for word in done.output.split()]
 
 
 def run_one_by_one(scripts: Scripts) -> float:
@@ -183,7 +175,7 @@ def run_notebooks(scripts: Scripts, program: str) -> tuple[float, float]:
     paths = environment(scripts.places) | {"JUPYTERCACHE": str(folder / ".jupyter_cache")}
     paths["PATH"] = f"{Path(program).parent}:{paths['PATH']}"
     names = sorted(path.name for path in folder.glob("*.ipynb"))
-    time_command([sys.executable, "-c", CONSENT, program, "notebook", "add", *names], folder, paths)
+    time_command([*CONSENT, program, "notebook", "add", *names], folder, paths)
     execute = [program, "project", "execute", "--executor", "local-parallel", "--timeout", "120"]
     cold = time_command(execute, folder, paths)
     count = len(list((folder / ".jupyter_cache" / "executed").iterdir()))

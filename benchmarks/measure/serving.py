@@ -10,7 +10,6 @@ from __future__ import annotations
 import functools
 import http.client
 import socket
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable
@@ -18,6 +17,7 @@ from collections.abc import Callable
 from benchmarks.measure.building import Site, attempt
 from benchmarks.measure.process import CommandError, stop
 from benchmarks.measure.tools import environment, lesson_place
+from coursebuild.core.run import gate
 
 EDIT_TO_SERVED = "edit to served"
 START_LIMIT = 120.0
@@ -37,14 +37,13 @@ def one_server(site: Site, edits: int) -> None:
     """Start the preview, edit a few times, stop it. The first edit is not counted."""
     port = free_port()
     with tempfile.TemporaryFile() as output:
-        process = subprocess.Popen(
+        process = gate.start(
             site.tool.preview_command(site.folder, port),
-            cwd=site.folder,
-            env=environment(site.places),
-            stdin=subprocess.DEVNULL,
+            environment(site.places),
+            folder=site.folder,
             stdout=output,
             stderr=output,
-            start_new_session=True,
+            bound=False,
         )
         try:
             reader = Reader(process, port, lesson_place(site.tool.address, site.name))
@@ -68,7 +67,7 @@ def one_server(site: Site, edits: int) -> None:
 class Reader:
     """Asks for one page, over a connection that stays open as long as the server keeps it."""
 
-    def __init__(self, process: subprocess.Popen[bytes], port: int, path: str) -> None:
+    def __init__(self, process: gate.Process, port: int, path: str) -> None:
         self.process = process
         self.connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
         self.path = path

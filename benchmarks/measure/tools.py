@@ -10,7 +10,6 @@ import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 import tomllib
 from collections.abc import Sequence
@@ -20,6 +19,8 @@ from typing import Literal
 import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
+
+from coursebuild.core.run import gate
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -144,14 +145,6 @@ def environment(places: Places) -> dict[str, str]:
 
 def read_version(command: Sequence[str]) -> str | None:
     """The first number with dots in the output of a version command."""
-    process = subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        check=False,
-        stdin=subprocess.DEVNULL,
-        timeout=60,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )
-    match = re.search(r"\d+\.\d[\w.]*", process.stdout + process.stderr)
-    return match[0] if match and process.returncode == 0 else None
+    asked = gate.finish(command, {**os.environ, "PYTHONPATH": str(ROOT)}, seconds=60.0)
+    match = re.search(r"\d+\.\d[\w.]*", (asked.output + asked.errors).decode(errors="replace"))
+    return match[0] if match and asked.status == 0 else None

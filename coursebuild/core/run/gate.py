@@ -174,18 +174,32 @@ def finish(
     command: Sequence[str],
     environment: Mapping[str, str],
     *,
+    folder: str | Path | None = None,
     stdin: bytes = b"",
     stderr: Stream = PIPE,
     seconds: float | None = None,
+    bound: bool = True,
 ) -> Completed:
     """Run a process to its end; an interrupt, or that it takes longer, ends all that it started.
+
+    `folder` and `bound` are as in `start`; without a folder it gets one of its own.
 
     Raises:
         OSError: it cannot be started.
         TimeoutError: it took longer than these seconds.
     """
-    streams: dict[str, Any] = {"stdin": PIPE, "stdout": PIPE, "stderr": stderr}
-    with temporary_folder() as folder, start(command, environment, folder=folder, **streams) as it:
+    with contextlib.ExitStack() as resources:
+        it = resources.enter_context(
+            start(
+                command,
+                environment,
+                folder=folder or resources.enter_context(temporary_folder()),
+                stdin=PIPE,
+                stdout=PIPE,
+                stderr=stderr,
+                bound=bound,
+            )
+        )
         try:
             output, errors = it.communicate(stdin, seconds)
         except subprocess.TimeoutExpired:
