@@ -16,7 +16,8 @@ next run removes. Of several files,
 
 If step 2 fails, the changes so far are undone. If the process was killed, the next command undoes
 them: a file with the new content gets the old one back; one that was edited since stays. Where the
-user has no state folder, there is no journal, and a kill leaves what was changed until then.
+user has no state folder, there is no journal, and a kill leaves what was changed until then; the
+user is told so before.
 """
 
 from __future__ import annotations
@@ -211,8 +212,8 @@ def change_files(
 ) -> bool:
     """Make all changes, or none; return whether `take_back` can undo them, as with `keep` it can.
 
-    `on_wait` gets a message if another command must end first. With `beside_commands` none must,
-    as if the changes were made in an editor.
+    `on_wait` gets a message if another command must end first, and if there is no journal. With
+    `beside_commands` no other must end, as if the changes were made in an editor.
 
     Raises:
         EffectError: a file cannot be written, or has changed since it was read.
@@ -230,6 +231,11 @@ def change_files(
                 replace_file(str(journal), data)
             except OSError as error:
                 raise EffectError(f"{journal} cannot be written: {reason(error)}") from None
+        elif on_wait is not None and len(changes) > 1:
+            on_wait(
+                "there is no place for a journal: if this command is killed, it stays half done "
+                "(set HOME or XDG_STATE_HOME to a folder outside the course)"
+            )
         try:
             for change in changes:
                 _replace(root, change.path, change.old, change.new)
@@ -379,9 +385,30 @@ def _replace(root: Path, path: str, old: bytes | None, new: bytes | None) -> Non
     file = check_writable(root, path)
     try:
         check_unchanged(file, path, old)
-        file.unlink()
+        _remove(file, path, old)
         for folder in file.relative_to(os.path.realpath(root)).parents:  # remove empty ones
             with contextlib.suppress(OSError):
                 Path(os.path.realpath(root), folder).rmdir()
     except OSError as error:
         raise EffectError(f"{path} cannot be removed: {reason(error)}") from None
+
+
+def _remove(file: Path, path: str, old: bytes | None) -> None:
+    """Remove a file that still has this content.
+
+    An editor that saves in place may have begun after the last look. So the file is first moved
+    aside, where it is looked at once more; what is saved from then on is a new file.
+    """
+    aside = file.with_name(f"{PREFIX}{os.urandom(6).hex()}")
+    file.rename(aside)
+    try:
+        check_unchanged(aside, path, old)
+    except FileChangedError:
+        try:
+            _move(str(aside), file, path, new=True)
+        except FileChangedError:  # it was saved twice, here and in the file's place
+            aside.replace(file.with_name(f"{file.name}~"))
+        else:
+            aside.unlink(missing_ok=True)
+        raise
+    aside.unlink()

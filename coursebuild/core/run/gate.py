@@ -29,7 +29,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any, NoReturn, TypeAlias
+from typing import IO, NoReturn, TypeAlias
 
 from msgspec import Struct
 

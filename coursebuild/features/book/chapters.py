@@ -17,7 +17,6 @@ import functools
 import os
 import posixpath
 import re
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from html import unescape
 from pathlib import Path
@@ -27,6 +26,7 @@ from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model import Lesson, Level
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
@@ -323,7 +323,7 @@ def pdf_file(context: ExportContext) -> OutputFile:
             "print the page of `coursebuild export page` in any browser",
         )
     html = page_file(context, page_numbers=True).data.decode()
-    with tempfile.TemporaryDirectory(prefix="coursebuild-pdf-") as folder:
+    with temporary_folder() as folder:
         first = _print(program, Path(folder), _with_numbers(html, {}))
         # The pages on which it has the targets of links.
         objects = {int(number): text for number, text in _OBJECT.findall(first)}

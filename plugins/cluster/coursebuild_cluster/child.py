@@ -107,7 +107,8 @@ def own_processor() -> Iterator[None]:
         return
     processors = os.sched_getaffinity(0)
     folder = Path(tempfile.gettempdir(), f"coursebuild-processors-{os.getuid()}")
-    folder.mkdir(mode=0o700, exist_ok=True)
+    with contextlib.suppress(FileExistsError):  # perhaps somebody else's, and no folder
+        folder.mkdir(mode=0o700)
     status = folder.lstat()
     if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid():
         yield

@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+import sys
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -367,5 +368,25 @@ def test_without_a_state_folder_all_are_changed_or_none(
     with pytest.raises(EffectError):
         change_files(root, (*GOOD[:2], FileChange("a.md/d.md", None, b"x")))
     assert files(root) == {"a.md": b"a\r\n", "b.md": b"b"}
-    change_files(root, GOOD)
+    said: list[str] = []
+    change_files(root, GOOD, said.append)
+    assert said == [
+        "there is no place for a journal: if this command is killed, it stays half done "
+        "(set HOME or XDG_STATE_HOME to a folder outside the course)"
+    ]
     assert files(root) == {"a.md": b"A\r\n", "new/folder/c.md": b"c"}
+
+
+def test_what_is_saved_in_place_at_the_last_moment_is_kept(root: Path) -> None:
+    """Just before a file is taken away, an editor saves it, without a rename."""
+    file, saves = root / "a.md", [b"saved\n"]
+
+    def save(event: str, arguments: tuple[object, ...]) -> None:
+        if saves and event in ("os.rename", "os.remove") and arguments[0] in (file, str(file)):
+            file.write_bytes(saves.pop())
+
+    sys.addaudithook(save)
+    seen = file.read_bytes()
+    with pytest.raises(FileChangedError):
+        change_files(root, [FileChange("new.md", None, seen), FileChange("a.md", seen, None)])
+    assert (saves, files(root)) == ([], {"a.md": b"saved\n", "b.md": b"b"})

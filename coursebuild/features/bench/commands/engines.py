@@ -11,7 +11,6 @@ import argparse
 import importlib
 import os
 import sys
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,6 +22,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import EffectError, UsageError, require
+from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.run.child import JsonChild
 from coursebuild.core.run.script_environment import machine, package_version
 from coursebuild.core.text.diagnostics import did_you_mean
@@ -194,7 +194,7 @@ class _EngineRun(MeasuringRun):
     def _engine_report(self, scene: CourseScene) -> EngineReport:
         compiled_scene = measuring.compile_scene(self.options.root, scene, quick=self.quick)
         load, scenarios = os.getloadavg()[0], []
-        with measuring.report_errors(scene), tempfile.TemporaryDirectory() as folder:
+        with measuring.report_errors(scene), temporary_folder() as folder:
             path = str(Path(folder, "model.mjb"))
             mujoco.mj_saveModel(compiled_scene.model, path, None)
             for physics in compiled_scene.scenarios:
