@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, NoReturn
 from coursebuild import MANUAL
 from coursebuild.cli.output import CLEAN, FAILURE, USAGE, fail, say, write
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, UsageError, lacking
+from coursebuild.core.files.locks import remove_abandoned_folders
 
 if TYPE_CHECKING:  # asking for the version loads nothing heavy
     from coursebuild.core.features import Command
@@ -97,6 +98,7 @@ def run(directory: str | None, words: list[str], *, alone: bool) -> int:
             if limit < _FILES_NEEDED:
                 text = f"only {limit} files may be open at a time, and {_FILES_NEEDED} are needed"
                 return fail(FAILURE, text, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
+            remove_abandoned_folders()
             return _choose_command(directory, words, alone=alone)
         except UsageError as error:
             return fail(USAGE, str(error))

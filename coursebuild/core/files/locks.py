@@ -7,7 +7,7 @@ written, the work goes on without: every write of the tool is whole by itself. (
 flocks would leave a file beside a site, cannot hold a folder, and do not say who has them.)
 
 1. A temporary folder is locked as long as the process that made it lives. So one that can be locked
-   is abandoned; it is removed by the next process that makes one, if it is the same user's.
+   is abandoned; it is removed by the next command, if it is the same user's.
 2. In a folder for temporary files others may put what they like. Only folders are removed that are
    private to this user and have a name as given here, and only where nobody else can have moved
    them there. Links are not followed.
@@ -185,7 +185,7 @@ def temporary_folder() -> Iterator[str]:
     import tempfile  # not above: processes that run scripts import this module, and not that
 
     try:
-        _remove_abandoned(tempfile.gettempdir())
+        remove_abandoned_folders()
         while True:
             folder = tempfile.mkdtemp(prefix=_PREFIX)
             with contextlib.suppress(FileNotFoundError):  # taken for abandoned, and removed
@@ -202,9 +202,16 @@ def temporary_folder() -> Iterator[str]:
         os.close(fd)
 
 
+def remove_abandoned_folders() -> None:
+    """Remove the temporary folders that this user's processes have left; once in a process."""
+    import tempfile
+
+    with contextlib.suppress(OSError):  # there is no place for temporary files
+        _remove_abandoned(tempfile.gettempdir())
+
+
 @functools.cache
 def _remove_abandoned(place: str) -> None:
-    """Remove the folders here that this user's processes have left; once in a process."""
     with contextlib.suppress(OSError), os.scandir(place) as entries:
         status, me = os.stat(place), os.geteuid()  # noqa: PTH116
         is_shared = status.st_mode & _OTHERS_WRITE and not status.st_mode & stat.S_ISVTX

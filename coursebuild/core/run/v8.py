@@ -13,6 +13,7 @@ import asyncio
 import atexit
 import contextlib
 import json
+import os
 import re
 import resource
 import threading
@@ -41,6 +42,8 @@ _MEMORY = 128
 """MiB of JavaScript objects."""
 _ADDRESSES = 1 << 40
 """Bytes of addresses that V8 needs to start; it reserves most of them and uses few."""
+_THREADS = 4
+"""Threads that V8 needs beside one for each processor."""
 _START_SECONDS = 20.0
 _BATCH = 100
 """Formulas at a time; one takes about 0.3 ms."""
@@ -91,6 +94,24 @@ def start() -> None:
         raise EffectError(message, help="run `pip install coursebuild` again") from None
 
 
+def _require_threads() -> None:
+    """Start the threads that V8 will need, and end them.
+
+    Raises:
+        RuntimeError: there may not be so many; V8 would end this process.
+    """
+    is_over, threads = threading.Event(), list[threading.Thread]()
+    try:
+        for _ in range(_THREADS + (os.cpu_count() or 1)):
+            threads.append(threading.Thread(target=is_over.wait))
+            threads[-1].start()
+    finally:
+        is_over.set()
+        for thread in threads:
+            if thread.ident is not None:
+                thread.join()
+
+
 class Heartbeat(NamedTuple):
     """How others see that a script makes progress."""
 
@@ -108,6 +129,7 @@ class Isolate:
 
     def __init__(self, *scripts: str, memory: int = _MEMORY << 20) -> None:
         start()
+        _require_threads()
         from py_mini_racer import mini_racer
 
         self._memory = memory
