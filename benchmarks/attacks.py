@@ -25,6 +25,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 from benchmarks.attack.foreign import Foreigners  # noqa: E402
 from benchmarks.attack.grounds import Grounds, Killings, Table, Try, Victim  # noqa: E402
 from benchmarks.attack.inputs import Mutants, drawing_tries, probe_tries  # noqa: E402
+from benchmarks.attack.traps import trap_tries  # noqa: E402
 from coursebuild.core.run import gate  # noqa: E402
 from support.mortal_commands import Mortals, mortal_commands  # noqa: E402
 from support.scratch_course import command  # noqa: E402
@@ -97,7 +98,9 @@ def main() -> int:
     }.items():
         parser.add_argument(f"--{name}", type=int, default=count, metavar="N")
     kinds = ("machines", "kills", "entries", "stores", "journals", "checks", "imports")
-    parser.add_argument("--only", nargs="+", choices=(*kinds, "drawings", "probes"), metavar="KIND")
+    parser.add_argument(
+        "--only", nargs="+", choices=(*kinds, "drawings", "probes", "traps"), metavar="KIND"
+    )
     parser.add_argument("--seed", type=int, default=36)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="attacks-") as top:
@@ -133,6 +136,7 @@ def main() -> int:
                     str,
                 ),
                 "probes": ("Probes of the sandbox", probe_tries(grounds), str),
+                "traps": ("Commands in a folder of traps", trap_tries(grounds), str),
             }
             for kind, (title, tries, note) in rows.items():
                 if kind in (arguments.only or rows):

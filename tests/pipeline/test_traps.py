@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -11,48 +10,13 @@ from pathlib import Path
 import pytest
 
 from coursebuild.cli.commands import known_commands
-from coursebuild.core.registry import features
 from support.editor import Editor
 from support.local_cluster import install_plugin
 from support.scratch_course import Folder, kill_at_end, processes
-from support.traps import TrapFolder, tool
+from support.traps import COMMANDS, TrapFolder, tool, variables
 
-COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
-    "bench": (("bench", "--quick"),),
-    "build": (("build",), ("build", "--sandbox")),
-    "check": (
-        ("check",),
-        ("check", "--sandbox", "--strict"),
-        ("check", "--fix"),
-        ("check", "--sensitivity"),
-        ("check", "--truth"),
-        ("check", "--against", "3.9.1"),
-    ),
-    "completion": (("completion", "bash"), ("completion", "bash", "--", "bench", "-")),
-    "diet": (("diet", "--quick"),),
-    "diff": (("diff", "HEAD"),),
-    "doctor": (("doctor",),),
-    "explain": (("explain", "link-text"), ("explain", "1.1"), ("explain", "models/box.xml")),
-    "export": tuple(
-        ("export", exporter.name, *(("1.1",) if exporter.of_lesson else ()))
-        for feature in features()
-        for exporter in feature.exporters
-    ),
-    "extract": (("extract",),),
-    "fmt": (("fmt",), ("fmt", "--check")),
-    "help": (("help",), ("help", "bench"), ("--version",)),
-    "import": (("import", "content/lessons", "--out", "../imported"),),
-    "init": (("init", "new"),),
-    "new": (("new", "lesson", "1.2", "B"), ("new", "feature", "x"), ("new", "model", "y")),
-    "rename": (("rename", "1.1", "1.2"),),
-    "schema": (("schema", "course"),),
-    "stability": (("stability", "box", "--quick"),),
-    "undo": (("undo",),),
-    "update": (("update",),),
-}
-"""Each command with the options by which it does something else."""
 STARTED_IN_TESTS_OF_THEIR_OWN = {"lsp", "serve"}
-IN_SUBFOLDERS = [
+EACH = [
     pytest.param(command, id=" ".join(command)) for group in COMMANDS.values() for command in group
 ]
 
@@ -63,11 +27,6 @@ def traps(tmp_path: Path, stores: Path) -> TrapFolder:
     traps = TrapFolder(folder)
     folder.borrow(stores)
     return traps
-
-
-def variables(**others: str) -> dict[str, str]:
-    """Of a user whose PATH begins with the working folder, and who reaches no package index."""
-    return {"PATH": f".::{os.environ['PATH']}", "PIP_NO_INDEX": "1", "PYTHONPATH": "", **others}
 
 
 def run(traps: TrapFolder, *command: str, **others: str) -> subprocess.CompletedProcess[str]:
@@ -86,7 +45,7 @@ def test_every_command_is_tried() -> None:
 
 
 @pytest.mark.site
-@pytest.mark.parametrize("command", IN_SUBFOLDERS)
+@pytest.mark.parametrize("command", EACH)
 def test_no_trap_runs(traps: TrapFolder, command: tuple[str, ...]) -> None:
     result = run(traps, *command)
     assert (traps.ran(), "Traceback" in result.stderr) == ([], False), result.stderr

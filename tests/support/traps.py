@@ -6,10 +6,12 @@ nothing else: what imports it fails as well.
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
+from coursebuild.core.registry import features
 from support.scratch_course import GOOD, Folder, course_map
 from support.workflows import git
 
@@ -17,6 +19,40 @@ PROGRAMS = """
 uv pip3 git node npm chromium chromium-headless-shell google-chrome python python3 gvim bwrap sh
 systemd-run sysctl uname fc-list gcc cc ldconfig emacs subl xdg-open
 """.split()
+COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "bench": (("bench", "--quick"),),
+    "build": (("build",), ("build", "--sandbox")),
+    "check": (
+        ("check",),
+        ("check", "--sandbox", "--strict"),
+        ("check", "--fix"),
+        ("check", "--sensitivity"),
+        ("check", "--truth"),
+        ("check", "--against", "3.9.1"),
+    ),
+    "completion": (("completion", "bash"), ("completion", "bash", "--", "bench", "-")),
+    "diet": (("diet", "--quick"),),
+    "diff": (("diff", "HEAD"),),
+    "doctor": (("doctor",),),
+    "explain": (("explain", "link-text"), ("explain", "1.1"), ("explain", "models/box.xml")),
+    "export": tuple(
+        ("export", exporter.name, *(("1.1",) if exporter.of_lesson else ()))
+        for feature in features()
+        for exporter in feature.exporters
+    ),
+    "extract": (("extract",),),
+    "fmt": (("fmt",), ("fmt", "--check")),
+    "help": (("help",), ("help", "bench"), ("--version",)),
+    "import": (("import", "content/lessons", "--out", "../imported"),),
+    "init": (("init", "new"),),
+    "new": (("new", "lesson", "1.2", "B"), ("new", "feature", "x"), ("new", "model", "y")),
+    "rename": (("rename", "1.1", "1.2"),),
+    "schema": (("schema", "course"),),
+    "stability": (("stability", "box", "--quick"),),
+    "undo": (("undo",),),
+    "update": (("update",),),
+}
+"""Each command with the options by which it does something else."""
 LESSON = f"""{GOOD}
 Text with `numpy.sqrt`, `mujoco.mj_step` and $x^2$, about the [box](model:box).
 
@@ -132,6 +168,11 @@ class TrapFolder:
         ):
             config += f"[{section}]\n" + "".join(f"\t{key} = {order}\n" for key in keys)
         write(".git/config", f"{config}[core]\n\thooksPath = .\n")
+
+
+def variables(**others: str) -> dict[str, str]:
+    """Of a user whose PATH begins with the working folder, and who reaches no package index."""
+    return {"PATH": f".::{os.environ['PATH']}", "PIP_NO_INDEX": "1", "PYTHONPATH": "", **others}
 
 
 def tool(*arguments: str) -> list[str]:
