@@ -67,8 +67,6 @@ class Session:
         self.calm.set()
         self.busy = "reading the course"
         """What is being done in the background, in words; empty when everything is done."""
-        self.commands: set[int] = set()
-        """The processes of commands that are being done for other terminals."""
         self.trouble = ""
         """Why background work could not be done, if it could not."""
         self._is_map_broken = False

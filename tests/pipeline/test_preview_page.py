@@ -189,7 +189,7 @@ def test_preview_that_stops_and_starts_again(make: Make, browser: Browser) -> No
 ATTACK = """
 <!DOCTYPE html><html lang=en><title>Elsewhere</title><body>
 <form method=post enctype=text/plain action=ADDRESS.coursebuild/accept><button>Go</button></form>
-<a href="ADDRESS">Link</a>
+<a href="LINK">Link</a>
 <script>
   window.draft = 'nothing'
   window.coursebuildSearch = { take: (...all) => { window.draft = all } }
@@ -229,10 +229,13 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
     with Host(tmp_path) as host, serve_preview(folder) as preview:
         preview.wait_for_line("checked: ")
         address = f"http://127.0.0.1:{preview.port}/"
-        (tmp_path / "index.html").write_text(ATTACK.replace("ADDRESS", address))
+        attack = ATTACK.replace("ADDRESS", address).replace("LINK", preview.link)
+        (tmp_path / "index.html").write_text(attack)
         for url in (host.url, host.url.replace("localhost", "127.0.0.1")):
             with browser.new_context() as context:
                 page = context.new_page()
+                page.goto(preview.link)  # whoever has its cookie is safe as well
+                expect(page.locator("h1").first).to_have_text("Scratch")
                 page.goto(url)
                 (frame,) = page.main_frame.child_frames
                 wait_for_condition(page, lambda frame=frame: frame.url.startswith("chrome-error:"))
@@ -244,6 +247,30 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
                 page.go_back()
                 page.get_by_role("link", name="Link").click()
                 expect(page.locator("h1").first).to_have_text("Scratch")
+
+
+FRAME = "<!DOCTYPE html><html lang=en><title>Editor</title><iframe src='{}'></iframe>"
+
+
+@pytest.mark.browser
+def test_preview_in_the_frame_of_an_editor_follows_and_accepts(
+    make: Make, browser: Browser, tmp_path: Path
+) -> None:
+    """Browsers send no strict cookie from a frame in a page of another site."""
+    folder = make(GOOD.replace("3.14159\n```", "3\n```"))
+    with Host(tmp_path) as host, serve_preview(folder, "--embed", host.url.rstrip("/")) as preview:
+        link = preview.link.replace("/?", f"/{LESSON}?")
+        (tmp_path / "index.html").write_text(FRAME.format(link))
+        with browser.new_context() as context:
+            page = context.new_page()
+            page.goto(host.url)
+            frame = page.frame_locator("iframe")
+            accept = frame.get_by_role("button", name="Accept this output")
+            accept.click()
+            expect(accept).to_have_count(0)
+            frame.get_by_role("link", name="Scratch").first.click()
+            expect(frame.locator("h1").first).to_have_text("Scratch")
+    assert "hello 3.14159" in folder.text(folder.lesson())
 
 
 @pytest.mark.browser
