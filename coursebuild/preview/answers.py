@@ -151,11 +151,14 @@ class Answers:
         if data is not None:
             text = self._add_preview(data, name, digest(data)) if name.endswith(".html") else data
             return HTTPStatus.OK, _type_of(name), text
-        if self._session.files.has_page(name):
-            return HTTPStatus.OK, HTML, self._add_preview(self._message_page("blocked"), name, "")
+        reason = self._session.unreadable(name)
+        if reason is not None or self._session.files.has_page(name):
+            words = self._words("preview.blocked")
+            text = words if reason is None else f"{reason.span.path}: {reason.message}"
+            return HTTPStatus.OK, HTML, self._add_preview(self._message_page(text), name, "")
         missing = self._session.find("404.html")
         if missing is None:
-            missing = self._message_page("unbuilt")
+            missing = self._message_page(self._words("preview.unbuilt"))
         return HTTPStatus.NOT_FOUND, HTML, self._add_preview(missing, name, "")
 
     @property
@@ -163,10 +166,10 @@ class Answers:
         course = self._session.course
         return strings_for(self._templates, (course and course.language) or DEFAULT_LANGUAGE)
 
-    def _message_page(self, key: str) -> bytes:
+    def _message_page(self, text: str) -> bytes:
         words = self._words
-        texts = escape(words("preview.title")), escape(words(f"preview.{key}"))
-        return _MESSAGE_PAGE.format(words.language, *texts).encode()
+        title = escape(words("preview.title"))
+        return _MESSAGE_PAGE.format(words.language, title, escape(text)).encode()
 
     def _add_preview(self, page: bytes, name: str, state: str) -> bytes:
         texts = {k: text for k, text in self._words.texts.items() if k.startswith("preview.")}

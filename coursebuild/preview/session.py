@@ -346,9 +346,19 @@ class Session:
 
     # --- files
 
+    def unreadable(self, path: str) -> Diagnostic | None:
+        """Why the document of the page at a site path cannot be read at all, if it cannot."""
+        for owner in () if self.course is None else self.course.owners:
+            if owner.document is None and urls.owner_path(owner) == path:
+                diagnostics = self._diagnostics_by_file.get(owner.path, ())
+                return next((d for d in diagnostics if d.is_error), None)
+        return None
+
     def find(self, path: str) -> bytes | None:
         """Return a file of the site, if there is one and it can be made."""
         with self.condition:
+            if self.unreadable(path) is not None:
+                return None
             try:
                 return self.files.find(path)
             except TemplateFailure as failure:

@@ -199,16 +199,18 @@ class PageWriter(PageContext, frozen=True):
         return html + Markup("\n") if html else html
 
     def _feature_block(self, block: model.FeatureBlock) -> Markup:
-        """A block of a feature; its source, if it has errors for which it cannot be drawn."""
-        marked = set(self._marked)
+        """A block of a feature; its source, if it has errors for which nothing can be drawn."""
+        is_broken, marked = self._is_broken(block), set(self._marked)
         try:
-            return kind_of_block(block).draw(self, block)
+            html = kind_of_block(block).draw(self, block)
         except Exception:
-            if not self._is_broken(block):
+            if not is_broken:
                 raise
-            self._marked.clear()
-            self._marked.update(marked)
-            return self.code("", block.span.text)
+            html = Markup()
+        if is_broken and not html.striptags():
+            self._marked.intersection_update(marked)
+            html = self.code("", block.span.text)
+        return html
 
     def _script(self, block: model.Script, recordings: tuple[model.Recording, ...]) -> Markup:
         """A script and the outputs that belong to it, as one object."""
