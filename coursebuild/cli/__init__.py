@@ -2,8 +2,7 @@
 
 Exit status 0: clean; 1: something is wrong in the course; 2: wrong usage. Heavy imports happen in
 the command that needs them, and here in `main`: first `unchanged`, for a command that has nothing
-to do, then `handover`, for one that a running `serve` does, then `commands`, which runs one of the
-modules here, or of features.
+to do, then `commands`, which runs one of the modules here, or of features.
 """
 
 from __future__ import annotations
@@ -44,12 +43,6 @@ def main(arguments: list[str] | tuple[str, ...] | None = None) -> int:
         while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
             pass
         os.close(number)
-        if alone:
-            from coursebuild.cli.handover import hand_over
-
-            status = hand_over(directory, words)
-            if status is not None:
-                return status
         from coursebuild.cli.commands import run
     except MemoryError:
         return say(FAILURE, "coursebuild: not enough memory to start")

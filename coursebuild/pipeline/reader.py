@@ -329,7 +329,7 @@ class Reader:
             document = None if whole is None else whole.document
             renderer = self._renderer_for(request, whole)
             inputs = request.inputs
-            head, html, context = draw(inputs, document, renderer)
+            head, html, context = draw(inputs, document, renderer, request.mistakes)
             body = isolate_formulas(html) if direction(request.language) == "rtl" else html
             page_record, body = record(head, body, request.base_url, context)
             all_notes = {

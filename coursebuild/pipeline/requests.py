@@ -26,7 +26,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.course import Words
 from coursebuild.core.model.results import Reports, Results
-from coursebuild.core.pages.context import PageHead, PageInputs
+from coursebuild.core.pages.context import Mistakes, PageHead, PageInputs
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.pages.renderer import Texts
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
@@ -124,6 +124,8 @@ class PageRequest(Struct, frozen=True):
     """The course's own templates."""
     is_manual: bool
     """See `Course.is_manual`."""
+    mistakes: Mistakes
+    """Those of its document, where it is drawn all the same: in a preview."""
     key: str
     """The key under which it is stored: a hash of all the others, and of the tool."""
 
@@ -137,11 +139,12 @@ class PageRequest(Struct, frozen=True):
         templates: Texts,
         *,
         is_manual: bool = False,
+        mistakes: Mistakes = (),
     ) -> PageRequest:
         """A request with its key."""
         text_key = "" if text is None else text.key
-        key = step_key("page", language, base_url, templates, is_manual, inputs, text_key)
-        return cls(inputs, text, language, base_url, templates, is_manual, key)
+        parts = (language, base_url, templates, is_manual, mistakes, inputs, text_key)
+        return cls(inputs, text, *parts[:5], step_key("page", *parts))
 
 
 class DrawnPage(Struct, frozen=True):

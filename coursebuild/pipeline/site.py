@@ -34,7 +34,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Names, compressed_files
-from coursebuild.core.pages.context import NotedPage, SiteContext
+from coursebuild.core.pages.context import Mistakes, NotedPage, SiteContext
 from coursebuild.core.pages.frame import (
     FrameInputs,
     PageFrame,
@@ -104,21 +104,21 @@ class Site:
         reader: Reader,
         options: Options,
         entries: Iterable[PageEntry] | None = None,
-        last_good: Mapping[str, str] | None = None,
+        mistakes: Mapping[str, Mistakes] | None = None,
         *,
         whole_fonts: bool = False,
     ) -> None:
         """Draw the pages that have changed of a course that the reader has read.
 
-        `entries`: only these pages; then links are not checked. `last_good`: the keys, by site
-        path, of pages that stay as they were. `whole_fonts`: leave fonts whole, for pages drawn
-        later.
+        `entries`: only these pages; then links are not checked. `mistakes`: those of the documents
+        of pages that are drawn all the same, by site path. `whole_fonts`: leave fonts whole, for
+        pages drawn later.
         """
         self._library = library
         self._reader = reader
         self._root, self._store = options.root, options.store
         self._has_all_pages, self._whole_fonts = entries is None, whole_fonts
-        self._last_good = last_good or {}
+        self._mistakes = mistakes or {}
         self._latest: tuple[str, DrawnPage] | None = None
         """The page that was loaded last: several files are made of it."""
         self.drawn_paths: list[str] = []
@@ -133,11 +133,6 @@ class Site:
         if entries is None and all_pages != last_pages:
             self._store.put_value(_INDEX, index, all_pages)
         reader.stop_workers()
-
-    @property
-    def keys(self) -> dict[str, str]:
-        """The keys of all pages, by site path."""
-        return {path: entry.key for path, entry in self._pages.items()}
 
     # --- pages
 
@@ -157,11 +152,12 @@ class Site:
                 text_key = "" if text is None else text.key
                 origin = "" if course is None else key_of(course, results, text_key)
                 last = last_pages.get(path)
-                key, request = self._last_good.get(path), None
-                if key is None and last is not None and origin and last.origin == origin:
+                mistakes = self._mistakes.get(path, ())
+                request, is_known = None, last is not None and origin and last.origin == origin
+                if last is not None and is_known and not mistakes:
                     key = last.key
-                if key is None:
-                    request = page_request(page, library)
+                else:
+                    request = page_request(page, library, mistakes)
                     key = request.key
                 if last is not None and (last.key, last.page) == (key, page):
                     record: PageRecord | None = last.record
@@ -170,7 +166,7 @@ class Site:
                     record = None if stored_page is None else stored_page.record
                 if record is not None:
                     known_pages[path] = _IndexEntry(page, key, origin, record)
-                elif path not in self._last_good:  # else it is no longer in the store
+                else:
                     known_pages[path] = None
                     pending.append((page, key, origin))
                     yield request or page_request(page, library)
@@ -186,7 +182,8 @@ class Site:
             entry = self._pages[path]
             page = self._reader.find_page(entry.key)
             if page is None:
-                page = self._reader.draw_page(page_request(entry.page, self._library))
+                mistakes = self._mistakes.get(path, ())
+                page = self._reader.draw_page(page_request(entry.page, self._library, mistakes))
             self._latest = path, page
         return self._latest[1]
 
@@ -333,7 +330,7 @@ def text_of(entry: PageEntry, library: Library) -> SourceText | None:
     )
 
 
-def page_request(entry: PageEntry, library: Library) -> PageRequest:
+def page_request(entry: PageEntry, library: Library, mistakes: Mistakes = ()) -> PageRequest:
     """Make the request to draw a page."""
     course = library.course
     return PageRequest.of(
@@ -343,6 +340,7 @@ def page_request(entry: PageEntry, library: Library) -> PageRequest:
         course.base_url,
         course.theme.template_texts,
         is_manual=course.is_manual,
+        mistakes=mistakes,
     )
 
 

@@ -1,18 +1,17 @@
 """Who may use the preview, and what is served at an address.
 
-1. A page of another origin may link to the preview and do nothing else. Browsers say where a
+1. Whoever asks shows a token, which the link that `serve` prints holds. It is first in the address,
+   then in the cookie for which it is exchanged. So no other user of the machine can ask anything,
+   nor a page whose host name was made to point at this machine (DNS rebinding): a cookie belongs to
+   the host that set it.
+2. A page of another origin may link to the preview and do nothing else. Browsers say where a
    request comes from (`Sec-Fetch-Site`, `Origin`), and are told to show answers to nobody else.
-2. A host name may be made to point at this machine (DNS rebinding), an address may not. So only
-   `localhost` and addresses are good hosts; 0.0.0.0 and [::] are not, which mean this machine to
-   some browsers that keep pages from its loopback address.
-3. Other machines need a token, first in the address, then in the cookie that it is exchanged for.
-   With it any host is good, since a cookie belongs to the host that set it.
+   Ports of a host share their cookies, so these alone do not keep out a page at another port.
 """
 
 from __future__ import annotations
 
 import hashlib
-import ipaddress
 import json
 import posixpath
 import re
@@ -31,15 +30,14 @@ from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.pages.renderer import DEFAULT_LANGUAGE, Strings
 from coursebuild.preview.session import Session
 
-_HOST = re.compile(r"(?P<name>[a-z0-9._-]+|\[[0-9a-f:.]+\])(?::(?P<port>[0-9]{1,5}))?")
+_HOST = re.compile(r"(?:[a-z0-9._-]+|\[[0-9a-f:.]+\])(?::(?P<port>[0-9]{1,5}))?")
 
 
 class Access(Struct, frozen=True):
     """Decides who may use the preview; see the module."""
 
     port: int
-    token: str = ""
-    """Empty where only this machine can reach the preview."""
+    token: str
     embed: tuple[str, ...] = ()
     """Origins whose pages may show the preview in a frame."""
 
@@ -54,13 +52,11 @@ class Access(Struct, frozen=True):
         }
 
     def refusal(self, method: str, target: str, headers: Message) -> str:
-        """Why a request is refused, with or without token; empty where it is not."""
+        """Why a request is refused, whoever has the token; empty where it is not."""
         host = headers.get("Host", "").lower()
         match = _HOST.fullmatch(host)
         if match is None or int(match["port"] or 0) > 0xFFFF:
             return "the request does not name its host"
-        if not self.token and not _is_fixed(match["name"]):
-            return "this preview answers only as localhost"
         scheme, separator, rest = target.lower().partition(":")
         if separator and scheme in ("http", "https") and re.split("[/?#]", rest)[2:3] != [host]:
             return "the request went to a different host from the one that it names"
@@ -78,12 +74,16 @@ class Access(Struct, frozen=True):
         return "pages of other origins can only link to the preview"
 
     def has_token(self, headers: Message) -> bool:
-        """Whether a request shows the token, where one is needed."""
+        """Whether a request shows the token in its cookie."""
         cookies = headers.get("Cookie", "").split(";")
-        return not self.token or any(_is_same(cookie.strip(), self._cookie) for cookie in cookies)
+        return any(_is_same(cookie.strip(), self._cookie) for cookie in cookies)
 
-    def exchange(self, address: str) -> dict[str, str] | None:
-        """The headers that set a cookie for the token in an address, and redirect to it without."""
+    def exchange(self, address: str, headers: Message) -> tuple[str, bytes] | None:
+        """The cookie for the token in an address, and a page that goes on to it without.
+
+        A redirect would be part of the request that led to it: after a link on another site,
+        browsers would withhold the new cookie.
+        """
         try:
             parts = urlsplit(address)
         except ValueError:
@@ -92,29 +92,21 @@ class Access(Struct, frozen=True):
         if not _is_same(fields.pop("token", ""), self.token):
             return None
         query = f"?{urlencode(fields)}" if fields else ""
-        return {
-            # Two slashes at its beginning would name another host.
-            "Location": f"/{parts.path.lstrip('/')}{query}",
-            "Set-Cookie": f"{self._cookie}; Path=/; HttpOnly; SameSite=Lax",
-        }
+        # Two slashes at its beginning would name another host.
+        place = "/" + parts.path.lstrip("/\\") + query
+        is_framed = headers.get("Sec-Fetch-Dest") == "iframe"
+        rule = "SameSite=None; Secure; Partitioned" if is_framed else "SameSite=Strict"
+        return f"{self._cookie}; Path=/; HttpOnly; {rule}", _NEXT_PAGE.format(
+            escape(place)
+        ).encode()
 
     @property
     def _cookie(self) -> str:
-        return f"coursebuild-{self.port}={self.token}"  # ports of a host share their cookies
+        return f"coursebuild-{self.port}={self.token}"
 
 
 def _is_same(text: str, secret: str) -> bool:
     return secrets.compare_digest(text.encode(), secret.encode())
-
-
-def _is_fixed(name: str) -> bool:
-    """Whether a host is `localhost` or an address, which nobody can make point elsewhere."""
-    try:
-        address = ipaddress.ip_address(name.strip("[]"))
-    except ValueError:
-        return name == "localhost"
-    mapped = address.ipv4_mapped if isinstance(address, ipaddress.IPv6Address) else None
-    return not (mapped or address).is_unspecified and (address.version == 6) == ("[" in name)
 
 
 PREFIX = "/.coursebuild/"
@@ -130,6 +122,7 @@ _TYPES = MimeTypes().types_map[True] | {
 }
 """Python's own table, and what it lacks in some version or has otherwise."""
 _WORKER = "/service-worker.js"
+_NEXT_PAGE = '<!DOCTYPE html><title>…</title><meta http-equiv="refresh" content="0; url={}">'
 _MESSAGE_PAGE = "<!DOCTYPE html><html lang={}><title>{}</title><body><p>{}</p></body></html>"
 
 
@@ -158,11 +151,14 @@ class Answers:
         if data is not None:
             text = self._add_preview(data, name, digest(data)) if name.endswith(".html") else data
             return HTTPStatus.OK, _type_of(name), text
-        if self._session.files.has_page(name):
-            return HTTPStatus.OK, HTML, self._add_preview(self._message_page("blocked"), name, "")
+        reason = self._session.unreadable(name)
+        if reason is not None or self._session.files.has_page(name):
+            words = self._words("preview.blocked")
+            text = words if reason is None else f"{reason.span.path}: {reason.message}"
+            return HTTPStatus.OK, HTML, self._add_preview(self._message_page(text), name, "")
         missing = self._session.find("404.html")
         if missing is None:
-            missing = self._message_page("unbuilt")
+            missing = self._message_page(self._words("preview.unbuilt"))
         return HTTPStatus.NOT_FOUND, HTML, self._add_preview(missing, name, "")
 
     @property
@@ -170,10 +166,10 @@ class Answers:
         course = self._session.course
         return strings_for(self._templates, (course and course.language) or DEFAULT_LANGUAGE)
 
-    def _message_page(self, key: str) -> bytes:
+    def _message_page(self, text: str) -> bytes:
         words = self._words
-        texts = escape(words("preview.title")), escape(words(f"preview.{key}"))
-        return _MESSAGE_PAGE.format(words.language, *texts).encode()
+        title = escape(words("preview.title"))
+        return _MESSAGE_PAGE.format(words.language, title, escape(text)).encode()
 
     def _add_preview(self, page: bytes, name: str, state: str) -> bytes:
         texts = {k: text for k, text in self._words.texts.items() if k.startswith("preview.")}

@@ -17,9 +17,9 @@ import queue
 import stat
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from coursebuild.core.files.course_root import FOLDERS, is_dropping
 from coursebuild.core.files.errors import EffectError, reason
@@ -204,17 +204,6 @@ class LiveCourse:
         self.session.start()
         self._watcher.start()
         threading.Thread(target=self._take_saves, name="saves", daemon=True).start()
-
-    def tell_command(self, event: Mapping[str, Any]) -> None:
-        """Say that a command for another terminal begins, or how it ended."""
-        process, command = event["process"], f"`coursebuild {event['command']}`"
-        if "status" not in event:
-            self.session.commands.add(process)
-            text = f"for another terminal: {command}"
-        else:
-            self.session.commands.discard(process)
-            text = f"done: {command}, exit status {event['status']} ({event['seconds']:.1f} s)"
-        self.session.options.progress.say(text)
 
     def rebuild(self) -> NoReturn:
         """Do the rest of a build after each save; raise what fails, also while saves are taken."""

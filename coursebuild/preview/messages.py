@@ -38,14 +38,12 @@ from coursebuild.core.text.source import Source
 from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.fix import may_edit
 from coursebuild.pipeline.recordings import read_recorded
-from coursebuild.preview.session import Session
+from coursebuild.preview.session import Session, is_marked
 from coursebuild.report import Report
 from coursebuild.report.text import location
 
 _MAX_DIAGNOSTICS = 60
 """The most mistakes that are sent to a page."""
-_IN_PLACE = ("output-drift", "binding-mismatch", "figure-drift")
-"""Rules whose mistakes a page shows where they are."""
 _IMAGES = {"svg": "image/svg+xml", "png": "image/png"}
 
 
@@ -118,23 +116,16 @@ def accept(session: Session, path: str, ids: str) -> str:
 
 def _collect_news(session: Session, path: str) -> dict[str, Any]:
     document, library = session.files.document(path), session.library
-    report, blocking = report_now(session), session.blocking_diagnostics(path)
+    report = report_now(session)
     document_path = "" if document is None else document.source.path
 
     def rank(d: Diagnostic) -> tuple[bool, ...]:
-        return d not in blocking, not d.is_error, d.span.path != document_path
+        return d.span.path != document_path, not d.is_error
 
     diagnostics = sorted(report.diagnostics, key=rank)[:_MAX_DIAGNOSTICS]
     news: dict[str, Any] = {
-        "problems": [
-            {
-                **_describe_mistake(session, d, document_path),
-                "blocks": d in blocking,
-            }
-            for d in diagnostics
-        ],
+        "problems": [_describe_mistake(session, d, document) for d in diagnostics],
         "more": max(0, len(report.diagnostics) - _MAX_DIAGNOSTICS),
-        "kept": session.files.is_outdated(path),
         "busy": session.busy,
         "trouble": session.trouble,
         "running": [
@@ -161,7 +152,7 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
 
 
 def _describe_mistake(
-    session: Session, diagnostic: Diagnostic, document_path: str
+    session: Session, diagnostic: Diagnostic, document: Document | None
 ) -> dict[str, Any]:
     span, offer = diagnostic.span, {}
     if len({edit.span.source for edit in diagnostic.edits}) == 1:
@@ -170,6 +161,8 @@ def _describe_mistake(
             offered = Offer.of(*diagnostic.edits)
             fixed = Source(offered.path, offered.new.decode()).line_text(first.span.line)
             offer = {"offer": offered, "fixed": fixed}
+    is_here = document is not None and span.path == document.source.path
+    has_mark = document is not None and is_marked(diagnostic, document)
     line = span.source.line_text(span.line)
     end = len(line) if span.end_line > span.line else span.end_column - 1
     return {
@@ -186,7 +179,8 @@ def _describe_mistake(
         "line": line,
         "start": span.column - 1,
         "end": max(end, span.column - 1),
-        "inPlace": span.path == document_path and diagnostic.rule in _IN_PLACE,
+        "here": is_here,
+        "mark": f"mistake:{span.start}" if has_mark else "",
         **offer,
     }
 

@@ -126,12 +126,7 @@ class BackgroundRebuild:
         """
         session = self._session
         self._edits = session.edits
-
-        def tell(text: str) -> None:
-            if not session.commands:  # else it is known who is at work
-                self._progress.say(text)
-
-        with project_lock(self._options.root, tell):
+        with project_lock(self._options.root, self._progress.say):
             session.read()
         with session.condition:
             self._edits = session.edits

@@ -16,6 +16,7 @@
 from __future__ import annotations
 
 import contextlib
+import hmac
 import ipaddress
 import json
 import os
@@ -37,8 +38,9 @@ from urllib.parse import parse_qs, urlsplit
 import msgspec
 
 from coursebuild.core.files.errors import reason
+from coursebuild.core.files.trust import store_key
 from coursebuild.core.run import gate
-from coursebuild.preview.answers import PREFIX, TEXT, Access, Answers, digest
+from coursebuild.preview.answers import HTML, PREFIX, TEXT, Access, Answers, digest
 from coursebuild.preview.messages import accept, page_news
 from coursebuild.preview.session import Session
 from coursebuild.report.text import location
@@ -80,10 +82,9 @@ class PreviewServer(ThreadingHTTPServer):
         super().__init__((str(address), port), _Handler)
         self._address = ipaddress.ip_address(str(self.server_address[0]))
         self._port = int(self.server_address[1])
-        token = "" if self._address.is_loopback else secrets.token_urlsafe(12)
-        self.access = Access(self._port, token, embed)
-        is_local = not token and not _find_editor()
-        self.linked_folder = str(session.root) if is_local else ""
+        self.access = Access(self._port, _token(session.root), embed)
+        self.is_local = self._address.is_loopback
+        self.linked_folder = str(session.root) if self.is_local and not _find_editor() else ""
         """The folder of the files that pages link to for VS Code, where no editor can be started
         here; empty where the browser may be another machine's."""
         self._thread = threading.Thread(
@@ -111,8 +112,7 @@ class PreviewServer(ThreadingHTTPServer):
                 probe.connect(("192.0.2.1", 9))
                 hosts.append(probe.getsockname()[0])
         names = [f"[{host}]" if ":" in host else host for host in hosts]
-        query = f"?token={self.access.token}" if self.access.token else ""
-        return [f"http://{host}:{self._port}/{query}" for host in names]
+        return [f"http://{host}:{self._port}/?token={self.access.token}" for host in names]
 
     def start(self) -> None:
         """Answer requests, in a thread."""
@@ -128,6 +128,12 @@ class PreviewServer(ThreadingHTTPServer):
         if self._thread.ident is not None:  # otherwise `shutdown` would wait forever
             self.shutdown()
         self.server_close()
+
+
+def _token(root: Path) -> str:
+    """The token of a course and its user, the same after a restart; random without a key."""
+    key = store_key(str(root)) or secrets.token_bytes()
+    return hmac.digest(key, b"preview\0" + os.fsencode(root.resolve()), "sha256").hex()[:32]
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -223,12 +229,15 @@ class _Handler(BaseHTTPRequestHandler):
         """Whether a request may be answered; if not, answer why."""
         access = self.server.access
         refusal = access.refusal(self.command, self.path, self.headers)
+        exchange = None if refusal else access.exchange(self.path, self.headers)
+        if exchange is not None:
+            cookie, page = exchange
+            self._send(HTTPStatus.OK, HTML, page, {"Set-Cookie": cookie})
+            return False
         if not refusal and access.has_token(self.headers):
             return True
-        redirect = None if refusal else access.exchange(self.path)
         message = refusal or "open the address that the terminal shows, which lets this browser in"
-        status = HTTPStatus.FORBIDDEN if redirect is None else HTTPStatus.SEE_OTHER
-        self._send(status, TEXT, f"{message}\n".encode(), redirect or {})
+        self._send(HTTPStatus.FORBIDDEN, TEXT, f"{message}\n".encode())
         return False
 
     def _send_message(self, status: HTTPStatus, message: str) -> None:

@@ -23,13 +23,14 @@ from coursebuild.core.model import Course, Document, Lesson, Owner, Page
 from coursebuild.core.model.results import Reports, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.context import Mistakes
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.renderer import TemplateFailure
 from coursebuild.core.registry import publish_trials
 from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
-from coursebuild.pipeline.load import MAP, Code, load
+from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.scenes import shown_reports
@@ -40,6 +41,8 @@ from coursebuild.preview.site_files import Files
 
 MAX_SINGLE_READS = 8
 """Documents saved at once that are read one by one; for more, the whole course is read."""
+SHOWN_BY_RESULT = ("output-drift", "binding-mismatch", "figure-drift")
+"""Rules whose mistakes a page shows with what was printed or drawn, where it is recorded."""
 _GARBAGE = 200_000
 """Objects after which Python looks for cycles: a session lives long."""
 _SWITCH = 0.001
@@ -67,11 +70,8 @@ class Session:
         self.calm.set()
         self.busy = "reading the course"
         """What is being done in the background, in words; empty when everything is done."""
-        self.commands: set[int] = set()
-        """The processes of commands that are being done for other terminals."""
         self.trouble = ""
         """Why background work could not be done, if it could not."""
-        self._is_map_broken = False
         self.library: Library | None = None
         """The course with its results, for drawing; `None` before a map could be read."""
         self.runs = RunHistory()
@@ -86,7 +86,7 @@ class Session:
         """The diagnostic of a template of the course that failed when a page was drawn."""
         self._targets: LinkTargets | None = None
         self._reports = Reports()
-        self.files = Files(options, self._assets, self._reader, self._is_sound)
+        self.files = Files(options, self._assets, self._reader, self.mistakes)
         self._site = site
 
     def run_code(self) -> None:
@@ -133,14 +133,13 @@ class Session:
                 d for diagnostics in self._diagnostics_by_file.values() for d in diagnostics
             )
 
-    def blocking_diagnostics(self, path: str) -> list[Diagnostic]:
-        """The errors that keep a page from being drawn: those in its text or in the map."""
-        document = self.files.document(path)
-        own_diagnostics = (
-            [] if document is None else self._diagnostics_by_file.get(document.source.path, ())
+    def mistakes(self, document: Document) -> Mistakes:
+        """Where the text of a document has mistakes that are marked when its page is drawn."""
+        return tuple(
+            sorted(
+                {(d.span.start, d.is_error) for d in self.diagnostics() if is_marked(d, document)}
+            )
         )
-        map_diagnostics = self._diagnostics_by_file.get(MAP, ()) if self._is_map_broken else ()
-        return [d for d in (*own_diagnostics, *map_diagnostics) if d.is_error]
 
     def files_elsewhere(self) -> frozenset[str]:
         """The files of lessons and pages, and other files of which they show parts."""
@@ -281,7 +280,6 @@ class Session:
         is_same = by_path == {
             path: before for path, before in self._diagnostics_by_file.items() if before
         }
-        self._is_map_broken = course is None
         self._diagnostics_by_file = by_path
         if course is not None:
             is_same = is_same and reports == self._reports and course == self.course
@@ -331,16 +329,14 @@ class Session:
         with self.condition:
             library = self.library
             assert library is not None
-            broken_paths = {
-                path
-                for path, diagnostics in self._diagnostics_by_file.items()
-                if has_errors(diagnostics)
-            }
-            broken_pages = {
-                urls.owner_path(o) for o in library.course.owners if o.path in broken_paths
+            paths = {diagnostic.span.path for diagnostic in self.diagnostics()}
+            mistakes = {
+                urls.owner_path(owner): self.mistakes(owner.document)
+                for owner in library.course.owners
+                if owner.document is not None and owner.path in paths
             }
         try:
-            site, files = self.files.make(library, broken_pages, pause)
+            site, files = self.files.make(library, mistakes, pause)
         except TemplateFailure as failure:
             self._take_template_failure(failure)
             return
@@ -350,9 +346,19 @@ class Session:
 
     # --- files
 
+    def unreadable(self, path: str) -> Diagnostic | None:
+        """Why the document of the page at a site path cannot be read at all, if it cannot."""
+        for owner in () if self.course is None else self.course.owners:
+            if owner.document is None and urls.owner_path(owner) == path:
+                diagnostics = self._diagnostics_by_file.get(owner.path, ())
+                return next((d for d in diagnostics if d.is_error), None)
+        return None
+
     def find(self, path: str) -> bytes | None:
         """Return a file of the site, if there is one and it can be made."""
         with self.condition:
+            if self.unreadable(path) is not None:
+                return None
             try:
                 return self.files.find(path)
             except TemplateFailure as failure:
@@ -367,11 +373,9 @@ class Session:
                 self._template_diagnostics = diagnostics
                 self.notify()
 
-    def _is_sound(self, document: Document) -> bool:
-        diagnostics = self._diagnostics_by_file.get(document.source.path, ())
-        return not has_errors(diagnostics) and not has_errors(self._check(document))
 
-
-def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
-    """Whether there are errors among diagnostics."""
-    return any(d.is_error for d in diagnostics)
+def is_marked(diagnostic: Diagnostic, document: Document) -> bool:
+    """Whether a diagnostic has a mark in the page of a document, at its place in the text."""
+    source = diagnostic.span.source
+    is_here = source.path == document.source.path and source.text == document.source.text
+    return is_here and diagnostic.rule not in SHOWN_BY_RESULT

@@ -1,12 +1,12 @@
 """The files of the site of a course as it is now; pages are drawn on demand.
 
-A page whose document has a mistake stays as it was. Callers hold the session's lock, except for
-`make`.
+A page whose document has mistakes is drawn with marks where they stand. Callers hold the session's
+lock, except for `make`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from msgspec.structs import replace
 
@@ -14,6 +14,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model import Document
 from coursebuild.core.model.results import OutputFile, SiteFile
 from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.context import Mistakes
 from coursebuild.core.pages.frame import FrameInputs, PageFrame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
@@ -36,17 +37,15 @@ class Files:
         options: Options,
         assets: Assets,
         reader: Reader,
-        is_sound: Callable[[Document], bool],
+        mistakes: Callable[[Document], Mistakes],
     ) -> None:
-        """`is_sound` says whether a document can be drawn."""
+        """`mistakes` finds those of a document."""
         self._options = replace(options, jobs=1)  # a process with threads is not forked
         self._assets = assets
         self._reader = reader
-        self._is_sound = is_sound
+        self._mistakes = mistakes
         self._library: Library | None = None
         self._entries: dict[str, PageEntry] = {}
-        self._last_good: dict[str, str] = {}
-        """The key of each page when it was last drawn without mistakes, by site path."""
         self._frame: PageFrame | None = None
         """There is a new frame after each change of the course or of what pages share."""
         self._framed_pages: dict[str, bytes] = {}
@@ -60,7 +59,6 @@ class Files:
         self._library = library
         self._trial_files = {file.path: file for file in library.trial_files}
         self._entries = {entry.path: entry for entry in page_list(library)}
-        self._last_good = {p: key for p, key in self._last_good.items() if p in self._entries}
         if self._sites:
             self._set_frame()
         else:  # fonts with all characters, as pages are not drawn yet
@@ -69,26 +67,23 @@ class Files:
             )
 
     def make(
-        self, library: Library, broken: Collection[str], pause: Callable[[], None]
+        self, library: Library, mistakes: Mapping[str, Mistakes], pause: Callable[[], None]
     ) -> tuple[Site, Mapping[str, SiteFile]]:
         """Make all files of the site; return them by path.
 
-        `broken` are paths of pages whose documents have mistakes. `pause` is called between pages.
+        `mistakes` are those of pages, by site path. `pause` is called between pages.
         """
-        last_good = {path: key for path, key in self._last_good.items() if path in broken}
 
         def entries() -> Iterator[PageEntry]:
             for entry in page_list(library):
-                if entry.path not in broken or entry.path in last_good:
-                    pause()
-                    yield entry
+                pause()
+                yield entry
 
-        return _with_files(Site(library, self._reader, self._options, entries(), last_good))
+        return _with_files(Site(library, self._reader, self._options, entries(), mistakes))
 
     def serve(self, site: Site, files: Mapping[str, SiteFile]) -> None:
         """Serve the files of this site from now on."""
         self._sites = [*self._sites[1 - _MOST_SITES :], (site, files)]
-        self._last_good |= {p: key for p, key in site.keys.items() if p in self._entries}
         self._set_frame()
 
     def _set_frame(self) -> None:
@@ -105,14 +100,8 @@ class Files:
         return tuple(self._sites[-1][1]) if self._sites else ()
 
     def has_page(self, path: str) -> bool:
-        """Whether the site has a page here, even one that cannot be drawn for its mistakes."""
+        """Whether the site has a page here, even one that a template fails to draw."""
         return path in self._entries
-
-    def is_outdated(self, path: str) -> bool:
-        """Whether a page is older than its document, which has mistakes."""
-        document = self.document(path)
-        is_drawn = path in self._last_good
-        return document is not None and is_drawn and not self._is_sound(document)
 
     def document(self, path: str) -> Document | None:
         """The document that a page shows, as it was last read."""
@@ -136,25 +125,20 @@ class Files:
                     return None  # gone since the course was read
         return None
 
-    def _find_page(self, path: str) -> bytes | None:
-        """Return a page as it is now, or as it was before its document had a mistake."""
+    def _find_page(self, path: str) -> bytes:
         if path not in self._framed_pages:
             page = self._find_drawn(path)
-            if page is None:
-                return None
             assert self._frame is not None
             if len(self._framed_pages) == _MOST_PAGES:
                 self._framed_pages.clear()
             self._framed_pages[path] = frame_page(page, self._frame)
         return self._framed_pages[path]
 
-    def _find_drawn(self, path: str) -> DrawnPage | None:
+    def _find_drawn(self, path: str) -> DrawnPage:
         assert self._library is not None
         document = self.document(path)
-        if document is not None and not self._is_sound(document):
-            return self._reader.find_page(self._last_good.get(path, ""))
-        request = page_request(self._entries[path], self._library)
-        self._last_good[path] = request.key
+        mistakes = () if document is None else self._mistakes(document)
+        request = page_request(self._entries[path], self._library, mistakes)
         return self._reader.find_page(request.key) or self._reader.draw_page(request)
 
 

@@ -201,6 +201,7 @@ def test_half_typed_answer_survives_the_author(
     with serve_preview(folder) as preview:
         preview.wait_for_line("checked: ")
         page = calm.new_page()
+        page.goto(preview.link)
         visit(page, f"http://127.0.0.1:{preview.port}/{PATH}")
         page.evaluate("window.same = true")
         field, explained = answer_field(page, NUMBER), page.locator(".explain").nth(2)

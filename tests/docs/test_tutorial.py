@@ -14,7 +14,7 @@ import re
 import shlex
 import subprocess
 from pathlib import Path
-from urllib.request import urlopen
+from urllib.request import HTTPCookieProcessor, build_opener
 
 import pytest
 
@@ -75,8 +75,10 @@ def look_at(folder: Folder) -> None:
     try:
         assert server.stdout is not None
         lines = iter(server.stdout.readline, b"")
-        address = next(match[0] for line in lines if (match := re.search(rb"http://\S+/", line)))
-        with urlopen(address.decode()) as page:
+        address = next(match[0] for line in lines if (match := re.search(rb"http://\S+", line)))
+        browser = build_opener(HTTPCookieProcessor())
+        browser.open(address.decode()).close()
+        with browser.open(address.decode().partition("?")[0]) as page:
             assert b"A first course" in page.read()
     finally:
         server.terminate()

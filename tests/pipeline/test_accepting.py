@@ -41,7 +41,7 @@ def test_output_is_accepted(make: Make) -> None:
         before = folder.read(folder.lesson())
         unsaid = (403, "a request that changes something says where it comes from\n")
         other_origin = (403, "pages of other origins cannot use the preview\n")
-        alone = (403, "this preview answers only as localhost\n")
+        denied = (403, "open the address that the terminal shows, which lets this browser in\n")
         unread = (400, {"message": "the request cannot be read"})
         no_such_offer = (
             409,
@@ -51,7 +51,8 @@ def test_output_is_accepted(make: Make) -> None:
             ({"Origin": ""}, body, unsaid),
             ({"Origin": "http://evil.example"}, body, other_origin),
             ({"Origin": "http://127.0.0.1:9"}, body, other_origin),
-            ({"Host": "evil.example"}, body, alone),
+            ({"Host": "evil.example"}, body, other_origin),
+            ({"Cookie": "coursebuild-1=x"}, body, denied),
             ({}, b"{", unread),
             ({}, b"[1]", unread),
             ({}, b'{"page": 1, "id": 2}', unread),

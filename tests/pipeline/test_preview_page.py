@@ -189,7 +189,7 @@ def test_preview_that_stops_and_starts_again(make: Make, browser: Browser) -> No
 ATTACK = """
 <!DOCTYPE html><html lang=en><title>Elsewhere</title><body>
 <form method=post enctype=text/plain action=ADDRESS.coursebuild/accept><button>Go</button></form>
-<a href="ADDRESS">Link</a>
+<a href="LINK">Link</a>
 <script>
   window.draft = 'nothing'
   window.coursebuildSearch = { take: (...all) => { window.draft = all } }
@@ -229,10 +229,13 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
     with Host(tmp_path) as host, serve_preview(folder) as preview:
         preview.wait_for_line("checked: ")
         address = f"http://127.0.0.1:{preview.port}/"
-        (tmp_path / "index.html").write_text(ATTACK.replace("ADDRESS", address))
+        attack = ATTACK.replace("ADDRESS", address).replace("LINK", preview.link)
+        (tmp_path / "index.html").write_text(attack)
         for url in (host.url, host.url.replace("localhost", "127.0.0.1")):
             with browser.new_context() as context:
                 page = context.new_page()
+                page.goto(preview.link)  # whoever has its cookie is safe as well
+                expect(page.locator("h1").first).to_have_text("Scratch")
                 page.goto(url)
                 (frame,) = page.main_frame.child_frames
                 wait_for_condition(page, lambda frame=frame: frame.url.startswith("chrome-error:"))
@@ -246,6 +249,30 @@ def test_page_of_another_origin_can_only_link_to_the_preview(
                 expect(page.locator("h1").first).to_have_text("Scratch")
 
 
+FRAME = "<!DOCTYPE html><html lang=en><title>Editor</title><iframe src='{}'></iframe>"
+
+
+@pytest.mark.browser
+def test_preview_in_the_frame_of_an_editor_follows_and_accepts(
+    make: Make, browser: Browser, tmp_path: Path
+) -> None:
+    """Browsers send no strict cookie from a frame in a page of another site."""
+    folder = make(GOOD.replace("3.14159\n```", "3\n```"))
+    with Host(tmp_path) as host, serve_preview(folder, "--embed", host.url.rstrip("/")) as preview:
+        link = preview.link.replace("/?", f"/{LESSON}?")
+        (tmp_path / "index.html").write_text(FRAME.format(link))
+        with browser.new_context() as context:
+            page = context.new_page()
+            page.goto(host.url)
+            frame = page.frame_locator("iframe")
+            accept = frame.get_by_role("button", name="Accept this output")
+            accept.click()
+            expect(accept).to_have_count(0)
+            frame.get_by_role("link", name="Scratch").first.click()
+            expect(frame.locator("h1").first).to_have_text("Scratch")
+    assert "hello 3.14159" in folder.text(folder.lesson())
+
+
 @pytest.mark.browser
 def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> None:
     """With everything that it can show at once, light and dark."""
@@ -257,6 +284,7 @@ def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> Non
         with PreviewPage(browser, preview, LESSON) as window:
             page = window.page
             see(page.get_by_role("button", name="Accept this output"))
+            page.get_by_role("button", name="2 mistakes").click()
             see(page.get_by_role("region", name="Problems"))
             page.evaluate(axe)
             for scheme in ("light", "dark"):
@@ -272,7 +300,7 @@ def test_a_mistake_that_knows_its_cure_is_fixed_from_its_page(make: Make, browse
         before = folder.text(folder.lesson())
         folder.write(folder.lesson(), f"{before}See [x](lesson:two) and [y](lesson:9.9).\n")
         panel = page.get_by_role("region", name="Problems")
-        see(panel)
+        page.get_by_role("button", name="2 mistakes").click()
         fix = panel.get_by_role("button", name="Fix it")
         expect(fix).to_have_count(1)
         expect(panel.locator("ins")).to_have_text("See [x](lesson:1.2) and [y](lesson:9.9).")
@@ -298,46 +326,54 @@ def test_mistakes_are_shown_and_clear_by_themselves(
             page = page_open.page
             panel = page.get_by_role("region", name="Problems")
             expect(panel).to_have_count(0)
-            folder.replace(folder.lesson(), "## Hello\n", "## Never\n\n[x](lesson:9.9)\n")
+            folder.replace(folder.lesson(), "## Hello\n", "## Seen\n\n[x](lesson:9.9)\n")
+            # The list begins closed; the mistake stands where it is on the page.
+            expect(page.locator(".prose h2").first).to_contain_text("Seen")
+            note = page.get_by_role("note")
+            expect(note).to_contain_text("lesson 9.9 is not in the course map")
+            expect(page.locator(".prose").get_by_role("link", name="x", exact=True)).to_have_count(
+                0
+            )
+            expect(panel).to_have_count(0)
+            button = page.get_by_role("button", name="1 mistake")
+            expect(button).to_have_attribute("aria-expanded", "false")
+            button.focus()
+            page.keyboard.press("Enter")
             see(panel)
-            expect(panel).to_contain_text("The last good page is shown")
+            expect(panel).to_contain_text("What is wrong on this page")
             panel.get_by_role("button", name="content/lessons/1.1-one.md:3:5").click()
             wait_for_file(calls, 1)
             assert calls.read_text() == f"--goto {folder.root / folder.lesson()}:3:5\n"
-            expect(panel).to_contain_text("lesson 9.9 is not in the course map")
             expect(panel.locator(".preview-source mark")).to_have_text("lesson:9.9")
-            expect(page.locator(".prose h2").first).to_contain_text("Hello")
-            see(second_page.page.get_by_role("region", name="Problems"))
-            expect(second_page.page.get_by_role("region", name="Problems")).to_contain_text(
-                "What is wrong with the course"
-            )
-            # The list can be closed, by keyboard too, and opens again for another mistake.
-            panel.get_by_role("button", name="Close").click()
+            panel.get_by_role("link", name="Show it on the page").click()
+            expect(note).to_be_focused()
+            expect(note).to_be_in_viewport()
             expect(panel).to_have_count(0)
-            button = page.get_by_role("button", name="1 mistake")
-            expect(button).to_be_focused()
-            expect(button).to_have_attribute("aria-expanded", "false")
-            page.keyboard.press("Enter")
-            see(panel)
+            button.click()
             page.keyboard.press("Escape")
             expect(panel).to_have_count(0)
+            expect(button).to_be_focused()
+            other = second_page.page
+            elsewhere = other.get_by_role("region", name="Problems")
+            other.get_by_role("button", name="1 mistake").click()
+            expect(elsewhere).to_contain_text("What is wrong with the course")
             folder.replace(folder.lesson(2), "## Two\n", "[x](lesson:9.9)\n")
-            expect(page.get_by_role("button", name="2 mistakes")).to_be_visible()
             folder.replace(folder.lesson(), "[x](lesson:9.9)", "[x](lesson:9.9) $\\frac{1$")
-            see(panel)
-            # On each page, the mistakes that keep it from being drawn come first.
-            kinds = ["Blocks this page", "Blocks this page", "Mistake"]
-            expect(panel.locator("strong")).to_have_text(kinds)
-            kinds = ["Blocks this page", "Mistake", "Mistake"]
-            elsewhere = second_page.page.get_by_role("region", name="Problems")
-            expect(elsewhere.locator("strong")).to_have_text(kinds)
+            page.get_by_role("button", name="3 mistakes").click()
+            # On each page, its own mistakes come first.
+            expect(panel.get_by_role("list")).to_have_count(2)
+            expect(panel.get_by_role("list").first.get_by_role("listitem")).to_have_count(2)
+            expect(elsewhere).to_contain_text("Elsewhere in the course")
             expect(elsewhere.get_by_role("listitem").first).to_contain_text("1.2-two.md:1:5")
+            expect(note).to_have_count(2)
+            expect(page.locator(".prose code.tex")).to_have_text("\\frac{1")
             folder.write(folder.lesson(2), "## Two\n\nText.\n")
             expect(panel).to_contain_text("the formula does not parse")
             folder.write(folder.lesson(), GOOD.replace("## Hello", "## Mended"))
             expect(panel).to_have_count(0)
             expect(page.locator(".prose h2").first).to_contain_text("Mended")
-            expect(second_page.page.get_by_role("region", name="Problems")).to_have_count(0)
+            expect(elsewhere).to_have_count(0)
+            expect(note).to_have_count(0)
             page_open.check_unbroken()
 
 

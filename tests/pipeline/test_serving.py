@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import socket
+import subprocess
 import sys
 from collections.abc import Iterator
 from http.client import HTTPConnection
@@ -13,7 +14,17 @@ from pathlib import Path
 import pytest
 
 from support.preview_process import Preview, serve_preview
-from support.scratch_course import GOOD, Folder, Make
+from support.scratch_course import (
+    GOOD,
+    WAIT_FOR_GO,
+    Folder,
+    Make,
+    block,
+    kill_at_end,
+)
+from support.scratch_course import (
+    SECOND as SECOND_LESSON,
+)
 from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.site
@@ -29,10 +40,12 @@ def preview(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[
     browser = folder.tmp / "browser"
     browser.write_text(
         f"#!{sys.executable}\n"
-        "import pathlib, sys, urllib.request\n"
-        "status = urllib.request.urlopen(sys.argv[1]).status\n"
+        "import pathlib, re, sys, urllib.request as requests\n"
+        "page = requests.urlopen(sys.argv[1]).read().decode()\n"
+        "link = re.search('url=([^\"]+)', page)[1]\n"
+        "status = requests.urlopen(link).status\n"
         "told = pathlib.Path(sys.argv[0]).with_name('told')\n"
-        "told.with_suffix('.new').write_text(f'{sys.argv[1]} {status}')\n"
+        "told.with_suffix('.new').write_text(f'{sys.argv[1]} {link} {status}')\n"
         "told.with_suffix('.new').rename(told)\n"
     )
     browser.chmod(0o755)
@@ -45,7 +58,9 @@ def preview(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[
 def test_browser_is_opened_when_the_address_answers(preview: Preview) -> None:
     calls = preview.folder.tmp / "told"
     wait_for_file(calls)
-    assert calls.read_text() == f"http://127.0.0.1:{preview.port}/ 200"
+    page, link, status = calls.read_text().split()
+    assert (link, status) == (preview.link, "200")
+    assert preview.token not in page  # all users can read the command that starts a browser
 
 
 def test_pages_and_files_have_their_types(preview: Preview) -> None:
@@ -71,7 +86,8 @@ def test_pages_and_files_have_their_types(preview: Preview) -> None:
 
 def test_a_drawing_runs_nothing_and_loads_nothing_before_it_is_judged(preview: Preview) -> None:
     with contextlib.closing(HTTPConnection("127.0.0.1", preview.port)) as connection:
-        connection.request("GET", "/files/pic%20%C3%A4.svg")
+        cookie = {"Cookie": preview.cookie}
+        connection.request("GET", "/files/pic%20%C3%A4.svg", headers=cookie)
         policies = connection.getresponse().headers.get_all("Content-Security-Policy", [])
     drawing = "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'"
     assert policies == [drawing, "frame-ancestors 'none'"]
@@ -145,83 +161,7 @@ def test_head_has_no_body_and_other_methods_are_refused(preview: Preview) -> Non
     assert statuses == dict.fromkeys(methods, 501)
 
 
-# --- access
-
-SITE, MODE, DEST = "Sec_Fetch_Site", "Sec_Fetch_Mode", "Sec_Fetch_Dest"
-LINK = {SITE: "cross-site", MODE: "navigate", DEST: "document"}
-CALLERS: tuple[tuple[dict[str, str], int], ...] = (
-    ({"Host": "127.0.0.1:PORT"}, 200),
-    ({"Host": "LOCALHOST:PORT"}, 200),
-    ({"Host": "localhost:9"}, 200),  # a forwarded port
-    ({"Host": "[::1]:PORT"}, 200),
-    ({"Host": "192.0.2.7"}, 200),  # an address cannot be made to point elsewhere
-    ({"Host": "evil.example:PORT"}, 403),
-    ({"Host": "127.0.0.1.evil.example:PORT"}, 403),
-    ({"Host": "localhost.evil.example"}, 403),
-    ({"Host": "["}, 403),
-    ({"Host": ""}, 403),
-    ({"Host": "localhost"}, 200),
-    ({"Host": "[::FFFF:127.0.0.1]:PORT"}, 200),
-    ({"Host": "0.0.0.0:PORT"}, 403),  # this machine, to some browsers
-    ({"Host": "0.0.0.0"}, 403),
-    ({"Host": "[::]:PORT"}, 403),
-    ({"Host": "[0:0::0]"}, 403),
-    ({"Host": "[::ffff:0.0.0.0]"}, 403),
-    ({"Host": "::1"}, 403),
-    ({"Host": "[127.0.0.1]"}, 403),
-    ({"Host": "127.0.0.1:1.evil.example"}, 403),
-    ({"Host": "127.0.0.1.evil"}, 403),
-    ({"Host": "127.0.0.1@evil.example"}, 403),
-    ({"Host": "evil.example@127.0.0.1"}, 403),
-    ({"Host": "127.0.0.1,evil.example"}, 403),
-    ({"Host": "127.0.0.1/evil.example"}, 403),
-    ({"Host": "127.0.0.1 evil.example"}, 403),
-    ({"Host": "127.0.0.1:"}, 403),
-    ({"Host": "127.0.0.1:+1"}, 403),
-    ({"Host": "127.0.0.1:65536"}, 403),
-    ({"Host": "127.1"}, 403),
-    ({"Host": "0177.0.0.1"}, 403),
-    ({"Host": "2130706433"}, 403),
-    ({"Host": "localhost."}, 403),
-    ({"Host": "l\u014dcalhost".encode("utf-8").decode("latin-1")}, 403),
-    ({"Origin": "http://127.0.0.1:PORT"}, 200),
-    ({"Origin": "http://127.0.0.1:9"}, 403),
-    ({"Origin": "http://evil.example"}, 403),
-    ({"Origin": "null"}, 403),
-    ({"Origin": "127.0.0.1:PORT"}, 403),
-    ({"Origin": "evil://127.0.0.1:PORT"}, 403),
-    ({"Origin": "HTTP://127.0.0.1:PORT"}, 200),
-    ({SITE: "same-origin"}, 200),
-    ({SITE: "none", MODE: "navigate", DEST: "document"}, 200),
-    ({SITE: "same-site", MODE: "cors", DEST: "empty"}, 403),  # another port of this host
-    ({SITE: "cross-site", MODE: "no-cors", DEST: "script"}, 403),
-    (LINK, 200),
-    ({**LINK, DEST: "iframe"}, 403),
-    ({**LINK, DEST: "object"}, 403),
-)
-PRIVATE = {
-    "Content-Security-Policy": "frame-ancestors 'none'",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "X-Content-Type-Options": "nosniff",
-}
-
-
-def test_other_origins_can_only_link_to_the_preview(preview: Preview) -> None:
-    failures = []
-    for path, method in (("/", "GET"), ("/search/index.js", "GET"), ("/", "POST"), ("/", "PUT")):
-        for caller, status in CALLERS:
-            headers = {n: v.replace("PORT", str(preview.port)) for n, v in caller.items()}
-            got_status, answer_headers, body = preview.get(path, method, **headers)
-            expected = {"GET": status, "PUT": 501}.get(method, 403)
-            if method == "POST" and (status, *caller) == (200, "Origin"):
-                expected = 405
-            told_more = got_status == 403 and b"Scratch" in body
-            if got_status != expected or told_more or answer_headers | PRIVATE != answer_headers:
-                failures.append((path, method, caller, got_status, answer_headers))
-    assert failures == []
-
-
-HEAD = b"HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n"
+HEAD = b"HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nCookie: COOKIE\r\n"
 SECOND = b"GET /lessons/1.1-one.html " + HEAD + b"Connection: close\r\n\r\n"
 LENGTH = b"Content-Length: %d\r\n" % len(SECOND)
 BAD_LENGTHS = (
@@ -315,62 +255,6 @@ def test_address_with_a_host_names_the_host_of_the_request(preview: Preview) -> 
         assert preview.get(address, Host=f"127.0.0.1:{preview.port}")[0] == status, target
 
 
-def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> None:
-    """Also for a course that will be published in a folder of a host."""
-    origins = ("vscode-webview:", "https://*.example.org:8080")
-    folder = make(GOOD)
-    folder.replace("content/course.toml", "[course]", '[course]\nbase_url = "https://x.org/a/b"')
-    with serve_preview(folder, *(f"--embed={origin}" for origin in origins)) as preview:
-        status, headers, _ = preview.get("/", **{**LINK, DEST: "iframe"})
-        policy = "frame-ancestors vscode-webview: https://*.example.org:8080"
-        assert (status, headers["Content-Security-Policy"]) == (200, policy)
-        assert preview.get("/", **{SITE: "cross-site", DEST: "script"})[0] == 403
-        status, _, body = preview.get("/no/such/page.html")
-        sheets = re.findall(rb'<link rel="stylesheet" href="(/a/b/assets/[^"]+)">', body)
-        assert (status, len(sheets)) == (404, 1)
-        assert preview.get(sheets[0].decode())[1]["Content-Type"] == "text/css; charset=utf-8"
-        assert b"Scratch" in preview.get("/a/b/")[2]
-    for bad_origin in ("example.org", "https://a;script-src *", "*"):
-        result = folder.main("serve", "--embed", bad_origin)
-        assert (result.status, "is not an origin" in result.err) == (2, True)
-
-
-def test_other_machines_need_the_token_of_the_link(make: Make) -> None:
-    with serve_preview(make(GOOD), "--host", "0.0.0.0") as preview:
-        (token,) = re.findall(r"/\?token=([\w-]{16,})", preview.wait_for_line("serving http://"))
-        status, headers, body = preview.get("/")
-        assert (status, headers | PRIVATE == headers) == (403, True)
-        assert body == b"open the address that the terminal shows, which lets this browser in\n"
-        assert preview.get("/?token=x")[0] == 403
-        away = {"Host": "laptop.local:8000"}
-        assert preview.get("http://[?token=x", **away)[0] == 403
-        for address in ("//evil.example/", "http://laptop.local:8000//evil.example/"):
-            status, headers, _ = preview.get(f"{address}?a=1&token={token}", **away, **LINK)
-            assert (status, headers["Location"]) == (303, "/evil.example/?a=1")
-        cookie, *rules = headers["Set-Cookie"].split("; ")
-        assert rules == ["Path=/", "HttpOnly", "SameSite=Lax"]
-        for cookies, status in ((f"a=b; {cookie}", 200), (f"{cookie}x", 403), (cookie[:-1], 403)):
-            assert preview.get("/", Cookie=cookies, **away)[0] == status, cookies
-        assert preview.get("/", Cookie=cookie, **{SITE: "cross-site"})[0] == 403
-        assert listening(preview) == ["00000000"]
-
-
-def listening(preview: Preview) -> list[str]:
-    """The addresses at which something listens on the preview's port."""
-    addresses = []
-    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
-        with contextlib.suppress(FileNotFoundError):
-            for row in Path(table).read_text().splitlines()[1:]:
-                address, state = row.split()[1], row.split()[3]
-                if state == "0A" and address.endswith(f":{preview.port:04X}"):
-                    addresses.append(address.partition(":")[0])
-    return addresses
-
-
-def test_preview_listens_on_the_loopback_only(preview: Preview) -> None:
-    assert listening(preview) == ["0100007F"]
-
-
 def test_port_or_host_that_cannot_be_had_is_told(preview: Preview, make: Make) -> None:
     """The port of another program, or of another course's preview; a host that is not there."""
     folder = make(GOOD)
@@ -388,3 +272,50 @@ def test_port_or_host_that_cannot_be_had_is_told(preview: Preview, make: Make) -
             proposal = re.search(r"; `coursebuild serve --port (\d+)`", result.err)
             assert (proposal is not None) == (host == "127.0.0.1")
             assert proposal is None or int(proposal[1]) > port
+
+
+# --- beside it
+
+PIPES = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+
+
+def test_a_second_preview_says_where_the_first_is(make: Make) -> None:
+    folder = make(GOOD)
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("checked: ")
+        for words in ((), ("--port", "0"), ("--port", str(preview.port))):
+            second = folder.run("serve", *words)
+            message = f"serving {preview.link} already (process {preview.process.pid})\n"
+            assert (second.status, second.err) == (0, message)
+        for words in (("--embed", "vscode-webview:"), ("--host", "localhost")):
+            process = folder.start("serve", "--port", "0", *words, **PIPES)
+            with kill_at_end(process):
+                assert Preview(folder, process).port != preview.port
+        assert folder.run("serve").status == 0, "others do not take its place"
+        preview.process.kill()
+        preview.process.wait()
+    with serve_preview(folder) as preview:  # what it said means nothing now
+        preview.wait_for_line("checked: ")
+
+
+def test_commands_beside_a_preview_wait_only_for_what_they_need(make: Make) -> None:
+    """A script that both need runs once, and nothing else holds up a command."""
+    count = "pathlib.Path(f'runs/{time.time_ns()}').touch()\n"
+    slow = block("slow.py", f"{WAIT_FOR_GO}{count}print(3)", "3", info="writes=runs/")
+    folder = make(f"## Slow\n\n{slow}", SECOND_LESSON)
+    (folder.root / "runs").mkdir()
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("running examples/slow.py")
+        for words in (("check", "1.2"), ("update", "1.2"), ("new", "lesson", "1.3", "Third")):
+            result = folder.run(*words)
+            assert (result.status, "slow.py" in result.err) == (0, False), (words, result)
+        with kill_at_end(folder.start("check", "1.1", **PIPES)) as process:
+            assert process.stderr is not None and process.stdout is not None
+            for line in process.stderr:
+                if b"another coursebuild is running examples/slow.py" in line:
+                    break
+            folder.write("go", "")
+            assert b"ok       examples/slow.py  cached" in process.stdout.read()
+            assert process.wait() == 0
+        preview.wait_for_line("checked: everything holds")
+        assert len([*(folder.root / "runs").iterdir()]) == 1

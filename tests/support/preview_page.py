@@ -20,7 +20,8 @@ class PreviewPage:
         self.console: list[str] = []
         self.page.on("console", lambda message: self.console.append(message.text))
         self.page.on("pageerror", lambda error: self.console.append(str(error)))
-        self.page.goto(f"http://127.0.0.1:{preview.port}/{path}")
+        self.page.goto(preview.link.replace("/?", f"/{path}?"))
+        self.page.wait_for_url(f"**/{path}")  # without the token
         # A page that is loaded again loses this.
         self.page.evaluate("window.same = true")
 

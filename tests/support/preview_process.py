@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
+from urllib.parse import urlsplit
 
 from coursebuild.preview.server import PREFIX
 from support.scratch_course import Folder, kill_at_end, wait_until_alone
@@ -37,7 +38,11 @@ class Preview:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         first = self.wait_for_line("serving http://127.0.0.1:")
-        self.port = int(first.partition("127.0.0.1:")[2].partition("/")[0])
+        self.link = first.split()[1]
+        parts = urlsplit(self.link)
+        assert parts.port is not None
+        self.port, self.token = parts.port, parts.query.removeprefix("token=")
+        self.cookie = f"coursebuild-{self.port}={self.token}"
 
     def _read(self) -> None:
         assert self.process.stderr is not None
@@ -66,10 +71,11 @@ class Preview:
     def get(
         self, path: str, method: str = "GET", body: bytes = b"", **headers: str
     ) -> tuple[int, dict[str, str], bytes]:
+        """The answer to a request, which shows the token unless another `Cookie` is given."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=120)
         with contextlib.closing(connection):
             connection.putrequest(method, path, skip_host="Host" in headers)
-            for name, value in headers.items():
+            for name, value in {"Cookie": self.cookie, **headers}.items():
                 connection.putheader(name.replace("_", "-"), value)
             if body:
                 connection.putheader("Content-Length", str(len(body)))
@@ -81,6 +87,7 @@ class Preview:
         address = ("127.0.0.1", self.port)
         with socket.create_connection(address, timeout=120) as link, contextlib.suppress(OSError):
             answer = b""
+            request = request.replace(b"COOKIE", self.cookie.encode())
             link.sendall(request.replace(b"PORT", str(self.port).encode()))
             while data := link.recv(1 << 16):
                 answer += data
@@ -99,14 +106,14 @@ class Preview:
     @contextlib.contextmanager
     def events(self, page: str = "lessons/1.1-one.html") -> Iterator[Events]:
         with socket.create_connection(("127.0.0.1", self.port), timeout=120) as link:
-            request = f"GET {PREFIX}events?page={page} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}"
-            link.sendall(f"{request}\r\n\r\n".encode())
+            head = f"Host: 127.0.0.1:{self.port}\r\nCookie: {self.cookie}\r\n\r\n"
+            link.sendall(f"GET {PREFIX}events?page={page} HTTP/1.1\r\n{head}".encode())
             with link.makefile("rb") as stream:
-                head = b""
-                while not head.endswith(b"\r\n\r\n"):
-                    head += stream.readline()
-                assert head.startswith(b"HTTP/1.1 200 ")
-                assert b"text/event-stream" in head
+                answer = b""
+                while not answer.endswith(b"\r\n\r\n"):
+                    answer += stream.readline()
+                assert answer.startswith(b"HTTP/1.1 200 ")
+                assert b"text/event-stream" in answer
                 yield Events(_events(stream))
 
 

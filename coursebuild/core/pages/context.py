@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Literal
+from typing import Literal, TypeAlias
 from urllib.parse import unquote
 
 from markupsafe import Markup
@@ -130,6 +130,10 @@ class LessonGraph(Struct, frozen=True):
     nodes: tuple[GraphNode, ...]
     edges: tuple[tuple[str, str], ...]
     """Ids of a prerequisite and of the lesson that builds on it."""
+
+
+Mistakes: TypeAlias = tuple[tuple[int, bool], ...]
+"""Where mistakes of a document begin, and whether each is an error."""
 
 
 class PageHead(Struct, frozen=True):

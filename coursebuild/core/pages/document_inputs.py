@@ -80,24 +80,28 @@ def document_inputs(
 
 
 def address(library: Library, place: urls.Place, path: str, target: model.Target) -> str:
-    """The address of a link's target, relative to a place; `path` is that of the document."""
+    """The address of a link's target, relative to a place; empty where the course has no such.
+
+    `path` is that of the document.
+    """
     target = model.resolve(target, library.course, path)
     match target:
         case model.LessonTarget():
-            return place.href(urls.lesson_path(library.lessons[target.id]), target.anchor)
+            lesson = library.lessons.get(target.id)
+            return place.href(urls.lesson_path(lesson), target.anchor) if lesson else ""
         case model.LevelTarget():
-            return place.href(urls.level_path(library.levels[target.id]))
+            level = library.levels.get(target.id)
+            return place.href(urls.level_path(level)) if level else ""
         case model.ModelTarget():
             return place.href(urls.model_page_path(target.name), target.anchor)
         case model.PageTarget():
-            return place.href(urls.page_path(library.pages[target.id]), target.anchor)
+            page = library.pages.get(target.id)
+            return place.href(urls.page_path(page), target.anchor) if page else ""
         case model.ExampleTarget():
             return place.href(target.path)
         case model.TermTarget():
             owner = library.terms.get(target.id)
-            # In a preview the definition may just have been removed.
-            owner_path = place.path if owner is None else urls.owner_path(owner)
-            return place.href(owner_path, f"term:{target.id}")
+            return place.href(urls.owner_path(owner), f"term:{target.id}") if owner else ""
         case model.UrlTarget():
             return urls.file_address(place, path, target.url)
         case _:

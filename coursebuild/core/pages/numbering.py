@@ -103,8 +103,8 @@ def name_elsewhere(library: Library, path: str, target: model.Target) -> str:
     if target.anchor is None or target.anchor.partition(":")[0] not in model.LABEL_KINDS:
         return ""
     lesson = isinstance(target, model.LessonTarget)
-    owner = library.lessons[target.id] if lesson else library.pages[target.id]
-    if owner.document is None:
+    owner = library.lessons.get(target.id) if lesson else library.pages.get(target.id)
+    if owner is None or owner.document is None:
         return ""
     items = items_of(owner.document, library.mathml)
     item = next((item for item in items if item.id == target.anchor), None)

@@ -310,8 +310,8 @@ class Renderer(Struct, frozen=True):
         return Markup("\n".join(highlight_lines(language, code)))
 
     def mathml(self, tex: str, display: bool) -> Markup:
-        """A formula's MathML; one that does not parse is never rendered (`ValueError`)."""
-        html = self.formulas[Formula(tex, display)]
-        if isinstance(html, MathError):
-            raise ValueError(f"formula {tex!r} does not parse: {html.message}")
+        """A formula's MathML; its TeX where that does not parse, which a preview shows."""
+        html = self.formulas.get(Formula(tex, display))
+        if not isinstance(html, str):
+            return Markup('<code class="tex" dir="ltr">{}</code>').format(tex)
         return Markup(html)

@@ -34,9 +34,9 @@ function pageOf(file, map) {
   return '';
 }
 
-/** The address of the preview in the text that it prints, or undefined. */
+/** The address of the preview, with its token, in the text that it prints, or undefined. */
 function addressIn(text) {
-  return /serving (http:\/\/\S+?\/)/.exec(text)?.[1];
+  return /serving (http:\/\/\S+)/.exec(text)?.[1];
 }
 
 module.exports = { courseOf, commandOf, pageOf, addressIn };

@@ -45,10 +45,11 @@ class Preview {
     const file = editor?.document.uri.fsPath;
     if (!this.address || (file && (!file.endsWith('.md') || courseOf(file) !== this.folder)) || (!file && this.page)) return;
     const map = fs.readFileSync(path.join(this.folder, 'content', 'course.toml'), 'utf8');
-    const page = this.address + (file ? pageOf(path.relative(this.folder, file).replaceAll(path.sep, '/'), map) : '');
-    if (page === this.page) return;
-    this.page = page;
-    const address = String(await vscode.env.asExternalUri(vscode.Uri.parse(page)));
+    const page = new URL(this.address); // its token stays
+    page.pathname = file ? pageOf(path.relative(this.folder, file).replaceAll(path.sep, '/'), map) : '';
+    if (page.href === this.page) return;
+    this.page = page.href;
+    const address = String(await vscode.env.asExternalUri(vscode.Uri.parse(page.href)));
     this.panel.webview.html = `<!doctype html>
 <meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; frame-src http: https:">
 <style>html, body, iframe { width: 100%; height: 100%; margin: 0; padding: 0; border: 0; display: block }</style>

@@ -38,6 +38,7 @@ test('a file has the page that the map says', () => {
 });
 
 test('the address of the preview is the one that it says', () => {
-  assert.equal(addressIn('serving http://127.0.0.1:43127/ (stop with Ctrl-C)\n'), 'http://127.0.0.1:43127/');
+  const address = 'http://127.0.0.1:43127/?token=0a1b';
+  assert.equal(addressIn(`serving ${address} (stop with Ctrl-C)\n`), address);
   assert.equal(addressIn('reading the course'), undefined);
 });

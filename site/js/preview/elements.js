@@ -10,3 +10,9 @@ export function h(tag, attributes = {}, ...children) {
   element.append(...children.filter((child) => child !== null && child !== undefined))
   return element
 }
+
+/** Attributes of messages of the tool, which have no translation. */
+export const OF_THE_TOOL = { lang: 'en', dir: 'ltr' }
+
+/** Show text between backticks as code. */
+export const formatCode = (text) => text.split(/`([^`]*)`/).map((part, index) => (index % 2 ? h('code', {}, part) : part))

@@ -1,12 +1,12 @@
 /**
- * Marks in the page for the results of scripts: at each recorded output that is being checked or has changed, at each figure that
+ * Marks in the page: at each mistake in its text, at each recorded output that is being checked or has changed, at each figure that
  * has changed, and at each bound number that does not hold.
  *
  *   const marks = new Marks(say, accept)      say(key, values) → text; accept(id) → Promise<text>: why not, or nothing
  *   marks.show(news)                          after each piece of news, and after each change of the page
  */
 
-import { h } from './elements.js'
+import { formatCode, h, OF_THE_TOOL } from './elements.js'
 import { timesOf } from './times.js'
 
 const SIGNS = { ' ': '\u2007', '-': '−', '+': '+' }
@@ -20,9 +20,15 @@ export class Marks {
     this.marksByElement = new Map() // element → { text, parts }
   }
 
-  show({ outputs, figures, numbers, running }) {
+  show({ problems, outputs, figures, numbers, running }) {
     this.running = running
     const itemsByElement = new Map()
+    for (const { mark, severity, message, help } of problems) {
+      const element = mark && document.getElementById(mark)
+      if (!element) continue
+      const { mistakes } = itemsByElement.get(element) ?? { mistakes: [] }
+      itemsByElement.set(element, { mistakes: [...mistakes, { severity, message, help }] })
+    }
     for (const output of outputs) {
       const element = outputOf(output)
       if (element && (output.state === 'drift' || STATES.includes(output.state))) itemsByElement.set(element, output)
@@ -52,9 +58,22 @@ export class Marks {
   }
 
   makeParts(element, item) {
+    if ('mistakes' in item) return this.markMistakes(element, item)
     if ('rows' in item) return this.markOutput(element, item)
     if ('drawn' in item) return item.drawn ? this.markFigure(element, item) : this.markData(element, item)
     return 'state' in item ? this.markState(element, item) : this.markNumber(element, item)
+  }
+
+  /** What is wrong in the block below; without elements of blocks, as it may stand in a line. */
+  markMistakes(element, { mistakes }) {
+    const notes = mistakes.map(({ severity, message, help }) => {
+      const note = h('span', { class: `preview-mistake preview-${severity}`, role: 'note', tabindex: '-1' })
+      note.append(h('strong', {}, this.say(severity)), ' ', h('span', OF_THE_TOOL, ...formatCode(message)))
+      if (help) note.append(h('span', { class: 'preview-help', ...OF_THE_TOOL }, ...formatCode(help)))
+      return note
+    })
+    element.append(...notes)
+    return notes
   }
 
   markState(element, { state, script }) {
@@ -138,6 +157,14 @@ export class Marks {
     foot.append(button, answer)
     return foot
   }
+}
+
+/** Bring the mark of a mistake into view, out of folds, and give it the focus. */
+export function showMistake(mark) {
+  const element = document.getElementById(mark)
+  for (let fold = element?.closest('details'); fold; fold = fold.parentElement.closest('details')) fold.open = true
+  element?.scrollIntoView({ block: 'center' })
+  element?.querySelector('.preview-mistake')?.focus({ preventScroll: true })
 }
 
 function sign(mark) {

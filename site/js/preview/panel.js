@@ -1,20 +1,20 @@
 /**
  * The course's mistakes, over the page: a small button in the corner shows the state and opens the list.
  *
- * The list opens by itself when there is a new mistake, closes when the last one is corrected, and once a reader has closed it
- * stays closed until there is another.
+ * The list begins closed, and closes when the last mistake is corrected. Mistakes of this page come first, each with a link to its
+ * place.
  */
 
-import { h } from './elements.js'
+import { formatCode, h, OF_THE_TOOL } from './elements.js'
+import { showMistake } from './marks.js'
 import { timesOf } from './times.js'
 
 const PATIENCE = 600 // ms
-const OF_THE_TOOL = { lang: 'en', dir: 'ltr' } // its messages, which have no translation
 
 /** The text of the button. */
 export function summary(say, { problems, busy, trouble, running }, lost, isGone) {
   const errors = problems.filter(({ severity }) => severity === 'error').length
-  const warnings = problems.length - errors
+  const warnings = problems.filter(({ severity }) => severity === 'warning').length
   const parts = []
   if (lost) parts.push(say('lost'))
   if (isGone) parts.push(say('gone'))
@@ -37,7 +37,6 @@ export class Panel {
     this.lost = false
     this.gone = false
     this.open = false
-    this.seenErrors = new Set() // mistakes that a reader has seen
     this.button = h('button', { type: 'button', class: 'preview-button', 'aria-expanded': 'false', click: () => this.toggle() })
     this.all = h('button', { type: 'button', class: 'preview-accept preview-all', hidden: true, click: () => this.acceptAll() })
     this.why = h('p', { class: 'preview-why preview-answer', role: 'status', hidden: true })
@@ -64,11 +63,7 @@ export class Panel {
 
   take(news) {
     this.news = news
-    const errors = news.problems.filter(({ severity, inPlace }) => severity === 'error' && !inPlace)
-    const fresh = errors.filter(({ place, message }) => !this.seenErrors.has(`${place} ${message}`))
-    if (fresh.length > 0) this.open = true
-    if (errors.length === 0 && !news.trouble) this.open = false
-    this.seenErrors = new Set(errors.map(({ place, message }) => `${place} ${message}`))
+    if (news.problems.length === 0 && !news.trouble) this.open = false
     this.draw()
   }
 
@@ -119,22 +114,30 @@ export class Panel {
   }
 
   makeContent() {
-    const { problems, more, trouble, kept } = this.news
+    const { problems, more, trouble } = this.news
+    const here = problems.filter((problem) => problem.here)
+    const elsewhere = problems.filter((problem) => !problem.here)
     const close = h('button', { type: 'button', class: 'preview-close', click: () => this.toggle() }, this.say('close'))
-    const parts = [h('div', { class: 'preview-head' }, h('p', { class: 'preview-title' }, this.say(kept ? 'kept' : 'wrong')), close)]
+    const parts = [h('div', { class: 'preview-head' }, h('p', { class: 'preview-title' }, this.say(here.length ? 'here' : 'wrong')), close)]
     if (trouble) parts.push(h('pre', { class: 'preview-trouble', ...OF_THE_TOOL }, trouble))
-    parts.push(h('ol', { class: 'preview-problems' }, ...problems.map((problem) => this.makeProblem(problem))))
+    if (here.length) parts.push(this.makeList(here))
+    if (here.length && elsewhere.length) parts.push(h('p', { class: 'preview-title preview-further' }, this.say('elsewhere')))
+    if (elsewhere.length) parts.push(this.makeList(elsewhere))
     if (more) parts.push(h('p', {}, this.say('more', { n: more })))
     return parts
   }
 
-  makeProblem({ severity, rule, place, message, label, help, notes, line, start, end, blocks, offer, fixed }) {
+  makeList(problems) {
+    return h('ol', { class: 'preview-problems' }, ...problems.map((problem) => this.makeProblem(problem)))
+  }
+
+  makeProblem({ severity, rule, place, message, label, help, notes, line, start, end, mark, offer, fixed }) {
     const item = h('li', { class: `preview-problem preview-${severity}` })
-    const kind = this.say(blocks ? 'blocks' : severity)
     item.append(
-      h('p', { class: 'preview-message' }, h('strong', {}, kind), ' ', h('span', OF_THE_TOOL, ...formatCode(message))),
+      h('p', { class: 'preview-message' }, h('strong', {}, this.say(severity)), ' ', h('span', OF_THE_TOOL, ...formatCode(message))),
       this.makePlace(place, rule),
     )
+    if (mark) item.append(h('p', {}, this.makeLink(mark)))
     if (line.trim()) {
       const excerpt = h('mark', {}, line.slice(start, Math.max(end, start + 1)) || '\u00a0')
       item.append(h('pre', { class: 'preview-source', tabindex: '0', dir: 'ltr' }, line.slice(0, start), excerpt, line.slice(Math.max(end, start + 1))))
@@ -144,6 +147,16 @@ export class Panel {
     if (help) item.append(h('p', { class: 'preview-help', ...OF_THE_TOOL }, ...formatCode(help)))
     if (offer) item.append(...this.makeFix(offer, fixed))
     return item
+  }
+
+  /** A link to the place of a mistake on the page, which closes the list. */
+  makeLink(mark) {
+    const show = (event) => {
+      event.preventDefault()
+      this.toggle()
+      showMistake(mark)
+    }
+    return h('a', { class: 'preview-show', href: `#${mark}`, click: show }, this.say('show'))
   }
 
   /** The line as a fix writes it, and the button that does. */
@@ -179,5 +192,3 @@ export class Panel {
 /** A link by which a browser asks Visual Studio Code to open a place, such as `content/a.md:3:5`. */
 export const editorLink = (folder, place) => `vscode://file${`${folder}/${place}`.split('/').map(encodeURIComponent).join('/').replaceAll('%3A', ':')}`
 
-/** Show text between backticks as code. */
-const formatCode = (text) => text.split(/`([^`]*)`/).map((part, index) => (index % 2 ? h('code', {}, part) : part))

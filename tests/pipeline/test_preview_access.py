@@ -1,0 +1,196 @@
+"""`serve`: who may read a preview and press its buttons."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from support.preview_process import Preview, serve_preview
+from support.scratch_course import GOOD, Folder, Make
+
+pytestmark = pytest.mark.site
+
+
+@pytest.fixture(scope="module")
+def preview(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[Preview]:
+    """A preview that a browser was told of."""
+    folder = Folder(tmp_path_factory.mktemp("served") / "a cöurse")
+    folder.fill([GOOD], stores)
+    with serve_preview(folder, "--open", env={"BROWSER": "true"}) as running:
+        running.wait_for_line("checked: ")
+        yield running
+
+
+SITE, MODE, DEST = "Sec_Fetch_Site", "Sec_Fetch_Mode", "Sec_Fetch_Dest"
+LINK = {SITE: "cross-site", MODE: "navigate", DEST: "document"}
+CALLERS: tuple[tuple[dict[str, str], int], ...] = (
+    ({"Host": "127.0.0.1:PORT"}, 200),
+    ({"Host": "LOCALHOST:PORT"}, 200),
+    ({"Host": "localhost:9"}, 200),  # a forwarded port
+    ({"Host": "[::1]:PORT"}, 200),
+    ({"Host": "laptop.local"}, 200),
+    ({"Host": "["}, 403),
+    ({"Host": ""}, 403),
+    ({"Host": "::1"}, 403),
+    ({"Host": "127.0.0.1:1.evil.example"}, 403),
+    ({"Host": "127.0.0.1@evil.example"}, 403),
+    ({"Host": "127.0.0.1,evil.example"}, 403),
+    ({"Host": "127.0.0.1/evil.example"}, 403),
+    ({"Host": "127.0.0.1 evil.example"}, 403),
+    ({"Host": "127.0.0.1:"}, 403),
+    ({"Host": "127.0.0.1:+1"}, 403),
+    ({"Host": "127.0.0.1:65536"}, 403),
+    ({"Host": "l\u014dcalhost".encode("utf-8").decode("latin-1")}, 403),
+    ({"Origin": "http://127.0.0.1:PORT"}, 200),
+    ({"Origin": "http://127.0.0.1:9"}, 403),
+    ({"Origin": "http://evil.example"}, 403),
+    ({"Origin": "null"}, 403),
+    ({"Origin": "127.0.0.1:PORT"}, 403),
+    ({"Origin": "evil://127.0.0.1:PORT"}, 403),
+    ({"Origin": "HTTP://127.0.0.1:PORT"}, 200),
+    ({SITE: "same-origin"}, 200),
+    ({SITE: "none", MODE: "navigate", DEST: "document"}, 200),
+    ({SITE: "same-site", MODE: "cors", DEST: "empty"}, 403),  # another port of this host
+    ({SITE: "cross-site", MODE: "no-cors", DEST: "script"}, 403),
+    (LINK, 200),
+    ({**LINK, DEST: "iframe"}, 403),
+    ({**LINK, DEST: "object"}, 403),
+)
+PRIVATE = {
+    "Content-Security-Policy": "frame-ancestors 'none'",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "X-Content-Type-Options": "nosniff",
+}
+
+
+def test_other_origins_can_only_link_to_the_preview(preview: Preview) -> None:
+    failures = []
+    for path, method in (("/", "GET"), ("/search/index.js", "GET"), ("/", "POST"), ("/", "PUT")):
+        for caller, status in CALLERS:
+            headers = {n: v.replace("PORT", str(preview.port)) for n, v in caller.items()}
+            got_status, answer_headers, body = preview.get(path, method, **headers)
+            expected = {"GET": status, "PUT": 501}.get(method, 403)
+            if method == "POST" and (status, *caller) == (200, "Origin"):
+                expected = 405
+            told_more = got_status == 403 and b"Scratch" in body
+            if got_status != expected or told_more or answer_headers | PRIVATE != answer_headers:
+                failures.append((path, method, caller, got_status, answer_headers))
+    assert failures == []
+
+
+def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> None:
+    """Also for a course that will be published in a folder of a host."""
+    origins = ("vscode-webview:", "https://*.example.org:8080")
+    folder = make(GOOD)
+    folder.replace("content/course.toml", "[course]", '[course]\nbase_url = "https://x.org/a/b"')
+    with serve_preview(folder, *(f"--embed={origin}" for origin in origins)) as preview:
+        framed = {**LINK, DEST: "iframe"}
+        cookie = preview.get(f"/?token={preview.token}", **framed)[1]["Set-Cookie"]
+        assert cookie.endswith("; HttpOnly; SameSite=None; Secure; Partitioned")
+        status, headers, _ = preview.get("/", **framed)
+        policy = "frame-ancestors vscode-webview: https://*.example.org:8080"
+        assert (status, headers["Content-Security-Policy"]) == (200, policy)
+        assert preview.get("/", **{SITE: "cross-site", DEST: "script"})[0] == 403
+        status, _, body = preview.get("/no/such/page.html")
+        sheets = re.findall(rb'<link rel="stylesheet" href="(/a/b/assets/[^"]+)">', body)
+        assert (status, len(sheets)) == (404, 1)
+        assert preview.get(sheets[0].decode())[1]["Content-Type"] == "text/css; charset=utf-8"
+        assert b"Scratch" in preview.get("/a/b/")[2]
+    for bad_origin in ("example.org", "https://a;script-src *", "*"):
+        result = folder.main("serve", "--embed", bad_origin)
+        assert (result.status, "is not an origin" in result.err) == (2, True)
+
+
+def test_whoever_asks_needs_the_token_of_the_link(preview: Preview) -> None:
+    """On this machine too, at any address, and whatever name led to it."""
+    denied = b"open the address that the terminal shows, which lets this browser in\n"
+    paths = ("/", "/?token=x", "/?token=", "/lessons/1.1-one.html", "/.coursebuild/events", "//[")
+    for cookie in ("", "a=b", f"{preview.cookie}x", preview.cookie[:-1], preview.cookie[12:]):
+        for path in (*paths, "http://evil.example?token=x"):
+            status, headers, body = preview.get(path, Host="evil.example", Cookie=cookie)
+            assert (status, body, headers | PRIVATE == headers) == (403, denied, True), path
+        here = {"Origin": "http://localhost", "Host": "localhost", "Cookie": cookie}
+        for command in ("accept", "open", "else"):
+            assert preview.get(f"/.coursebuild/{command}", "POST", b"{}", **here)[0] == 403
+    assert preview.get("/", Cookie=f"a=b; {preview.cookie}", Host="laptop.local")[0] == 200
+    assert preview.get("/", **{SITE: "cross-site"})[0] == 403
+
+
+def test_token_of_the_link_becomes_a_cookie(preview: Preview) -> None:
+    away = {"Host": "laptop.local:8000", "Cookie": ""}
+    for address in (
+        "//evil.example/",
+        "/%5Cevil.example/",
+        "/\\evil.example/",
+        "http://laptop.local:8000//evil.example/",
+    ):
+        link = f"{address}?a=1&token={preview.token}"
+        status, headers, body = preview.get(link, **away, **LINK)
+        (next_page,) = re.findall(r'content="0; url=(.+?)"', body.decode())
+        assert (status, next_page) in ((200, "/evil.example/?a=1"), (200, "/%5Cevil.example/?a=1"))
+        cookie, *rules = headers["Set-Cookie"].split("; ")
+        assert (cookie, rules) == (preview.cookie, ["Path=/", "HttpOnly", "SameSite=Strict"])
+    assert len(preview.token) == 32
+
+
+def test_link_stays_good_after_a_restart(make: Make) -> None:
+    """It belongs to the course and its user; without a place for a key it is made each time."""
+    folder, other = make(GOOD), make(GOOD, name="other")
+    nowhere = {"XDG_STATE_HOME": str(folder.root)}
+    tokens = []
+    for course, env in ((folder, {}), (folder, {}), (other, {}), *[(folder, nowhere)] * 2):
+        with serve_preview(course, env=env) as preview:
+            assert preview.get("/")[0] == 200
+            tokens.append(preview.token)
+    assert tokens[0] == tokens[1]
+    assert len({*tokens}) == 4
+
+
+def test_another_user_can_neither_read_nor_press_anything(
+    preview: Preview, held_back: Path
+) -> None:
+    """Nor does the list of running programs tell the token."""
+    origin = {"Origin": f"http://127.0.0.1:{preview.port}", "Cookie": ""}
+    assert preview.get("/", Cookie="")[0] == 403
+    assert preview.get("/.coursebuild/events?page=index.html", Cookie="")[0] == 403
+    for command in ("accept", "open"):
+        assert preview.get(f"/.coursebuild/{command}", "POST", b"{}", **origin)[0] == 403
+    for program in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            assert preview.token.encode() not in program.read_bytes()
+
+
+def test_files_that_hold_the_link_are_the_users_own(preview: Preview) -> None:
+    folder = Path(os.environ["XDG_STATE_HOME"], "coursebuild", "previews")
+    files = [file for file in folder.iterdir() if preview.token in file.read_text()]
+    assert {file.suffix for file in files} == {".json", ".html"}
+    assert {file.stat().st_mode & 0o777 for file in files} == {0o600}
+    assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_host_for_other_machines_is_said_and_listened_at(make: Make) -> None:
+    with serve_preview(make(GOOD), "--host", "0.0.0.0") as preview:
+        assert preview.get("/", Cookie="", Host="laptop.local")[0] == 403
+        assert preview.get("/", Host="laptop.local")[0] == 200
+        assert listening(preview) == ["00000000"]
+
+
+def listening(preview: Preview) -> list[str]:
+    """The addresses at which something listens on the preview's port."""
+    addresses = []
+    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
+        with contextlib.suppress(FileNotFoundError):
+            for row in Path(table).read_text().splitlines()[1:]:
+                address, state = row.split()[1], row.split()[3]
+                if state == "0A" and address.endswith(f":{preview.port:04X}"):
+                    addresses.append(address.partition(":")[0])
+    return addresses
+
+
+def test_preview_listens_on_the_loopback_only(preview: Preview) -> None:
+    assert listening(preview) == ["0100007F"]
