@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
-from support.lab_lessons import RIGHT, course, fence
+from support.lab_lessons import course, fence
 from support.sandboxes import require_sandbox
 
 pytestmark = pytest.mark.engine
@@ -99,9 +99,13 @@ def test_limits_hold_for_a_script_of_a_lab_and_what_it_starts(
 def test_course_with_a_lab_is_checked_and_built_in_the_sandbox(
     tmp_path: Path, stores: Path
 ) -> None:
-    folder = course(tmp_path / "course", stores, "## Lab\n\n" + fence(RIGHT))
+    folder = course(
+        tmp_path / "course",
+        stores,
+        "## Lab\n\n" + fence('{"model": "ball", "verify": {"seconds": 0.2}}'),
+    )
     require_sandbox(folder.root)
     results = [folder.main(*words) for words in (("check", "--sandbox"), ("build", "--sandbox"))]
     assert [result.status for result in results] == [0, 0], results[0].err + results[1].err
-    (offer,) = folder.root.glob("public/assets/labs/*-lab-1*.json")
+    (offer,) = folder.root.glob("public/assets/labs/1.2-lab-1.*.json")
     assert "mujoco" in json.loads(offer.read_text())["exportPython"]["text"]

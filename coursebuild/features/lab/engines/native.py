@@ -17,8 +17,10 @@ import msgspec
 from msgspec import Struct
 
 from coursebuild.core.engine.tool import code_digest
+from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.run.child import LIMITS, JsonChild
+from coursebuild.core.run.environments import find_environment, prepare_environment
 from coursebuild.core.run.script_environment import (
     Interpreter,
     engine_version,
@@ -171,9 +173,16 @@ class NativeEngine(JsonChild):
         """The environment with the labs' MuJoCo; none where that is installed here."""
         if engine_version() == LAB_ENGINE:
             return None
-        from coursebuild.core.run.packages import prepare_environment
-
-        return prepare_environment(self._root, LAB_ENGINE, self._say)
+        if self._sandbox is None:
+            return prepare_environment(self._root, LAB_ENGINE, self._say, locked=True)
+        environment = find_environment(self._root, LAB_ENGINE, locked=True)
+        if fault := environment.fault():
+            raise EffectError(
+                f"labs need MuJoCo {LAB_ENGINE}, {engine_version()} is installed here, and with "
+                f"`--sandbox` nothing is installed: {environment.prefix} {fault}",
+                help="run `coursebuild doctor --install-engine` before",
+            )
+        return environment.interpreter
 
     def _request(self, request: dict[str, Any], seconds: float | None = None) -> dict[str, Any]:
         if self._process is None and self._interpreter is not None:
