@@ -20,6 +20,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.features import Trial, TrialContext, TrialOutcome
+from coursebuild.core.files.errors import AddressLimitError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Limits
@@ -114,7 +115,13 @@ class LabTrials:
         diagnostics: list[Diagnostic] = []
         with self._engines:
             for trial in trials:
-                result, lab_diagnostics = self._try_lab(trial)
+                try:
+                    result, lab_diagnostics = self._try_lab(trial)
+                except AddressLimitError as error:
+                    if isinstance(trial.block, Lab) and trial.block.is_of_text:
+                        raise
+                    self._context.say(f"the pages of models have no labs: {error.message}")
+                    break  # they come last
                 results += () if result is None else (result,)
                 diagnostics += lab_diagnostics
         return tuple(results), tuple(diagnostics)
