@@ -281,7 +281,7 @@ def test_only_main_is_published_and_a_pull_request_gets_a_report(
     assert runner.notes == [*installed, *check, *check]
 
 
-@pytest.mark.site
+@pytest.mark.long
 def test_new_course_with_its_lab_passes_its_jobs(tmp_path: Path) -> None:
     folder = Folder(tmp_path / "repository")
     folder.root.mkdir()
