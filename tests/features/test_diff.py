@@ -104,8 +104,8 @@ def test_sandbox_runs_no_feature_and_says_so(course: Folder) -> None:
     course.write("content/course.toml", map.replace("[course]\n", entry))
     result = course.main("diff", "HEAD", "--sandbox")
     assert (result.status, result.err) == (0, "")
-    said = "Not run, so that what they tell is left out: `features/own.py`."
-    assert result.out == f"{plain}\n### Features\n\n{said}\n"
+    note = "Not run, so that what they tell is left out: `features/own.py`."
+    assert result.out == f"{plain}\n### Features\n\n{note}\n"
     assert not (course.root / "ran").exists()
 
 

@@ -208,7 +208,7 @@ class Sandbox(Struct, frozen=True):
         own_environment = {name: os.environ[name] for name in names if name in os.environ}
         return [*scope, *starter, *options, "--", *command], own_environment
 
-    def around(self, root: Path, interpreter: Interpreter | None, memory: int) -> gate.Enclose:
+    def enclosure(self, root: Path, interpreter: Interpreter | None, memory: int) -> gate.Enclose:
         """What puts a process into the sandbox that runs Python and writes nothing.
 
         It sees the course at `root`, and what is installed for the interpreter; it takes at most

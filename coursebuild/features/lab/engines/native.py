@@ -149,7 +149,7 @@ class NativeEngine(JsonChild):
         if self._sandbox is None:
             return msgspec.convert(self._request(request), ScriptReply)
         python = None if self._interpreter is None else self._interpreter.python
-        enclose = self._sandbox.around(self._root, self._interpreter, self.memory)
+        enclose = self._sandbox.enclosure(self._root, self._interpreter, self.memory)
         with JsonChild(str(_WORKER), self._seconds, python, self.memory, enclose) as child:
             self._script_child = child
             if self._interrupted:
