@@ -174,8 +174,8 @@ def prepare_environment(
 
 
 def _hash_files(prefix: Path) -> Iterator[tuple[str, str]]:
-    for folder, _, names in os.walk(prefix):
-        for path in (Path(folder, name) for name in names):
+    for folder, folders, names in os.walk(prefix):
+        for path in (Path(folder, name) for name in (*folders, *names)):
             name = path.relative_to(prefix).as_posix()
             if path.is_symlink():
                 yield name, f"link to {path.readlink()}"

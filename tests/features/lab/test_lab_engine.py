@@ -73,7 +73,7 @@ def install(folder: Folder, variables: dict[str, str]) -> Path:
     lines = (f"import site; site.addsitedir({path!r})\n" for path in site_folders())
     (packages / "here.pth").write_text("".join(lines))
     files = {}
-    for path in (path for path in prefix.rglob("*") if path.is_file()):
+    for path in (p for p in prefix.rglob("*") if p.is_symlink() or p.is_file()):
         content = f"link to {path.readlink()}" if path.is_symlink() else hash_of(path)
         files[path.relative_to(prefix).as_posix()] = content
     record = {"requirements": [f"mujoco=={LAB_ENGINE}"], "sources": [], "files": files}
