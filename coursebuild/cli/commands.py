@@ -24,7 +24,13 @@ from typing import TYPE_CHECKING, NoReturn
 
 from coursebuild import MANUAL
 from coursebuild.cli.output import CLEAN, FAILURE, USAGE, fail, say, write
-from coursebuild.core.files.errors import EffectError, PublishRefusedError, UsageError, lacking
+from coursebuild.core.files.errors import (
+    AddressLimitError,
+    EffectError,
+    PublishRefusedError,
+    UsageError,
+    lacking,
+)
 from coursebuild.core.files.locks import remove_abandoned_folders
 
 if TYPE_CHECKING:  # asking for the version loads nothing heavy
@@ -103,8 +109,8 @@ def run(directory: str | None, words: list[str], *, alone: bool) -> int:
         except UsageError as error:
             return fail(USAGE, str(error))
         except EffectError as error:
-            status = USAGE if isinstance(error, PublishRefusedError) else FAILURE
-            return fail(status, error.message, error.help)
+            is_refused = isinstance(error, PublishRefusedError | AddressLimitError)
+            return fail(USAGE if is_refused else FAILURE, error.message, error.help)
         except (MemoryError, OSError, RuntimeError) as error:
             lack = lacking(error)
             if lack is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from coursebuild.cli.arguments import add_running, options_of, print_report
+from coursebuild.cli.arguments import add_running, add_sandbox, options_of, print_report
 from coursebuild.core.registry import features
 from coursebuild.pipeline.publication import export
 
@@ -20,6 +20,7 @@ examples:
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_running(parser)
+    add_sandbox(parser)
     exporters = [exporter for feature in features() for exporter in feature.exporters]
     offers = ", ".join(f"{e.name} ({e.summary})" for e in exporters)
     files = ", ".join(f"LESSON-{e.file}" if e.of_lesson else e.file for e in exporters)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import resource
 import stat
 import sys
 import time
@@ -76,7 +77,8 @@ def identify_command(words: list[str]) -> tuple[str, ...] | None:
     relevant_words = [word for word in words if word != _NO_CACHE]
     is_terminal = sys.stdout is not None and sys.stdout.isatty()
     style = terminal_style(is_terminal=is_terminal)
-    conditions = [*style, *map(os.environ.get, _ARGUMENT_VARIABLES)]
+    addresses = resource.getrlimit(resource.RLIMIT_AS)[0]  # without enough, there is no V8
+    conditions = [*style, addresses, *map(os.environ.get, _ARGUMENT_VARIABLES)]
     if any("/" in w or os.sep in w or os.path.exists(w) for w in relevant_words):
         try:
             conditions.append(os.getcwd())  # from where paths are meant

@@ -41,6 +41,7 @@ from coursebuild.core.pages.renderer import Renderer
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.run_store import RunStore
+from coursebuild.core.run.sandbox import Sandbox
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.run.script_server import RunAll
 from coursebuild.core.syntax.fence import Fence, TextParser
@@ -307,6 +308,9 @@ class TrialContext(Struct, frozen=True):
     """Whether pages will be made from the results."""
     say: Callable[[str], None] = lambda _: None
     """Tells the user of what takes long."""
+    sandbox: Sandbox | None = None
+    """What encloses all that becomes a program of the course's own; with one, nothing is installed.
+    """
 
 
 TrialOutcome: TypeAlias = tuple[tuple[TrialResult, ...], tuple[Diagnostic, ...]]

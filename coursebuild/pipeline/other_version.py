@@ -19,7 +19,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.registry import losses_against
-from coursebuild.core.run.packages import (
+from coursebuild.core.run.environments import (
     check_other_version,
     latest_version,
     prepare_environment,

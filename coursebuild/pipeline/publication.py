@@ -74,7 +74,7 @@ def export(options: Options, name: str, lesson: str, out: Path | None) -> Report
         UsageError: no feature has an exporter of this name, or there is no such `lesson`; it is
             empty for exporters of the whole course.
     """
-    exporter = _find_exporter(options.root, name)
+    exporter = _find_exporter(options, name)
     if exporter.of_lesson and not lesson:
         raise UsageError(
             f"`export {name}` writes one lesson, but none was named",
@@ -130,16 +130,17 @@ def make_files(
     return report, outputs if report.ok else None
 
 
-def _find_exporter(root: Path, name: str) -> Exporter:
-    """Find an exporter by its name, also among the features of the course itself."""
+def _find_exporter(options: Options, name: str) -> Exporter:
+    """Find an exporter by its name, also among features of the course, where they may run."""
     exporter = find_exporter(name)
     feature_diagnostics: tuple[Diagnostic, ...] = ()
-    if isinstance(exporter, str):
+    if isinstance(exporter, str) and options.sandbox is None:
         from coursebuild.core.syntax.coursemap import parse_course_map
 
-        for source in read_sources(root, [MAP]).value:
+        for source in read_sources(options.root, [MAP]).value:
             course = parse_course_map(source).value
-            feature_diagnostics = () if course is None else load_course_features(root, course)
+            if course is not None:
+                feature_diagnostics = load_course_features(options.root, course)
         exporter = find_exporter(name)
     if isinstance(exporter, str):
         raise UsageError(

@@ -109,7 +109,14 @@ def verify(
     models, model_diagnostics = compile_models(course, options)
     say, trial_store = options.progress.say, RunStore(options.root, options.store)
     context = TrialContext(
-        options.root, course, dict(models), trial_store, model_diagnostics, static, say
+        options.root,
+        course,
+        dict(models),
+        trial_store,
+        model_diagnostics,
+        static,
+        say,
+        options.sandbox,
     )
     runner = _ScriptRunner(course, options, extracted_scripts, scripts, known_runs)
     runs, (trial_results, trial_diagnostics) = _run_with_trials(

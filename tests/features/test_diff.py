@@ -95,6 +95,20 @@ def test_report_has_every_effect_of_a_change(
     assert not (course.root / "examples").exists(), "nothing was run"
 
 
+def test_sandbox_runs_no_feature_and_says_so(course: Folder) -> None:
+    plain = course.main("diff", "HEAD").out
+    assert course.main("diff", "HEAD", "--sandbox").out == plain
+    course.write("features/own.py", "open('ran', 'w')\n")
+    map = course.text("content/course.toml")
+    entry = '[course]\nfeatures = ["features/own.py"]\n'
+    course.write("content/course.toml", map.replace("[course]\n", entry))
+    result = course.main("diff", "HEAD", "--sandbox")
+    assert (result.status, result.err) == (0, "")
+    note = "Not run, so that what they tell is left out: `features/own.py`."
+    assert result.out == f"{plain}\n### Features\n\n{note}\n"
+    assert not (course.root / "ran").exists()
+
+
 def test_report_without_changes(course: Folder) -> None:
     report = course.main("diff", "HEAD").out
     assert "Lessons and pages: no change.\n" in report

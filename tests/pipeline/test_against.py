@@ -49,9 +49,10 @@ def mj_printSchema(html, pad):
 
 
 @pytest.fixture
-def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def wheels(installed: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with wheels of small packages, the only place where pip looks."""
-    folder = tmp_path / "wheels"
+    folder = installed.with_name("wheels")
+    shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     for version, number in ((VERSION, REAL_NUMBER), (NEW_VERSION, 9_001_000)):
         code = ENGINE.format(version=version, number=number)
@@ -310,9 +311,9 @@ def test_version_that_cannot_be_installed_leaves_nothing(make: Make, wheels: Pat
 UV = """\
 #!{python}
 import os, sys
-pip, install, option, target, progress, *words = sys.argv[1:]
+pip, install, alone, option, target, progress, *words = sys.argv[1:]
 assert [pip, install, option, progress] == ["pip", "install", "--python", "--no-progress"]
-words.remove("--no-config")
+assert alone == "--no-config"
 os.execv(sys.executable, [sys.executable, "-m", pip, option, target, install, *words])
 """
 """A stand-in that installs as uv would."""
@@ -337,6 +338,62 @@ def test_uv_installs_where_there_is_no_pip(
     result = check_against(course, "-q", version="9.0.9")
     assert result.err.startswith("coursebuild: uv finds no MuJoCo 9.0.9 for Python ")
     assert result.err.endswith("the environment variables UV_FIND_LINKS and UV_OFFLINE\n")
+
+
+def test_environment_that_is_not_what_was_installed_is_made_anew(make: Make, wheels: Path) -> None:
+    course = make(f"## A\n\n{NUMBER}")
+    first = check_against(course, "-q")
+    assert f"changed by MuJoCo {NEW_VERSION}" in first.out
+    (environment,) = environments_folder().glob(f"mujoco-{NEW_VERSION}-*")
+    record = json.loads((environment / "record.json").read_text())
+    assert record["requirements"] == [f"mujoco-core=={NEW_VERSION}", f"mujoco=={NEW_VERSION}"]
+    assert [source.split()[0] for source in record["sources"]] == [
+        (wheels / f"{name}-{NEW_VERSION}-py3-none-any.whl").as_uri()
+        for name in ("mujoco", "mujoco_core")
+    ]
+    packages = next(environment.glob("lib/*/site-packages"))
+    code = next(packages.glob("mujoco/__pycache__/*.pyc"))
+    another = "has another `{}` than was installed"
+    faults = dict.fromkeys((packages / "mujoco/__init__.py", packages / "x.pth", code), another)
+    faults[environment / "record.json"] = "has no record of what was installed"
+    faults[packages / "numpy"] = another
+    for path, fault in faults.items():
+        if path.name == "numpy":
+            path.symlink_to(wheels)
+        else:
+            path.write_text("raise SystemExit(3)")
+        result = check_against(course)
+        word = fault.format(path.relative_to(environment))
+        assert f"{environment} {word}, and is made anew\n" in result.err
+        assert f"changed by MuJoCo {NEW_VERSION}" in result.out
+    assert "made anew" not in check_against(course).err
+
+
+def test_environments_are_kept_apart_by_where_the_installer_looks(
+    make: Make, wheels: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    course = make(f"## A\n\n{NUMBER}")
+    check_against(course, "-q")
+    mirror = tmp_path / "mirror"
+    shutil.copytree(wheels, mirror)
+    code = ENGINE.format(version=NEW_VERSION, number=9_002_000) + "import mujoco_core\n"
+    wheel(mirror, NEW_VERSION, code, part=f"mujoco-core=={NEW_VERSION}")
+    settings = tmp_path / "pip.conf"
+    settings.write_text(f"[global]\nfind-links = {mirror}\nno-index = true\n")
+    with monkeypatch.context() as patch:
+        patch.delenv("PIP_FIND_LINKS")
+        patch.delenv("PIP_NO_INDEX")
+        patch.setenv("PIP_CONFIG_FILE", str(settings))
+        assert "printed 9002000" in check_against(course, "-q").out
+    assert "printed 9001000" in check_against(course, "-q").out
+
+
+def test_settings_of_installers_in_a_course_are_not_obeyed(make: Make, wheels: Path) -> None:
+    course = make(f"## A\n\n{NUMBER}")
+    for name in ("pip.conf", "uv.toml", "pyproject.toml", "pip/__main__.py", "pip/__init__.py"):
+        course.write(name, "raise SystemExit(3)")
+    result = course.run("check", "--against", NEW_VERSION, "-q")
+    assert f"changed by MuJoCo {NEW_VERSION}" in result.out, result.err
 
 
 SLOW = """\

@@ -150,10 +150,19 @@ def test_too_few_files_are_told_and_as_many_as_said_are_enough(make: Make) -> No
 
 
 @pytest.mark.site
-def test_too_few_addresses_for_v8_are_told(make: Make) -> None:
-    folder = make(GOOD + "$a_{18}$\n")
+def test_too_few_addresses_for_v8_are_told_where_it_is_needed(make: Make) -> None:
+    folder = make(GOOD)
+    folder.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    status, output = run_limited(folder, "-v 8388608", "build")
+    assert status == 0, output
+    assert "the pages of models have no labs: V8 needs more than the 8 GiB" in output
+    page = folder.root / "public/models/ball.html"
+    assert "data-lab" not in page.read_text()
+    assert folder.run("build").status == 0
+    assert "data-lab" in page.read_text()
+    folder.write(folder.lesson(1), GOOD + "$a_{18}$\n")
     status, output = run_limited(folder, "-v 8388608", "check")
-    assert status == 1
+    assert status == 2
     assert "coursebuild: V8 needs more than the 8 GiB of address space" in output
     assert "`ulimit -v unlimited`" in output
     assert "Traceback" not in output

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 import subprocess
 import sys
@@ -164,6 +165,25 @@ def test_the_sandbox_has_this_environment_and_no_other_folder_it_names(make: Mak
     assert result.status == 1 and "cannot run scripts" in result.err
 
 
+@pytest.mark.parametrize("words", [("check",), ("build",), ("export", "epub")])
+def test_environment_of_the_course_runs_in_the_sandbox_alone(
+    make: Make, words: tuple[str, ...], tmp_path: Path
+) -> None:
+    folder = with_environment(make, "print(1)", "1")
+    require_sandbox(folder.root)
+    folder.replace(folder.lesson(), "## ", "It calls `mj_step` and `planet.NAME`.\n\n## ")
+    marks = [folder.root / "ran", tmp_path / "ran"]
+    python = folder.root / PYTHON
+    python.unlink()
+    python.write_text(f"#!/bin/sh\ntouch {' '.join(map(shlex.quote, map(str, marks)))}\nexit 3\n")
+    python.chmod(0o755)
+    result = folder.main(*words, "--sandbox")
+    assert result.status == 1 and f"{python} cannot run scripts" in result.err
+    assert not any(mark.exists() for mark in marks)
+    folder.main(*words)
+    assert all(mark.exists() for mark in marks), "without it, scripts have all rights"
+
+
 WRITES = "from pathlib import Path\nPath('new').write_text('x')\nprint(1)"
 
 
@@ -198,9 +218,11 @@ def test_code_that_the_tool_would_run_is_refused(make: Make) -> None:
     folder.write("features/evil.py", "open('evil', 'w')\n")
     with_feature = map.replace("[course]\n", '[course]\nfeatures = ["features/evil.py"]\n')
     folder.write("content/course.toml", with_feature)
-    result = folder.main("check", "--sandbox")
-    assert (result.status, result.out) == (1, "")
-    assert "`features/evil.py` is code that the tool would run" in result.err
+    for words in (("check",), ("build",), ("export", "epub")):
+        result = folder.main(*words, "--sandbox")
+        assert (result.status, result.out) == (1, "")
+        assert "`features/evil.py` is code that the tool would run" in result.err
+    assert "there is no export `evil`" in folder.main("export", "evil", "--sandbox").err
     assert not (folder.root / "evil").exists()
     folder.write("content/course.toml", map)
     folder.write("theme/templates/page.html", "{{ 1 }}")

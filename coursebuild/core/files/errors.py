@@ -31,6 +31,10 @@ class OutsideProjectError(EffectError):
     """A path leads out of the project."""
 
 
+class AddressLimitError(EffectError):
+    """V8 does not fit into the address space that this process may use."""
+
+
 class PublishRefusedError(EffectError):
     """The place where the site should go holds something that a site must not replace."""
 

@@ -2,7 +2,8 @@
 
 It runs a file of this package in a temporary folder and a clean environment, says `ready`, then
 answers each line with one. It is started with the first request, again after it died, and ends
-with the thread that uses it, even if that is killed.
+with the thread that uses it, even if that is killed. In a sandbox it works on what a stranger
+wrote: nothing that it says or takes is trusted then, and its limits are enforced from outside.
 """
 
 from __future__ import annotations
@@ -23,25 +24,38 @@ from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model import Limits
 from coursebuild.core.run import gate
 from coursebuild.core.run.script_environment import clean_environment
+from coursebuild.core.run.script_worker import PROCESSES, SandboxWatch
 
 LIMITS = Limits()
 """Those of a course whose map sets none."""
 _START = 120.0
 """Seconds in which the child must be ready."""
+_VIGILANCE = 0.05
+"""Seconds between two looks at what a sandbox takes."""
+_LONGEST_ANSWER = 1 << 30
+"""Bytes."""
 
 
 class JsonChild:
     """The child and its folder."""
 
     def __init__(
-        self, script: str, seconds: float, python: str | None = None, memory: int = LIMITS.memory
+        self,
+        script: str,
+        seconds: float,
+        python: str | None = None,
+        memory: int = LIMITS.memory,
+        enclose: gate.Enclose | None = None,
     ) -> None:
         """A child ends itself, by SIGPROF, after `seconds` of processor time for a request.
 
         Where it does not compute, it is killed after ten times as long. It cannot take more than
-        `memory` MiB, where the system can enforce that.
+        `memory` MiB, where the system can enforce that. `enclose` puts it into a sandbox.
         """
         self.memory = memory
+        self._enclose = enclose
+        self._watch: SandboxWatch | None = None
+        self._excess = ""
         self._python = python or sys.executable
         self._script = script
         self._seconds = self._limit = seconds
@@ -77,7 +91,15 @@ class JsonChild:
             process.stdin.write(json.dumps(request).encode() + b"\n")
             process.stdin.flush()
         line = self._read_line(10 * self._limit)
-        return None if line is None else json.loads(line)
+        if line is None:
+            return None
+        try:
+            return json.loads(line)
+        except (ValueError, RecursionError):
+            if self._watch is None:
+                raise
+            self._excess = "gave no answer that can be read"
+            return None
 
     def stop(self) -> None:
         """End the child, whatever it is doing."""
@@ -86,6 +108,9 @@ class JsonChild:
             return
         process.kill()
         process.wait()
+        if self._watch is not None:
+            self._watch.close()
+            self._watch = None
         for pipe in (process.stdin, process.stdout, process.stderr):
             if pipe is not None:
                 with contextlib.suppress(BrokenPipeError):
@@ -100,6 +125,9 @@ class JsonChild:
     def death(self) -> str:
         """What ended the child, after it gave no answer."""
         assert self._process is not None
+        if self._excess:
+            self.stop()
+            return self._excess
         with contextlib.suppress(gate.StillRunningError):
             self._process.wait(1.0)
         status = self._process.returncode
@@ -114,6 +142,7 @@ class JsonChild:
 
     def _start(self) -> gate.Process:
         self._folder = self._folder or self._resources.enter_context(temporary_folder())
+        self._excess, is_enclosed = "", self._enclose is not None
         with tempfile.TemporaryFile() as errors:
             self._process = process = gate.start(
                 gate.python_command(self._script, program=self._python),
@@ -121,17 +150,23 @@ class JsonChild:
                 folder=self._folder,
                 stdin=gate.PIPE,
                 stdout=gate.PIPE,
-                stderr=errors,
+                stderr=gate.NOTHING if is_enclosed else errors,  # which a stranger would fill
+                enclose=self._enclose,
             )
-            if self._read_line(_START) != b"ready":
+            self._watch = SandboxWatch(process.pid) if is_enclosed else None
+            is_ready = self._read_line(_START) == b"ready"
+            number = process.pid if self._watch is None else self._watch.first_process()
+            if not is_ready or not number:
                 self.stop()
                 errors.seek(0)
                 lines = errors.read().decode("utf-8", "replace").strip().splitlines()
-                cause = lines[-1] if lines else "the import crashed"
+                cause = self._excess or (lines[-1] if lines else "the import crashed")
                 raise EffectError(f"MuJoCo cannot be loaded: {cause}")
         with contextlib.suppress(AttributeError, OSError):  # only Linux can
-            resource.prlimit(process.pid, resource.RLIMIT_DATA, (self.memory << 20,) * 2)
-            resource.prlimit(process.pid, resource.RLIMIT_CORE, (0, 0))
+            limits = [(resource.RLIMIT_DATA, self.memory << 20), (resource.RLIMIT_CORE, 0)]
+            limits += [(resource.RLIMIT_NPROC, 16 * PROCESSES)] if is_enclosed else []
+            for limit, most in limits:
+                resource.prlimit(number, limit, (most, most))
         return process
 
     def _read_line(self, seconds: float) -> bytes | None:
@@ -142,7 +177,15 @@ class JsonChild:
         with selectors.DefaultSelector() as selector:
             selector.register(self._process.stdout, selectors.EVENT_READ)
             while not line.endswith(b"\n"):
-                if not selector.select(max(0.0, until - time.monotonic())):
+                left = max(0.0, until - time.monotonic())
+                if self._watch is not None:
+                    self._excess = self._watch.excess(self.memory)
+                    left = min(left, _VIGILANCE)
+                if self._excess or len(line) > _LONGEST_ANSWER:
+                    return None
+                if not selector.select(left):
+                    if time.monotonic() < until:
+                        continue
                     return None
                 data = os.read(self._process.stdout.fileno(), 1 << 20)
                 if not data:

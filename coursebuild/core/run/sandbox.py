@@ -22,6 +22,7 @@ import os
 import platform
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from msgspec import Struct
@@ -207,6 +208,16 @@ class Sandbox(Struct, frozen=True):
         own_environment = {name: os.environ[name] for name in names if name in os.environ}
         return [*scope, *starter, *options, "--", *command], own_environment
 
+    def enclosure(self, root: Path, interpreter: Interpreter | None, memory: int) -> gate.Enclose:
+        """What puts a process into the sandbox that runs Python and writes nothing.
+
+        It sees the course at `root`, and what is installed for the interpreter; it takes at most
+        `memory` MiB.
+        """
+        sources = visible_places(str(root), library_folder(), interpreter)
+        hidden = special_files(sources, ())
+        return partial(self.command, sources=sources, special_files=hidden, memory=memory)
+
 
 def _hide(path: str) -> tuple[str, ...]:
     """Let a file be one that cannot be opened: devices of the system are not allowed there."""
@@ -221,11 +232,11 @@ def visible_places(root: str, library: str, interpreter: Interpreter | None) -> 
     ours = library_folder()
     sources = {path: path for path in (*_SYSTEM, root, f"{ours}/coursebuild")}
     sources[f"{library}/mjcourse"] = f"{ours}/mjcourse"
-    if interpreter is None:
-        sources |= {path: path for path in site_folders()}
-        prefixes = (sys.prefix, sys.base_prefix)
-    else:
+    prefixes = (sys.prefix, sys.base_prefix)
+    if interpreter is not None:
         prefixes = (interpreter.prefix, interpreter.base)
+    if interpreter is None or interpreter.name:  # one that the tool has made uses these, too
+        sources |= {path: path for path in site_folders()}
     for prefix in prefixes:
         # A course can name any folder of the machine, also by a link: it must hold an interpreter.
         real = os.path.realpath(prefix)

@@ -247,6 +247,10 @@ class SandboxWatch:
             return False
         return True
 
+    def first_process(self) -> int:
+        """The first process in the sandbox, as it is numbered outside; 0 before it stands."""
+        return self._first if self.is_ready() else 0
+
     def excess(self, memory: int) -> str:
         """The limit that is exceeded (`memory` is in MiB), as the end of a sentence, or empty."""
         if not self.is_ready():

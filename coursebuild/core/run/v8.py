@@ -23,7 +23,7 @@ from concurrent.futures import CancelledError, Future
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
-from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.errors import AddressLimitError, EffectError
 from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.model.results import Formula, MathError
 
@@ -77,11 +77,12 @@ def start() -> None:
     """Start V8 if it does not run yet; this starts no thread, and copies of this process share it.
 
     Raises:
-        EffectError: it is not installed, or a limit on addresses would make it end this process.
+        AddressLimitError: the limit on addresses would make it end this process.
+        EffectError: it is not installed.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < _ADDRESSES:
-        raise EffectError(
+        raise AddressLimitError(
             f"V8 needs more than the {limit >> 30} GiB of address space that this process may use",
             help="`ulimit -v unlimited` removes the limit; V8 reserves addresses, not memory",
         )

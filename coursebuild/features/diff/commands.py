@@ -36,7 +36,7 @@ from coursebuild.core.scripts.figures import ReadFile, describe_difference
 from coursebuild.core.scripts.findings import classes
 from coursebuild.core.text.source import Excerpt
 from coursebuild.features.truth.claims import Claims, course_claims, sum_claims
-from coursebuild.pipeline.load import load_course
+from coursebuild.pipeline.load import Code, load_course
 from coursebuild.pipeline.recordings import read_recorded
 
 _ROWS = 40
@@ -305,12 +305,15 @@ examples:
   coursebuild diff main              since this branch left main
   coursebuild diff ../before         another copy of the course
   coursebuild diff main --base-site ../before/public --site public
+  coursebuild diff main --sandbox    somebody else's branch
 """
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument("base", metavar="BASE", help="a Git revision, or a folder with a course")
+    help = "run no code of the course: what its own features would tell is left out"
+    parser.add_argument("--sandbox", dest="confined", action="store_true", help=help)
     for name, subject in (("--base-site", "BASE"), ("--site", "this course")):
         help = f"where `build` published {subject}, for the weight of pages"
         parser.add_argument(name, metavar="FOLDER", help=help)
@@ -321,15 +324,28 @@ def run(arguments: argparse.Namespace) -> int:
     root, sites = options_of(arguments).root, (arguments.base_site, arguments.site)
     if sites.count(None) == 1:
         raise UsageError("--site and --base-site need each other: one is compared with the other")
+    code: Code = "none" if arguments.confined else "run"
     with _open_base(root, arguments.base) as (name, folder):
-        text = report(name, _load_state(folder), _load_state(root))
+        old, new = (_load_state(place, code) for place in (folder, root))
+        text = report(name, old, new)
+    if arguments.confined:
+        text += _features_section(old.course, new.course)
     if None not in sites:
         text += f"\n{weight_section(*(root / site for site in sites))}"
     return write(text, CLEAN)
 
 
-def _load_state(root: Path) -> CourseState:
-    return CourseState(load_course(root, code="run"), functools.partial(read_recorded, root))
+def _load_state(root: Path, code: Code) -> CourseState:
+    return CourseState(load_course(root, code=code), functools.partial(read_recorded, root))
+
+
+def _features_section(*courses: Course) -> str:
+    """Name the features that were not run."""
+    paths = sorted({feature.path for course in courses for feature in course.features})
+    if not paths:
+        return ""
+    names = ", ".join(map(code_span, paths))
+    return f"\n### Features\n\nNot run, so that what they tell is left out: {names}.\n"
 
 
 @contextlib.contextmanager

@@ -26,6 +26,7 @@ def refusal(node: Node, kind: str = "") -> UntranslatableError:
 _ESCAPE = re.compile(
     r"\\(?:u\{([0-9a-fA-F]+)\}|u([0-9a-fA-F]{4})|x([0-9a-fA-F]{2})|([^ux1-9\r\n\u2028\u2029]))"
 )
+_NAME = re.compile(r"[A-Za-z_$][\w$]*", re.ASCII)
 _ESCAPED_CHARACTERS = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "v": "\v", "0": "\0"}
 
 
@@ -51,6 +52,10 @@ def parse_statements(code: str) -> list[Node]:
     root = parse(code)
     if root.has_error:
         raise UntranslatableError("code that cannot be read")
+    for node in walk(root):
+        # Python takes other letters for these: it would not see the name that was looked at here.
+        if node.type.endswith("identifier") and not _NAME.fullmatch(text_of(node)):
+            raise UntranslatableError(f"`{text_of(node)}`, a name not in plain ASCII,")
     return children(root)
 
 

@@ -20,6 +20,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.features import Trial, TrialContext, TrialOutcome
+from coursebuild.core.files.errors import AddressLimitError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Limits
@@ -27,6 +28,7 @@ from coursebuild.core.model.results import TrialLine, TrialResult
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.mjcf import model_files, model_key
+from coursebuild.core.run.sandbox import Sandbox
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import fingerprint
@@ -69,8 +71,11 @@ class Engines:
         root: Path,
         limits: Limits = LIMITS,
         say: Callable[[str], None] = lambda _: None,
+        sandbox: Sandbox | None = None,
     ) -> None:
-        self.native = NativeEngine(root, memory=limits.memory, compiling=limits.models, say=say)
+        self.native = NativeEngine(
+            root, memory=limits.memory, compiling=limits.models, say=say, sandbox=sandbox
+        )
         self.browser = LabEngine(limits.memory)
         self.equations = EquationEngine(limits.memory)
 
@@ -100,7 +105,9 @@ class LabTrials:
         """`seconds`: the processor time that a trial may take; by default, what the map says."""
         self._context = context
         self._seconds = seconds or context.course.limits.lab
-        self._engines = engines or Engines(context.root, context.course.limits, context.say)
+        self._engines = engines or Engines(
+            context.root, context.course.limits, context.say, context.sandbox
+        )
 
     def run(self, trials: Sequence[Trial]) -> TrialOutcome:
         """Run the trials in turn, and end the engines."""
@@ -108,7 +115,13 @@ class LabTrials:
         diagnostics: list[Diagnostic] = []
         with self._engines:
             for trial in trials:
-                result, lab_diagnostics = self._try_lab(trial)
+                try:
+                    result, lab_diagnostics = self._try_lab(trial)
+                except AddressLimitError as error:
+                    if isinstance(trial.block, Lab) and trial.block.is_of_text:
+                        raise
+                    self._context.say(f"the pages of models have no labs: {error.message}")
+                    break  # they come last
                 results += () if result is None else (result,)
                 diagnostics += lab_diagnostics
         return tuple(results), tuple(diagnostics)

@@ -149,10 +149,12 @@ def test_pull_request_leaves_no_cache_and_runs_scripts_in_the_sandbox_only() -> 
     assert "cache" not in str([step.get("with") for step in job["steps"][:2]])
     called = [line for line in commands(job["steps"]) if line.startswith("coursebuild ")]
     assert [line.split()[1:3] for line in called] == [
+        ["doctor", "--install-engine"],
         ["check", "--sandbox"],
         ["build", "--sandbox"],
         ["diff", "HEAD^"],
     ]
+    assert "--sandbox" in called[-1]
     keys = {"runs-on", "timeout-minutes", "steps", "if"}
     assert job.keys() == keys, "no environment, permission or secret of its own"
 
@@ -257,11 +259,11 @@ def test_only_main_is_published_and_a_pull_request_gets_a_report(
     assert caches == [f"course-{git(course.root, 'rev-parse', 'main')}"]
 
     steps_with_mistake = propose(runner, course, SECOND.replace("```text\n2", "```text\n3"))
-    assert statuses(steps_with_mistake) == [0, 0, 1, 0], "without a build, and with a report"
-    assert "running scripts (2)\n" in steps_with_mistake[2].err, "what main keeps has its secret"
+    assert statuses(steps_with_mistake) == [0, 0, 0, 1, 0], "without a build, and with a report"
+    assert "running scripts (2)\n" in steps_with_mistake[3].err, "what main keeps has its secret"
     for name, text in zip(INSTALLED, LOCKS.values(), strict=True):
         assert (runner.folder / "tmp" / name).read_text() == text
-    assert steps_with_mistake[2].out.startswith(f"::error file={course.lesson(2)},line=10,col=1,")
+    assert steps_with_mistake[3].out.startswith(f"::error file={course.lesson(2)},line=10,col=1,")
     assert "| `examples/two.py` | 1.2 | numeric: 1 (relative, up to 5.0e-01) |" in runner.summary
     assert "-2\n+3\n" in runner.summary
     assert runner.summary.endswith("Not compared: there is no site in `preview`.\n")
@@ -269,7 +271,7 @@ def test_only_main_is_published_and_a_pull_request_gets_a_report(
     steps_without_mistake = propose(
         runner, course, SECOND.replace("print(2)", "print(12)").replace("\n2\n", "\n12\n")
     )
-    assert statuses(steps_without_mistake) == [0] * 5, steps_without_mistake
+    assert statuses(steps_without_mistake) == [0] * 6, steps_without_mistake
     assert "\n| the whole site | " in runner.summary
     assert [*runner.caches] == caches
     assert ">12</" not in page.read_text()
@@ -277,6 +279,26 @@ def test_only_main_is_published_and_a_pull_request_gets_a_report(
     folder = str(runner.folder / "tmp")
     check = [*installations(folder, f"{folder}/course.txt"), *SUDO]
     assert runner.notes == [*installed, *check, *check]
+
+
+@pytest.mark.long
+def test_new_course_with_its_lab_passes_its_jobs(tmp_path: Path) -> None:
+    folder = Folder(tmp_path / "repository")
+    folder.root.mkdir()
+    require_sandbox(folder.root)
+    assert folder.main("init").status == 0
+    commit(folder.root)
+    runner = Runner(tmp_path / "service", folder.root, {"COURSEBUILD_STORE_KEY": "a key"})
+    assert statuses(push(runner)["build"]) == [0, 0]
+    git(folder.root, "checkout", "-q", "-b", "change")
+    path = "content/lessons/1.1-pendulum.md"
+    folder.write(path, folder.text(path).replace('"Push"', '"Kick"'))
+    commit(folder.root)
+    base = git(folder.root, "rev-parse", "main")
+    event = {"event_name": "pull_request", "event.pull_request.base.sha": base}
+    steps = runner.run(workflow(), "change", **event)["check"]
+    assert statuses(steps) == [0] * 6, steps
+    assert "`controls`" in runner.summary
 
 
 @pytest.mark.site
@@ -321,14 +343,19 @@ def test_action_installs_a_version_and_runs_a_command(course: Folder, runner: Ru
     parent, steps = course.root.parent, ACTION["runs"]["steps"]
     results = runner.action(parent, steps, **{**defaults, "path": course.root.name})
     assert statuses(results) == [0, 0], results
+    file = runner.folder / "tmp/coursebuild.txt"
     inputs = {"version": "0.9.0", "path": course.root.name, "command": "build --out ../site"}
-    assert statuses(runner.action(parent, steps, **inputs)) == [0, 0]
+    refused = runner.action(parent, steps[:2], **inputs, hash="")
+    assert [step.status != 0 for step in refused] == [True]
+    assert refused[0].err.endswith("version needs a hash\n")
+    assert statuses(runner.action(parent, steps, **inputs, hash="sha256:00")) == [0, 0]
+    assert file.read_text() == "coursebuild==0.9.0 --hash=sha256:00\n"
     assert (parent / "site/index.html").is_file()
     locked = "pip install --require-hashes -r requirements-course.txt -r requirements-build.txt"
-    alone = "pip install --no-deps --no-build-isolation"
     assert runner.notes == [
-        *(locked, f"{alone} .", "pip check"),
-        *(locked, f"{alone} coursebuild==0.9.0", "pip check"),
+        *(locked, "pip install --no-deps --no-build-isolation .", "pip check"),
+        locked,
+        *(locked, f"pip install --require-hashes --no-deps -r {file}", "pip check"),
     ]
 
 

@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.run.v8 import Isolate
-from coursebuild.features.lab.engines.native import NativeEngine
+from coursebuild.features.lab.engines.native import EngineDescription, NativeEngine
 from coursebuild.features.lab.export.script import (
     Export,
     ExportMetadata,
@@ -43,7 +43,7 @@ from coursebuild.features.lab.trial import Engines
 from coursebuild.pipeline.options import Options
 from support.built_sites import BuiltCourses
 from support.fixture_cases import Case, check_cases, fixture_text
-from support.lab_values import make_lab, try_labs
+from support.lab_values import Bench, make_lab, try_labs
 from support.made_courses import make_course
 
 ROOT = Path(__file__).parents[3]
@@ -202,9 +202,9 @@ def test_scripts_that_the_site_offers_print_what_lesson_4_2_says(
         assert f"kinetic energy (J): {energy}\n" in printed and "time: 20 s\n" in printed
 
 
-def test_a_script_reads_well(tmp_path: Path) -> None:
+def test_a_script_reads_well(tmp_path: Path, engine: EngineDescription) -> None:
     lab = make_lab(**RICH)
-    export = export_script(lab, METADATA)
+    export = export_script(lab, METADATA, engine)
     assert isinstance(export, Export)
     assert export.buttons == ("kick", "again")
     text = fill_in_values(export, initial_values(lab))
@@ -231,18 +231,23 @@ def test_a_script_reads_well(tmp_path: Path) -> None:
         ({"readouts": [{"label": "{{control:0}}", "expr": "1"}]}, "a text that no script can hold"),
     ],
 )
-def test_what_cannot_be_translated_has_no_script(fields: dict[str, Any], reason: str) -> None:
-    assert export_script(make_lab(**fields), METADATA) == f"{reason} has no counterpart in Python"
+def test_what_cannot_be_translated_has_no_script(
+    engine: EngineDescription, fields: dict[str, Any], reason: str
+) -> None:
+    export = export_script(make_lab(**fields), METADATA, engine)
+    assert export == f"{reason} has no counterpart in Python"
 
 
-def test_code_that_is_nested_too_deeply_or_a_model_of_several_files_has_no_script() -> None:
+def test_code_that_is_nested_too_deeply_or_a_model_of_several_files_has_no_script(
+    engine: EngineDescription,
+) -> None:
     for depth in (250, 20_000):
         deep = make_lab(setup=f"data.qpos[0] = {'Math.abs(' * depth}1{')' * depth}")
         reason = "code that is nested too deeply has no counterpart in Python"
-        assert export_script(deep, METADATA) == reason
+        assert export_script(deep, METADATA, engine) == reason
     xml = '<mujoco><asset><mesh name="m" file="m.obj"/></asset></mujoco>'
     reason = "the model in the lab may be made of several files"
-    assert export_script(make_lab(xml=xml), METADATA) == reason
+    assert export_script(make_lab(xml=xml), METADATA, engine) == reason
 
 
 def test_names_of_files() -> None:
@@ -268,36 +273,42 @@ def test_the_page_fills_a_script_as_the_build_does() -> None:
 FIELDS = ("n", "on", "v", "k")
 
 
-def python(code: str) -> str:
+@pytest.fixture(scope="session")
+def engine(bench: Bench) -> EngineDescription:
+    return bench.native.description
+
+
+def python(engine: EngineDescription, code: str) -> str:
     value = "GAIN" if "value" in code else None
-    return "\n".join(translate_statements(code, FIELDS, value))
+    return "\n".join(translate_statements(engine, code, FIELDS, value))
 
 
-def refusal(code: str) -> str:
+def refusal(engine: EngineDescription, code: str) -> str:
     with pytest.raises(UntranslatableError) as refused:
-        translate_statements(code, FIELDS)
+        translate_statements(engine, code, FIELDS)
     return str(refused.value)
 
 
-TRANSLATORS: dict[str, Callable[[str], str]] = {
+TRANSLATORS: dict[str, Callable[[EngineDescription, str], str]] = {
     "statements": python,
-    "expressions": lambda code: translate_expression(code, FIELDS),
+    "expressions": lambda engine, code: translate_expression(engine, code, FIELDS),
     "code without a counterpart in Python is refused": refusal,
 }
 
 
-def test_code_becomes_python_or_is_refused(rewriting: bool) -> None:
+def test_code_becomes_python_or_is_refused(engine: EngineDescription, rewriting: bool) -> None:
     def translate_pieces(case: Case) -> str:
         pieces = case.input.rstrip("\n").split("\n\n")
         translate = TRANSLATORS[case.title]
-        return "\n".join(f"{code}\n{indent(translate(code), '    ')}\n" for code in pieces)
+        return "\n".join(f"{code}\n{indent(translate(engine, code), '    ')}\n" for code in pieces)
 
     check_cases(Path(__file__).with_name("translated.md"), translate_pieces, rewriting=rewriting)
 
 
-def test_what_only_concerns_the_page_is_left_out_of_buttons() -> None:
+def test_what_only_concerns_the_page_is_left_out_of_buttons(engine: EngineDescription) -> None:
     code = "sim.reset(); sim.play()"
-    assert translate_statements(code, FIELDS, button=True) == ["reset(model, data, ctx)"]
+    lines = translate_statements(engine, code, FIELDS, button=True)
+    assert lines == ["reset(model, data, ctx)"]
 
 
 def test_what_code_assigns_to_is_there_from_the_start() -> None:
@@ -337,8 +348,8 @@ def formulas() -> st.SearchStrategy[str]:
 
 @example(code="Math.round(data.qpos[0])")
 @given(code=formulas())
-def test_values_are_those_of_v8(v8: Isolate, code: str) -> None:
-    lines = translate_statements(f"const x = 3.5, y = -7.25\nctx.n = {code}", FIELDS)
+def test_values_are_those_of_v8(v8: Isolate, engine: EngineDescription, code: str) -> None:
+    lines = translate_statements(engine, f"const x = 3.5, y = -7.25\nctx.n = {code}", FIELDS)
     ctx, data = SimpleNamespace(), SimpleNamespace(qpos=np.array([2.5, -1]))
     try:
         with np.errstate(divide="raise", invalid="raise"):
@@ -362,5 +373,5 @@ def test_values_are_those_of_v8(v8: Isolate, code: str) -> None:
         "`${(2.345).toFixed(1)} ${(-1 / 3).toFixed()} ${7}`",
     ],
 )
-def test_texts_are_those_of_v8(v8: Isolate, code: str) -> None:
-    assert eval(translate_expression(code, FIELDS)) == v8.call("run", code, 10.0)
+def test_texts_are_those_of_v8(v8: Isolate, engine: EngineDescription, code: str) -> None:
+    assert eval(translate_expression(engine, code, FIELDS)) == v8.call("run", code, 10.0)

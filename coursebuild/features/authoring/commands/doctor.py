@@ -24,16 +24,18 @@ from coursebuild.core.files.locks import try_lock
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.files.trust import FOLDER, find_store, store_key
 from coursebuild.core.run import gate
-from coursebuild.core.run.packages import environment_prefix
+from coursebuild.core.run.environments import find_environment, prepare_environment
 from coursebuild.core.run.sandbox import examine_sandbox
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import LAB_ENGINE
+from coursebuild.pipeline.options import Progress
 from coursebuild.report.text import GREEN, RED, YELLOW, visible
 
 EXAMPLES = """\
 examples:
-  coursebuild doctor                 in a course, or anywhere
+  coursebuild doctor                     in a course, or anywhere
+  coursebuild doctor --install-engine    before `check --sandbox`
 """
 _SECONDS = 120
 _STEP = """
@@ -61,7 +63,9 @@ class Probe(Struct, frozen=True):
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
-    """Declare no arguments."""
+    """Declare the arguments of the command."""
+    help = "only install the MuJoCo of labs where another one is installed, for `--sandbox`"
+    parser.add_argument("--install-engine", action="store_true", help=help)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -69,6 +73,8 @@ def run(arguments: argparse.Namespace) -> int:
     folder = Path(arguments.root or find_course_root(".") or ".").resolve()
     if not folder.is_dir():
         raise UsageError(f"there is no folder {arguments.root}")
+    if arguments.install_engine:
+        return _install_engine(folder)
     style, status = style_of(sys.stdout), CLEAN
     required = (_engines, _lab_engine, _fonts, _folder)
     for make_probes in (*required, _store, _locks, _disk, _rendering, _sandbox):
@@ -81,6 +87,13 @@ def run(arguments: argparse.Namespace) -> int:
             if probe.is_required and not probe.ok:
                 status = FAILURE
     return status
+
+
+def _install_engine(folder: Path) -> int:
+    place = sys.executable
+    if engine_version() != LAB_ENGINE:
+        place = prepare_environment(folder, LAB_ENGINE, Progress().say, locked=True).python
+    return write(f"MuJoCo {LAB_ENGINE}, for labs, is installed for {visible(place)}\n", CLEAN)
 
 
 def _engines(_: Path) -> Iterator[Probe]:
@@ -107,17 +120,14 @@ def _lab_engine(folder: Path) -> Iterator[Probe]:
     if engine_version() == LAB_ENGINE:
         return
     try:
-        prefix, text = (
-            environment_prefix(folder, LAB_ENGINE),
-            f"native MuJoCo {LAB_ENGINE} for labs",
-        )
+        environment = find_environment(folder, LAB_ENGINE, locked=True)
     except EffectError as error:
         yield Probe(error.message, False, error.help)
         return
-    text += (
-        f" in {prefix}" if prefix.is_dir() else ": pip will install it when a lab is first tried"
-    )
-    yield Probe(text, True)
+    place = ": it will be installed when a lab is first tried, or by `doctor --install-engine`"
+    if not environment.fault():
+        place = f" in {environment.prefix}"
+    yield Probe(f"native MuJoCo {LAB_ENGINE} for labs{place}", True)
 
 
 def _fonts(_: Path) -> Iterator[Probe]:

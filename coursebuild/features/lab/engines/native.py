@@ -11,12 +11,24 @@ import functools
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import msgspec
+from msgspec import Struct
 
 from coursebuild.core.engine.tool import code_digest
+from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.run.child import LIMITS, JsonChild
-from coursebuild.core.run.script_environment import engine_version
+from coursebuild.core.run.environments import find_environment, prepare_environment
+from coursebuild.core.run.script_environment import (
+    Interpreter,
+    engine_version,
+    library_folder,
+)
+
+if TYPE_CHECKING:
+    from coursebuild.core.run.sandbox import Sandbox
 
 LAB_ENGINE = "3.14.0"
 """The version of MuJoCo in the browser, as `site/package.json` names it."""
@@ -50,11 +62,40 @@ class NativeError(Exception):
     """Native MuJoCo could not do what a request asks; the text says why."""
 
 
+class EngineDescription(Struct, frozen=True):
+    """What of MuJoCo the scripts of labs use."""
+
+    fields: dict[str, Literal["number", "array", "rows", "single"]]
+    """By paths such as `model.opt.gravity`: a number; an array; one with rows, which is flat in
+    JavaScript; one of 32-bit numbers."""
+    functions: frozenset[str]
+    """Those that do nothing but compute."""
+
+
+Readout: TypeAlias = tuple[str, float | str]
+"""Its label and its value."""
+
+
+class ScriptReply(Struct, frozen=True):
+    """What a script of a lab does natively."""
+
+    failure: str = ""
+    """Why it fails, if it does."""
+    steps: int = 0
+    last: int = 0
+    """The checksum of its last state."""
+    state: tuple[float, ...] = ()
+    """The one at the step that was asked for."""
+    start: tuple[Readout, ...] = ()
+    end: tuple[Readout, ...] = ()
+
+
 class NativeEngine(JsonChild):
     """The child that runs MuJoCo; requests raise a `NativeError` if it dies.
 
     `seconds` and `compiling` are the processor time that a request and a model may take; `memory`
-    is in MiB; `say` tells of an environment that has to be made.
+    is in MiB; `say` tells of an environment that has to be made. With a `sandbox` none is made, and
+    each script runs in a child of its own in there, so that it can falsify only its own result.
     """
 
     def __init__(
@@ -64,9 +105,12 @@ class NativeEngine(JsonChild):
         memory: int = LIMITS.memory,
         compiling: float = LIMITS.models,
         say: Callable[[str], None] = lambda _: None,
+        sandbox: Sandbox | None = None,
     ) -> None:
         super().__init__(str(_WORKER), seconds, memory=memory)
         self._say = say
+        self._sandbox = sandbox
+        self._script_child: JsonChild | None = None
         self._root = root.resolve()
         self._compiling = compiling
 
@@ -88,21 +132,61 @@ class NativeEngine(JsonChild):
         model = run["mjb"]["data"] if run["mjb"] else base64.b64encode(mjb).decode()
         return self._request({"task": "parity", "mjb": model, "run": run, "horizon": horizon})
 
-    def script(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Run an exported script natively, and return what it computes, or its `failure` in words.
+    @functools.cached_property
+    def description(self) -> EngineDescription:
+        """What of the engine scripts may use."""
+        return msgspec.convert(self._request({"task": "describe"}), EngineDescription)
+
+    def script(self, request: dict[str, Any]) -> ScriptReply:
+        """Run an exported script natively.
 
         `request` has the script's `path` in the course (nothing need be there), its `text`, its
         `buttons`, `variants` (the text with other values), and `near`, the step whose state is
         returned.
         """
-        library = str(Path(__file__).resolve().parents[4])
-        return self._request({"task": "script", "library": library, **request})
+        library = library_folder()
+        request = {"task": "script", "library": library, **request}
+        if self._sandbox is None:
+            return msgspec.convert(self._request(request), ScriptReply)
+        python = None if self._interpreter is None else self._interpreter.python
+        enclose = self._sandbox.enclosure(self._root, self._interpreter, self.memory)
+        with JsonChild(str(_WORKER), self._seconds, python, self.memory, enclose) as child:
+            self._script_child = child
+            if self._interrupted:
+                child.interrupt()
+            reply = child.ask({**request, "limit": self._seconds})
+            if reply is None:
+                raise NativeError(child.death())
+        try:
+            return msgspec.convert(reply, ScriptReply)
+        except msgspec.ValidationError as error:
+            return ScriptReply(f"its report is none: {error}")
+
+    def interrupt(self) -> None:
+        """From another thread: end what runs, and refuse all further requests."""
+        super().interrupt()
+        if (child := self._script_child) is not None:
+            child.interrupt()
+
+    @functools.cached_property
+    def _interpreter(self) -> Interpreter | None:
+        """The environment with the labs' MuJoCo; none where that is installed here."""
+        if engine_version() == LAB_ENGINE:
+            return None
+        if self._sandbox is None:
+            return prepare_environment(self._root, LAB_ENGINE, self._say, locked=True)
+        environment = find_environment(self._root, LAB_ENGINE, locked=True)
+        if fault := environment.fault():
+            raise EffectError(
+                f"labs need MuJoCo {LAB_ENGINE}, {engine_version()} is installed here, and with "
+                f"`--sandbox` nothing is installed: {environment.prefix} {fault}",
+                help="run `coursebuild doctor --install-engine` before",
+            )
+        return environment.interpreter
 
     def _request(self, request: dict[str, Any], seconds: float | None = None) -> dict[str, Any]:
-        if self._process is None and engine_version() != LAB_ENGINE:
-            from coursebuild.core.run.packages import prepare_environment
-
-            self._python = prepare_environment(self._root, LAB_ENGINE, self._say).python
+        if self._process is None and self._interpreter is not None:
+            self._python = self._interpreter.python
         limit = self._seconds if seconds is None else min(seconds, self._seconds)
         reply: dict[str, Any] | None = self.ask({**request, "limit": limit}, limit)
         if reply is None:

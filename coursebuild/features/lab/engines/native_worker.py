@@ -1,4 +1,4 @@
-"""The child process that runs native MuJoCo for labs: it saves models and repeats runs.
+"""The child process that runs native MuJoCo for labs: it saves models, repeats runs, runs scripts.
 
 `native` runs this file in a temporary folder, where MuJoCo may leave its log. The protocol is JSON
 lines: this process says that it is ready, then answers each request with one line. A request that
@@ -11,6 +11,7 @@ import base64
 import importlib.util
 import json
 import os
+import re
 import signal
 import sys
 import types
@@ -30,7 +31,7 @@ def main() -> None:
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)  # MuJoCo prints its warnings
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
-    tasks = {"save": _save, "parity": _parity, "script": _script}
+    tasks = {"describe": _describe, "save": _save, "parity": _parity, "script": _script}
     print("ready", file=replies, flush=True)
     for line in sys.stdin:
         request = json.loads(line)
@@ -41,6 +42,41 @@ def main() -> None:
             reply = {"error": str(error) or type(error).__name__}
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         print(json.dumps(reply), file=replies, flush=True)
+
+
+def _describe(_: Any) -> dict[str, Any]:
+    """List the numbers of a model and its data, and what they are, and the functions that compute.
+
+    Scripts of labs call no others. What reads and writes files, loads libraries, or changes what is
+    common to all models takes a text, or nothing.
+    """
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    owners = {
+        "model": model,
+        "data": mujoco.MjData(model),
+        "model.opt": model.opt,
+        "model.stat": model.stat,
+    }
+    fields: dict[str, str] = {}
+    for owner, values in owners.items():
+        for name in dir(values):
+            value = None if name.startswith("_") else getattr(values, name)
+            if isinstance(value, np.ndarray):
+                kind = "rows" if value.ndim > 1 else "array"
+                fields[f"{owner}.{name}"] = "single" if value.dtype == np.float32 else kind
+            elif isinstance(value, int | float):
+                fields[f"{owner}.{name}"] = "number"
+    names = filter(re.compile(r"(mj|mju|mjd)_\w+").fullmatch, dir(mujoco))
+    return {"fields": fields, "functions": [name for name in names if _computes(name)]}
+
+
+def _computes(name: str) -> bool:
+    if name in ("mj_name2id", "mju_euler2Quat"):  # a name, the order of axes
+        return True
+    signature = getattr(mujoco, name).__doc__ or ""
+    parameters = signature.partition("(")[2].partition(") -> ")[0]
+    is_computing = bool(parameters) and re.search(r"\b(?:str|args)\b", parameters) is None
+    return is_computing and name != "mju_threadpool"
 
 
 def _save(request: Any) -> dict[str, Any]:

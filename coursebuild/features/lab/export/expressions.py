@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import ast
-import functools
 import keyword
-import re
-from collections.abc import Collection, Iterable, Mapping
-from typing import Any, Literal, TypeAlias
+from collections.abc import Collection, Iterable
 
-import numpy as np
 from tree_sitter import Node
 
 from coursebuild.features.lab import javascript as js
+from coursebuild.features.lab.engines.native import EngineDescription
 
 ROOTS = frozenset("model data mj sim ctx lib Math".split())
 RESERVED = ROOTS.union(
@@ -65,14 +62,14 @@ _BINARY = {
 _UNBOUNDED = {"NaN": "math.nan", "Infinity": "math.inf"}
 _FLAT = ".reshape(-1)"
 
-EngineField: TypeAlias = Literal["number", "array", "rows", "single"]
-"""A number; an array; one with rows, which is flat in JavaScript; one of 32-bit numbers."""
-
 
 class Expressions:
     """Translates the expressions of a piece of code."""
 
-    def __init__(self, fields: Collection[str], value: str | None, button: bool) -> None:
+    def __init__(
+        self, engine: EngineDescription, fields: Collection[str], value: str | None, button: bool
+    ) -> None:
+        self.engine = engine
         self.fields, self.value, self.button = fields, value, button
         self.scopes: list[set[str]] = []
         self.counters: set[str] = set()
@@ -107,10 +104,8 @@ class Expressions:
                 return self.member(node)
             case "subscript_expression":
                 text = self.element(node)
-                is_single = (
-                    engine_fields().get(js.dotted_name(js.field(node, "object"))) == "single"
-                )
-                return f"float({text})" if is_single else text
+                kind = self.kind(js.dotted_name(js.field(node, "object")))
+                return f"float({text})" if kind == "single" else text
             case "call_expression":
                 return self.call(node)
             case "spread_element":
@@ -149,6 +144,10 @@ class Expressions:
         """Whether a variable of this name is in scope."""
         return any(python_name(name) in scope for scope in self.scopes)
 
+    def kind(self, path: Iterable[str]) -> str | None:
+        """What stands at a path of the engine's, such as `model.opt.gravity`."""
+        return self.engine.fields.get(".".join(path))
+
     def name(self, name: str) -> str:
         """Translate a name without dots."""
         if self.is_variable(name):
@@ -175,7 +174,7 @@ class Expressions:
                 return f"mujoco.{enumeration}.{member}.value"
             case _:
                 pass
-        kind = engine_fields().get(path)
+        kind = self.kind(path)
         if kind is not None:
             return ".".join(path) + (_FLAT if kind in ("rows", "single") else "")
         if name == "length":
@@ -227,7 +226,7 @@ class Expressions:
         path = js.dotted_name(function)
         if ".".join(path) in _FUNCTIONS:
             return _FUNCTIONS[".".join(path)].replace("...", self.all(values))
-        if path[:1] == ("mj",) and len(path) == 2 and _computes(path[1]):
+        if path[:1] == ("mj",) and len(path) == 2 and path[1] in self.engine.functions:
             return f"mujoco.{path[1]}({self.all(values)})"
         match js.text_of(js.field(function, "property")) if "member" in function.type else "":
             case "slice" | "subarray" as method if len(values) < 3:
@@ -238,50 +237,6 @@ class Expressions:
                 return f"format({self.part(function, 'object')}, '.{digits}f')"
             case _:
                 raise js.refusal(function, "a call of ")
-
-
-@functools.cache
-def engine_fields() -> Mapping[tuple[str, ...], EngineField]:
-    """Map paths such as `("model", "opt", "gravity")` to what numbers stand there."""
-    mujoco = _mujoco()
-    model = mujoco.MjModel.from_xml_string("<mujoco/>")
-    owners: dict[tuple[str, ...], Any] = {
-        ("model",): model,
-        ("data",): mujoco.MjData(model),
-        ("model", "opt"): model.opt,
-        ("model", "stat"): model.stat,
-    }
-    fields: dict[tuple[str, ...], EngineField] = {}
-    for owner, values in owners.items():
-        for name in dir(values):
-            value = None if name.startswith("_") else getattr(values, name)
-            if isinstance(value, np.ndarray):
-                kind: EngineField = "rows" if value.ndim > 1 else "array"
-                fields[*owner, name] = "single" if value.dtype == np.float32 else kind
-            elif isinstance(value, int | float):
-                fields[*owner, name] = "number"
-    return fields
-
-
-def _mujoco() -> Any:
-    import mujoco  # late: only a lab that has changed is translated
-
-    return mujoco
-
-
-def _computes(name: str) -> bool:
-    """Whether a function of MuJoCo does nothing but compute: the script of a lab is run untrusted.
-
-    What reads and writes files, loads libraries, or changes what is common to all models takes a
-    text, or nothing.
-    """
-    if name in ("mj_name2id", "mju_euler2Quat"):  # a name, the order of axes
-        return True
-    if not re.fullmatch(r"(mj|mju|mjd)_\w+", name) or name == "mju_threadpool":
-        return False
-    signature = getattr(getattr(_mujoco(), name, None), "__doc__", None) or ""
-    parameters = signature.partition("(")[2].partition(") -> ")[0]
-    return bool(parameters) and re.search(r"\b(?:str|args)\b", parameters) is None
 
 
 def python_name(name: str) -> str:

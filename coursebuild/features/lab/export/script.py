@@ -8,6 +8,7 @@ fails for any value that the page may fill in.
 
 from __future__ import annotations
 
+import functools
 import json
 import keyword
 import math
@@ -26,8 +27,11 @@ from coursebuild.core.text.source import unique_name
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.engines.native import (
     LAB_ENGINE,
+    EngineDescription,
     NativeEngine,
     NativeError,
+    Readout,
+    ScriptReply,
     lab_digest,
 )
 from coursebuild.features.lab.export.expressions import RESERVED
@@ -93,22 +97,23 @@ def initial_values(lab: Lab) -> dict[int, float | str]:
     return {i: control.start for i, control in controls if not isinstance(control, Button)}
 
 
-def export_script(lab: Lab, metadata: ExportMetadata) -> Export | str:
+def export_script(lab: Lab, metadata: ExportMetadata, engine: EngineDescription) -> Export | str:
     """Write the script of a lab, or say why there is none."""
     if lab.kind != SIMLAB:
         return "its kind has code of its own"
     if lab.xml is not None and "file" in lab.xml.text:
         return "the model in the lab may be made of several files"
     try:
-        return _export(lab, metadata)
+        return _export(lab, metadata, engine)
     except UntranslatableError as error:
         return f"{error} has no counterpart in Python"
     except (RecursionError, MemoryError, SyntaxError):  # Python, too, has a limit
         return "code that is nested too deeply has no counterpart in Python"
 
 
-def _export(lab: Lab, metadata: ExportMetadata) -> Export:
+def _export(lab: Lab, metadata: ExportMetadata, engine: EngineDescription) -> Export:
     code, names = lab.fields, _names(lab.fields.controls)
+    translate = functools.partial(translate_statements, engine)
     setters = {
         i: (control, _setter(control))
         for i, control in enumerate(code.controls)
@@ -124,12 +129,12 @@ def _export(lab: Lab, metadata: ExportMetadata) -> Export:
     for i, (control, setter) in setters.items():
         constants += [*_comment(control), f"{names[i]} = {{{{control:{i}}}}}"]
         phase = "param" if control.param is not None else "again" if control.init else "once"
-        settings[phase] += translate_statements(setter, fields, names[i])
+        settings[phase] += translate(setter, fields, names[i])
     button_functions = [
         {
             "name": names[i],
             "doc": f"The button “{_one_line(button.label)}”.",
-            "lines": translate_statements(button.run, fields, button=True),
+            "lines": translate(button.run, fields, button=True),
         }
         for i, button in buttons.items()
     ]
@@ -145,12 +150,14 @@ def _export(lab: Lab, metadata: ExportMetadata) -> Export:
         xml=None if lab.xml is None else _long_text(lab.xml.text),
         fields=fields,
         keyframe=_keyframe(code.key),
-        setup=translate_statements(code.setup, fields),
-        controller=translate_statements(code.controller, fields),
+        setup=translate(code.setup, fields),
+        controller=translate(code.controller, fields),
         settings=settings,
         buttons=button_functions,
         resets="sim.reset" in "".join(button.run for button in buttons.values()),
-        readouts=[(label, translate_expression(e, fields), digits) for label, e, digits in values],
+        readouts=[
+            (label, translate_expression(engine, e, fields), digits) for label, e, digits in values
+        ],
     )
     if len(_PLACE.findall(text)) != len(setters) or _HALF_CHARACTER.search(text):
         raise UntranslatableError("a text that no script can hold")
@@ -284,7 +291,7 @@ def _try_export(
     metadata: ExportMetadata,
     main: MainRun,
 ) -> LabExport:
-    export = export_script(lab, metadata)
+    export = export_script(lab, metadata, native.description)
     if isinstance(export, str):
         return LabExport(None, export)
     if main["diverged"]:
@@ -309,8 +316,8 @@ def _try_export(
         "near": record["near"],
     }
     run = native.script(request)
-    if run["failure"]:
-        return LabExport(None, f"the script fails: {run['failure']}")
+    if run.failure:
+        return LabExport(None, f"the script fails: {run.failure}")
     rtol = PARITY_RTOL if lab.verify.rtol is None else lab.verify.rtol
     reason = _difference(main, run, rtol)
     return LabExport(None, reason) if reason else LabExport((export.name, export.text))
@@ -338,7 +345,7 @@ def record_for_export(run: dict[str, Any], horizon: int) -> dict[str, Any] | Non
     }
 
 
-def _difference(main: MainRun, run: dict[str, Any], rtol: float) -> str | None:
+def _difference(main: MainRun, run: ScriptReply, rtol: float) -> str | None:
     """Say how a script's run differs from the main run of the trial; `None` if it does not.
 
     The states may differ by `rtol`, relative to the largest number, or to 1 if that is larger. If
@@ -346,9 +353,9 @@ def _difference(main: MainRun, run: dict[str, Any], rtol: float) -> str | None:
     """
     record = main["recorded"]
     assert record is not None, "without a record no script is tried"
-    if run["steps"] != record["steps"]:
-        return f"it makes {run['steps']} steps, and the lab {record['steps']}"
-    state, lab_state, difference = run["state"], record["state"], math.inf
+    if run.steps != record["steps"]:
+        return f"it makes {run.steps} steps, and the lab {record['steps']}"
+    state, lab_state, difference = run.state, record["state"], math.inf
     if len(state) == len(lab_state):
         largest = max([1.0, *map(abs, lab_state)])
         pairs = zip(state, lab_state, strict=True)
@@ -356,13 +363,13 @@ def _difference(main: MainRun, run: dict[str, Any], rtol: float) -> str | None:
     if not difference <= rtol:
         return f"its state after {record['near']} steps is apart from the lab's by {difference:.1e}"
     first, last = main["pictures"][0], main["pictures"][-1]
-    reason = _compare_readouts(first["readouts"], run["start"], "start")
-    if reason is None and run["last"] == record["last"]:
-        reason = _compare_readouts(last["readouts"], run["end"], "end")
+    reason = _compare_readouts(first["readouts"], run.start, "start")
+    if reason is None and run.last == record["last"]:
+        reason = _compare_readouts(last["readouts"], run.end, "end")
     return reason
 
 
-def _compare_readouts(lab_values: Any, readouts: list[list[Any]], moment: str) -> str | None:
+def _compare_readouts(lab_values: Any, readouts: Sequence[Readout], moment: str) -> str | None:
     for (label, value), lab_value in zip(readouts, lab_values or (), strict=False):
         if lab_value is None:  # it is not a number, and the lab shows nothing
             continue

@@ -15,25 +15,31 @@ from collections.abc import Collection, Iterable, Iterator
 from tree_sitter import Node
 
 from coursebuild.features.lab import javascript as js
+from coursebuild.features.lab.engines.native import EngineDescription
 from coursebuild.features.lab.export import expressions
 
 _AUGMENTED = ("+=", "-=", "*=", "/=", "**=", "&=", "|=", "^=")
 
 
 def translate_statements(
-    code: str, fields: Collection[str], value: str | None = None, *, button: bool = False
+    engine: EngineDescription,
+    code: str,
+    fields: Collection[str],
+    value: str | None = None,
+    *,
+    button: bool = False,
 ) -> list[str]:
     """Translate statements into lines; `value` is the expression that `value` stands for.
 
     In the code of a `button`, calls that only concern the page's clock are left out.
     """
-    lines = _Statements(fields, value, button).block(js.parse_statements(code))
+    lines = _Statements(engine, fields, value, button).block(js.parse_statements(code))
     return ast.unparse(ast.parse("\n".join(lines))).splitlines()
 
 
-def translate_expression(code: str, fields: Collection[str]) -> str:
+def translate_expression(engine: EngineDescription, code: str, fields: Collection[str]) -> str:
     """Translate an expression."""
-    text = _Statements(fields, None, button=False).expression(js.parse_expression(code))
+    text = _Statements(engine, fields, None, button=False).expression(js.parse_expression(code))
     return ast.unparse(ast.parse(text))
 
 
@@ -164,7 +170,7 @@ class _Statements(expressions.Expressions):
                 return self.element(node)
             case "member_expression":
                 path = js.dotted_name(node)
-                if path[:1] == ("ctx",) or expressions.engine_fields().get(path) == "number":
+                if path[:1] == ("ctx",) or self.kind(path) == "number":
                     return self.member(node)
             case _:
                 pass
