@@ -141,6 +141,10 @@ class Trace(Struct, frozen=True, rename={"is_perturbed": "moved"}):
     sought: tuple[str, ...] = ()
     """Modules that it looked for in a folder of the project but did not find, such as those that
     would replace Python's own: `folder/{one,two}`."""
+    existence: tuple[tuple[str, str], ...] = ()
+    """Paths of the project where it looked whether something is there, each with the answer."""
+    statuses: tuple[tuple[str, str], ...] = ()
+    """Paths of the project whose sizes or times it asked for, each with the answer."""
 
 
 class ScriptRun(Struct, frozen=True):
