@@ -24,11 +24,11 @@ from typing import Any, Protocol
 
 _OF_KIND = frozenset(
     "exists lexists isfile isdir islink ismount isjunction samefile realpath _joinrealpath"
-    " is_file is_dir is_symlink is_mount is_junction _stat copymode copystat"
-    " checkcache updatecache".split()
+    " resolve is_file is_dir is_symlink is_mount is_junction _stat copymode copystat"
+    " checkcache updatecache select_exists".split()
 )
 """Functions of Python's that give their caller no size and no time: of `os.path`, `pathlib`,
-`shutil`, and of `linecache`, which reads the file as well."""
+`shutil`, `glob`, and `linecache`, which reads the file as well."""
 _PASSING = ("stat", "lstat", "readlink")
 """Methods of `pathlib` that give all to their caller."""
 
@@ -91,6 +91,10 @@ class QuestionNotes:
             ):
                 if real in functions:
                     functions.add(new)
+        # Python 3.13 keeps the function itself for `Path.glob`.
+        globber = getattr(sys.modules.get("glob"), "_StringGlobber", None)
+        if hasattr(globber, "lstat"):
+            setattr(globber, "lstat", os.lstat)  # noqa: B010 (no type checker knows it)
 
     def forget(self) -> None:
         """Take questions anew, as must be where relative paths mean something else."""
