@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import re
 import unicodedata
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Generic, TypeVar
 
 from msgspec import Struct
@@ -198,15 +198,11 @@ def misspelt(word: str, names: Iterable[str]) -> str | None:
 
     A letter may be dropped, added, changed or swapped with the next one, or be a capital.
     """
-    return next((name for name, _ in _misspelt_names(word, names)), None)
-
-
-def _misspelt_names(word: str, names: Iterable[str]) -> Iterator[tuple[str, tuple[int, int]]]:
-    """The names of which a word may be a misspelling, and by how much, without case first."""
     for name in sorted(set(names) - {word}):
         difference = _difference(word.lower(), name.lower())
         if difference <= (1 if len(name) < 5 else 2) and difference < len(name):
-            yield name, (difference, _difference(word, name))
+            return name
+    return None
 
 
 def _difference(first: str, second: str) -> int:
@@ -288,27 +284,23 @@ def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     """The fix that writes the nearest known name, or a help that lists them if few; or nothing."""
     names = sorted(set(known_names))
     if (likely := nearest(name, names)) is not None:
-        return propose(name, likely, names)
+        return propose(name, likely)
     return "known: " + ", ".join(f"`{n}`" for n in names) if 0 < len(names) <= 12 else ""
 
 
 _IDS = re.compile(r"\d+|(?<![^\W_])[^\W\d_](?![^\W_])")
 
 
-def propose(name: str, likely: str, names: Iterable[str] = ()) -> Fix:
-    """The fix that writes the likely one of `names` for a name.
+def propose(name: str, likely: str) -> Fix:
+    """The fix that writes the likely name for another, if a human finds it so.
 
-    It is safe where the name differs from that one by a letter or two, and from others by more.
     Names that differ in numbers or single letters are of different things: there it has no
     edit.
     """
     help = f"did you mean `{likely}`?"
     if _IDS.findall(name.lower()) != _IDS.findall(likely.lower()):
         return Fix(help)
-    candidates = dict(_misspelt_names(name, {*names, likely}))
-    difference = candidates.pop(likely, None)
-    is_safe = difference is not None and all(difference < number for number in candidates.values())
-    return Fix(help, likely, name, safe=is_safe and len(likely) > 2)
+    return Fix(help, likely, name)
 
 
 def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
