@@ -306,6 +306,8 @@ class TrialLine(Struct, frozen=True):
     """Why its page offers no Python script, in words."""
     fill: float | None = None
     """The mean share of its picture that moving things fill; `None` where nothing moves."""
+    fallen: tuple[str, ...] = ()
+    """What has fallen out of the scene, and to where."""
 
 
 class TrialResult(Struct, frozen=True):

@@ -291,6 +291,10 @@ class _LabTrial(Struct, frozen=True):
             tried=len(reply.attempts),
             parity=_in_english(*comparison),
             fill=None if reply.main is None else reply.main["fill"],
+            fallen=tuple(
+                f"`{body['name']}`, to z = {body['height']:.3g} m at t = {body['time']:.3g} s"
+                for body in (reply.main or {}).get("fallen", ())
+            ),
             cached=cached_evaluation is not None,
             unexported=export.reason,
         )
