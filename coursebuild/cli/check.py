@@ -81,11 +81,12 @@ def run(arguments: argparse.Namespace) -> int:
             truth=arguments.truth,
         )
         safe = sum(diagnostic.safe for diagnostic in report.diagnostics)
-        others = sum(bool(d.edits) and not d.safe for d in report.diagnostics)
-        hints = [f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}"] * bool(
-            safe
-        )
-        hints += [f"`coursebuild check --propose` has {plural(others, 'proposal')}"] * bool(others)
+        proposals = sum(bool(d.edits) and not d.safe for d in report.diagnostics)
+        hints = []
+        if safe:
+            hints.append(f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}")
+        if proposals:
+            hints.append(f"`coursebuild check --propose` has {plural(proposals, 'proposal')}")
         return replace(report, remarks=(*report.remarks, *hints))
 
     # Other formats say how long it took, which the report of before would not.

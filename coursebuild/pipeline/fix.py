@@ -112,8 +112,10 @@ def propose(options: Options, names: tuple[str, ...] = (), ask: Ask | None = Non
         f"{location(diagnostic.span)}: {diagnostic.message}\n{diff}"
         for diagnostic, diff in proposals
     ]
-    said = f"{plural(len(changes), 'proposal')}; in a terminal, each can be accepted"
-    return replace(report, remarks=(*report.remarks, *changes, said if changes else _NO_PROPOSAL))
+    summary = f"{plural(len(changes), 'proposal')}; in a terminal, each can be accepted"
+    return replace(
+        report, remarks=(*report.remarks, *changes, summary if changes else _NO_PROPOSAL)
+    )
 
 
 _NO_PROPOSAL = "there is nothing to propose"
@@ -146,8 +148,8 @@ class _Fixer:
         return report
 
     def propose(self, ask: Ask | None) -> tuple[Report, list[tuple[Diagnostic, str]]]:
-        """Ask about each proposal until there is no new one; return what is left, and all asked."""
-        asked: list[tuple[Diagnostic, str]] = []
+        """Ask about each proposal until there is no new one; return what is left, and all of them."""
+        questions: list[tuple[Diagnostic, str]] = []
         while True:
             self._read(self.texts)  # which lessons the names mean
             report = self._verify()
@@ -159,14 +161,14 @@ class _Fixer:
                 if len(choose_fixes([*accepted, diagnostic], proposals=True)) <= len(accepted):
                     continue  # it touches an accepted one, and is proposed again if need be
                 self.tried.add(_key(diagnostic))
-                asked.append((diagnostic, "\n".join(self._diff(diagnostic))))
-                answer = Answer.NO if ask is None else ask(*asked[-1])
+                questions.append((diagnostic, "\n".join(self._diff(diagnostic))))
+                answer = Answer.NO if ask is None else ask(*questions[-1])
                 accepted += [diagnostic] if answer is Answer.YES else []
             self._make(accepted)
             if not accepted:
-                return report, asked
+                return report, questions
             if answer is Answer.QUIT:
-                return self._verify(), asked
+                return self._verify(), questions
 
     def write(self, verb: str, report: Report) -> tuple[str, ...]:
         """Write the files; what was done, as remarks."""

@@ -149,10 +149,10 @@ def test_proposals_are_accepted_one_by_one(make: Make) -> None:
         window.type(b"maybe\ny\n")
         window.read(r"(?s)(\[y/n/q\] .*){4}")
         window.type(b"q\n")
-        shown = screen(window.read())
+        text_left = screen(window.read())
         assert window.process.wait(120) == 1
-    assert "\n+See [a](term:friction), [b](term:frictio) and [c](term:fricton).\n" in shown
-    assert "\nfixed 1 mistake in 1 file (link-term); 2 left; " in shown
+    assert "\n+See [a](term:friction), [b](term:frictio) and [c](term:fricton).\n" in text_left
+    assert "\nfixed 1 mistake in 1 file (link-term); 2 left; " in text_left
     assert folder.text(folder.lesson()) == text.replace("frictio)", "friction)")
     assert folder.main("undo").status == 0
     assert folder.text(folder.lesson()) == text

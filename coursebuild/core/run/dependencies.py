@@ -163,12 +163,12 @@ def dependencies_of(
         for need in needs
     ]
     # What was read or listed is known better than whether it exists.
-    known = {*trace.files, *trace.folders}
+    contents = {*trace.files, *trace.folders}
     for field, kind in ANSWERS.items():
         dependencies += [
             Dependency(kind, name, answer)
             for name, answer in getattr(trace, field)
-            if kind is Kind.STATUS or name not in known
+            if kind is Kind.STATUS or name not in contents
         ]
     return tuple(sorted(dependencies, key=lambda d: (d.kind.value, d.name, d.state)))
 

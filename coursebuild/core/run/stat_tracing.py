@@ -75,7 +75,7 @@ class QuestionNotes:
 
     def __init__(self, tracer: Asker) -> None:
         self._tracer = tracer
-        self._seen: set[tuple[object, ...]] = set()
+        self._noted_keys: set[tuple[object, ...]] = set()
 
     def install(self) -> None:
         """Wrap the functions in this process."""
@@ -98,16 +98,16 @@ class QuestionNotes:
 
     def forget(self) -> None:
         """Take questions anew, as must be where relative paths mean something else."""
-        self._seen.clear()
+        self._noted_keys.clear()
 
     def _wrap(self, name: str) -> Callable[..., Any]:
         real = getattr(posix, name)
-        seen, get_frame, note = self._seen, sys._getframe, self._note
+        keys, get_frame, note = self._noted_keys, sys._getframe, self._note
 
         def wrapper(path: Any, *args: Any, **keywords: Any) -> Any:
             try:
                 code = get_frame(1).f_code
-                if (path, name, args, code.co_name, code.co_filename) not in seen:
+                if (path, name, args, code.co_name, code.co_filename) not in keys:
                     note(path, name, args, keywords)
             except Exception:
                 pass
@@ -142,7 +142,7 @@ class QuestionNotes:
             folder = posix.readlink(f"/proc/self/fd/{descriptor}")
             full_path = full_path if full_path[:1] == "/" else f"{folder}/{full_path}"
         elif is_direct and "mode" not in keywords:
-            self._seen.add(key)
+            self._noted_keys.add(key)
         mode = keywords.get("mode", *args[:1]) if name == "access" else None
         is_library = not code.co_filename.startswith(root)
         if is_library and code.co_name == "getsize":

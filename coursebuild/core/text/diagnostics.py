@@ -165,8 +165,8 @@ def keeps_words(edits: Iterable[Edit]) -> bool:
 
 
 def _words(text: str) -> list[str]:
-    seen = (char for char in text if char.isspace() or unicodedata.category(char) not in _UNSEEN)
-    return _WORD.findall("".join(seen))
+    visible = (char for char in text if char.isspace() or unicodedata.category(char) not in _UNSEEN)
+    return _WORD.findall("".join(visible))
 
 
 _UNSEEN = ("Cc", "Cf")

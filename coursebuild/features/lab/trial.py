@@ -293,7 +293,7 @@ class _LabTrial(Struct, frozen=True):
             fill=None if reply.main is None else reply.main["fill"],
             fallen=tuple(
                 f"`{body['name']}`, to z = {body['height']:.3g} m at t = {body['time']:.3g} s"
-                for body in (reply.main or {}).get("fallen", ())
+                for body in ([] if reply.main is None else reply.main.get("fallen", []))
             ),
             cached=cached_evaluation is not None,
             unexported=export.reason,

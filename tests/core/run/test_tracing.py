@@ -67,8 +67,8 @@ def test_what_is_asked_about_files_without_opening_them(traced: RunTraced, root:
         os.utime(root / path, ns=(9, 9))
     for code, answers in SCRIPTS["questions"].items():
         trace = traced(code)
-        asked = [f"{path}: {answer}" for path, answer in (*trace.existence, *trace.statuses)]
-        assert sorted(asked) == answers, code
+        texts = [f"{path}: {answer}" for path, answer in (*trace.existence, *trace.statuses)]
+        assert sorted(texts) == answers, code
     for code, paths in SCRIPTS["found"].items():
         assert [*traced(code).files] == paths, code
     for question in ("util.find_spec", "import_module"):
