@@ -148,7 +148,7 @@ class _Fixer:
         return report
 
     def propose(self, ask: Ask | None) -> tuple[Report, list[tuple[Diagnostic, str]]]:
-        """Ask about each proposal until there is no new one; return what is left, and all of them."""
+        """Ask about each proposal until there is no new one; return what is left, and all."""
         questions: list[tuple[Diagnostic, str]] = []
         while True:
             self._read(self.texts)  # which lessons the names mean
