@@ -12,17 +12,22 @@ from coursebuild.cli import arguments as shared
 from coursebuild.cli.arguments import options_of, print_report
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.errors import UsageError
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.check import check
+from coursebuild.pipeline.fix import Answer, fix, propose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.verify import read_shard
 from coursebuild.report import Report
+from coursebuild.report.text import diagnostic_text, visible_lines
+from coursebuild.report.values import plural
 
 EXAMPLES = """\
 examples:
   coursebuild check                      the whole course
   coursebuild check 4.2                  one lesson
   coursebuild check -v                   why each script runs
-  coursebuild check --fix                fix what has a single cure
+  coursebuild check --fix                mend the form, and no word
+  coursebuild check --propose            decide what else to change, one by one
   coursebuild check --format github      annotations in GitHub Actions
   coursebuild check --strict             in CI: warnings are errors
   coursebuild check --sandbox            somebody else's branch
@@ -31,8 +36,8 @@ examples:
 
 
 _FLAGS = {
-    "--fix": "fix mistakes that have a single cure; `undo` reverts it",
-    "--unsafe": "with --fix: also make fixes that are only likely to be right",
+    "--fix": "mend mistakes of form, without changing any word or number; `undo` reverts it",
+    "--propose": "ask about each change that you should decide; without a terminal, list them",
     "--sensitivity": "repeat recorded runs, move initial states, halve timesteps, and report which "
     "digits hold",
     "--truth": "list numbers and arithmetic that nothing proves",
@@ -63,16 +68,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Print what is wrong."""
     if arguments.against is not None:
         return _compare_with_version(arguments)
-    if arguments.unsafe and not arguments.fix:
-        raise UsageError("--unsafe needs --fix")
-    if arguments.fix:
-        from coursebuild.pipeline.fix import fix
-
-        if conflicts := _special_options(arguments):
-            raise UsageError(f"--fix cannot be combined with {conflicts[0]}")
-        options = options_of(arguments)
-        report = fix(options, tuple(arguments.lessons), unsafe=arguments.unsafe)
-        return print_report(report, arguments.format, options)
+    if arguments.fix or arguments.propose:
+        return _mend(arguments)
 
     def work(options: Options) -> Report:
         report = check(
@@ -84,8 +81,13 @@ def run(arguments: argparse.Namespace) -> int:
             truth=arguments.truth,
         )
         safe = sum(diagnostic.safe for diagnostic in report.diagnostics)
-        hint = f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}"
-        return replace(report, remarks=(*report.remarks, *([hint] if safe else [])))
+        proposals = sum(bool(d.edits) and not d.safe for d in report.diagnostics)
+        hints = []
+        if safe:
+            hints.append(f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}")
+        if proposals:
+            hints.append(f"`coursebuild check --propose` has {plural(proposals, 'proposal')}")
+        return replace(report, remarks=(*report.remarks, *hints))
 
     # Other formats say how long it took, which the report of before would not.
     if arguments.format != "text" or arguments.long or _special_options(arguments):
@@ -94,6 +96,35 @@ def run(arguments: argparse.Namespace) -> int:
             report = work(options)
         return print_report(report, arguments.format, options)
     return shared.run_unless_unchanged(arguments, ("examples",), work)
+
+
+def _mend(arguments: argparse.Namespace) -> int:
+    """Mend what can be mended, and print what is left."""
+    option = "--fix" if arguments.fix else "--propose"
+    conflicts = ["--propose"] if arguments.fix and arguments.propose else []
+    conflicts += _special_options(arguments)
+    if conflicts:
+        raise UsageError(f"{option} cannot be combined with {conflicts[0]}")
+    options, names = options_of(arguments), tuple(arguments.lessons)
+    streams = (sys.stdin, sys.stdout)
+    can_ask = arguments.format == "text" and all(s is not None and s.isatty() for s in streams)
+    report = (
+        fix(options, names) if arguments.fix else propose(options, names, _ask if can_ask else None)
+    )
+    return print_report(report, arguments.format, options)
+
+
+def _ask(diagnostic: Diagnostic, change: str) -> Answer:
+    """Show a proposal, and wait for an answer."""
+    style = shared.style_of(sys.stdout)
+    sys.stdout.write(f"{diagnostic_text(diagnostic, style)}\n\n{visible_lines(change)}\n")
+    while True:
+        try:
+            word = input("make this change? [y/n/q] ").strip().lower()[:1]
+        except EOFError:
+            return Answer.QUIT
+        with contextlib.suppress(ValueError):
+            return Answer(word)
 
 
 def _special_options(arguments: argparse.Namespace) -> list[str]:
@@ -109,7 +140,9 @@ def _compare_with_version(arguments: argparse.Namespace) -> int:
 
     conflicts = [] if arguments.format in ("text", "json") else [f"--format {arguments.format}"]
     conflicts += _special_options(arguments)
-    conflicts += [f"--{name}" for name in ("sandbox", "strict", "fix") if getattr(arguments, name)]
+    conflicts += [
+        f"--{name}" for name in ("sandbox", "strict", "fix", "propose") if getattr(arguments, name)
+    ]
     conflicts += [arguments.executor[0].option] if arguments.executor else []
     if conflicts:
         raise UsageError(f"--against cannot be combined with {conflicts[0]}")

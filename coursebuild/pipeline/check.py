@@ -310,6 +310,7 @@ def depends_on(
         if run.trace is None or run.trace.opaque or "." in run.trace.folders:
             return None
         files |= {*run.trace.files, *run.trace.folders, *run.trace.outside}
+        files |= {name for name, _ in (*run.trace.existence, *run.trace.statuses)}
         files |= {file for name in run.trace.sought for file in sought_files(name)}
     for _, result in results.models:
         if result.facts is not None:

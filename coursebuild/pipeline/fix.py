@@ -1,16 +1,20 @@
-"""`coursebuild check --fix`: make the edits that diagnostics carry, and check what comes of them.
+"""`coursebuild check --fix` and `--propose`: make the edits that diagnostics carry.
 
-Edits are made in memory, and the course is read again: a fix stays if its mistake is gone and the
-course has no more errors than before; else each half of the fixes is tried. Where reading finds
-nothing more to fix, scripts and labs run, and what they show is fixed likewise. The files, texts in
-`content/` and `models/` behind no link, are written at the end, all or none, with a journal for
-`coursebuild undo`.
+1. `--fix` makes those that change form and no word, in memory, and reads the course again: a fix
+   stays if its mistake is gone and the course has no more errors than before; else each half of the
+   fixes is tried. Where reading finds nothing more to fix, scripts and labs run, and what they show
+   is fixed likewise.
+2. `--propose` shows the others one by one; a human accepts or declines each.
+3. The files, texts in `content/` and `models/` behind no link, are written at the end, all or none,
+   with a journal for `coursebuild undo`.
 """
 
 from __future__ import annotations
 
+import difflib
+import enum
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -27,6 +31,7 @@ from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.outputs import changed_text
 from coursebuild.pipeline.reader import Reader
 from coursebuild.report import Report
+from coursebuild.report.text import location
 from coursebuild.report.values import plural
 
 _ROUNDS = 20
@@ -43,14 +48,29 @@ _HIDING = frozenset(
 be found."""
 
 
+class Answer(enum.Enum):
+    """What a human says to a proposal."""
+
+    YES = "y"
+    NO = "n"
+    QUIT = "q"
+
+
+Ask = Callable[[Diagnostic, str], Answer]
+"""Shows a diagnostic and the change that is proposed, as a diff, and returns the answer."""
+
+
 def choose_fixes(
-    diagnostics: Iterable[Diagnostic], *, unsafe: bool = False
+    diagnostics: Iterable[Diagnostic], *, proposals: bool = False
 ) -> tuple[Diagnostic, ...]:
-    """The diagnostics whose edits can be made together: none touches another, safe ones first."""
+    """The diagnostics whose edits can be made together: none touches another, safe ones first.
+
+    With `proposals`, also those that a human has to decide.
+    """
     fixes: list[Diagnostic] = []
     taken_places: dict[str, list[tuple[int, int]]] = {}
     for diagnostic in sorted(diagnostics, key=lambda d: (not d.safe, d.order)):
-        if not diagnostic.edits or not (diagnostic.safe or unsafe):
+        if not diagnostic.edits or not (diagnostic.safe or proposals):
             continue
         places = [(e.span.path, e.span.start, e.span.end) for e in diagnostic.edits]
         if any(
@@ -73,47 +93,39 @@ def may_edit(root: Path, path: str) -> bool:
     return path.startswith(("content/", "models/")) and any(map(target.is_relative_to, folders))
 
 
-def fix(options: Options, names: tuple[str, ...] = (), *, unsafe: bool = False) -> Report:
-    """Mend the lessons that the names mean, or everything; report what was done and what is left.
-
-    Without `unsafe`, only what can be mended in one way.
-    """
+def fix(options: Options, names: tuple[str, ...] = ()) -> Report:
+    """Mend the form of the lessons that the names mean, or of everything; report what is left."""
     with project_lock(options.root, options.progress.say), Reader(options) as reader:
-        fixer = _Fixer(options, reader, names, unsafe=unsafe)
+        fixer = _Fixer(options, reader, names)
         report = fixer.run()
-    originals = fixer.originals
-    changed = {p: text for p, text in fixer.texts.items() if text != originals[p].text}
+    return replace(report, remarks=(*report.remarks, *fixer.write("fixed", report)))
+
+
+def propose(options: Options, names: tuple[str, ...] = (), ask: Ask | None = None) -> Report:
+    """Propose one by one what a human should decide; without `ask`, only say what that is."""
+    with project_lock(options.root, options.progress.say), Reader(options) as reader:
+        fixer = _Fixer(options, reader, names)
+        report, proposals = fixer.propose(ask)
+    if ask is not None:
+        return replace(report, remarks=(*report.remarks, *fixer.write("changed", report)))
     changes = [
-        FileChange(path, originals[path].text.encode(), text.encode())
-        for path, text in sorted(changed.items())
+        f"{location(diagnostic.span)}: {diagnostic.message}\n{diff}"
+        for diagnostic, diff in proposals
     ]
-    can_undo = bool(changes) and change_files(
-        options.root, changes, options.progress.say, keep=True
+    summary = f"{plural(len(changes), 'proposal')}; in a terminal, each can be accepted"
+    return replace(
+        report, remarks=(*report.remarks, *changes, summary if changes else _NO_PROPOSAL)
     )
-    remarks = [changed_text("fixed", originals[c.path], changed[c.path]) for c in changes]
-    # How much was fixed, by rule, and what is left
-    fixed, files = fixer.fixed, len(changes)
-    rules = Counter(diagnostic.rule for diagnostic in fixed)
-    rule_names = ", ".join(f"{rule} {n}" if n > 1 else rule for rule, n in sorted(rules.items()))
-    left = len(report.diagnostics)
-    parts = [f"nothing fixed; {left} left"]
-    if fixed:
-        parts = [f"fixed {plural(len(fixed), 'mistake')} in {plural(files, 'file')} ({rule_names})"]
-        parts.append(f"{left} left" if left else "nothing is left")
-    if likely := sum(bool(d.edits) and not d.safe for d in report.diagnostics):
-        parts.append(f"{likely} more with `--unsafe`, if they are what you meant")
-    if fixed:
-        parts.append("`coursebuild undo` takes it back" if can_undo else "it cannot be undone")
-    return replace(report, remarks=(*report.remarks, *remarks, "; ".join(parts)))
+
+
+_NO_PROPOSAL = "there is nothing to propose"
 
 
 class _Fixer:
     """Mends the texts of a course in memory."""
 
-    def __init__(
-        self, options: Options, reader: Reader, names: tuple[str, ...], *, unsafe: bool
-    ) -> None:
-        self.options, self.reader, self.names, self.unsafe = options, reader, names, unsafe
+    def __init__(self, options: Options, reader: Reader, names: tuple[str, ...]) -> None:
+        self.options, self.reader, self.names = options, reader, names
         self.code: Code = "run" if options.sandbox is None else "refuse"
         self.texts: dict[str, str] = {}
         """The mended texts, by path."""
@@ -125,15 +137,67 @@ class _Fixer:
         """Fixes that were made, or are not to be made."""
 
     def run(self) -> Report:
+        """Mend the form of all texts; return what is left."""
         for _ in range(_ROUNDS):
             diagnostics = self._read(self.texts)
             if self._mend(diagnostics, diagnostics):
                 continue
-            outcome = read_and_verify(self.options, self.reader, self.names, texts=self.texts)
-            report = outcome if isinstance(outcome, Report) else outcome.report()
+            report = self._verify()
             if not self._mend(report.diagnostics, diagnostics):
                 break
         return report
+
+    def propose(self, ask: Ask | None) -> tuple[Report, list[tuple[Diagnostic, str]]]:
+        """Ask about each proposal until there is no new one; return what is left, and all."""
+        questions: list[tuple[Diagnostic, str]] = []
+        while True:
+            self._read(self.texts)  # which lessons the names mean
+            report = self._verify()
+            accepted: list[Diagnostic] = []
+            answer = Answer.NO
+            for diagnostic in self._candidates(report.diagnostics):
+                if diagnostic.safe or answer is Answer.QUIT:
+                    continue
+                if len(choose_fixes([*accepted, diagnostic], proposals=True)) <= len(accepted):
+                    continue  # it touches an accepted one, and is proposed again if need be
+                self.tried.add(_key(diagnostic))
+                questions.append((diagnostic, "\n".join(self._diff(diagnostic))))
+                answer = Answer.NO if ask is None else ask(*questions[-1])
+                accepted += [diagnostic] if answer is Answer.YES else []
+            self._make(accepted)
+            if not accepted:
+                return report, questions
+            if answer is Answer.QUIT:
+                return self._verify(), questions
+
+    def write(self, verb: str, report: Report) -> tuple[str, ...]:
+        """Write the files; what was done, as remarks."""
+        changed = {p: text for p, text in self.texts.items() if text != self.originals[p].text}
+        changes = [
+            FileChange(path, self.originals[path].text.encode(), text.encode())
+            for path, text in sorted(changed.items())
+        ]
+        can_undo = bool(changes) and change_files(
+            self.options.root, changes, self.options.progress.say, keep=True
+        )
+        remarks = [changed_text(verb, self.originals[c.path], changed[c.path]) for c in changes]
+        rules = Counter(diagnostic.rule for diagnostic in self.fixed)
+        names = ", ".join(f"{rule} {n}" if n > 1 else rule for rule, n in sorted(rules.items()))
+        left = len(report.diagnostics)
+        parts = [f"nothing {verb}; {left} left"]
+        if self.fixed:
+            mistakes, files = plural(len(self.fixed), "mistake"), plural(len(changes), "file")
+            parts = [f"fixed {mistakes} in {files} ({names})"]
+            parts.append(f"{left} left" if left else "nothing is left")
+        if proposals := sum(bool(d.edits) and not d.safe for d in report.diagnostics):
+            parts.append(f"`coursebuild check --propose` has {plural(proposals, 'proposal')}")
+        if self.fixed:
+            parts.append("`coursebuild undo` takes it back" if can_undo else "it cannot be undone")
+        return (*remarks, "; ".join(parts))
+
+    def _verify(self) -> Report:
+        outcome = read_and_verify(self.options, self.reader, self.names, texts=self.texts)
+        return outcome if isinstance(outcome, Report) else outcome.report()
 
     def _read(self, texts: Mapping[str, str]) -> tuple[Diagnostic, ...]:
         """What is wrong with the course with these texts, as far as reading it shows."""
@@ -150,23 +214,38 @@ class _Fixer:
 
         `before` are the diagnostics of reading the course.
         """
+        fixes = choose_fixes(self._candidates(diagnostics))
+        self.tried |= {_key(diagnostic) for diagnostic in fixes}
+        harmless = self._select_harmless(list(fixes), [], before) if fixes else []
+        self._make(harmless)
+        return bool(harmless)
+
+    def _candidates(self, diagnostics: Collection[Diagnostic]) -> list[Diagnostic]:
+        """The diagnostics with edits that may be made and were not tried."""
         doubtful = {d.span.path for d in diagnostics if d.rule in _DOUBTFUL}
-        candidates = [
+        return [
             d
             for d in diagnostics
-            if _key(d) not in self.tried
+            if d.edits
+            and _key(d) not in self.tried
             and all(e.span.path not in doubtful and self._may_edit(e) for e in d.edits)
         ]
-        fixes = choose_fixes(candidates, unsafe=self.unsafe)
-        self.tried |= {_key(diagnostic) for diagnostic in fixes}
-        if not fixes:
-            return False
-        harmless = self._select_harmless(list(fixes), [], before)
-        for edit in (edit for diagnostic in harmless for edit in diagnostic.edits):
+
+    def _make(self, fixes: Sequence[Diagnostic]) -> None:
+        """Make the edits of diagnostics in memory."""
+        for edit in (edit for diagnostic in fixes for edit in diagnostic.edits):
             self.originals.setdefault(edit.span.path, edit.span.source)
-        self.texts = self._texts_with(harmless)
-        self.fixed += harmless
-        return bool(harmless)
+        self.texts = self._texts_with(fixes)
+        self.fixed += fixes
+
+    def _diff(self, diagnostic: Diagnostic) -> Iterator[str]:
+        """The lines that the edits of a diagnostic change."""
+        for path, new in self._texts_with([diagnostic]).items():
+            sources = (edit.span.source for edit in diagnostic.edits)
+            if (source := next((s for s in sources if s.path == path), None)) is not None:
+                old_lines, new_lines = source.text.splitlines(), new.splitlines()
+                diff = difflib.unified_diff(old_lines, new_lines, n=0, lineterm="")
+                yield from (line for line in list(diff)[2:] if not line.startswith("@@"))
 
     def _may_edit(self, edit: Edit) -> bool:
         path = edit.span.path

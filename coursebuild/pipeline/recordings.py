@@ -116,7 +116,7 @@ def record_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], option
         portable = tuple(
             dependency
             for dependency in dependencies
-            if dependency.kind in (Kind.FILE, Kind.LISTING, Kind.SOUGHT)
+            if dependency.kind in (Kind.FILE, Kind.LISTING, Kind.SOUGHT, Kind.EXISTENCE)
             and not dependency.name.startswith(local_folders)
         )
         record = record_of(

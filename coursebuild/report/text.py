@@ -194,6 +194,7 @@ def lab_line(line: TrialLine, style: Style) -> str:
         return f"{verdict} {line.name}  {style.paint('not tried: a custom kind of lab', FAINT)}"
     parts += [plural(line.tried, "thing") + " tried"] + ([line.parity] if line.parity else [])
     parts += [f"motion fills {100 * line.fill:.1f} %"] if line.fill is not None else []
+    parts += [f"falls out of the scene: {body}" for body in line.fallen]
     parts += [f"no Python export: {line.unexported}"] if line.unexported else []
     parts += ["cached"] if line.cached else [f"{line.seconds:.2f} s"]
     return f"{verdict} {line.name}  {style.paint(', '.join(parts), FAINT)}"

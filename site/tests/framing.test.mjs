@@ -121,3 +121,31 @@ test('a run in which something flies off is left out', () => {
   assert.ok(near > first)
   assert.equal(far, near)
 })
+
+test('the camera does not follow what falls out of the scene', () => {
+  const pass = 'contype="0" conaffinity="0"'
+  const scene = (around) => `<mujoco><worldbody>${around}
+    <body name="ball" pos="0 0 1"><freejoint/><geom size=".1" ${pass}/></body></worldbody></mujoco>`
+  const arm = `<body pos="0 0 2"><joint axis="0 1 0"/><geom type="capsule" size=".03" fromto="0 0 0 .5 0 0" ${pass}/></body>`
+  const run = (xml, steps) => {
+    const lab = new Lab(engine, compile(engine, xml), config(), code({}))
+    lab.start()
+    const framing = new Framing(lab, DIRECTION)
+    framing.begin()
+    for (let i = 0; i < 20; i++) {
+      framing.observe(lab)
+      lab.step(steps)
+    }
+    lab.dispose()
+    return framing
+  }
+  const plane = `<geom type="plane" size="1 1 .1" ${pass}/>`
+  for (const around of [plane, plane + arm, `<geom type="box" size="1 1 .1" ${pass}/>${arm}`]) {
+    const framing = run(scene(around), 100)
+    assert.equal(framing.fallen.size, 1, around)
+    assert.ok(Math.min(...framing.fallen.values()) < -50, around)
+    assert.ok(framing.fit().distance < 12, `${around} ${framing.fit().distance}`)
+  }
+  for (const around of ['', '<geom size=".1" pos="0 0 1.5"/>']) assert.ok(run(scene(around), 100).fit().distance > 50, 'there is nothing else to see')
+  assert.equal(run(scene('<geom type="plane" size="1 1 .1"/>').replaceAll(pass, ''), 100).fallen.size, 0, 'it lies on the floor')
+})

@@ -81,6 +81,45 @@ def test_an_edit_runs_again_what_depends_on_it(course: Folder) -> None:
     assert run_paths(course) == []
 
 
+QUESTIONS = (
+    "Path('content/extra.csv').exists()",
+    "os.path.isfile('content/extra.csv')",
+    "os.access('content/extra.csv', os.F_OK)",
+    "importlib.util.find_spec('extra') is not None",
+    "os.path.getsize('content/table.csv') > 2",
+    "Path('content/table.csv').stat().st_size > 2",
+    "'extra.csv' in os.listdir('content')",
+    "any(e.name == 'extra.csv' for e in os.scandir('content'))",
+    "glob.glob('content/*.csv') != ['content/table.csv']",
+    "next(Path('content').glob('extra.csv'), None) is not None",
+    "any('extra.csv' in files for _, _, files in os.walk('content'))",
+    "subprocess.call(['test', '-e', 'content/extra.csv']) == 0",
+)
+
+
+def test_what_a_script_asked_about_files_runs_it_again_when_the_answer_changes(make: Make) -> None:
+    imports = "import glob, importlib.util, os, subprocess\nfrom pathlib import Path\n"
+    scripts = [
+        block(f"ask{n}.py", f"{imports}print({question})", "False")
+        for n, question in enumerate(QUESTIONS)
+    ]
+    folder = make("## Questions\n\n" + "\n".join(scripts))
+    folder.write("content/table.csv", "1\n")
+    assert folder.main("check").status == 0
+    again = folder.main("check", "-v")
+    assert "1 script run, 11 cached: everything holds" in again.out, "all but who starts programs"
+    folder.write("content/extra.csv", "")
+    folder.write("content/table.csv", "1,2\n")
+    folder.write("examples/extra.py", "")
+    assert "because content/extra.csv appeared" in folder.main("explain", "examples/ask0.py").out
+    result = folder.main("check")
+    assert result.out.count("error[output-drift]") == len(QUESTIONS)
+    (folder.root / "content/extra.csv").unlink()
+    (folder.root / "examples/extra.py").unlink()
+    folder.write("content/table.csv", "1\n")
+    assert folder.main("check").status == 0
+
+
 def test_damaged_entry_and_unreachable_cache_are_no_mistake(course: Folder) -> None:
     result = course.main("check", "--cache", "/not/mounted/cache")
     assert result.status == 0

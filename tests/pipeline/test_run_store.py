@@ -235,6 +235,28 @@ NOTICED_CHANGES: dict[str, tuple[list[Act], Trace, list[tuple[Act, bool]]]] = {
         Trace((), ("models",), (), (), ""),
         [(write("models/a.xml"), True), (write("models/b.xml"), False)],
     ),
+    "whether a file exists": (
+        [],
+        Trace((), (), (), (), "", existence=(("models/a.xml", "file"), ("data/b", "absent"))),
+        [
+            (write("models/a.xml", b"other content"), True),
+            (write("models/b.xml"), True),
+            (write("data/a"), True),
+            (write("data/b"), False),
+            (remove("data/b"), True),
+            (remove("models/a.xml"), False),
+        ],
+    ),
+    "the size of a file": (
+        [write("size", b"12"), lambda desk: os.utime(desk.root / "size", ns=(9, 9))],
+        Trace((), (), (), (), "", statuses=(("size", "file 644 2 9"),)),
+        [
+            (lambda desk: os.utime(desk.root / "size", ns=(1, 9)), True),
+            (lambda desk: os.utime(desk.root / "size", ns=(9, 10)), False),
+            (lambda desk: os.utime(desk.root / "size", ns=(9, 9)), True),
+            (write("size", b"123"), False),
+        ],
+    ),
     "a module that is sought": (
         [],
         SOUGHT_MODULE,
@@ -316,6 +338,12 @@ WHILE_IT_RAN: tuple[tuple[Trace, Act, str], ...] = (
     (EMPTY_TRACE, write(PATH, b"print('other')\n"), "its file changed while it ran"),
     (MODEL_TRACE, write("content/lessons/1.1-a.md"), ""),
     (SOUGHT_MODULE, write("examples/picture.png"), ""),
+    (
+        Trace((), (), (), (), "", existence=(("data/b", "absent"),)),
+        write("data/b"),
+        "data/b changed while it ran",
+    ),
+    (Trace((), (), (), (), "", existence=(("data/b", "absent"),)), write("data/c"), ""),
 )
 
 

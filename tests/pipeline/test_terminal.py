@@ -136,6 +136,28 @@ def test_a_terminal_shows_what_runs_and_then_only_the_results(make: Make) -> Non
     assert "\x1b[32m" in text
 
 
+def test_proposals_are_accepted_one_by_one(make: Make) -> None:
+    """Each with its diff; what is declined stays, and `undo` takes all back."""
+    text = (
+        "See [a](term:frict), [b](term:frictio) and [c](term:fricton).\n\nThe [friction]{term}.\n"
+    )
+    folder = make(text)
+    with terminal(folder, "check", "--propose") as window:
+        window.read(r"\[y/n/q\] ")
+        window.type(b"n\n")
+        window.read(r"(?s)\[y/n/q\] .*\[y/n/q\] ")
+        window.type(b"maybe\ny\n")
+        window.read(r"(?s)(\[y/n/q\] .*){4}")
+        window.type(b"q\n")
+        text_left = screen(window.read())
+        assert window.process.wait(120) == 1
+    assert "\n+See [a](term:friction), [b](term:frictio) and [c](term:fricton).\n" in text_left
+    assert "\nfixed 1 mistake in 1 file (link-term); 2 left; " in text_left
+    assert folder.text(folder.lesson()) == text.replace("frictio)", "friction)")
+    assert folder.main("undo").status == 0
+    assert folder.text(folder.lesson()) == text
+
+
 def test_the_live_line_fits_the_terminal(make: Make) -> None:
     names = [f"{'長い名前' * 4}_{n}.py" for n in range(3)]
     folder = make(

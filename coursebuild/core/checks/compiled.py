@@ -209,10 +209,10 @@ def _propose_name(
     if len(parts) < len(misspelling.places) or any(part.text != word for part in parts):
         return None
     place, *copies = (part.span() for part in parts)
-    fix = propose(word, likely, misspelling.candidates)
+    fix = propose(word, likely)
     if fix.new is not None:
         edits = tuple(Edit(span, likely) for span in copies)
-        fix = Fix(fix, fix.new, fix.old, edits=edits, safe=fix.safe)
+        fix = Fix(fix, fix.new, fix.old, edits=edits)
     return place, fix
 
 

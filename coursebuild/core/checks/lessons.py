@@ -210,7 +210,7 @@ def check_formulas(
             place = span if at < 0 else tex.span(at, at + len(command[1]))
             likely = nearest(command[1], _COMMANDS, cutoff=0.75)
             if likely is not None:
-                help = propose(command[1], likely, _COMMANDS).at(place)
+                help = propose(command[1], likely).at(place)
         diagnostics.append(diagnose("math-syntax", span, message, help=help))
     return tuple(diagnostics)
 

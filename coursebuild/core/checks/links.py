@@ -226,8 +226,8 @@ class _Checker(Struct, frozen=True):
         if likely is None:
             return "files that pages may use lie in content/"
         new = posixpath.relpath(files[likely], posixpath.dirname(self.document.source.path))
-        fix = propose(name, likely, files)
-        return Fix(f"did you mean `{files[likely]}`?", fix.new and new, address, safe=fix.safe)
+        fix = propose(name, likely)
+        return Fix(f"did you mean `{files[likely]}`?", fix.new and new, address)
 
     def check_media(self, subject: str, url: str, span: Span) -> Iterator[Diagnostic]:
         parts = urlsplit_or_none(url)

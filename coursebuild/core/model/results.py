@@ -141,6 +141,10 @@ class Trace(Struct, frozen=True, rename={"is_perturbed": "moved"}):
     sought: tuple[str, ...] = ()
     """Modules that it looked for in a folder of the project but did not find, such as those that
     would replace Python's own: `folder/{one,two}`."""
+    existence: tuple[tuple[str, str], ...] = ()
+    """Paths of the project where it looked whether something is there, each with the answer."""
+    statuses: tuple[tuple[str, str], ...] = ()
+    """Paths of the project whose sizes or times it asked for, each with the answer."""
 
 
 class ScriptRun(Struct, frozen=True):
@@ -302,6 +306,8 @@ class TrialLine(Struct, frozen=True):
     """Why its page offers no Python script, in words."""
     fill: float | None = None
     """The mean share of its picture that moving things fill; `None` where nothing moves."""
+    fallen: tuple[str, ...] = ()
+    """What has fallen out of the scene, and to where."""
 
 
 class TrialResult(Struct, frozen=True):

@@ -50,9 +50,18 @@ def main() -> None:
 
 def _compile(mujoco: Any, path: str, texts: dict[str, str]) -> tuple[str, dict[str, Any] | None]:
     assets = {name: text.encode() for name, text in texts.items()}
+    errors = (ValueError, RuntimeError, mujoco.FatalError, MemoryError)
     try:
-        model = mujoco.MjModel.from_xml_path(path, assets=assets)
-    except (ValueError, RuntimeError, mujoco.FatalError, MemoryError) as error:
+        try:
+            model = mujoco.MjModel.from_xml_path(path, assets=assets)
+        except errors as error:
+            if "allocate memory" not in str(error) or not hasattr(mujoco, "MjSpec"):
+                raise
+            # What a model reserves (`memory` of its `size`) it does not use to be compiled.
+            spec = mujoco.MjSpec.from_file(path, include=assets, assets=assets)
+            spec.memory = -1
+            model = spec.compile()
+    except errors as error:
         return str(error) or type(error).__name__, None
 
     def names(addresses: Any) -> list[str]:

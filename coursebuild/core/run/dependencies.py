@@ -18,11 +18,11 @@ from typing import assert_never
 
 from msgspec import Struct
 
-from coursebuild.core.engine.digests import ABSENT, FOLDER, SPECIAL
+from coursebuild.core.engine.digests import ABSENT, FILE, FOLDER, SPECIAL
 from coursebuild.core.model import Limits
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 
-VERSION = "6"
+VERSION = "7"
 """Change it when scripts are run or watched in another way: older results then no longer count."""
 
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)
@@ -41,6 +41,10 @@ class Kind(enum.Enum):
     SOUGHT = "sought"
     """Modules that were looked for in vain in a folder of the project (`folder/{one,two}`); its
     state says which of them are there."""
+    EXISTENCE = "existence"
+    """What lies at a path of the project: a file, a folder, or nothing."""
+    STATUS = "status"
+    """The size, times and mode of a file of the project."""
     OUTSIDE = "outside"
     """A file elsewhere on this machine, by its absolute path."""
     MODULE = "module"
@@ -58,7 +62,9 @@ FIELDS = {
     "modules": Kind.MODULE,
     "sought": Kind.SOUGHT,
 }
-"""The fields of a trace that hold what dependencies are made of."""
+"""The fields of a trace that hold the names of what a script depends on."""
+ANSWERS = {"existence": Kind.EXISTENCE, "statuses": Kind.STATUS}
+"""The fields that hold names, each with the state that the script saw."""
 
 
 class Need(Struct, frozen=True):
@@ -152,10 +158,19 @@ def dependencies_of(
         if len(folder) > 1 and folder in run.stdout:
             needs.add(Need(Kind.PLACE, name))
     # A module that was sought in vain was absent then, whatever is there by now.
-    return tuple(
+    dependencies = [
         Dependency(need.kind, need.name, "" if need.kind is Kind.SOUGHT else state(need))
-        for need in sorted(needs, key=lambda need: (need.kind.value, need.name))
-    )
+        for need in needs
+    ]
+    # What was read or listed is known better than whether it exists.
+    contents = {*trace.files, *trace.folders}
+    for field, kind in ANSWERS.items():
+        dependencies += [
+            Dependency(kind, name, answer)
+            for name, answer in getattr(trace, field)
+            if kind is Kind.STATUS or name not in contents
+        ]
+    return tuple(sorted(dependencies, key=lambda d: (d.kind.value, d.name, d.state)))
 
 
 def parse_sought(name: str) -> tuple[str, tuple[str, ...]]:
@@ -232,6 +247,12 @@ def state_changes(
         match dependency.kind:
             case Kind.FILE | Kind.OUTSIDE:
                 yield f"{name} {_became(before, now)}"
+            case Kind.EXISTENCE:
+                yield f"{name} {_became(before, now)}"
+            case Kind.STATUS if now == ABSENT or before == ABSENT:
+                yield f"{name} {_became(before, now)}"
+            case Kind.STATUS:
+                yield f"the size, time or mode of {name} changed"
             case Kind.LISTING if ABSENT in (before, now):
                 yield f"the folder {name} {_became(before, now)}"
             case Kind.LISTING:
@@ -257,8 +278,8 @@ def _became(old: str, now: str) -> str:
         return "is gone"
     if old == ABSENT:
         return "appeared"
-    if now == FOLDER:
-        return "is a folder now"
+    if now in (FOLDER, FILE):
+        return f"is a {now} now"
     if now.startswith("unreadable"):
         return f"is {now}"
     return "may have changed" if now == SPECIAL else "changed"
@@ -274,6 +295,10 @@ def describe(dependency: Dependency) -> str:
     match dependency.kind:
         case Kind.FILE | Kind.OUTSIDE | Kind.SOUGHT:
             return dependency.name
+        case Kind.EXISTENCE:
+            return f"that {dependency.name} exists"
+        case Kind.STATUS:
+            return f"the size and times of {dependency.name}"
         case Kind.LISTING:
             return f"the list of files in {dependency.name or '.'}"
         case Kind.MODULE:

@@ -170,6 +170,7 @@ class _Compiler(JsonChild):
             except expat.ExpatError as error:
                 line = min(error.lineno, len(text.splitlines())) or line
         elif _NO_MEMORY.search(message):
+            self.stop()  # where memory was refused, MuJoCo may not go on
             return CompileResult(f"{OWN_FAULT}takes more than {self.memory} MiB of memory for it")
         return CompileResult(message, line)
 

@@ -12,7 +12,7 @@ import os
 import re
 from collections import defaultdict
 from collections.abc import Iterable
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import msgspec
 from msgspec import Meta, Struct
@@ -27,7 +27,7 @@ from coursebuild.core.model.results import (
     Sign,
     Trace,
 )
-from coursebuild.core.run.dependencies import FIELDS, Dependency, Inputs, Kind
+from coursebuild.core.run.dependencies import ANSWERS, FIELDS, Dependency, Inputs, Kind
 
 Moment: TypeAlias = Annotated[int, Meta(ge=0, lt=1 << 37)]
 """Seconds since 1970, in a year that has a name."""
@@ -56,7 +56,9 @@ class RunRecord(
         names: dict[Kind, list[str]] = {kind: [] for kind in Kind}
         for dependency in self.dependencies:
             names[dependency.kind].append(dependency.name)
-        fields = {field: tuple(names[kind]) for field, kind in FIELDS.items()}
+        fields: dict[str, Any] = {field: tuple(names[kind]) for field, kind in FIELDS.items()}
+        for field, kind in ANSWERS.items():
+            fields[field] = tuple((d.name, d.state) for d in self.dependencies if d.kind is kind)
         trace = replace(self.stored_run.trace or Trace((), (), (), (), ""), **fields)
         stderr = self.stored_run.stderr
         for name, folder in places if _MARK in stderr else ():
@@ -72,7 +74,7 @@ def record_of(
     run: ScriptRun,
 ) -> RunRecord:
     """The record of a run."""
-    bare = run.trace and replace(run.trace, **dict.fromkeys(FIELDS, ()))
+    bare = run.trace and replace(run.trace, **dict.fromkeys((*FIELDS, *ANSWERS), ()))
     return RunRecord(inputs, dependencies, timestamp, reason_forgotten, replace(run, trace=bare))
 
 
@@ -131,6 +133,13 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
         folder, _, names = record.partition("\t")
         sought_names[_make_relative(folder, top)].update(names.split(","))
     folders = {_make_relative(folder, top) or "." for folder in values_by_kind["l"]}
+    own_paths = {os.path.normpath(script), *(_make_relative(p, top) for p in values_by_kind["x"])}
+
+    def answers(kind: str) -> tuple[tuple[str, str], ...]:
+        pairs = {value.rpartition("\t")[::2] for value in values_by_kind[kind] if "\t" in value}
+        relative = {(_make_relative(path, top) or ".", answer) for path, answer in pairs}
+        return tuple(sorted(pair for pair in relative if pair[0] not in own_paths))
+
     sought = (f"{at}/{{{','.join(sorted(n))}}}" for at, n in sorted(sought_names.items()))
     return Trace(
         files=tuple(sorted(inside - {os.path.normpath(script)})),
@@ -143,6 +152,8 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
         is_perturbed=bool(values_by_kind["p"]),
         states=tuple(values_by_kind["s"]),
         sought=tuple(sought),
+        existence=answers("e"),
+        statuses=answers("t"),
     )
 
 

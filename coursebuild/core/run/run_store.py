@@ -34,6 +34,7 @@ from coursebuild.core.run.dependencies import Dependency, Inputs, Kind, Need
 from coursebuild.core.run.packages import InstalledPackages
 from coursebuild.core.run.run_record import STORABLE_OUTCOMES, RunRecord
 from coursebuild.core.run.script_environment import Interpreter, conditions, places
+from coursebuild.core.run.stat_tracing import existence, status
 
 _RESULTS, _LAST = "scripts", "lastruns"
 _MOST_SHARED = 32
@@ -71,6 +72,10 @@ class States:
             case Kind.SOUGHT:
                 folder, modules = needs.parse_sought(need.name)
                 return digests.modules_in(self._inside + folder, modules)
+            case Kind.EXISTENCE:
+                return existence(self._inside + need.name)
+            case Kind.STATUS:
+                return status(self._inside + need.name)
             case Kind.OUTSIDE:
                 return digests.file_state(need.name)
             case Kind.MODULE:
@@ -236,6 +241,10 @@ class RunStore:
                     path = str(self.states.root / dependency.name)
                 case Kind.OUTSIDE:
                     path = dependency.name
+                case Kind.EXISTENCE | Kind.STATUS:
+                    if self.states.now(dependency.need) != dependency.state:
+                        return _REASON.format(dependency.name)
+                    continue
                 case Kind.SOUGHT | Kind.MODULE | Kind.PLACE:
                     continue
                 case _:

@@ -1,8 +1,8 @@
 """Turn a process into a script that finds what a bare `python examples/x.py` finds, and is traced.
 
-Only two things differ from a bare Python: there is one more frame below the script's own, that of
-`script_main`, and `sys.modules` holds modules of the standard library that the script has not
-imported.
+Only three things differ from a bare Python: there is one more frame below the script's own, that of
+`script_main`; `sys.modules` holds modules of the standard library that the script has not imported;
+and a few functions of `os` are wrapped (`stat_tracing`).
 """
 
 from __future__ import annotations
@@ -135,9 +135,15 @@ class PreloadedPackages:
             sys.modules.pop(name, None)
 
     def find_spec(
-        self, name: str, path: object = None, target: ModuleType | None = None
+        self, name: str, path: Sequence[object] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """A spec that gives the preloaded module, if Python would find the same."""
+        """A spec that gives the preloaded module, if Python would find the same.
+
+        Whoever looks for a module asks here first, whether to import it or not: so it is noted.
+        """
+        if self._tracer is not None:
+            with contextlib.suppress(Exception):  # a script's own call must not fail for this
+                self._tracer.note_import(name, path)
         module = self.module(name) if target is None else None
         if module is None or "." in name:
             return None
@@ -242,9 +248,10 @@ class ScriptProcess:
         root, library = self.job["root"], self.job["library"]
         if "PYTHONPATH" in self._environment and not f"{library}/".startswith(f"{root}/"):
             installed.append(f"{library}/mjcourse")  # unless the project itself holds it
-        temporary, writable = self._environment["TMPDIR"], self.job["writes"]
+        temporary, job = self._environment["TMPDIR"], self.job
         overflow = notes_folder(temporary)
-        return Tracer(root, temporary, installed, overflow, self._shared, writable)
+        effects = job["writes"], job["figures"]
+        return Tracer(root, temporary, installed, overflow, self._shared, *effects)
 
 
 def notes_folder(temporary: str) -> str:

@@ -12,6 +12,8 @@ A record is a letter and a value, in bytes:
 - `b`: tracing has begun
 - `r` and a path: a file was read, or was sought for reading and not there
 - `l` and a path: a folder was listed
+- `e` or `t`, a path, a tab and the answer: it was asked whether something exists there, or for its
+  size or times (see `stat_tracing`); `x` and a path: the script has written that itself
 - `m` and a name: a module was imported that is not Python's own, nor of the project
 - `v`, a folder of the project, a tab and names: modules that were looked for there in vain, or that
   were imported before the script began, which would have looked for them there first
@@ -38,6 +40,8 @@ from functools import partial
 from importlib.machinery import PathFinder
 from posixpath import normpath
 from types import FrameType
+
+from coursebuild.core.run.stat_tracing import QuestionNotes, status
 
 _WRITING = posix.O_WRONLY | posix.O_RDWR | posix.O_CREAT | posix.O_TRUNC | posix.O_APPEND
 _SYSTEM = ("/dev/", "/proc/", "/sys/")
@@ -85,7 +89,7 @@ class Tracer:
 
     `root` and `temporary` are absolute; `installed` are the folders of Python and its packages.
     Records go to the shared memory; without it, and from processes that the script forks, to files
-    in `overflow`. `writable` are folders that the script may write into.
+    in `overflow`. `writable` are folders that the script may write into, `figures` what it draws.
     """
 
     def __init__(
@@ -96,6 +100,7 @@ class Tracer:
         overflow: str,
         shared: mmap.mmap | None,
         writable: Iterable[str] = (),
+        figures: Iterable[str] = (),
     ) -> None:
         self.root = root.rstrip("/") + "/"
         self.temporary = temporary.rstrip("/") + "/"
@@ -119,19 +124,22 @@ class Tracer:
         self._is_spilling = False
         self._opened: set[object] = set()
         self._written_paths: set[str] = set()
+        self._questions = QuestionNotes(self)
+        self._asked_paths: set[str] = set()
+        self._figures = frozenset(f"{self.root}{name}" for name in figures)
         self._noted_records: set[str] = set()
         self._builtin = frozenset(sys.builtin_module_names)
         self._standard = sys.stdlib_module_names
         self._is_frozen = _imp.is_frozen
 
     def install(self) -> None:
-        """Add the audit hook."""
+        """Add the audit hook, and wrap what has no events."""
         handlers: dict[str, Callable[[tuple[object, ...]], None]] = {
             "open": self._on_open,
             "import": self._on_import,
             "os.listdir": self._on_list,
-            "os.scandir": self._on_list,
-            "os.chdir": lambda args: self._opened.clear(),
+            "os.scandir": self._on_scan,
+            "os.chdir": self._on_change_folder,
             "ctypes.dlopen": self._on_load_library,
             "sqlite3.connect": self._on_open_database,
         }
@@ -150,6 +158,7 @@ class Tracer:
                     handler(args)
 
         sys.addaudithook(hook)
+        self._questions.install()
 
     def begin(self, modules: Iterable[str]) -> None:
         """Begin to note; `modules` are loaded already, and will not be looked for."""
@@ -164,6 +173,18 @@ class Tracer:
         full_path = self._relevant_path(path)
         if full_path is not None and full_path not in self._written_paths:
             self.note(f"r{full_path}")
+
+    def note_question(self, kind: str, path: object, answer: Callable[[str], str]) -> None:
+        """Note the answer to a question about a file of the project that the script did not write.
+
+        Its kind is the letter of the record.
+        """
+        full_path = self._relevant_path(path)
+        if full_path in self._written_paths or full_path in self._figures:
+            return
+        if full_path is not None and self._is_of_project(full_path):
+            self._asked_paths.add(full_path)
+            self.note(f"{kind}{full_path}\t{answer(full_path)}")
 
     def note_import(self, name: str, path: Sequence[object] | None) -> None:
         """Note that a module was looked for: in each folder up to the first that has it."""
@@ -201,6 +222,8 @@ class Tracer:
         if full_path is None:
             return
         self._written_paths.add(full_path)
+        if full_path in self._asked_paths:
+            self.note(f"x{full_path}")
         if not f"{full_path}/".startswith(self._writable or ("\0",)):
             reason = WRITES if full_path.startswith(self.root) else WRITES_OUTSIDE
             self._note_effect("w", full_path.removeprefix(self.root), reason)
@@ -265,24 +288,32 @@ class Tracer:
             self.note_read(path)
 
     def _on_import(self, args: tuple[object, ...]) -> None:
-        name, file, path = args[:3]
+        name, file = args[:2]
         if file is not None:
             full_path = self._relevant_path(file)
             if full_path is not None:
                 self.note(f"r{full_path}")
                 if full_path.startswith(self.root):
                     self.note_opaque(NATIVE)
-        elif isinstance(name, str):
-            if name in _PROGRAM_STARTERS:
-                self.note_opaque(PROGRAMS)
-            self.note_import(name, path if isinstance(path, list) else None)
+        elif name in _PROGRAM_STARTERS:
+            self.note_opaque(PROGRAMS)
 
-    def _on_list(self, args: tuple[object, ...]) -> None:
-        code = sys._getframe(2).f_code
+    def _on_change_folder(self, args: tuple[object, ...]) -> None:
+        self._opened.clear()
+        self._questions.forget()
+
+    def _on_scan(self, args: tuple[object, ...]) -> None:
+        self._on_list(args, depth=3)
+        folder = self._project_folder(_path_of(args[0]))
+        if folder is not None and sys._getframe(2).f_code.co_filename.startswith(self.root):
+            for name in posix.listdir(folder):  # its entries say their sizes and times
+                self.note_question("t", f"{folder}/{name}", status)
+
+    def _on_list(self, args: tuple[object, ...], depth: int = 2) -> None:
+        code = sys._getframe(depth).f_code
         if code.co_filename == _BOOTSTRAP_EXTERNAL:
             return  # Python is looking for a module
-        path = args[0] if args[0] is not None else "."
-        full_path = self._relevant_path(_descriptor_path(path) if isinstance(path, int) else path)
+        full_path = self._relevant_path(_path_of(args[0]))
         if full_path is None:
             return
         if full_path == self.root[:-1] or full_path.startswith(self.root):
@@ -353,10 +384,13 @@ class Tracer:
         if not isinstance(folder, str):
             return None
         full_path = self._relevant_path(folder or ".")
-        if full_path is None or not f"{full_path}/".startswith(self.root):
-            return None
+        return full_path if full_path is not None and self._is_of_project(full_path) else None
+
+    def _is_of_project(self, full_path: str) -> bool:
         # Packages of an environment in the course's folder count by their versions.
-        return None if f"{full_path}/".startswith(self._packages_inside or ("\0",)) else full_path
+        return f"{full_path}/".startswith(self.root) and not f"{full_path}/".startswith(
+            self._packages_inside or ("\0",)
+        )
 
     def note(self, record: str) -> None:
         """Add a record, unless it is there already."""
@@ -389,6 +423,13 @@ class Tracer:
                 posix.close(fd)
         finally:
             self._is_spilling = False
+
+
+def _path_of(folder: object) -> object:
+    """The path of a folder that is listed: given as such, as an open one, or not at all."""
+    return (
+        _descriptor_path(folder) if isinstance(folder, int) else "." if folder is None else folder
+    )
 
 
 def _descriptor_path(fd: int) -> str:

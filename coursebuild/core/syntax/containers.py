@@ -93,7 +93,7 @@ def _read_broken_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head
     help = f"write `> [!{kind}] Title`, or a backslash before the bracket that is meant to be seen"
     follows = paragraph.text[len(paragraph.text[: match.start(4)].rstrip()) :]
     blank = "" if not title.text or follows[:1].isspace() else " "
-    fix = Fix(help, f"[!{kind}]{blank}", safe=True)
+    fix = Fix(help, f"[!{kind}]{blank}")
     message = f"`{place.text}` does not begin a callout"
     return Parsed(head, (diagnose("callout-unknown", place.span(), message, help=fix),))
 
@@ -244,7 +244,7 @@ def check_quotation(span: Span) -> Iterator[Diagnostic]:
             start = source.line_start(line)
             message = f"`{slip[1]}` would be shown as written: this line continues a quotation"
             place = source.span(start + slip.start(1), start + slip.end(1))
-            help = Fix("begin the line with `> `", ">", safe=True)
+            help = Fix("begin the line with `> `", ">")
             yield diagnose("markup-unread", place, message, help=help)
 
 
@@ -354,7 +354,7 @@ def check_item(span: Span) -> Iterator[Diagnostic]:
         elif match := re.match(rf"{re.escape(prefix)}({slip})", text):
             place = source.span(start, start + len(match[1]))
             message = f"`{match[1]}` would be shown as written: no item of a list begins here"
-            help = Fix(f"begin the line with `{mark} `", mark, safe=True)
+            help = Fix(f"begin the line with `{mark} `", mark)
             yield diagnose("markup-unread", place, message, help=help)
 
 

@@ -248,7 +248,7 @@ class _Decoder:
             key, help = key_node.value, ""
             if (likely := nearest(key, set(fields) - set(values) - misspelt)) is not None:
                 misspelt.add(likely)
-                help = propose(key, likely, fields)
+                help = propose(key, likely)
             elif owners := _variants_with_field(key, variants or {}):
                 names = " and ".join(f'`"{type.tag_field}": "{owner}"`' for owner in owners)
                 help = f"it is a field of {names}"

@@ -86,7 +86,7 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
     likely = nearest(scheme, (*_COURSE_SCHEMES, "https", "mailto"), cutoff=0.75)
     if likely is None or scheme in _OTHER_SCHEMES:
         return None
-    fix = propose(f"{match[1]}:", f"{likely}:", (*_COURSE_SCHEMES, "https", "mailto"))
+    fix = propose(f"{match[1]}:", f"{likely}:")
     return diagnose("link-scheme", span, f"no link scheme `{match[1]}:`", help=fix)
 
 

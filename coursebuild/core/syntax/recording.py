@@ -16,7 +16,7 @@ from coursebuild.core.syntax.attributes import split_label
 from coursebuild.core.syntax.fence import Fence, FenceKeys, Word
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.unread_markup import is_known_kind
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, misspelt, propose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, misspelt
 from coursebuild.core.text.patterns import matches_empty_text, pattern_mistake
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -76,9 +76,8 @@ def find_misspelt_caption(
         return None
     message = f"`{content.text[: match.end()].rstrip()}` is not a caption"
     place = content.span(0, len(match[0].rstrip()))
-    is_safe = is_name or propose(match[1], word, names).safe
     new = word if content.text.startswith(",", match.end()) else f"{word}:"
-    fix = Fix(f"did you mean `{new}`?", new, safe=is_safe)
+    fix = Fix(f"did you mean `{new}`?", new, safe=is_name)
     return diagnose("recording-misspelt", place, message, help=fix)
 
 

@@ -252,7 +252,7 @@ def _diagnose_braces(markup: str, span: Span, before: str) -> Diagnostic | None:
         help = 'write `{out}`, `{out=examples/x.py}`, `{given}` or `{given="its source"}`'
         if likely in (None, key):
             return diagnose("binding-attribute", span, message, help=help + escaping)
-        fix = propose(key, likely, ("out", "given", "code"))
+        fix = propose(key, likely)
         return diagnose("binding-attribute", span, message, help=fix)
     if before == "$":
         help = 'write `{symbol="what it stands for" unit="m/s"}`' + escaping
@@ -385,7 +385,7 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
         yield diagnose("fence-info", kind.span(), message, help=help)
     elif (likely := _find_misspelt(name, kinds, fence.body.text)) is not None:
         message = f"`{kind.text}` is not a known kind of block"
-        help = propose(kind.text, likely, kinds)
+        help = propose(kind.text, likely)
         yield diagnose("fence-kind-near", kind.span(), message, help=help)
     elif (
         not package

@@ -1,21 +1,22 @@
 """Messages to the author: diagnostics, their notes and edits, and the `Parsed` values with them.
 
 A message says what is wrong and where, in lower case without a full stop; `help` says how to mend
-it. `coursebuild check --fix` makes the edits of a `Fix` that are safe, and others where its user
-asks.
+it. `coursebuild check --fix` makes the edits of a `Fix` that are safe and change the form of a text
+only (`keeps_words`); all others are proposed, for a human to decide.
 """
 
 from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterable, Iterator
+import unicodedata
+from collections.abc import Iterable
 from typing import Generic, TypeVar
 
 from msgspec import Struct
 
 from coursebuild.core.text.rules import RULES, Severity
-from coursebuild.core.text.source import Span
+from coursebuild.core.text.source import Source, Span
 
 T_co = TypeVar("T_co", covariant=True)
 
@@ -94,7 +95,7 @@ class Diagnostic(Struct, frozen=True):
     edits: tuple[Edit, ...] = ()
     """What mends it, if that is known: all of them, or none."""
     safe: bool = False
-    """Whether the edits are what its author meant, beyond doubt."""
+    """Whether the edits are what its author meant, beyond doubt, and leave all words alone."""
     strict: bool = False
     """Whether it is an error even if its rule is a warning."""
 
@@ -132,8 +133,44 @@ def diagnose(
     if rule not in RULES:
         raise KeyError(f"no rule {rule!r} in the catalogue")
     edits = help.edits_at(span) if isinstance(help, Fix) else ()
-    is_safe = isinstance(help, Fix) and help.safe and bool(edits)
+    is_safe = isinstance(help, Fix) and help.safe and bool(edits) and keeps_words(edits)
     return Diagnostic(rule, span, message, label, str(help), tuple(notes), edits, is_safe)
+
+
+_WORD = re.compile(r"(?<!\w)[-+\u2212]?\d+(?:[.,]\d+)*|[\u207a\u207b]?\w+")
+"""A number with its sign, or a word; names in code are words."""
+
+
+def keeps_words(edits: Iterable[Edit]) -> bool:
+    """Whether edits leave each word and number of their lines as it is: they change form only.
+
+    That is: marks and white space between them, and characters that nobody sees.
+    """
+    by_source: dict[Source, list[Edit]] = {}
+    for edit in edits:
+        by_source.setdefault(edit.span.source, []).append(edit)
+    for source, changes in by_source.items():
+        changes.sort(key=lambda edit: edit.span.start)
+        start = source.text.rfind("\n", 0, changes[0].span.start) + 1
+        end = source.text.find("\n", max(edit.span.end for edit in changes))
+        old = source.text[start : None if end < 0 else end]
+        new, at = "", start
+        for edit in changes:
+            new += source.text[at : edit.span.start] + edit.text
+            at = edit.span.end
+        new += source.text[at : start + len(old)]
+        if _words(old) != _words(new):
+            return False
+    return True
+
+
+def _words(text: str) -> list[str]:
+    visible = (char for char in text if char.isspace() or unicodedata.category(char) not in _UNSEEN)
+    return _WORD.findall("".join(visible))
+
+
+_UNSEEN = ("Cc", "Cf")
+"""Categories of characters that have no look: of control, and of format."""
 
 
 class Parsed(Struct, Generic[T_co], frozen=True):
@@ -161,15 +198,11 @@ def misspelt(word: str, names: Iterable[str]) -> str | None:
 
     A letter may be dropped, added, changed or swapped with the next one, or be a capital.
     """
-    return next((name for name, _ in _misspelt_names(word, names)), None)
-
-
-def _misspelt_names(word: str, names: Iterable[str]) -> Iterator[tuple[str, tuple[int, int]]]:
-    """The names of which a word may be a misspelling, and by how much, without case first."""
     for name in sorted(set(names) - {word}):
         difference = _difference(word.lower(), name.lower())
         if difference <= (1 if len(name) < 5 else 2) and difference < len(name):
-            yield name, (difference, _difference(word, name))
+            return name
+    return None
 
 
 def _difference(first: str, second: str) -> int:
@@ -251,27 +284,23 @@ def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     """The fix that writes the nearest known name, or a help that lists them if few; or nothing."""
     names = sorted(set(known_names))
     if (likely := nearest(name, names)) is not None:
-        return propose(name, likely, names)
+        return propose(name, likely)
     return "known: " + ", ".join(f"`{n}`" for n in names) if 0 < len(names) <= 12 else ""
 
 
 _IDS = re.compile(r"\d+|(?<![^\W_])[^\W\d_](?![^\W_])")
 
 
-def propose(name: str, likely: str, names: Iterable[str] = ()) -> Fix:
-    """The fix that writes the likely one of `names` for a name.
+def propose(name: str, likely: str) -> Fix:
+    """The fix that writes the likely name for another, if a human finds it so.
 
-    It is safe where the name differs from that one by a letter or two, and from others by more.
     Names that differ in numbers or single letters are of different things: there it has no
     edit.
     """
     help = f"did you mean `{likely}`?"
     if _IDS.findall(name.lower()) != _IDS.findall(likely.lower()):
         return Fix(help)
-    candidates = dict(_misspelt_names(name, {*names, likely}))
-    difference = candidates.pop(likely, None)
-    is_safe = difference is not None and all(difference < number for number in candidates.values())
-    return Fix(help, likely, name, safe=is_safe and len(likely) > 2)
+    return Fix(help, likely, name)
 
 
 def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:

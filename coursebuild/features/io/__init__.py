@@ -21,7 +21,6 @@ from coursebuild.core.text.diagnostics import (
     Parsed,
     diagnose,
     nearest,
-    propose,
 )
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -104,8 +103,8 @@ def _diagnose_missing(
         if word is not None and nearest(word[1].upper(), LABELS, cutoff=0.75) == label:
             span = line.span(word.start(1), word.end())
             notes.append(Note(f"`{span.text}` is read as text", span))
-            is_safe = propose(word[1].upper(), label, LABELS).safe or word[1].upper() == label
-            fix = Fix(f"write `{label}:`", edits=(Edit(span, f"{label}:"),), safe=is_safe)
+            edit = Edit(span, f"{label}:")
+            fix = Fix(f"write `{label}:`", edits=(edit,), safe=word[1] == label)
     message = f"the io block has no line `{label}:`"
     return diagnose("io-missing", fence.head, message, help=fix, notes=notes)
 

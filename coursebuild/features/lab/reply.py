@@ -104,6 +104,14 @@ class ResetDifference(TypedDict):
     entry: Entry
 
 
+class Fallen(TypedDict):
+    """A body that has fallen out of the scene, and how high its top is at the end."""
+
+    name: str
+    height: Number
+    time: Number
+
+
 class MainRun(TypedDict):
     """What the main run recorded. Drawing it checks the parts typed `Any`."""
 
@@ -114,6 +122,7 @@ class MainRun(TypedDict):
     plots: MainPlots
     scene: dict[str, Any]
     arrows: dict[str, Number | str] | None
+    fallen: NotRequired[list[Fallen]]
     fill: Number | None
     mostFill: Number | None
     parity: Parity | None

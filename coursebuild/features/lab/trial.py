@@ -51,14 +51,13 @@ from coursebuild.features.lab.equations.equation_trial import (
 )
 from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
+from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size
 from coursebuild.features.lab.reply import LabOutput, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 
 _PARITY_SECONDS = 1.0
 """Simulated time over which the size of a difference counts, unless a lab says how much is allowed.
 """
-_PART_OF_MODEL = 20
-"""Engine, model and states together take up to 16 times the memory of a large compiled model."""
 _TRANSIENT = ("timeout", "engine")
 """Kinds of failure that may not happen again: a trial that ends in one is not stored."""
 
@@ -264,8 +263,8 @@ class _LabTrial(Struct, frozen=True):
         inputs = inputs_of(lab, module)
         try:
             mjb = _save_model(self.context, self.engines.native, self.model)
-            if diagnostic := self._check_size(mjb):
-                return self._fail(module, [diagnostic])
+            if too_large := diagnose_size(lab, mjb, self.context.course.limits.memory):
+                return self._fail(module, too_large)
             if assignments := list(verdict.assignment_diagnostics(lab)):
                 return self._fail(module, assignments)
             key = fingerprint((inputs.text, inputs.conditions, mjb))
@@ -275,8 +274,9 @@ class _LabTrial(Struct, frozen=True):
                 return self._fail(module, diagnostics)
             evaluation = cached_evaluation or evaluate(self._run_trial(module, mjb, key))
         except NativeError as error:
+            refusals = diagnose_refusal(lab, self.context.root, self.model, str(error))
             diagnostic = diagnose("lab-engine", lab.place(()), f"native MuJoCo {error}")
-            return self._fail(module, [diagnostic])
+            return self._fail(module, refusals or [diagnostic])
         reply, failures = evaluation.reply, evaluation.failures
         export = LabExport(None)
         if not failures and reply.main is not None and self.lab.kind != MJCF:
@@ -304,6 +304,10 @@ class _LabTrial(Struct, frozen=True):
             tried=len(reply.attempts),
             parity=_in_english(*comparison),
             fill=None if reply.main is None else reply.main["fill"],
+            fallen=tuple(
+                f"`{body['name']}`, to z = {body['height']:.3g} m at t = {body['time']:.3g} s"
+                for body in ([] if reply.main is None else reply.main.get("fallen", []))
+            ),
             cached=cached_evaluation is not None,
             unexported=export.reason,
         )
@@ -317,18 +321,6 @@ class _LabTrial(Struct, frozen=True):
         output = LabOutput(module.code, module.config)
         return TrialResult(self.lab.span, line, output), diagnostics
 
-    def _check_size(self, mjb: bytes) -> Diagnostic | None:
-        memory = self.context.course.limits.memory
-        size, largest = len(mjb) >> 20, memory // _PART_OF_MODEL
-        if size <= largest:
-            return None
-        message = f"the compiled model has {size} MiB, {largest} MiB at most can be tried"
-        help = (
-            "give it smaller meshes, textures and height fields, or set `memory` in `[limits]` of "
-            f"the map: {_PART_OF_MODEL} times the size of the model"
-        )
-        return diagnose("lab-timeout", self.lab.place(("model",)), message, help=help)
-
     def _evaluate_reply(self, module: LabModule, key: str, data: bytes) -> _Evaluation:
         """Evaluate a stored reply.
 
@@ -339,7 +331,15 @@ class _LabTrial(Struct, frozen=True):
         lab, reply = self.lab, read_reply(data)
         if reply.main is None and not reply.failures:
             raise ValueError("a reply without a main run has a failure")
-        failures = tuple(verdict.failure_diagnostics(lab, reply)) if lab.is_of_text else ()
+        failures: tuple[Diagnostic, ...] = ()
+        if lab.is_of_text:
+            messages = (failure.message or "" for failure in reply.failures)
+            refusals = (
+                diagnose_refusal(lab, self.context.root, self.model, message)
+                for message in messages
+            )
+            refusal = next(filter(None, refusals), [])
+            failures = tuple(refusal or verdict.failure_diagnostics(lab, reply))
         remarks, main = tuple(verdict.remark_diagnostics(lab, reply)), reply.main
         config = module.config
         if main is not None:

@@ -138,7 +138,7 @@ class Guesses:
         if (likely := min(near, default=None)) is None:
             return None
         message = f"nothing that the course knows is called `{name}`"
-        return Unknown(message, propose(name, likely, near), name)
+        return Unknown(message, propose(name, likely), name)
 
     def _page_names(self, names: CodeNames) -> frozenset[str]:
         """The names of a document, of three letters or more, for which others may be slips."""

@@ -342,7 +342,7 @@ def resolve_table(manual: str, table: str, key: str) -> Answer:
         likely = misspelt(name, tables) if len(name) > 3 else None
         if likely is None:
             return None
-        fix = propose(name, likely, tables)
+        fix = propose(name, likely)
         return Unknown(f"the course map has no table `{name}`", fix, name)
     if key and tables[name] and key not in tables[name]:
         help = did_you_mean(key, tables[name])

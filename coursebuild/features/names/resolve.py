@@ -61,7 +61,7 @@ def _propose(name: str, names: Iterable[str]) -> str:
     """Propose the nearest name, if one is near; only those of about its length are compared."""
     similar = {candidate for candidate in names if abs(len(candidate) - len(name)) <= 2}
     likely = nearest(name, similar, cutoff=0.8)
-    return propose(name, likely, similar) if likely else ""
+    return propose(name, likely) if likely else ""
 
 
 class Resolver:
@@ -303,7 +303,7 @@ class Resolver:
         if name in self.words or likely is None or name in known_keys():
             return None
         message = f"no element of MuJoCo {engine.version} has an attribute `{name}`"
-        return Unknown(message, propose(name, likely, engine.attributes), name)
+        return Unknown(message, propose(name, likely), name)
 
     # --- coursebuild and the course
 

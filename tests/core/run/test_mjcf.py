@@ -155,7 +155,8 @@ ENDLESS = (
 
 def test_a_model_without_end_or_of_any_size_is_ended(root: Path) -> None:
     """One model may take half of the time, so that the others of the course are still judged."""
-    large = '<mujoco><size memory="90000G"/></mujoco>'
+    field = '<hfield name="h" nrow="40000" ncol="30000" size="1 1 1 1"/>'
+    large = f"<mujoco><asset>{field}</asset></mujoco>"
     for seconds in (1.0, 16.0, 240.0):  # slow machines need a longer limit
         results = texts(root, [ENDLESS, large, "<mujoco/>"], Limits(models=seconds))
         assert results[0].error == f"takes more than {seconds / 2:g} s to compile"
@@ -163,6 +164,20 @@ def test_a_model_without_end_or_of_any_size_is_ended(root: Path) -> None:
             break
     message = "MuJoCo's compiler takes more than 896 MiB of memory for it"
     assert [result.error for result in results[1:]] == [message, ""]
+
+
+def test_what_a_model_reserves_is_not_what_its_compiler_takes(root: Path) -> None:
+    scene = '<worldbody><body name="b"><freejoint/><geom size="1"/></body></worldbody>'
+    (root / "models/reserve.xml").write_text('<mujoco><size memory="1G"/></mujoco>')
+    xmls = [
+        f'<mujoco><size memory="2G"/>{scene}</mujoco>',
+        f'<mujoco><include file="reserve.xml"/>{scene}</mujoco>',
+    ]
+    for result in texts(root, xmls):
+        assert result.facts is not None, result.error
+        assert result.facts.body_names == ("b",)
+    (refused,) = texts(root, [xmls[0].replace('"1"', '"-1"')])
+    assert "size 0 must be positive in geom" in refused.error
 
 
 def test_models_that_take_all_the_time_of_a_course_leave_none_for_others(root: Path) -> None:

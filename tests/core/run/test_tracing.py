@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import mmap
+import os
 import sys
 import tomllib
 from collections.abc import Callable
@@ -57,6 +58,37 @@ def test_files_that_are_read_however_the_script_ends(traced: RunTraced) -> None:
         trace = traced(code)
         assert [*trace.files] == files, code
         assert (trace.folders, trace.outside, trace.opaque) == ((), (), ""), code
+
+
+def test_what_is_asked_about_files_without_opening_them(traced: RunTraced, root: Path) -> None:
+    (root / "data/link").symlink_to("a.txt")
+    for path in ("data/a.txt", "lib/helper.py", "lib/other.py"):
+        (root / path).chmod(0o644)
+        os.utime(root / path, ns=(9, 9))
+    for code, answers in SCRIPTS["questions"].items():
+        trace = traced(code)
+        texts = [f"{path}: {answer}" for path, answer in (*trace.existence, *trace.statuses)]
+        assert sorted(texts) == answers, code
+    for code, paths in SCRIPTS["found"].items():
+        assert [*traced(code).files] == paths, code
+    for question in ("util.find_spec", "import_module"):
+        code = f"import importlib.util\ntry: importlib.{question}('none')\nexcept ImportError: 0"
+        trace = traced(code)
+        assert any("none" in names for names in trace.sought), code
+        assert trace.modules == ("none",), code
+
+
+@both_ways
+def test_functions_that_are_wrapped_behave_as_before(run: Run, root: Path) -> None:
+    result = run(fixture_text("scripts/wrapped.txt"))
+    assert result.stdout == "True True True True\nstat os\n", result.stderr
+    lines = [line for line in result.stderr.splitlines() if set(line) - set(" ^~")]
+    assert lines == [
+        "Traceback (most recent call last):",
+        f'  File "{root}/examples/x.py", line 11, in <module>',
+        "    os.stat('data/none')",
+        "FileNotFoundError: [Errno 2] No such file or directory: 'data/none'",
+    ]
 
 
 def test_files_that_are_read_before_a_timeout(server: ScriptServer, root: Path) -> None:

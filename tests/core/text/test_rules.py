@@ -51,8 +51,8 @@ def catalogue_page() -> str:
 
 {errors} rules are errors, which keep the site from being published; {len(RULES) - errors} are
 warnings, which can be [silenced](course-map.md#silence). `coursebuild explain RULE` prints an
-entry; with `--format json`, it also says why [`--fix`](commands.md#fix) cannot mend a mistake.
-Where `--fix` or `--unsafe` stands over a message, that option mends it.
+entry; with `--format json`, it also says why nothing can be proposed. Where `--fix` stands over a
+message, [that option](commands.md#fix) mends it; where `--propose` does, a human decides.
 """
     return head + "".join(
         f"\n## {title}\n" + "".join(_entry(RULES[name]) for name in group)
@@ -73,11 +73,11 @@ def _entry(rule: Rule) -> str:
     if len(_words(rule.summary) - _words(message)) > 1:  # or else the message says as much
         sentences.append(rule.summary)
     outputs = "".join(case.expected for case in CASES[rule.name])
-    options = [o for o in ("--fix", "--fix --unsafe") if f"\n{o} writes" in outputs]
+    options = [o for o in ("--fix", "--propose") if f"\n{o} writes" in outputs]
     if command_of(case) != "check":
         sentences.append(f"Reported by `coursebuild {command_of(case)}`.")
     if options:
-        sentences.append(", ".join(f"`{option.split()[-1]}`" for option in options))
+        sentences.append(", ".join(f"`{option}`" for option in options))
     text = f"{' '.join(sentences)}\n\n" if sentences else ""
     return f"\n### {rule.name}\n\n{text}{message}\n"
 
@@ -132,7 +132,7 @@ def print_diagnostics(case: Case, root: Path, workshop: Workshop) -> str:
     With them the mistakes are gone, and there is none of another rule.
     """
     diagnostics = run_case(case, root, workshop)
-    fixes = choose_fixes(diagnostics, unsafe=True)
+    fixes = choose_fixes(diagnostics, proposals=True)
     if fixes:
         fixed_texts = {s.path: apply_edits(s.text, edits) for s, edits in by_source(fixes).items()}
         after = run_case(case, root.with_name(f"{root.name}-fixed"), workshop, fixed_texts)
@@ -151,8 +151,8 @@ def print_diagnostics(case: Case, root: Path, workshop: Workshop) -> str:
 
 
 def print_fixes(fixes: Sequence[Diagnostic]) -> Iterator[str]:
-    """The lines that `--fix` changes, and those that it changes only with `--unsafe`."""
-    for option, is_safe in (("--fix", True), ("--fix --unsafe", False)):
+    """The lines that `--fix` changes, and those that `--propose` would change."""
+    for option, is_safe in (("--fix", True), ("--propose", False)):
         for source, edits in by_source(f for f in fixes if f.safe is is_safe).items():
             lines, new_lines = (
                 source.text.splitlines(),
@@ -244,7 +244,9 @@ def test_every_rule_has_its_fixture_and_every_fixture_its_rule() -> None:
 
 def test_a_rule_without_edits_says_why() -> None:
     with_edits = {
-        name for name, cases in CASES.items() if any("\n--fix" in case.expected for case in cases)
+        name
+        for name, cases in CASES.items()
+        if any(re.search("^--(fix|propose) writes", c.expected, re.MULTILINE) for c in cases)
     }
     without_edits = {name for name, rule in RULES.items() if rule.no_fix}
     assert sorted(RULES.keys() - with_edits - without_edits) == [], "neither edit nor reason"

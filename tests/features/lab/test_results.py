@@ -107,6 +107,20 @@ def test_a_page_shows_what_the_trial_recorded(site: BuiltSite) -> None:
 
 
 @pytest.mark.engine
+def test_what_falls_through_the_floor_is_told_in_the_labs_line(
+    tmp_path: Path, stores: Path
+) -> None:
+    folder = course(tmp_path / "course", stores, "## A lab\n\n" + fence('{"model": "ball"}'))
+    plane = '<worldbody><geom type="plane" size="1 1 .1" conaffinity="0" contype="2"/>'
+    folder.write("models/ball.xml", BALL.replace("<worldbody>", plane))
+    (line,) = run_check(folder, status=0)["labs"]
+    assert line["fallen"] == ["`ball`, to z = -123 m at t = 5 s"]
+    assert "falls out of the scene: `ball`, to z" in folder.main("check").out
+    folder.write("models/ball.xml", BALL)
+    (line,) = run_check(folder, status=0)["labs"]
+    assert line["fallen"] == []
+
+
 def test_models_are_live_on_their_pages_and_seen_in_the_gallery(site: BuiltSite) -> None:
     models = site.public / "models"
     for name, lab in (("ball", "1.2-lab-1"), ("a/still", "model-a-still"), ("lost", "model-lost")):

@@ -5,7 +5,8 @@
  *   framing.begin(); framing.observe(lab); …        a run, and each moment of it
  *   framing.fit() → { distance, target } | null     null: nothing moves
  *
- * Runs in which something flies off are left out: those that would take the camera much farther away than the first run does.
+ * Runs in which something flies off are left out: those that would take the camera much farther away than the first run does. So is
+ * what falls out of the scene (`fallen`): bodies that begin above its lowest point and end far below, beside others that stay or a floor.
  *
  * A camera sees a point if the point lies on the inner side of the picture's four edges, each of which is a plane through the
  * camera. So of each moment only the `reach` is kept: how far the moving parts extend along the normals of these planes.
@@ -20,6 +21,7 @@ const GAP = 0.04 // of the motion's size: between it and the floor
 const LEVEL = 0.999
 const SHOWN_GROUPS = 3
 const RADIANS = Math.PI / 180
+const UP = [0, 0, 1]
 const AXES = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
 const EDGES = AXES.length // where the normals of the edges begin
 
@@ -53,6 +55,13 @@ export class Framing {
     const planes = visible.filter((i) => model.geom_type[i] === this.kinds.PLANE)
     this.tilted = planes.some((i) => data.geom_xmat[9 * i + 8] < LEVEL)
     this.planes = planes.map((i) => data.geom_xpos[3 * i + 2])
+    this.trees = new Map() // the geoms of each body that may fall, with all that it carries
+    for (const i of this.movingGeoms) {
+      const root = model.body_rootid[model.geom_bodyid[i]]
+      if (model.body_mocapid[root] < 0) this.trees.set(root, [...(this.trees.get(root) ?? []), i])
+    }
+    this.bottom = null // the depth of what the scene stands on, once a moment was observed
+    this.fallen = new Map() // heights of the bodies that have fallen out of the scene
     this.runs = []
     this.stillReaches = []
   }
@@ -83,11 +92,36 @@ export class Framing {
     const { data } = lab.sync()
     const points = [...rows(data.flexvert_xpos, 0, model.nflexvert), ...rows(data.site_xpos, sampler.site, sampler.site < 0 ? 0 : 1)]
     for (let i = 0; i < model.ntendon; i++) points.push(...rows(data.wrap_xpos, data.ten_wrapadr[i], data.ten_wrapnum[i]))
+    this.stillReaches = this.stillGeoms.map((i) => this.directions.map((d) => this.support(model, data, i, d)))
+    const gone = this.falling(model, data)
+    const staying = this.movingGeoms.filter((i) => !gone.has(model.body_rootid[model.geom_bodyid[i]]))
+    if (staying.length + points.length === 0 && this.planes.length > 0) return
+    const shown = staying.length + points.length > 0 ? staying : this.movingGeoms
     const reach = this.directions.map((d) =>
-      Math.max(...this.movingGeoms.map((i) => this.support(model, data, i, d)), ...points.map((p) => dot(p, d))),
+      Math.max(...shown.map((i) => this.support(model, data, i, d)), ...points.map((p) => dot(p, d))),
     )
     if (reach.every(Number.isFinite)) this.runs.at(-1).push(reach)
-    this.stillReaches = this.stillGeoms.map((i) => this.directions.map((d) => this.support(model, data, i, d)))
+  }
+
+  /** The top bodies that have fallen out of the scene by now: they are below all that stands still by more than the scene's first size. */
+  falling(model, data) {
+    const gone = new Set()
+    if (!this.falls) return gone
+    const height = (geoms) => Math.max(...geoms.map((i) => this.support(model, data, i, UP)))
+    const tops = new Map([...this.trees].map(([body, geoms]) => [body, height(geoms)]))
+    if (this.bottom === null) {
+      this.bottom = Math.min(...this.planes, ...this.stillReaches.map((still) => -still.at(-1)))
+      const reachOf = (i) => this.directions.map((d) => this.support(model, data, i, d))
+      const all = [...this.movingGeoms, ...this.stillGeoms].map(reachOf)
+      this.size = all.length > 0 ? sizeOf(furthest(all)) : 0
+      for (const [body, top] of tops) if (top < this.bottom) this.trees.delete(body)
+    }
+    for (const [body, top] of tops) {
+      if (!this.trees.has(body) || !(top < this.bottom - this.size)) continue
+      gone.add(body)
+      this.fallen.set(body, top)
+    }
+    return gone
   }
 
   /** How far a geom reaches in a direction. */

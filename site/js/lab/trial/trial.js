@@ -36,6 +36,7 @@
  *     scene                      as the page gets it, with textures of at most 256 × 256 and faces of cubes of 64 × 64
  *     fill, mostFill             the part of the picture that what moves fills, in the mean of the run: with the lab's camera, and with
  *                                the fitting one
+ *     fallen                     `[{name, height, time}]`: bodies that have fallen out of the scene, and where they are at the end
  *     arrows                     metres for each unit of momentum, angular momentum and force: the middle arrow seen is 0.3 of the
  *                                picture's height
  *     parity                     what native MuJoCo needs (parity.js)
@@ -51,6 +52,7 @@ import { OVERLAYS } from '../core/frame.js'
 import { Lab } from '../core/lab.js'
 import { LabError, call, current, numeric, plottable, readable } from '../core/piece.js'
 import { Framing } from '../core/framing.js'
+import { nameOf } from '../core/names.js'
 import { act, controlActs, describe } from './acts.js'
 import { packed } from './base64.js'
 import { deepContact } from './deep.js'
@@ -350,6 +352,11 @@ class Trial {
       pictures,
       plots: record(lab),
       parity,
+      fallen: [...this.framing.fallen].map(([body, height]) => ({
+        name: nameOf(this.engine, lab.model, this.engine.k.obj.BODY, body) || `body ${body}`,
+        height,
+        time: lab.time,
+      })),
       fill: null, // see `frame`
       mostFill: null,
       arrows: null,
