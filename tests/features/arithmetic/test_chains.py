@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from coursebuild.core.text.units import find_unit
 from coursebuild.features.arithmetic.chains import SymbolQuantity, check_arithmetic
-from coursebuild.features.arithmetic.evaluate import check_identity
+from coursebuild.features.arithmetic.evaluate import measure
+from coursebuild.features.arithmetic.identities import check_identity
+from coursebuild.features.arithmetic.real import Real
 
 HOLDS = r"""
 I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168\ \mathrm{kg\,m^2}.
@@ -131,9 +133,11 @@ IDENTITIES = r"""
 \sin 2x = 2\sin x\,\cos x
 \frac{\mathrm d}{\mathrm dx}\,\frac{x}{1 + x^2} = \frac{1 - x^2}{(1 + x^2)^2}
 \frac{\mathrm d\,x^3}{\mathrm dx} = 3x^2
-\int_0^x \cos x\,\mathrm dx = \sin x = \sqrt{1 - \cos^2 x}
+\int_0^x \cos x\,\mathrm dx = \sin x
 \int x\,\mathrm e^{x}\,\mathrm dx = (x - 1)\,e^x
-\int_0^\infty e^{-x^2}\,\mathrm dx = \tfrac12\sqrt\pi
+\int_{-1}^1 \sqrt{1 - x^2}\,\mathrm dx = \tfrac12\pi
+(x^2)^{1/2} = |x|
+\frac{\mathrm d}{\mathrm dx} \int_0^{x^2} \sin(x)\,\mathrm dx = 2x\,\sin(x^2)
 \sum_{k=0}^{3} \binom{3}{k}\,x^k = (1 + x)^3
 x! = x\,(x - 1)!
 """
@@ -156,8 +160,8 @@ def symbols(*rows: tuple[str, str, str]) -> tuple[SymbolQuantity, ...]:
                 name,
                 unit_text,
                 unit,
-                Fraction(value) * unit.size if value else None,
-                Fraction(10) ** -decimals * unit.size if decimals else 0,
+                Real.of(value) * measure(unit) if value else None,
+                Real.of(Fraction(10) ** -decimals) * measure(unit) if decimals else None,
                 f"{value} {unit_text}",
             )
         )
