@@ -142,7 +142,9 @@ class BoundText(Struct, frozen=True):
         places: list[tuple[int, int, str]] = []
         for number, printed in zip(self.numbers, window.numbers, strict=True):
             rounded = round_like(number, printed.value) if printed.is_finite else None
-            if rounded is None or (printed.value and not Decimal(plain_text(rounded))):
+            if rounded is None or (
+                printed.value and not Decimal(plain_text(rounded).replace(",", ""))
+            ):
                 return ""
             places.append((number.start, number.end, rounded))
         return replace_ranges(self.text, places)

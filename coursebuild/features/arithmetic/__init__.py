@@ -20,8 +20,8 @@ from coursebuild.features.arithmetic.expressions import NotUnderstood
 from coursebuild.features.arithmetic.identities import check_identity, read_domain
 from coursebuild.features.arithmetic.symbol_values import check_formulas, read_symbols
 
-_OTHER_ARITHMETIC = (
-    "where other numbers are meant (floating-point, binary, remainders), write"
+_OTHER_NUMBERS = (
+    "where other numbers are meant, as in floating-point, binary or remainders, write"
     ' `{given="floats"}` or the like after the formula'
 )
 
@@ -53,7 +53,7 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
             if comparison.kind == "wrong":
                 texts = (span.text, comparison.result)
                 are_plain = all(re.fullmatch(r"-?[\d.]+", text) for text in texts)
-                help = comparison.help or _OTHER_ARITHMETIC
+                help = "; ".join(filter(None, (comparison.help, _OTHER_NUMBERS)))
                 fix = Fix(help, comparison.result if are_plain else None)
                 mistake = diagnose("formula-arithmetic", span, message, help=fix)
                 diagnostics.append(mistake)

@@ -107,8 +107,10 @@ def _check_chain(
                 terms = left.get_expression(), right.get_expression()
                 terms = (_strip_unit(terms[0]), _strip_unit(terms[1])) if has_common_unit else terms
                 mistake = _find_mistake(*terms, relation)
-                if mistake is not None and any(map(_is_constant, terms)):
-                    raise terms[1].not_understood("it says what the letter stands for")
+                letter = next((term.text for term in terms if _is_constant(term)), "")
+                if mistake is not None and letter:
+                    reason = "it says what the letter stands for"
+                    mistake = FormulaComparison("unread", left.start, right.end, reason, letter)
             elif symbols and relation not in ("?", "≡"):
                 follows = unit if right is statement.sides[-1] else ""
                 mistake = SymbolComparison(statement, i, symbols, follows).find_mistake()
@@ -121,35 +123,8 @@ def _check_chain(
         yield mistake or FormulaComparison("holds", left.start, right.end)
 
 
-def find_letters(tex: str) -> set[str]:
-    r"""Return the constants that a formula gives another value, as `\pi = 0.5` does.
-
-    Where one is alone on a side, the relation holds, or says what the letter stands for.
-    """
-    if not any(constant in tex for constant in CONSTANTS) or not _RELATION.search(tex):
-        return set()
-    return {
-        expression.text
-        for statement in read_statements(tex)
-        for i, relation in enumerate(statement.relations)
-        for pair in (statement.sides[i : i + 2],)
-        if all(side.is_numeric and isinstance(side.expression, Expression) for side in pair)
-        for expression in (side.get_expression() for side in pair)
-        if _is_constant(expression) and not _holds(pair, relation)
-    }
-
-
-def _holds(pair: tuple[FormulaSide, ...], relation: str) -> bool:
-    """Whether a relation between two numbers holds, or cannot be computed."""
-    left, right = pair
-    try:
-        mistake = _find_mistake(left.get_expression(), right.get_expression(), relation)
-        return mistake is None
-    except NotUnderstood:
-        return True
-
-
 def _is_constant(expression: Expression) -> bool:
+    r"""Whether it is a letter alone: `\pi = 0.5` is no mistake, but says what the letter is."""
     return expression.kind == "symbol" and expression.text in CONSTANTS
 
 
@@ -214,7 +189,7 @@ def _find_mistake(left: Expression, right: Expression, relation: str) -> Formula
     message = f"the result is {result}, not this"
     is_rounded = numeral.is_whole and relation == "=" and agrees(numeral, value, "≈")
     help = "write `\\approx` where a whole number is rounded" if is_rounded else ""
-    return FormulaComparison("wrong", side.start, side.end, message, help, result)
+    return FormulaComparison("wrong", side.start, side.end, message, help=help, result=result)
 
 
 def _decide(verdict: bool | None, place: Expression) -> bool:
@@ -399,7 +374,7 @@ class SymbolComparison:
             help = "`{given}` after the formula gives the symbol another value in this section"
         message += f" where {conditions}" if conditions else ""
         message += ", not this" if result else ""
-        return FormulaComparison("wrong", side.start, side.end, message, help, result)
+        return FormulaComparison("wrong", side.start, side.end, message, help=help, result=result)
 
     def _chain_units(self) -> Iterator[Unit]:
         """Yield the units that the chain names."""

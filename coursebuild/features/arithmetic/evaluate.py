@@ -38,6 +38,8 @@ class FormulaComparison(Struct, frozen=True):
     start: int
     end: int
     message: str = ""
+    letter: str = ""
+    """A constant, such as π, that stands for something else here."""
     help: str = ""
     result: str = ""
     """What should stand there, where a number that stands there is wrong."""

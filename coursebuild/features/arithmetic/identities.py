@@ -113,7 +113,7 @@ def check_identity(
                 _try_identity(*sides, symbols, domain or Domain())
             except NotUnderstood as error:
                 help = _DOMAIN_HELP if isinstance(error, _Refuted) else ""
-                yield FormulaComparison(error.kind, error.start, error.end, error.reason, help)
+                yield FormulaComparison(error.kind, error.start, error.end, error.reason, help=help)
 
 
 _DOMAIN_HELP = 'name the domain in its label, as in `check="x > 0"`'

@@ -27,11 +27,7 @@ from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 from coursebuild.core.text.units import Unit, find_unit
-from coursebuild.features.arithmetic.chains import (
-    SymbolQuantity,
-    check_arithmetic,
-    find_letters,
-)
+from coursebuild.features.arithmetic.chains import SymbolQuantity, check_arithmetic
 from coursebuild.features.arithmetic.evaluate import (
     FormulaComparison,
     WrongDimensions,
@@ -100,28 +96,32 @@ def check_formulas(document: model.Document) -> Mapping[int, tuple[FormulaCompar
     """
 
     def compare() -> dict[int, tuple[FormulaComparison, ...]]:
-        symbols = read_symbols(document)
-        definitions = {value.span for values in symbols.values.values() for value in values}
-        definitions |= {diagnostic.span for diagnostic in symbols.diagnostics}
-        letters = tuple(
-            SymbolQuantity(name, "", None)
-            for name in sorted(
-                {n for p in symbols.places for n in find_letters(p.formula.tex.text)}
-            )
-        )
-        levels = {place.level: symbols.at(place.level) for place in symbols.places}
-        comparisons: dict[int, tuple[FormulaComparison, ...]] = {}
-        for place in symbols.places:
-            formula = place.formula
-            is_identity = formula.label is not None and formula.label.domain is not None
-            if formula.span in definitions or is_identity or _source(formula) is not None:
-                continue
-            tex = formula.tex
-            quantities = (*letters, *levels[place.level])
-            comparisons[tex.span().start] = check_arithmetic(tex.text, quantities, place.unit)
+        comparisons = _compare_all(symbols, ())
+        letters = {c.letter for group in comparisons.values() for c in group} - {""}
+        if letters:  # a π that is defined in the document is none of the number's
+            others = tuple(SymbolQuantity(name, "", None) for name in sorted(letters))
+            comparisons = _compare_all(symbols, others)
         return comparisons
 
+    symbols = read_symbols(document)
     return model.computed_once(document, "formula_comparisons", compare)
+
+
+def _compare_all(
+    symbols: DocumentQuantities, letters: tuple[SymbolQuantity, ...]
+) -> dict[int, tuple[FormulaComparison, ...]]:
+    definitions = {value.span for values in symbols.values.values() for value in values}
+    definitions |= {diagnostic.span for diagnostic in symbols.diagnostics}
+    levels = {place.level: symbols.at(place.level) for place in symbols.places}
+    comparisons: dict[int, tuple[FormulaComparison, ...]] = {}
+    for place in symbols.places:
+        formula = place.formula
+        is_identity = formula.label is not None and formula.label.domain is not None
+        if formula.span in definitions or is_identity or _source(formula) is not None:
+            continue
+        tex, quantities = formula.tex, (*letters, *levels[place.level])
+        comparisons[tex.span().start] = check_arithmetic(tex.text, quantities, place.unit)
+    return comparisons
 
 
 def _source(formula: _Formula) -> str | None:

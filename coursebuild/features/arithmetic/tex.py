@@ -42,6 +42,8 @@ GREEK = frozenset(
 )
 _ACCENTS = frozenset("dot ddot hat bar tilde".split())
 _FRACTIONS = frozenset((r"\frac", r"\tfrac", r"\dfrac"))
+_BRACKET = re.compile(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
+"""What holds all that a function is of: brackets, perhaps in braces, as other programs write."""
 _BRACKETS = {"(": ")", "[": "]", "{": "}", "|": "|", r"\lvert": r"\rvert"}
 _QUOTIENT_SIGNS = ("/", r"\div")
 _PRODUCT_SIGNS = (r"\cdot", r"\times", "*", "⋅", "×", *_QUOTIENT_SIGNS)
@@ -223,8 +225,11 @@ class _Reader:
         text = re.sub(r"\^\{(-?\d+)\}", r"^\1", text).strip("*")
         return Expression("unit", start, self.at, text=text + exponent)
 
-    def power(self) -> Expression:
-        """Parse a base with its factorial and its exponent."""
+    def power(self, in_function: bool = False) -> Expression:
+        """Parse a base with its factorial and its exponent.
+
+        `in_function`: as a factor of what a function without brackets is of.
+        """
         power = self.base()
         if self.take("!"):
             power = Expression("factorial", power.start, self.at, (power,))
@@ -232,6 +237,8 @@ class _Reader:
             if self.match(_DEGREES):
                 self.raw()
                 return self.degrees(power)
+            if in_function:
+                raise self.not_understood("the power may be of the function, or of what it is of")
             if self.peek() in ("*", "'", r"\prime", r"\top"):
                 raise self.not_understood()
             exponent = self.group()
@@ -395,7 +402,7 @@ class _Reader:
         exponent = self.group() if self.take("^") else None
         if exponent is not None and exponent.kind != "number":
             raise exponent.not_understood("an inverse or a power can be meant")
-        argument = self.base() if self.peek() in ("(", "[") else self.argument()
+        argument = self.base() if self.match(_BRACKET) else self.argument()
         value = Expression(name, start, self.at, (argument,))
         end = self.at
         if self.peek() in ("°", "!") or (self.take("^") and (exponent or self.match(_DEGREES))):
@@ -407,7 +414,7 @@ class _Reader:
 
     def argument(self) -> Expression:
         """Parse the factors that a function without brackets is of."""
-        argument = self.argument_factor()
+        argument = self.power(in_function=True)
         while True:
             end = self.at
             sign = self.take(*_PRODUCT_SIGNS)
@@ -422,24 +429,8 @@ class _Reader:
                 return argument
             if sign or is_spaced or self.peek() in _BRACKETS:
                 raise self.not_understood("it may be a factor of the function, or of what it is of")
-            factor = self.argument_factor()
+            factor = self.power(in_function=True)
             argument = Expression("*", argument.start, self.at, (argument, factor), SIDE_BY_SIDE)
-
-    def argument_factor(self) -> Expression:
-        """Parse a factor whose exponent, if any, is the sign of degrees."""
-        factor = self.base()
-        if self.take("!"):
-            factor = Expression("factorial", factor.start, self.at, (factor,))
-        if self.take("^") and self.match(_DEGREES):
-            self.raw()
-            return self.degrees(factor)
-        if self.take("°"):
-            return self.degrees(factor)
-        if self.tex[self.at - 1 : self.at] == "^":
-            raise self.not_understood("the power may be of the function, or of what it is of")
-        if self.peek() in ("!", "'", "_"):
-            raise self.not_understood()
-        return factor
 
 
 def _is_mixed(left: Expression, right: Expression) -> bool:
