@@ -43,7 +43,9 @@ _TOKEN = re.compile(
     rf"|(?P<number>(?:(?<![\w.)\]]){_SIGN})?{_MAGNITUDE}{_ENDS})"
     r"|(?P<word>[^\W\d]\w*(?:\.[0-9]\w*)*(?:-[0-9][\w.]*)*))"
 )
-_GROUPS = re.compile(r"[1-9][0-9]{0,2}(?:,[0-9]{3})+(?:\.[0-9]+)?(?!,?[0-9])(?!\.[0-9])")
+_GROUPS = re.compile(
+    r"(?<![0-9.,])[1-9][0-9]{0,2}(?:,[0-9]{3})+(?:\.[0-9]+)?(?!,?[0-9])(?!\.[0-9])"
+)
 """Digits as Python's format `,` writes them."""
 _DIGIT_COMMA = re.compile("[0-9],[0-9]")
 _NOTATION = re.compile(
