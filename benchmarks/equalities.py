@@ -43,17 +43,17 @@ class Term(NamedTuple):
     tex: str
     value: sympy.Expr
 
-    def __add__(self, other: Term) -> Term:
-        return Term(rf"\left({self.tex} + {other.tex}\right)", self.value + other.value)
+    def __add__(self, right: Term) -> Term:
+        return Term(rf"\left({self.tex} + {right.tex}\right)", self.value + right.value)
 
-    def __sub__(self, other: Term) -> Term:
-        return Term(rf"\left({self.tex} - {other.tex}\right)", self.value - other.value)
+    def __sub__(self, right: Term) -> Term:
+        return Term(rf"\left({self.tex} - {right.tex}\right)", self.value - right.value)
 
-    def __mul__(self, other: Term) -> Term:
-        return Term(rf"{self.tex}\cdot{other.tex}", self.value * other.value)
+    def __mul__(self, right: Term) -> Term:
+        return Term(rf"{self.tex}\cdot{right.tex}", self.value * right.value)
 
-    def __truediv__(self, other: Term) -> Term:
-        return Term(rf"\frac{{{self.tex}}}{{{other.tex}}}", self.value / other.value)
+    def __truediv__(self, right: Term) -> Term:
+        return Term(rf"\frac{{{self.tex}}}{{{right.tex}}}", self.value / right.value)
 
     def __pow__(self, exponent: int) -> Term:
         return Term(rf"\left({self.tex}\right)^{{{exponent}}}", self.value**exponent)
@@ -149,10 +149,10 @@ def fractions(rng: random.Random) -> Case:
     terms = [number(f"{rng.randint(1, 40)}") / number(f"{rng.randint(2, 40)}") for _ in range(3)]
     total = terms[0] + terms[1] - terms[2]
     off = rng.choice((0, 0, 1, -1))
-    shown = total.value + sympy.Rational(off, total.value.q * rng.choice((1, 10, 1000)))
-    sign = "-" if shown < 0 else ""
-    tex = rf"{total.tex} = {sign}\frac{{{abs(shown.p)}}}{{{shown.q}}}"
-    return Case("fractions", tex, compare(total.value, shown) == 0)
+    stated_number = total.value + sympy.Rational(off, total.value.q * rng.choice((1, 10, 1000)))
+    sign = "-" if stated_number < 0 else ""
+    tex = rf"{total.tex} = {sign}\frac{{{abs(stated_number.p)}}}{{{stated_number.q}}}"
+    return Case("fractions", tex, compare(total.value, stated_number) == 0)
 
 
 def rounded(rng: random.Random) -> Case:
@@ -165,41 +165,47 @@ def rounded(rng: random.Random) -> Case:
         context.prec = 2 * DIGITS
         exact = Decimal(mpmath.nstr(value, DIGITS - 5, strip_zeros=False))
         step = Decimal(1).scaleb(min(exact.adjusted() - rng.randint(1, 25), -1))
-        shown = exact.quantize(step, ROUND_HALF_EVEN) + rng.choice((0, 0, 1, -1)) * step
-        return Case("rounded", rf"{term.tex} \approx {shown:f}", 2 * abs(shown - exact) <= step)
+        stated_number = exact.quantize(step, ROUND_HALF_EVEN) + rng.choice((0, 0, 1, -1)) * step
+        return Case(
+            "rounded",
+            rf"{term.tex} \approx {stated_number:f}",
+            2 * abs(stated_number - exact) <= step,
+        )
 
 
 def edges(rng: random.Random) -> Case:
     """A number at the edge of what another may be rounded from, or a hair beside it."""
     step = Decimal(1).scaleb(-rng.randint(1, 8))
-    shown = rng.randint(-(10**6), 10**6) * step
-    number = shown + step / 2 * rng.choice((1, -1)) + step.scaleb(-12) * rng.choice((-1, 0, 1))
-    truth = 2 * abs(shown - number) <= step
-    return Case("edges", f"{number:f} = {shown:f}", truth)
+    stated_number = rng.randint(-(10**6), 10**6) * step
+    number = (
+        stated_number + step / 2 * rng.choice((1, -1)) + step.scaleb(-12) * rng.choice((-1, 0, 1))
+    )
+    truth = 2 * abs(stated_number - number) <= step
+    return Case("edges", f"{number:f} = {stated_number:f}", truth)
 
 
 def cancellation(rng: random.Random) -> Case:
     """What is left where nearly all cancels: right, zero, or another number."""
     small = rng.randint(3, 40)
     h = power_of_ten(-small)
-    one, two = number("1"), number("2")
+    unit, double = number("1"), number("2")
     term, limit = rng.choice(
         (
-            ((one - call("cos", h)) / power_of_ten(-2 * small), "0.5"),
-            (call("ln", one + h) / h, "1.0"),
-            ((call("exp", h) - one) / h, "1.0"),
+            ((unit - call("cos", h)) / power_of_ten(-2 * small), "0.5"),
+            (call("ln", unit + h) / h, "1.0"),
+            ((call("exp", h) - unit) / h, "1.0"),
             ((call("tan", h) - call("sin", h)) / power_of_ten(-3 * small), "0.5"),
-            ((root(one + h) - one) / h, "0.5"),
-            ((one + h - one) / h, "1.0"),
-            ((root(two + h) - root(two)) * root(two) / h, "0.50"),
+            ((root(unit + h) - unit) / h, "0.5"),
+            ((unit + h - unit) / h, "1.0"),
+            ((root(double + h) - root(double)) * root(double) / h, "0.50"),
         )
     )
-    shown = rng.choice((limit, limit, "0", "0.0", "0.4", "1.1"))
-    numbers = Decimal(shown), evaluate(term.value)
-    step = mpmath.mpf(10) ** -len(shown.partition(".")[2])
-    gap = 2 * abs(numbers[1] - mpmath.mpf(shown))
-    truth = gap <= step if "." in shown else gap == 0
-    return Case("cancellation", f"{term.tex} = {shown}", bool(truth))
+    stated_number = rng.choice((limit, limit, "0", "0.0", "0.4", "1.1"))
+    numbers = Decimal(stated_number), evaluate(term.value)
+    step = mpmath.mpf(10) ** -len(stated_number.partition(".")[2])
+    gap = 2 * abs(numbers[1] - mpmath.mpf(stated_number))
+    truth = gap <= step if "." in stated_number else gap == 0
+    return Case("cancellation", f"{term.tex} = {stated_number}", bool(truth))
 
 
 def zeros(rng: random.Random) -> Case:
@@ -236,9 +242,11 @@ def branches(rng: random.Random) -> Case:
             root(inner) ** 2,
         )
     )
-    shown = rng.choice((inner, place, inner + power_of_ten(-rng.randint(5, 30))))
-    sign = compare(term.value, shown.value)
-    return Case("branches", f"{term.tex} = {shown.tex}", None if sign is None else sign == 0)
+    stated_number = rng.choice((inner, place, inner + power_of_ten(-rng.randint(5, 30))))
+    sign = compare(term.value, stated_number.value)
+    return Case(
+        "branches", f"{term.tex} = {stated_number.tex}", None if sign is None else sign == 0
+    )
 
 
 def orders(rng: random.Random) -> Case:
@@ -399,8 +407,7 @@ def judge(case: Case) -> bool | None:
     if case.domain is None:
         kinds = {comparison.kind for comparison in check_arithmetic(case.tex)}
     else:
-        known = {"x": (), "y": ()}
-        comparisons = check_identity(case.tex, known, read_domain(case.domain))
+        comparisons = check_identity(case.tex, {"x": (), "y": ()}, read_domain(case.domain))
         kinds = {comparison.kind for comparison in comparisons} or {"holds"}
     if "wrong" in kinds:
         return False

@@ -86,9 +86,8 @@ def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]
 def _check_identity(
     tex: Excerpt, domain: str, place: Span, dimensions: Mapping[str, Dimension]
 ) -> Iterator[Diagnostic]:
-    known = frozenset(dimensions.items())
     try:
-        comparisons = _compare_at_points(tex.text, domain, known)
+        comparisons = _compare_at_points(tex.text, domain, frozenset(dimensions.items()))
     except NotUnderstood as error:
         message = f"this condition is not computed: {error.reason}"
         help = 'write conditions on symbols, as in `check="x > 0, n \\ne 1"`'

@@ -185,8 +185,7 @@ def _agrees_at(left: Expression, right: Expression, values: Mapping[str, Physica
     if difference.sign():
         points = ", ".join(f"{name} = {format_number(x.value, 6)}" for name, x in values.items())
         sides = " and ".join(_format_apart(lhs.value, rhs.value))
-        where = f" where {points}" if points else ""
-        raise _Refuted(f"the sides are {sides}{where}", right.start, right.end)
+        raise _Refuted(f"the sides are {sides} where {points}", right.start, right.end)
     return difference.is_negligible(lhs.value, rhs.value)
 
 

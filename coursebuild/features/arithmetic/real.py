@@ -110,11 +110,11 @@ class Real:
     def __hash__(self) -> int:
         return hash(self.form or str(self.ball))
 
-    def __eq__(self, other: object) -> bool:
+    def __eq__(self, right: object) -> bool:
         """Whether it is known in the same way, as a key of caches asks."""
-        if not isinstance(other, Real):
+        if not isinstance(right, Real):
             return NotImplemented
-        return (self.form or str(self.ball)) == (other.form or str(other.ball))
+        return (self.form or str(self.ball)) == (right.form or str(right.ball))
 
     def __float__(self) -> float:
         return float(self.ball)
@@ -125,33 +125,34 @@ class Real:
             return format(Decimal(rational.numerator) / Decimal(rational.denominator), spec)
         return format(Decimal(self.ball.str(60, radius=False)), spec)
 
-    def __add__(self, other: Real) -> Real:
-        left, right = self.form, other.form
-        if left is not None and right is not None:
-            if left.factor == 0 or right.factor == 0:
-                return self if right.factor == 0 else other
-            if (left.radicand, left.power) == (right.radicand, right.power):
-                return Real(_Form(left.factor + right.factor, left.radicand, left.power))
-        return Real(ball=self.ball + other.ball)
+    def __add__(self, right: Real) -> Real:
+        first, second = self.form, right.form
+        if first is not None and second is not None:
+            if first.factor == 0 or second.factor == 0:
+                return self if second.factor == 0 else right
+            if (first.radicand, first.power) == (second.radicand, second.power):
+                return Real(_Form(first.factor + second.factor, first.radicand, first.power))
+        return Real(ball=self.ball + right.ball)
 
     def __neg__(self) -> Real:
         return self * Real.of(-1)
 
-    def __sub__(self, other: Real) -> Real:
-        return self + -other
+    def __sub__(self, right: Real) -> Real:
+        return self + -right
 
-    def __mul__(self, other: Real) -> Real:
-        left, right = self.form, other.form
-        if left is None or right is None:
-            return Real(ball=self.ball * other.ball)
-        common = gcd(left.radicand, right.radicand)
-        radicand = left.radicand * right.radicand // common**2
-        return Real(_Form(left.factor * right.factor * common, radicand, left.power + right.power))
+    def __mul__(self, right: Real) -> Real:
+        first, second = self.form, right.form
+        if first is None or second is None:
+            return Real(ball=self.ball * right.ball)
+        common = gcd(first.radicand, second.radicand)
+        radicand = first.radicand * second.radicand // common**2
+        factor = first.factor * second.factor * common
+        return Real(_Form(factor, radicand, first.power + second.power))
 
-    def __truediv__(self, other: Real) -> Real:
-        form = other.form
+    def __truediv__(self, right: Real) -> Real:
+        form = right.form
         if form is None:
-            return Real(ball=self.ball / other.ball)
+            return Real(ball=self.ball / right.ball)
         return self * Real(_Form(1 / (form.factor * form.radicand), form.radicand, -form.power))
 
     def __abs__(self) -> Real:

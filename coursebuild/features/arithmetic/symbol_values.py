@@ -99,8 +99,8 @@ def check_formulas(document: model.Document) -> Mapping[int, tuple[FormulaCompar
         comparisons = _compare_all(symbols, ())
         letters = {c.letter for group in comparisons.values() for c in group} - {""}
         if letters:  # a π that is defined in the document is none of the number's
-            others = tuple(SymbolQuantity(name, "", None) for name in sorted(letters))
-            comparisons = _compare_all(symbols, others)
+            unknown = tuple(SymbolQuantity(name, "", None) for name in sorted(letters))
+            comparisons = _compare_all(symbols, unknown)
         return comparisons
 
     symbols = read_symbols(document)
