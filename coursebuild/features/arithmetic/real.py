@@ -314,14 +314,20 @@ def integrate(function: Callable[[Real, bool], Real], start: Real, end: Real) ->
 
     The function is told whether it must be analytic.
     """
-    tolerance = arb(2) ** -72
+    errors: list[Exception] = []
+
+    def integrand(place: Any, analytic: bool) -> Any:
+        try:
+            return acb(function(Real(ball=place), analytic).ball)
+        except Exception as error:  # which FLINT does not pass on
+            errors.append(error)
+            return acb(arb.nan())
+
+    limits, tolerance = (start.ball, end.ball), arb(2) ** -72
     with ctx.workprec(128):
         value = acb.integral(
-            lambda place, analytic: acb(function(Real(ball=place), analytic).ball),
-            start.ball,
-            end.ball,
-            rel_tol=tolerance,
-            abs_tol=tolerance,
-            eval_limit=3000,
+            integrand, *limits, rel_tol=tolerance, abs_tol=tolerance, eval_limit=2000
         )
+    if errors and not value.is_finite():
+        raise errors[0]
     return Real(ball=value.real if value.imag.contains(0) else arb.nan())

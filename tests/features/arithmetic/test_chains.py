@@ -5,7 +5,7 @@ from __future__ import annotations
 from decimal import Decimal
 from fractions import Fraction
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.text.units import find_unit
@@ -104,6 +104,25 @@ def test_a_sum_is_wrong_exactly_if_its_last_digit_is(terms: list[Decimal], off: 
 def test_any_text_can_be_checked(tex: str) -> None:
     for comparison in (*check_arithmetic(tex), *check_arithmetic(tex, KNOWN, "ms")):
         assert 0 <= comparison.start <= comparison.end <= len(tex)
+
+
+@settings(max_examples=60)
+@given(st.lists(st.sampled_from((*TOKENS, "x", "x", "(x)")), max_size=20).map(" ".join))
+def test_any_text_can_be_tried_as_an_identity(tex: str) -> None:
+    for text in (tex, rf"\int_0^x {tex}\,\mathrm dx = \frac{{\mathrm d}}{{\mathrm dx}} {tex}"):
+        for comparison in check_identity(text, {"x": (), "m": ()}):
+            assert 0 <= comparison.start <= comparison.end <= len(text)
+
+
+def test_functions_without_real_values_in_integrals_are_not_understood() -> None:
+    for tex, reason in (
+        (r"\int_0^x x!\,\mathrm dx = x", "it is of whole numbers only"),
+        (r"\int_0^x \ln(-1 - x^2)\,\mathrm dx = x", "it is not a real number"),
+        (r"\int_{-1}^{1} \frac{1}{x}\,\mathrm dx = x", "300 digits do not tell"),
+        (r"\int_0^\infty x\,\mathrm dx = x", "nothing is computed up to infinity"),
+    ):
+        (comparison,) = check_identity(tex, {"x": ()})
+        assert (comparison.kind, reason in comparison.message) == ("unread", True), tex
 
 
 def test_what_is_too_large_or_no_whole_number_is_not_understood() -> None:
