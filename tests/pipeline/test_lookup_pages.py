@@ -63,6 +63,10 @@ THIRD = """The [عزم القصور]{term} عدد. A [慣性]{term} is. An
 [that](term:عزم-القصور) and [so](<term:慣性>).
 
 See [one](lesson:1.1).
+
+$$w + w = 2w$$ {#eq:twice check}
+
+$$|w| = w$$ {#eq:size check="w >= 0"}
 """
 
 
@@ -140,6 +144,15 @@ def test_nothing_hostile_is_markup(site: dict[str, str]) -> None:
     assert "rate &lt;i&gt;" in site["symbols/index.html"]
 
 
+def test_an_identity_says_that_it_is_not_proven_and_where_it_was_tried(
+    site: dict[str, str],
+) -> None:
+    page = site["lessons/1.3-three.html"]
+    first, second = re.findall(r'<small class="equation-check">(.*?)</small>', page)
+    assert first == "Not proven; tried at 32 points"
+    assert text(second) == "Not proven; tried at 32 points (w≥0)"
+
+
 def test_formulas_have_ids_numbers_and_references(site: dict[str, str]) -> None:
     first, second = site["lessons/1.1-one.html"], site["lessons/1.2-two.html"]
     ids = re.findall(r'<span class="equation" id="(.*?)">', first)
@@ -177,7 +190,7 @@ def test_the_index_of_symbols(site: dict[str, str]) -> None:
     assert rows == [
         "q˙ rate <i> 1/s 1.1 Law",
         "V volume (1.1) m³ 1.1 Core, also in 1.2 voltage (1.2)",
-        "w width 1.1 Detail of Table 1.1.1",
+        "w width 1.1 Detail of Table 1.1.1, also in 1.3",
     ]
     symbols = [text(item) for item in undeclared_part.partition("</section>")[0].split("<li>")[1:]]
     assert [item.split()[0] for item in symbols] == ["a", "I", "x", "z", "ρ"]

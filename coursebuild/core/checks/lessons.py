@@ -178,6 +178,9 @@ def _formula_uses(document: Document) -> Iterator[tuple[Formula, Excerpt]]:
     for _, formula in find_formulas(document):
         if formula.tex.text.strip():
             yield Formula(formula.tex.text, formula.display), formula.tex
+        label = formula.label
+        if label is not None and label.domain is not None and label.conditions:
+            yield Formula(label.conditions, display=False), label.domain
 
 
 def document_formulas(document: Document) -> tuple[Formula, ...]:

@@ -340,6 +340,8 @@ class NumberedItem(Struct, frozen=True):
     """The number among those of its kind, such as `3`; empty for a formula without a label."""
     has_margin_number: bool = False
     """Whether its page writes the number beside it, as a formula may show one itself."""
+    domain: str | None = None
+    """The conditions under which it was tried as an identity, perhaps empty."""
 
     @property
     def kind(self) -> str:

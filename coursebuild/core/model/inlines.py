@@ -86,8 +86,20 @@ class Label(Located, frozen=True):
     """With its prefix and colon."""
     source: str | None = None
     """The source of its numbers from `given="…"`, perhaps empty; `None` where none is given."""
-    check: Span | None = None
-    """Where the word `check` stands, which demands a proof."""
+    domain: Excerpt | None = None
+    """The conditions of `check="x > 0"`, perhaps empty, under which an identity is tried; `None`
+    where `check` does not stand."""
+
+    @property
+    def conditions(self) -> str | None:
+        """The domain in TeX."""
+        if self.domain is None:
+            return None
+        return self.domain.text.replace(">=", r"\ge ").replace("<=", r"\le ").strip()
+
+
+IDENTITY_POINTS = 32
+"""At so many points is an identity tried, as its page says."""
 
 
 class Meaning(Located, frozen=True):

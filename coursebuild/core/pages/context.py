@@ -226,7 +226,14 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
         """A formula on a line of its own, which scrolls if it is too wide."""
         mathml = self.renderer.mathml(tex, True)
         item = self.numbered_items.get(start)
-        return self.template("blocks/formula.html", mathml=mathml, equation=item)
+        domain = item.domain if item is not None else None
+        return self.template(
+            "blocks/formula.html",
+            mathml=mathml,
+            equation=item,
+            domain=self.renderer.mathml(domain, False) if domain else domain,
+            points=model.IDENTITY_POINTS,
+        )
 
     def number(self, label: model.Label | None) -> str:
         """The name that a label gives, such as "Figure 4.2.3"; empty without one."""

@@ -45,7 +45,10 @@ def number_items(document: model.Document, mathml: Mathml) -> dict[int, model.Nu
             number = unescape(tag[1]) if tag is not None and not styled_count else str(count + 1)
         count += styled_count + has_margin_number
         if formula.id:
-            items[formula.start] = model.NumberedItem(formula.id, number, has_margin_number)
+            conditions = formula.label.conditions if formula.label is not None else None
+            items[formula.start] = model.NumberedItem(
+                formula.id, number, has_margin_number, conditions
+            )
     counts = Counter[str]()
     for block, label in model.labelled_blocks(document):
         item = model.NumberedItem(label.id)

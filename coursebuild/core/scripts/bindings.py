@@ -297,6 +297,7 @@ def _mismatch(
     bound_text = BoundText.of(binding.text)
     stray, label = bound_text.stray, ""
     pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", binding.text)
+    with_point = BoundText.of(pointed)
     if not bound_text.numbers:
         message = f"`{binding.text}` is not in the output of `{path}`"
         help = "write it as it is printed, or remove `{out}`"
@@ -305,8 +306,8 @@ def _mismatch(
         help = Fix(f"remove the `{stray}`", "", stray)
     elif mismatch := _wrong_unit(binding, replace(bound_text, before="", after=""), path, lines):
         return mismatch
-    elif pointed != binding.text and BoundText.of(pointed).is_in(lines):
-        message = f"`{binding.text}` is two numbers, as outputs have a decimal point"
+    elif pointed != binding.text and with_point.numbers and with_point.is_in(lines):
+        message = f"`{binding.text}` has a comma where outputs have a decimal point"
         help = Fix(f"write `{pointed}`", pointed)
     else:
         label, better = _propose(bound_text, lines, list(map(PrintedLine, before)))

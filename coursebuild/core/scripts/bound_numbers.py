@@ -11,9 +11,16 @@ from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.scripts.lines import MappedText, Side, plain_text, replace_ranges
-from coursebuild.core.scripts.numbers import Number, round_like, scan, scan_prose, within_half_unit
+from coursebuild.core.scripts.numbers import (
+    Number,
+    has_groups,
+    round_like,
+    scan,
+    scan_prose,
+    within_half_unit,
+)
 from coursebuild.core.scripts.tables import RowCell, table_rows
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.text.units import units_at
 
 Locate = Callable[[int, int], Span]
@@ -27,25 +34,35 @@ class PrintedLine(Struct, frozen=True, dict=True):
     text: str
     locate: Locate | None = None
     """Where `text[start:end]` stands in the lesson; `None` for what is not recorded."""
+    is_grouped: bool = False
+    """Whether commas between digits part thousands, as they all do in its output."""
 
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
         """The numbers in it; not computed until needed, as those of most lines never are."""
-        return scan(self.text)
+        return scan(self.text, self.is_grouped)
 
 
 def lines_of_run(stdout: str, filters: Iterable[Filter] = ()) -> list[PrintedLine]:
     """The lines of an output that is not recorded."""
-    return list(map(PrintedLine, Side.of(stdout, filters).lines))
+    lines = Side.of(stdout, filters).lines
+    is_grouped = has_groups("\n".join(lines))
+    return [PrintedLine(line, None, is_grouped) for line in lines]
 
 
 def printed_lines(recording: Recording, filters: Iterable[Filter] = ()) -> tuple[PrintedLine, ...]:
     """The lines of a recorded output; without filters, as the author sees them."""
     if isinstance(recording.body, Table):
-        return tuple(map(_row_line, table_rows(recording.body)))
+        rows = [_join_cells(row) for row in table_rows(recording.body)]
+        is_grouped = has_groups("\n".join(row.text for row in rows))
+        source = recording.body.span.source
+        return tuple(
+            PrintedLine(row.text, _locator_in_row(row, source), is_grouped) for row in rows
+        )
     side = Side.of(recording.body.text, filters)
+    is_grouped = has_groups("\n".join(side.lines))
     return tuple(
-        PrintedLine(line, _locator_in_fence(recording.body, side, index))
+        PrintedLine(line, _locator_in_fence(recording.body, side, index), is_grouped)
         for index, line in enumerate(side.lines)
     )
 
@@ -54,11 +71,13 @@ def _locator_in_fence(body: Excerpt, side: Side, line: int) -> Locate:
     return lambda start, end: body.span(*side.origin(line, start, end))
 
 
-def _row_line(row: tuple[RowCell, ...]) -> PrintedLine:
+def _join_cells(row: tuple[RowCell, ...]) -> MappedText:
     gap = MappedText.substitute_for(0, 0, " ")
-    cells = [part for cell in row for part in (gap, cell.mapped)]
-    line, source = MappedText.join(cells[1:]), row[0].cell.span.source
-    return PrintedLine(line.text, lambda start, end: Span(source, *line.origin(start, end)))
+    return MappedText.join([part for cell in row for part in (gap, cell.mapped)][1:])
+
+
+def _locator_in_row(row: MappedText, source: Source) -> Locate:
+    return lambda start, end: Span(source, *row.origin(start, end))
 
 
 def shows(number: Number, printed: Number) -> bool:
@@ -123,7 +142,9 @@ class BoundText(Struct, frozen=True):
         places: list[tuple[int, int, str]] = []
         for number, printed in zip(self.numbers, window.numbers, strict=True):
             rounded = round_like(number, printed.value) if printed.is_finite else None
-            if rounded is None or (printed.value and not Decimal(plain_text(rounded))):
+            if rounded is None or (
+                printed.value and not Decimal(plain_text(rounded).replace(",", ""))
+            ):
                 return ""
             places.append((number.start, number.end, rounded))
         return replace_ranges(self.text, places)

@@ -43,8 +43,13 @@ _TOKEN = re.compile(
     rf"|(?P<number>(?:(?<![\w.)\]]){_SIGN})?{_MAGNITUDE}{_ENDS})"
     r"|(?P<word>[^\W\d]\w*(?:\.[0-9]\w*)*(?:-[0-9][\w.]*)*))"
 )
+_GROUPS = re.compile(
+    r"(?<![0-9.,])[1-9][0-9]{0,2}(?:,[0-9]{3})+(?:\.[0-9]+)?(?!,?[0-9])(?!\.[0-9])"
+)
+"""Digits as Python's format `,` writes them."""
+_DIGIT_COMMA = re.compile("[0-9],[0-9]")
 _NOTATION = re.compile(
-    rf"(?P<sign>{_SIGN})?(?P<whole>[0-9]*)(?:\.(?P<decimals>[0-9]*))?"
+    rf"(?P<sign>{_SIGN})?(?P<whole>[0-9,]*)(?:\.(?P<decimals>[0-9]*))?"
     rf"(?:(?P<mark>[eE])(?P<power_sign>{_SIGN})?(?P<power>[0-9]+))?"
 )
 
@@ -87,11 +92,27 @@ class Number(Struct, frozen=True):
         return self.is_finite and not self.is_integer
 
 
-def scan(text: str) -> tuple[Number, ...]:
-    """The numbers of a text, in order."""
+def has_groups(text: str) -> bool:
+    """Whether all commas between digits part thousands, as those of a list of numbers do not."""
+    return "," in text and _DIGIT_COMMA.search(_GROUPS.sub("", text)) is None
+
+
+def scan(text: str, is_grouped: bool = False) -> tuple[Number, ...]:
+    """The numbers of a text, in order; if it is grouped, `1,234.5` is one."""
     numbers: list[Number] = []
     for match in _TOKEN.finditer(text):
         kind = match.lastgroup
+        if is_grouped and numbers and match.start() < numbers[-1].end:
+            continue
+        groups = _GROUPS.match(text, match.end() - len(match[0].lstrip("+-\u2212")))
+        if is_grouped and kind == "number" and groups is not None:
+            digits = text[match.start() : groups.end()]
+            value = Decimal(digits.replace("\u2212", "-").replace(",", ""))
+            place = -len(digits.partition(".")[2])
+            numbers.append(
+                Number(match.start(), groups.end(), digits, value, place, "." not in digits)
+            )
+            continue
         if kind in ("number", "imaginary", "special") and match.end() - match.start() <= _LONGEST:
             digits = match.group()
             value = Decimal(digits.replace("\u2212", "-"))
@@ -111,7 +132,7 @@ def only_number(text: str) -> Number | None:
 def scan_prose(text: str) -> tuple[Number, ...]:
     """The numbers of a text that a person wrote: `3.9 × 10⁻¹¹` and `3.9·10^-11` are one number."""
     numbers: list[Number] = []
-    for number in scan(text):
+    for number in scan(text, has_groups(text)):
         if numbers and number.start < numbers[-1].end:
             continue
         power = _POWER.match(text, number.end)
@@ -182,7 +203,8 @@ def round_like(sample: Number, value: Decimal) -> str | None:
         shown_sign = minus_power if int(power) < 0 else "+" if sign == "+" or width > 1 else ""
         exponent = f"{match['mark']}{shown_sign}{abs(int(power)):0{width}d}"
     else:
-        mantissa, exponent = f"{abs(value):.{decimals}f}", ""
+        grouping = "," if "," in match["whole"] else ""
+        mantissa, exponent = f"{abs(value):{grouping}.{decimals}f}", ""
     if match["decimals"] == "":
         mantissa += "."
     if not match["whole"]:

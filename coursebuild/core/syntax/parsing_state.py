@@ -68,14 +68,17 @@ class ParsingState:
             return None
         end, keys = match.end(), ("check", "given") if kind == "eq" else ()
         if keys:
-            help = 'write `{#eq:name check}`, or `{#eq:name given="its source"}`'
+            help = (
+                'write `{#eq:name check}`, `{#eq:name check="x > 0"}` or'
+                ' `{#eq:name given="its source"}`'
+            )
         values = read_pairs(braces.slice(end - 1), keys, "label-attribute", help)
         if isinstance(values, Diagnostic):
             self.report(values)
             values = {}
         source = value_text(values["given"]) if "given" in values else None
-        check = braces.span(end, len(braces.text) - 1) if "check" in values else None
-        label = Label(braces.span(2, end), match[1], source, check)
+        domain = (values["check"] or braces.slice(end, end)) if "check" in values else None
+        label = Label(braces.span(2, end), match[1], source, domain)
         self.anchors.take(label.id, label.span)
         return label
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
@@ -15,8 +15,15 @@ from coursebuild.core.text.diagnostics import Diagnostic, Fix, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import Dimension, find_unit
-from coursebuild.features.arithmetic.evaluate import FormulaComparison, check_identity
+from coursebuild.features.arithmetic.evaluate import FormulaComparison
+from coursebuild.features.arithmetic.expressions import NotUnderstood
+from coursebuild.features.arithmetic.identities import check_identity, read_domain
 from coursebuild.features.arithmetic.symbol_values import check_formulas, read_symbols
+
+_OTHER_NUMBERS = (
+    "where other numbers are meant, as in floating-point, binary or remainders, write"
+    ' `{given="floats"}` or the like after the formula'
+)
 
 
 class FormulaSummary(Struct, frozen=True):
@@ -26,27 +33,28 @@ class FormulaSummary(Struct, frozen=True):
     """Places of arithmetic that is not understood, and the reasons."""
     symbols: tuple[tuple[str, str], ...]
     """Symbols whose meaning the document declares, and their units."""
-    identities: tuple[Excerpt, ...]
-    """Formulas whose label says `check`."""
+    identities: tuple[tuple[Excerpt, str, Span], ...]
+    """Formulas whose label says `check`, their domains and where these stand."""
 
 
 def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]:
     """Summarize the formulas of a document; diagnostics are for numbers that are wrong."""
     unread: list[tuple[Span, str]] = []
-    identities: list[Excerpt] = []
+    identities: list[tuple[Excerpt, str, Span]] = []
     symbols, comparisons = read_symbols(document), check_formulas(document)
     diagnostics = list(symbols.diagnostics)
     for _, formula in find_formulas(document):
         tex = formula.tex
-        is_identity = formula.label is not None and formula.label.check is not None
-        if is_identity:
-            identities.append(tex)
+        label = formula.label
+        if label is not None and label.domain is not None:
+            identities.append((tex, label.conditions or "", label.domain.span()))
         for comparison in comparisons.get(tex.span().start, ()):
             span, message = tex.span(comparison.start, comparison.end), comparison.message
             if comparison.kind == "wrong":
                 texts = (span.text, comparison.result)
                 are_plain = all(re.fullmatch(r"-?[\d.]+", text) for text in texts)
-                fix = Fix(comparison.help, comparison.result if are_plain else None)
+                help = "; ".join(filter(None, (comparison.help, _OTHER_NUMBERS)))
+                fix = Fix(help, comparison.result if are_plain else None)
                 mistake = diagnose("formula-arithmetic", span, message, help=fix)
                 diagnostics.append(mistake)
             elif comparison.kind == "unread":
@@ -71,20 +79,33 @@ def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]
         units |= {name: {unit} for name, unit in document_summary.symbols}
         unique = {name: find_unit(min(all)) for name, all in units.items() if len(all) == 1}
         dimensions = {name: unit.dimension for name, unit in unique.items() if unit is not None}
-        for tex in document_summary.identities:
-            for comparison in _check_identity(tex.text, frozenset(dimensions.items())):
-                span, message = tex.span(comparison.start, comparison.end), comparison.message
-                if comparison.kind != "wrong":
-                    message = f"not understood: {message}"
-                yield diagnose("formula-identity", span, message)
+        for tex, domain, place in document_summary.identities:
+            yield from _check_identity(tex, domain, place, dimensions)
+
+
+def _check_identity(
+    tex: Excerpt, domain: str, place: Span, dimensions: Mapping[str, Dimension]
+) -> Iterator[Diagnostic]:
+    try:
+        comparisons = _compare_at_points(tex.text, domain, frozenset(dimensions.items()))
+    except NotUnderstood as error:
+        message = f"this condition is not computed: {error.reason}"
+        help = 'write conditions on symbols, as in `check="x > 0, n \\ne 1"`'
+        yield diagnose("formula-identity", place, message, help=help)
+        return
+    for comparison in comparisons:
+        span, message = tex.span(comparison.start, comparison.end), comparison.message
+        if comparison.kind != "wrong":
+            message = f"this is not computed: {message}"
+        yield diagnose("formula-identity", span, message, help=comparison.help)
 
 
 @functools.lru_cache(maxsize=256)
-def _check_identity(
-    tex: str, dimensions: frozenset[tuple[str, Dimension]]
+def _compare_at_points(
+    tex: str, domain: str, dimensions: frozenset[tuple[str, Dimension]]
 ) -> tuple[FormulaComparison, ...]:
     """Cached, since it is the slowest check while a lesson is edited."""
-    return tuple(check_identity(tex, dict(dimensions)))
+    return tuple(check_identity(tex, dict(dimensions), read_domain(domain)))
 
 
 def _summary_of(document: Document) -> FormulaSummary | None:

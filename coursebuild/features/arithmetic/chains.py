@@ -16,18 +16,17 @@ Entry points: `check_arithmetic(tex, symbols, unit)`; `SymbolQuantity`, what is 
 from __future__ import annotations
 
 import functools
-import operator
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import Any
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.text.units import Dimension, Unit, find_unit
 from coursebuild.features.arithmetic.evaluate import (
-    EXACT,
+    ORDERS,
+    UNDECIDED,
     FormulaComparison,
     Numeral,
     PhysicalQuantity,
@@ -36,11 +35,14 @@ from coursebuild.features.arithmetic.evaluate import (
     describe_dimension,
     evaluate,
     format_number,
-    is_close,
+    has_zero,
+    measure,
     read_numeral,
 )
+from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
+from coursebuild.features.arithmetic.real import ONE, Real
 from coursebuild.features.arithmetic.statements import FormulaSide, Statement, read_statements
-from coursebuild.features.arithmetic.tex import CONSTANTS, Expression, NotUnderstood
+from coursebuild.features.arithmetic.tex import CONSTANTS
 
 _RELATION = re.compile(r"[=<>≈≤≥≠]|\\(?:approx|sim|le|ge|ne|ll|gg)")
 _COMMA = re.compile(r"([0-9]+)\{,\}([0-9]+)")
@@ -48,7 +50,6 @@ _DECIMAL_COMMA = re.compile(r"(?<![0-9.])0\{,\}[0-9]|[0-9]\{,\}(?:[0-9]{1,2}|[0-
 """A comma that parts no thousands."""
 _ARABIC = {zero + n: str(n) for zero in (0x660, 0x6F0) for n in range(10)} | {0x66B: "."}
 """Digits and the decimal sign, as they are written in Arabic and Persian."""
-_ORDER = {"<": operator.lt, ">": operator.gt, "≤": operator.le, "≥": operator.ge, "≠": operator.ne}
 
 
 def check_arithmetic(
@@ -100,13 +101,17 @@ def _check_chain(
     for i, relation in enumerate(statement.relations):
         left, right = statement.sides[i : i + 2]
         try:
-            if left.is_numeric and right.is_numeric:
+            if _is_of_numbers(left, symbols) and _is_of_numbers(right, symbols):
                 if has_common_unit is None:
                     has_common_unit = _has_common_unit(statement.sides)
                 terms = left.get_expression(), right.get_expression()
                 terms = (_strip_unit(terms[0]), _strip_unit(terms[1])) if has_common_unit else terms
                 mistake = _find_mistake(*terms, relation)
-            elif symbols and relation != "?":
+                letter = next((term.text for term in terms if _is_constant(term)), "")
+                if mistake is not None and letter:
+                    reason = "it says what the letter stands for"
+                    mistake = FormulaComparison("unread", left.start, right.end, reason, letter)
+            elif symbols and relation not in ("?", "≡"):
                 follows = unit if right is statement.sides[-1] else ""
                 mistake = SymbolComparison(statement, i, symbols, follows).find_mistake()
             else:
@@ -116,6 +121,18 @@ def _check_chain(
         except NotUnderstood as error:
             mistake = FormulaComparison(error.kind, error.start, error.end, error.reason)
         yield mistake or FormulaComparison("holds", left.start, right.end)
+
+
+def _is_constant(expression: Expression) -> bool:
+    r"""Whether it is a letter alone: `\pi = 0.5` is no mistake, but says what the letter is."""
+    return expression.kind == "symbol" and expression.text in CONSTANTS
+
+
+def _is_of_numbers(side: FormulaSide, symbols: Mapping[str, SymbolQuantity]) -> bool:
+    """Whether a side has numbers and no symbols; a constant is one if the lesson says so."""
+    if not side.is_numeric or isinstance(side.expression, NotUnderstood):
+        return side.is_numeric
+    return not (side.expression.names() & symbols.keys())
 
 
 def _has_common_unit(sides: tuple[FormulaSide, ...]) -> bool:
@@ -136,44 +153,53 @@ def _strip_unit(expression: Expression) -> Expression:
 
 
 def _find_mistake(left: Expression, right: Expression, relation: str) -> FormulaComparison | None:
-    """Return a comparison that is wrong if a relation does not hold; `None` if it does."""
-    if relation == "?":
+    """Return a comparison that is wrong if a relation does not hold; `None` if it does.
+
+    Raises:
+        NotUnderstood: this is not certain.
+    """
+    if relation in ("?", "≡"):
         raise right.not_understood("the relation says too little")
-    values = evaluate(left), evaluate(right)
-    if values[0].dimension != values[1].dimension:
-        message = " is held against ".join(describe_dimension(value.dimension) for value in values)
-        return FormulaComparison("wrong", right.start, right.end, message)
-    if relation in _ORDER:
-        if _ORDER[relation](values[0].value, values[1].value):
-            return None
-        numbers = [format_number(value.value) for value in values]
-        message = f"{numbers[0]} {relation} {numbers[1]} does not hold"
+    quantities = evaluate(left), evaluate(right)
+    values = [quantity.value for quantity in quantities]
+    if quantities[0].dimension != quantities[1].dimension:
+        message = " is held against ".join(describe_dimension(q.dimension) for q in quantities)
         return FormulaComparison("wrong", right.start, right.end, message)
     numerals = [(i, n) for i, e in enumerate((left, right)) if (n := read_numeral(e))]
-    if not numerals:
+    if relation in ORDERS or not numerals:
         if relation == "≈":
             raise right.not_understood("neither side is a number whose digits could be compared")
-        if is_close(values[0].value, values[1].value):
+        sign = (values[0] - values[1]).sign()
+        if sign is None:
+            raise right.not_understood(UNDECIDED)
+        if ORDERS[relation](sign, 0) if relation in ORDERS else sign == 0:
             return None
-        numbers = [format_number(value.value) for value in values]
+        numbers = [format_number(value) for value in values]
         message = f"{numbers[0]} and {numbers[1]} are not the same"
+        if relation in ORDERS:
+            message = f"{numbers[0]} {relation} {numbers[1]} does not hold"
         return FormulaComparison("wrong", right.start, right.end, message)
-    index, numeral = max(numerals, key=lambda item: (item[1].step, item[0]))  # the coarser one
-    side, value = (left, right)[index], values[1 - index].value
-    if agrees(numeral, value, relation):
+    # the coarser one is held against the other
+    index, numeral = max(numerals, key=lambda item: (float(item[1].step), item[0]))
+    side, value = (left, right)[index], values[1 - index]
+    if _decide(agrees(numeral, value, relation), right):
         return None
     digits = max(numeral.digits + 2, 4)
     result = format_number(value / numeral.unit_size, digits)
     message = f"the result is {result}, not this"
     is_rounded = numeral.is_whole and relation == "=" and agrees(numeral, value, "≈")
     help = "write `\\approx` where a whole number is rounded" if is_rounded else ""
-    return FormulaComparison("wrong", side.start, side.end, message, help, result)
+    return FormulaComparison("wrong", side.start, side.end, message, help=help, result=result)
+
+
+def _decide(verdict: bool | None, place: Expression) -> bool:
+    if verdict is None:
+        raise place.not_understood(UNDECIDED)
+    return verdict
 
 
 _LARGEST_COEFFICIENT = 12
 """A larger number may be a quantity whose unit is left out."""
-_SAMPLES = replace(EXACT, calculus=lambda function, *places: function(places[0]))
-"""Has the units of derivatives and integrals right, though not their values."""
 
 
 class SymbolQuantity(Struct, frozen=True):
@@ -183,10 +209,10 @@ class SymbolQuantity(Struct, frozen=True):
     unit_text: str
     unit: Unit | None
     """`None` if the text does not say it."""
-    value: Any = None
+    value: Real | None = None
     """In base units; `None` if it has none."""
-    step: Any = 0
-    """One unit of the last place of its value; 0 if that is exact, as a whole number is."""
+    step: Real | None = None
+    """One unit of the last place of its value; `None` if that is exact, as a whole number is."""
     text: str = ""
     """Its value as it is written."""
 
@@ -220,7 +246,7 @@ class SymbolComparison:
             self.expressions = [side.get_expression() for side in self.sides]
             self._find_symbols()
             try:
-                quantities = self._evaluate({})
+                quantities = self._evaluate()
             except WrongDimensions:
                 self._pass_hidden_unit()
                 raise
@@ -235,7 +261,7 @@ class SymbolComparison:
             base = dimensions[1 - bare]
             is_foreign = self.unit is not None and self.unit.dimension != base
             dimensions[bare] = self.unit.dimension if self.unit and is_foreign else base
-        if dimensions[0] != dimensions[1] and 0 not in (q.value for q in quantities):
+        if dimensions[0] != dimensions[1] and not has_zero(*quantities):
             if bare is None:
                 self._pass_hidden_unit()
             message = " is held against ".join(map(describe_dimension, dimensions))
@@ -276,20 +302,23 @@ class SymbolComparison:
         if any(part.text not in self.known for part in missing) or (missing and self.is_claim):
             raise missing[0].not_understood(f"`{missing[0].text}` has no value here")
 
-    def _evaluate(self, shifts: Mapping[str, Any]) -> list[PhysicalQuantity]:
-        """Return the quantities of both sides; without values, of any for which there are some."""
+    def _evaluate(self, is_rounded: bool = False) -> list[PhysicalQuantity]:
+        """Return the quantities of both sides; without values, of any for which there are some.
+
+        `is_rounded`: of all values that are rounded to those of the symbols.
+        """
         for attempt in range(1 if self.has_values else 4):
-            quantities = {
-                name: PhysicalQuantity(
-                    symbol.value + shifts.get(name, 0)
-                    if self.has_values
-                    else 0.5 + (0.618 * i + 0.37 * attempt) % 1.5,
-                    symbol.unit.dimension if symbol.unit is not None else (),
-                )
-                for i, (name, symbol) in enumerate(self.known.items(), 1)
-            }
+            quantities = {}
+            for number, (name, symbol) in enumerate(self.known.items(), 1):
+                value = Real.of(Fraction(500 + (618 * number + 370 * attempt) % 1500, 1000))
+                if self.has_values and symbol.value is not None:
+                    value = symbol.value
+                    if is_rounded and symbol.step is not None:
+                        value = value.widen(symbol.step)
+                dimension = symbol.unit.dimension if symbol.unit is not None else ()
+                quantities[name] = PhysicalQuantity(value, dimension)
             try:
-                return [evaluate(e, quantities, _SAMPLES) for e in self.expressions]
+                return [evaluate(e, quantities, has_calculus=False) for e in self.expressions]
             except WrongDimensions:
                 raise
             except NotUnderstood:
@@ -305,13 +334,13 @@ class SymbolComparison:
         )
 
     def _compare_values(
-        self, values: Sequence[Any], bare: int | None, dimensions: Sequence[Dimension]
+        self, values: Sequence[Real], bare: int | None, dimensions: Sequence[Dimension]
     ) -> FormulaComparison | None:
-        sizes = [Fraction(1)]
+        sizes = [ONE]
         if bare is not None:
             units = [self.unit] if self.unit is not None else [*self._chain_units()]
-            sizes = [u.size for u in units if u.dimension == dimensions[1 - bare]]
-            sizes += [] if self.unit is not None else [Fraction(1)]
+            sizes = [measure(u) for u in units if u.dimension == dimensions[1 - bare]]
+            sizes += [] if self.unit is not None else [ONE]
         numerals = {i: n for i in (0, 1) if (n := self._numeral(i)) is not None}
         if not numerals and self.relation == "≈":
             raise NotJudged
@@ -319,19 +348,16 @@ class SymbolComparison:
         for size in sizes:
             scaled = [v * size if i == bare else v for i, v in enumerate(values)]
             if not numerals:
-                if self._is_within_rounding(scaled):
+                if self._is_within_rounding(bare, size):
                     return None
                 numbers = " and ".join(format_number(value) for value in scaled)
                 mistakes.append(self._mistake(1, f"{numbers} are not the same"))
                 continue
-            units_of = {i: size if i == bare else Fraction(1) for i in numerals}
-            index = max(numerals, key=lambda i: (numerals[i].step * units_of[i], i))
-            numeral, unit_size = numerals[index], units_of[index]
-            numeral = replace(
-                numeral, value=numeral.value * unit_size, step=numeral.step * unit_size
-            )
+            sized = {i: n.scale(size) if i == bare else n for i, n in numerals.items()}
+            index = max(sized, key=lambda i: (float(sized[i].step), i))
+            numeral, unit_size = sized[index], size if index == bare else ONE
             value = scaled[1 - index]
-            if agrees(numeral, value, self.relation):
+            if _decide(agrees(numeral, value, self.relation), self.expressions[1]):
                 return None
             digits = max(numeral.digits + 2, 4)
             result = format_number(value / (numeral.unit_size * unit_size), digits)
@@ -348,7 +374,7 @@ class SymbolComparison:
             help = "`{given}` after the formula gives the symbol another value in this section"
         message += f" where {conditions}" if conditions else ""
         message += ", not this" if result else ""
-        return FormulaComparison("wrong", side.start, side.end, message, help, result)
+        return FormulaComparison("wrong", side.start, side.end, message, help=help, result=result)
 
     def _chain_units(self) -> Iterator[Unit]:
         """Yield the units that the chain names."""
@@ -366,21 +392,19 @@ class SymbolComparison:
         if self.sides[index].is_numeric:
             return read_numeral(expression)
         symbol = self.known.get(expression.text) if expression.kind == "symbol" else None
-        if symbol is None or not symbol.step:
+        if symbol is None or symbol.value is None or symbol.step is None:
             return None
-        size = symbol.unit.size if symbol.unit is not None else Fraction(1)
+        size = measure(symbol.unit) if symbol.unit is not None else ONE
         return Numeral(symbol.value, symbol.step, False, 6, size)
 
-    def _is_within_rounding(self, values: Sequence[Any]) -> bool:
-        """Whether two sides differ by no more than half a unit of the last place of each value."""
-        if is_close(*values):
-            return True
-        slack = 0.0
-        for name, symbol in self.known.items():
-            shifted = [quantity.value for quantity in self._evaluate({name: symbol.step / 2})]
-            first, second = (float(now - then) for now, then in zip(shifted, values, strict=True))
-            slack += abs(first - second)
-        return bool(abs(values[0] - values[1]) <= slack * (1 + 1e-9))
+    def _is_within_rounding(self, bare: int | None, size: Real) -> bool:
+        """Whether two sides may agree where each value is rounded to half a unit of its place."""
+        sides = [quantity.value for quantity in self._evaluate(is_rounded=True)]
+        left, right = (v * size if i == bare else v for i, v in enumerate(sides))
+        sign = (left - right).sign()
+        if sign is None and all(symbol.step is None for symbol in self.known.values()):
+            raise self.expressions[1].not_understood(UNDECIDED)
+        return not sign
 
 
 def _find_symbol(name: str, symbols: Mapping[str, SymbolQuantity]) -> SymbolQuantity | None:

@@ -13,15 +13,8 @@ from functools import cached_property, lru_cache
 
 from msgspec import Struct
 
-from coursebuild.features.arithmetic.tex import (
-    CONSTANTS,
-    GREEK,
-    SPACE,
-    TOKEN,
-    Expression,
-    NotUnderstood,
-    read_expression,
-)
+from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
+from coursebuild.features.arithmetic.tex import CONSTANTS, GREEK, SPACE, TOKEN, read_expression
 
 _MAX_LENGTH = 5_000
 _DIGITS = re.compile("[0-9],[0-9]")
@@ -42,7 +35,8 @@ _RELATIONS = {
     **dict.fromkeys((r"\le", r"\leq", r"\leqslant", "≤"), "≤"),
     **dict.fromkeys((r"\ge", r"\geq", r"\geqslant", "≥"), "≥"),
     **dict.fromkeys((r"\ne", r"\neq", "≠"), "≠"),
-    **dict.fromkeys((r"\equiv", r"\coloneqq"), "="),
+    r"\coloneqq": "=",
+    **dict.fromkeys((r"\equiv", "≡"), "≡"),
     **{rf"\{name}": "?" for name in ("sim", "propto", "ll", "gg", "in", "lesssim", "gtrsim")},
 }
 _CUTS = frozenset(
@@ -96,7 +90,10 @@ class FormulaSide(Struct, frozen=True, dict=True):
 
 
 class Statement(Struct, frozen=True):
-    """Sides with the relations between them: `=`, `≈`, `<` …, or `?` for any other."""
+    """Sides with the relations between them: `=`, `≈`, `<` …, or `?` for any other.
+
+    `≡` may be of remainders, and is an equation only where an identity is asked for.
+    """
 
     sides: tuple[FormulaSide, ...]
     relations: tuple[str, ...]

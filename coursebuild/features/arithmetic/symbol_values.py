@@ -33,10 +33,12 @@ from coursebuild.features.arithmetic.evaluate import (
     WrongDimensions,
     describe_dimension,
     evaluate,
+    measure,
     read_numeral,
 )
+from coursebuild.features.arithmetic.expressions import NotUnderstood
+from coursebuild.features.arithmetic.real import ONE, Real
 from coursebuild.features.arithmetic.statements import read_statements
-from coursebuild.features.arithmetic.tex import NotUnderstood
 
 _Formula = model.Math | model.MathBlock
 _Level = tuple[int, ...]
@@ -88,25 +90,45 @@ def read_symbols(document: model.Document) -> DocumentQuantities:
 
 
 def check_formulas(document: model.Document) -> Mapping[int, tuple[FormulaComparison, ...]]:
-    """Compare what each formula states; by the offset of its TeX."""
+    """Compare what each formula states; by the offset of its TeX.
+
+    What has a source is taken from there, and an identity is compared elsewhere.
+    """
 
     def compare() -> dict[int, tuple[FormulaComparison, ...]]:
-        symbols = read_symbols(document)
-        definitions = {value.span for values in symbols.values.values() for value in values}
-        definitions |= {diagnostic.span for diagnostic in symbols.diagnostics}
-        levels = {place.level: symbols.at(place.level) for place in symbols.places}
-        comparisons: dict[int, tuple[FormulaComparison, ...]] = {}
-        for place in symbols.places:
-            formula = place.formula
-            if formula.span in definitions:
-                continue
-            is_identity = formula.label is not None and formula.label.check is not None
-            quantities = () if is_identity else levels[place.level]
-            tex = formula.tex
-            comparisons[tex.span().start] = check_arithmetic(tex.text, quantities, place.unit)
+        comparisons = _compare_all(symbols, ())
+        letters = {c.letter for group in comparisons.values() for c in group} - {""}
+        if letters:  # a π that is defined in the document is none of the number's
+            unknown = tuple(SymbolQuantity(name, "", None) for name in sorted(letters))
+            comparisons = _compare_all(symbols, unknown)
         return comparisons
 
+    symbols = read_symbols(document)
     return model.computed_once(document, "formula_comparisons", compare)
+
+
+def _compare_all(
+    symbols: DocumentQuantities, letters: tuple[SymbolQuantity, ...]
+) -> dict[int, tuple[FormulaComparison, ...]]:
+    definitions = {value.span for values in symbols.values.values() for value in values}
+    definitions |= {diagnostic.span for diagnostic in symbols.diagnostics}
+    levels = {place.level: symbols.at(place.level) for place in symbols.places}
+    comparisons: dict[int, tuple[FormulaComparison, ...]] = {}
+    for place in symbols.places:
+        formula = place.formula
+        is_identity = formula.label is not None and formula.label.domain is not None
+        if formula.span in definitions or is_identity or _source(formula) is not None:
+            continue
+        tex, quantities = formula.tex, (*letters, *levels[place.level])
+        comparisons[tex.span().start] = check_arithmetic(tex.text, quantities, place.unit)
+    return comparisons
+
+
+def _source(formula: _Formula) -> str | None:
+    """The source of a formula's numbers."""
+    if formula.label is not None:
+        return formula.label.source
+    return formula.source if isinstance(formula, model.Math) else None
 
 
 def _read_symbols(document: model.Document) -> DocumentQuantities:
@@ -117,10 +139,7 @@ def _read_symbols(document: model.Document) -> DocumentQuantities:
     for place in sorted(places, key=lambda place: place.formula.meaning is None):
         formula, span = place.formula, place.formula.span
         number = formula.value if isinstance(formula, model.Math) else None
-        source = formula.source if isinstance(formula, model.Math) else None
-        if formula.label is not None:
-            source = formula.label.source
-        if formula.meaning is None and number is None and source is None:
+        if formula.meaning is None and number is None and _source(formula) is None:
             continue
         try:
             quantity = _read_quantity(place, declarations, values)
@@ -178,11 +197,12 @@ def _read_quantity(
         unit_text = declarations[name].unit_text
     unit = find_unit(unit_text) if unit_text else None
     if number is not None:
-        size = unit.size if unit is not None else Fraction(1)
+        size = measure(unit) if unit is not None else ONE
         mantissa, _, exponent = number.text.replace("−", "-").lower().partition("e")
         decimals = len(mantissa.partition(".")[2])
-        step = Fraction(10) ** (int(exponent or 0) - decimals) * size if decimals else 0
-        value = Fraction(f"{mantissa}e{exponent or 0}") * size
+        last_place = Fraction(10) ** (int(exponent or 0) - decimals)
+        step = Real.of(last_place) * size if decimals else None
+        value = Real.of(Fraction(f"{mantissa}e{exponent or 0}")) * size
         text = f"{number.text} {unit_text}".rstrip()
         return SymbolQuantity(name, unit_text, unit or Unit(Fraction(1)), value, step, text)
     if len(sides) == 1:
@@ -200,12 +220,12 @@ def _read_quantity(
         dimensions = " and not ".join(map(describe_dimension, (unit.dimension, scale.dimension)))
         raise WrongDimensions(f"it is {dimensions}", sides[1].start, sides[1].end)
     unit = (find_unit(unit_text or unit_name) if unit_text or unit_name else None) or scale
-    size, factor = Fraction(1), Fraction(1) if units else scale.size
-    if unit_name and (own_unit := find_unit(unit_name)) is not None:
-        size = own_unit.size
+    factor = ONE if units else measure(scale)
+    own_unit = find_unit(unit_name) if unit_name else None
+    size = measure(own_unit) if own_unit is not None else ONE
     value = quantity.value * factor
-    step = numeral.step * factor if numeral is not None and not numeral.is_whole else 0
-    text = f"{float(value / size):.10g} {unit_name}".rstrip()
+    step = numeral.step * factor if numeral is not None and not numeral.is_whole else None
+    text = f"{value / size:.10g} {unit_name}".rstrip()
     return SymbolQuantity(name, unit_text or unit_name, unit, value, step, text)
 
 

@@ -1,63 +1,24 @@
 r"""Parses the part of mathematics in TeX whose meaning is certain.
 
-Entry point: `read_expression(tex, start, end)`, an `Expression`, by recursive descent. Numbers,
-symbols and groups side by side are a product; what can be read in two ways (`a/bc`, `f(x)`,
-`2\tfrac12`) is not understood. A number is `12`, `1\,000`, `1{,}000` or `0.5`; `\mathrm{kg}` after
-it is its unit.
+Entry point: `read_expression(tex, start, end)`, an `Expression`, by recursive descent.
+
+1. Numbers, symbols and groups side by side are a product. A number is `12`, `1\,000`, `1{,}000` or
+   `0.5`; `\mathrm{kg}` after it is its unit.
+2. What can be read in two ways is not understood: `a/bc`, `1/2x`, `f(x)`, `2\tfrac12`, `\sin x^2`,
+   `\sin 2\pi/3`, `\sin x\cdot y`.
+3. Round or square brackets right after a function hold all that it is of: `\cos(x)^2` is the square
+   of the cosine. Without brackets it is of the factors that follow, up to the next function.
+4. Digits with a zero before them (`0010`) may be of another base, and have no value here.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from typing import Literal
 
-from msgspec import Struct
+from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 
 CONSTANTS = frozenset((r"\pi", r"\mathrm{e}"))
 """Symbols that stand for fixed numbers."""
-
-
-class NotUnderstood(Exception):  # noqa: N818  # it is no mistake
-    """A part of a formula that cannot be computed, with the reason and its range in the TeX."""
-
-    kind: Literal["wrong", "unread"] = "unread"
-
-    def __init__(self, reason: str, start: int, end: int) -> None:
-        super().__init__(reason)
-        self.reason, self.start, self.end = reason, start, end
-
-
-class Expression(Struct, frozen=True):
-    """An operation on expressions, or a number, symbol or unit.
-
-    `kind` is `number`, `symbol`, `unit`, one of `+ - * / ^`, `abs`, `derivative` (parts: function,
-    variable), `integral` (parts: function, variable, and the limits if there are any), `sum` or
-    `prod` (parts: term, index, first, last), `index`, `factorial`, `binom`, or the name of a
-    function, as `sin`.
-    """
-
-    kind: str
-    start: int
-    end: int
-    parts: tuple[Expression, ...] = ()
-    text: str = ""
-    """The digits of a number; the name of a symbol or a unit."""
-
-    def walk(self) -> Iterator[Expression]:
-        """Yield this expression and all expressions in it."""
-        yield self
-        for part in self.parts:
-            yield from part.walk()
-
-    def has(self, *kinds: str) -> bool:
-        """Whether this expression is or contains one of these kinds."""
-        return any(expression.kind in kinds for expression in self.walk())
-
-    def not_understood(self, reason: str) -> NotUnderstood:
-        """Return the exception that says that this part cannot be computed."""
-        return NotUnderstood(reason, self.start, self.end)
-
 
 _MAX_FACTORS = 100
 """The limit for one expression, which also limits how deep it nests."""
@@ -81,8 +42,14 @@ GREEK = frozenset(
 )
 _ACCENTS = frozenset("dot ddot hat bar tilde".split())
 _FRACTIONS = frozenset((r"\frac", r"\tfrac", r"\dfrac"))
+_BRACKET = re.compile(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
+"""What holds all that a function is of: brackets, perhaps in braces, as other programs write."""
 _BRACKETS = {"(": ")", "[": "]", "{": "}", "|": "|", r"\lvert": r"\rvert"}
-_NO_FACTOR = frozenset(")]}|+-−=<>,;:.!'_^/*") | {r"\rvert", r"\cdot", r"\times", r"\div", "⋅", "×"}
+_QUOTIENT_SIGNS = ("/", r"\div")
+_PRODUCT_SIGNS = (r"\cdot", r"\times", "*", "⋅", "×", *_QUOTIENT_SIGNS)
+_NO_FACTOR = frozenset(")]}|+-−=<>,;:.!'_^") | {r"\rvert", *_PRODUCT_SIGNS}
+SIDE_BY_SIDE = "side by side"
+"""The text of a product in what a function without brackets is of."""
 _NUMBER_ONE, _NUMBER_TWO = (Expression("number", 0, 0, text=digit) for digit in "12")
 _REASONS = {
     ",": "a comma between digits may part two numbers",
@@ -94,6 +61,7 @@ _REASONS = {
     r"\lVert": "it is a norm",
     r"\begin": "it is an array",
     r"\log": "the base of `\\log` is not said",
+    r"\bmod": "it is a remainder",
     **dict.fromkeys(r"\dots \ldots \cdots \dotsc \dotsb".split(), "something is left out"),
 }
 
@@ -199,7 +167,7 @@ class _Reader:
         product = self.power()
         is_quotient = False
         while True:
-            sign = self.take(r"\cdot", r"\times", "*", "/", r"\div", "⋅", "×")
+            sign = self.take(*_PRODUCT_SIGNS)
             if not sign and not self.begins_factor():
                 return product
             if is_quotient:
@@ -221,7 +189,7 @@ class _Reader:
                     content = factor.parts[0] if factor.kind in ("^", "factorial") else factor
                     if content.kind in ("symbol", "number", "/", "*"):
                         raise content.not_understood("it may be a product or a function of this")
-            is_quotient = sign in ("/", r"\div")
+            is_quotient = sign in _QUOTIENT_SIGNS
             unit = self.unit() if is_quotient else None
             if unit is not None and product.has("unit"):  # `10 m/2 s`, unlike `1/2 m`
                 factor, unit = Expression("*", start, self.at, (factor, unit)), None
@@ -257,16 +225,21 @@ class _Reader:
         text = re.sub(r"\^\{(-?\d+)\}", r"^\1", text).strip("*")
         return Expression("unit", start, self.at, text=text + exponent)
 
-    def power(self) -> Expression:
-        """Parse a base with its factorial and its exponents."""
+    def power(self, in_function: bool = False) -> Expression:
+        """Parse a base with its factorial and its exponent.
+
+        `in_function`: as a factor of what a function without brackets is of.
+        """
         power = self.base()
         if self.take("!"):
             power = Expression("factorial", power.start, self.at, (power,))
-        while self.take("^"):
+        if self.take("^"):
             if self.match(_DEGREES):
                 self.raw()
                 return self.degrees(power)
-            if self.peek() in ("*", "'", r"\prime", r"\top") or power.kind == "^":
+            if in_function:
+                raise self.not_understood("the power may be of the function, or of what it is of")
+            if self.peek() in ("*", "'", r"\prime", r"\top"):
                 raise self.not_understood()
             exponent = self.group()
             if exponent.kind == "symbol" and exponent.text == "T":
@@ -274,7 +247,7 @@ class _Reader:
             power = Expression("^", power.start, self.at, (power, exponent))
         if self.take("°"):
             return self.degrees(power)
-        if self.peek() in ("!", "'", "_"):
+        if self.peek() in ("!", "'", "_", "^"):
             raise self.not_understood()
         return power
 
@@ -293,6 +266,8 @@ class _Reader:
         if number := self.match(_NUMBER):
             self.at = number.end()
             digits = re.sub(r"[^0-9.]", "", number[0])
+            if re.match("0[0-9]", digits):
+                raise NotUnderstood("a number with leading zeros may be binary", start, self.at)
             return Expression("number", start, self.at, text=digits)
         if sign in _BRACKETS:
             self.at += len(sign)
@@ -427,15 +402,35 @@ class _Reader:
         exponent = self.group() if self.take("^") else None
         if exponent is not None and exponent.kind != "number":
             raise exponent.not_understood("an inverse or a power can be meant")
-        is_bracket = self.peek() in _BRACKETS
-        argument = self.power()
-        while not is_bracket and self.begins_factor() and self.peek()[1:] not in _FUNCTIONS:
-            if self.peek() in _BRACKETS:
-                raise self.not_understood("it may be a factor of the function, or of what it is of")
-            factor = self.power()
-            argument = Expression("*", argument.start, self.at, (argument, factor))
+        argument = self.base() if self.match(_BRACKET) else self.argument()
         value = Expression(name, start, self.at, (argument,))
-        return Expression("^", start, self.at, (value, exponent)) if exponent else value
+        end = self.at
+        if self.peek() in ("°", "!") or (self.take("^") and (exponent or self.match(_DEGREES))):
+            raise self.not_understood("it may be of the function, or of what it is of")
+        self.at = end
+        if exponent is None:
+            return value
+        return Expression("^", start, self.at, (value, exponent))
+
+    def argument(self) -> Expression:
+        """Parse the factors that a function without brackets is of."""
+        argument = self.power(in_function=True)
+        while True:
+            end = self.at
+            sign = self.take(*_PRODUCT_SIGNS)
+            is_function = self.peek()[1:] in _FUNCTIONS
+            is_spaced = re.search(r"\\[,;: ]", self.tex[end : self.at]) is not None
+            if not (sign or self.begins_factor()) or (is_function and sign not in _QUOTIENT_SIGNS):
+                self.at = end
+                return argument
+            is_angle = argument.kind == "*" and argument.parts[1].text == "deg"
+            if is_angle and sign and sign not in _QUOTIENT_SIGNS:
+                self.at = end
+                return argument
+            if sign or is_spaced or self.peek() in _BRACKETS:
+                raise self.not_understood("it may be a factor of the function, or of what it is of")
+            factor = self.power(in_function=True)
+            argument = Expression("*", argument.start, self.at, (argument, factor), SIDE_BY_SIDE)
 
 
 def _is_mixed(left: Expression, right: Expression) -> bool:

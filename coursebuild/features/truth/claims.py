@@ -35,9 +35,9 @@ from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import find_unit
 from coursebuild.features.arithmetic.evaluate import FormulaComparison, read_numeral
+from coursebuild.features.arithmetic.expressions import Expression
 from coursebuild.features.arithmetic.statements import FormulaSide, read_statements
 from coursebuild.features.arithmetic.symbol_values import check_formulas
-from coursebuild.features.arithmetic.tex import Expression
 
 _PATH = re.compile(r"[\w.-]+(?:/[\w.-]+)+\.[a-z]+|(?:content|examples|lib|models|runs)/.*")
 """A source that is a file, also where its name is misspelt."""

@@ -147,7 +147,7 @@ def test_a_decimal_comma_is_named() -> None:
     mistake = find_mistake("`6,64`{out}")
     assert mistake is not None
     assert (mistake.message.partition(",")[2], mistake.help) == (
-        "64` is two numbers, as outputs have a decimal point",
+        "64` has a comma where outputs have a decimal point",
         "write `6.64`",
     )
     mistake = find_mistake("`0.0138, 0.0169`{out}")

@@ -5,12 +5,14 @@ from __future__ import annotations
 from decimal import Decimal
 from fractions import Fraction
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.text.units import find_unit
 from coursebuild.features.arithmetic.chains import SymbolQuantity, check_arithmetic
-from coursebuild.features.arithmetic.evaluate import check_identity
+from coursebuild.features.arithmetic.evaluate import measure
+from coursebuild.features.arithmetic.identities import check_identity
+from coursebuild.features.arithmetic.real import Real
 
 HOLDS = r"""
 I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168\ \mathrm{kg\,m^2}.
@@ -104,6 +106,25 @@ def test_any_text_can_be_checked(tex: str) -> None:
         assert 0 <= comparison.start <= comparison.end <= len(tex)
 
 
+@settings(max_examples=60)
+@given(st.lists(st.sampled_from((*TOKENS, "x", "x", "(x)")), max_size=20).map(" ".join))
+def test_any_text_can_be_tried_as_an_identity(tex: str) -> None:
+    for text in (tex, rf"\int_0^x {tex}\,\mathrm dx = \frac{{\mathrm d}}{{\mathrm dx}} {tex}"):
+        for comparison in check_identity(text, {"x": (), "m": ()}):
+            assert 0 <= comparison.start <= comparison.end <= len(text)
+
+
+def test_functions_without_real_values_in_integrals_are_not_understood() -> None:
+    for tex, reason in (
+        (r"\int_0^x x!\,\mathrm dx = x", "it is of whole numbers only"),
+        (r"\int_0^x \ln(-1 - x^2)\,\mathrm dx = x", "it is not a real number"),
+        (r"\int_{-1}^{1} \frac{1}{x}\,\mathrm dx = x", "300 digits do not tell"),
+        (r"\int_0^\infty x\,\mathrm dx = x", "nothing is computed up to infinity"),
+    ):
+        (comparison,) = check_identity(tex, {"x": ()})
+        assert (comparison.kind, reason in comparison.message) == ("unread", True), tex
+
+
 def test_what_is_too_large_or_no_whole_number_is_not_understood() -> None:
     large, whole = "the numbers become too large", "it is of whole numbers only"
     reasons = {
@@ -131,9 +152,11 @@ IDENTITIES = r"""
 \sin 2x = 2\sin x\,\cos x
 \frac{\mathrm d}{\mathrm dx}\,\frac{x}{1 + x^2} = \frac{1 - x^2}{(1 + x^2)^2}
 \frac{\mathrm d\,x^3}{\mathrm dx} = 3x^2
-\int_0^x \cos x\,\mathrm dx = \sin x = \sqrt{1 - \cos^2 x}
+\int_0^x \cos x\,\mathrm dx = \sin x
 \int x\,\mathrm e^{x}\,\mathrm dx = (x - 1)\,e^x
-\int_0^\infty e^{-x^2}\,\mathrm dx = \tfrac12\sqrt\pi
+\int_{-1}^1 \sqrt{1 - x^2}\,\mathrm dx = \tfrac12\pi
+(x^2)^{1/2} = |x|
+\frac{\mathrm d}{\mathrm dx} \int_0^{x^2} \sin(x)\,\mathrm dx = 2x\,\sin(x^2)
 \sum_{k=0}^{3} \binom{3}{k}\,x^k = (1 + x)^3
 x! = x\,(x - 1)!
 """
@@ -156,8 +179,8 @@ def symbols(*rows: tuple[str, str, str]) -> tuple[SymbolQuantity, ...]:
                 name,
                 unit_text,
                 unit,
-                Fraction(value) * unit.size if value else None,
-                Fraction(10) ** -decimals * unit.size if decimals else 0,
+                Real.of(value) * measure(unit) if value else None,
+                Real.of(Fraction(10) ** -decimals) * measure(unit) if decimals else None,
                 f"{value} {unit_text}",
             )
         )

@@ -1,0 +1,66 @@
+"""What a formula says, as a tree of expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Literal
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+
+class NotUnderstood(Exception):  # noqa: N818  # it is no mistake
+    """A part of a formula that cannot be computed, with the reason and its range in the TeX."""
+
+    kind: Literal["wrong", "unread"] = "unread"
+
+    def __init__(self, reason: str, start: int, end: int) -> None:
+        super().__init__(reason)
+        self.reason, self.start, self.end = reason, start, end
+
+
+class Expression(Struct, frozen=True):
+    """An operation on expressions, or a number, symbol or unit.
+
+    `kind` is `number`, `symbol`, `unit`, one of `+ - * / ^`, `abs`, `derivative` (parts: function,
+    variable), `integral` (parts: function, variable, and the limits if there are any), `sum` or
+    `prod` (parts: term, index, first, last), `index`, `factorial`, `binom`, or the name of a
+    function, as `sin`.
+    """
+
+    kind: str
+    start: int
+    end: int
+    parts: tuple[Expression, ...] = ()
+    text: str = ""
+    """The digits of a number; the name of a symbol or a unit."""
+
+    def walk(self) -> Iterator[Expression]:
+        """Yield this expression and all expressions in it."""
+        yield self
+        for part in self.parts:
+            yield from part.walk()
+
+    def has(self, *kinds: str) -> bool:
+        """Whether this expression is or contains one of these kinds."""
+        return any(expression.kind in kinds for expression in self.walk())
+
+    def names(self) -> set[str]:
+        """The names of the symbols on which its value depends."""
+        if self.kind == "symbol":
+            return {self.text}
+        if self.kind == "integral" and len(self.parts) == 4:
+            integrand, variable, first, last = self.parts
+            return (integrand.names() - {variable.text}) | first.names() | last.names()
+        return set().union(*(part.names() for part in self.parts))
+
+    def substitute(self, symbols: Mapping[str, Expression]) -> Expression:
+        """Return this expression with others for symbols."""
+        if self.kind == "symbol":
+            return symbols.get(self.text, self)
+        parts = tuple(part.substitute(symbols) for part in self.parts)
+        return replace(self, parts=parts)
+
+    def not_understood(self, reason: str) -> NotUnderstood:
+        """Return the exception that says that this part cannot be computed."""
+        return NotUnderstood(reason, self.start, self.end)
