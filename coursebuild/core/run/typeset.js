@@ -4,10 +4,11 @@
  *   typeset(json)   json: [{tex, display}, …]; returns as JSON, for each, its MathML (a string) or
  *                   {message, position}, position being an offset in UTF-16 units into tex, or null
  *
- * 1. Temml makes a tree of MathML nodes, or throws.
- * 2. The tree is mended where Temml's output is not valid HTML, and refused where it cannot be right:
+ * 1. What KaTeX and MathJax take and Temml does not is written as Temml takes it.
+ * 2. Temml makes a tree of MathML nodes, or throws.
+ * 3. The tree is mended where Temml's output is not valid HTML, and refused where it cannot be right:
  *    references that a script in the page would have to fill, colours and lengths that do not exist.
- * 3. The tree becomes text.
+ * 4. The tree becomes text.
  */
 
 'use strict'
@@ -18,6 +19,60 @@ const typeset = (() => {
   const MAX_DEPTH = 150 // nested elements; browsers flatten what is deeper than a few hundred
 
   const OPTIONS = { throwOnError: true, trust: false, strict: false, annotate: true, maxExpand: 1000 }
+
+  // Commands of LaTeX, MathJax and KaTeX that Temml has under another name.
+  const MACROS = {
+    '\\mbox': '\\text{#1}',
+    '\\mathds': '\\mathbb{#1}',
+    '\\mathbbm': '\\mathbb{#1}',
+    '\\R': '\\mathbb{R}',
+    '\\N': '\\mathbb{N}',
+    '\\Z': '\\mathbb{Z}',
+    '\\textdegree': '\\degree',
+  }
+  for (const name in MACROS) temml.__defineMacro(name, MACROS[name])
+
+  // What no macro can replace: the name of an environment, the columns of an array, a font's name as an index.
+  const REWRITES = [
+    [/\\begin\{eqnarray\*?\}/g, () => '\\begin{array}{rcl}'],
+    [/\\end\{eqnarray\*?\}/g, () => '\\end{array}'],
+    [/\\(begin|end)\{flalign(\*?)\}/g, (_, edge, star) => `\\${edge}{align${star}}`],
+    [/\\(?:begin|end)\{(?:math|displaymath)\}|\\(?:require|vspace\*?)\{[^{}]*\}/g, () => ''],
+    [/(\\begin\{array\})(?:\[[tcb]\])?\{((?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*)\}/g, (_, begin, columns) => `${begin}{${plainColumns(columns)}}`],
+    [/([_^])\s*\\(rm|bf|it|sf|tt|cal)\s*(?=\{)/g, (_, mark, font) => `${mark}\\math${font}`],
+    [/\\text(?:tt|rm|sf|bf|it)?\{[^{}$\\]*\}/g, (text) => text.replaceAll('_', '\\_')],
+  ]
+
+  /** The columns of an array without the spaces, widths and commands of LaTeX's `array` package; `*{3}{c}` is `ccc`. */
+  function plainColumns(columns) {
+    return columns
+      .replace(/\*\s*\{?\s*(\d{1,2})\s*\}?\s*(?:\{([^{}]*)\}|([lcr]))/g, (_, count, many, one) => (many ?? one).repeat(Number(count)))
+      .replace(/[@!<>]\s*\{(?:[^{}]|\{[^{}]*\})*\}/g, '')
+      .replace(/[pmb]\s*\{[^{}]*\}/g, 'l')
+  }
+
+  /** A formula as Temml takes it, and where each of its characters stands in what the author wrote. */
+  function rewrite(tex) {
+    let text = tex
+    let places = null // each at its own
+    for (const [pattern, replacement] of REWRITES) {
+      const before = text
+      const shift = []
+      let end = 0
+      text = before.replace(pattern, (match, ...rest) => {
+        const start = rest.findLast((part) => typeof part === 'number')
+        const made = replacement(match, ...rest)
+        for (let i = end; i < start; i++) shift.push(i)
+        for (let i = 0; i < made.length; i++) shift.push(start + Math.min(i, match.length - 1))
+        end = start + match.length
+        return made
+      })
+      if (end === 0) continue
+      for (let i = end; i <= before.length; i++) shift.push(i)
+      places = places === null ? shift : shift.map((at) => places[at])
+    }
+    return { text, places }
+  }
 
   // Temml lets any word pass as a colour. These are the names of CSS Color Module Level 4.
   const COLOURS = new Set(
@@ -90,6 +145,23 @@ const typeset = (() => {
     node.children = [inner]
   }
 
+  /** Temml gives a cell that is not written the state of its typesetter as a style, padding and borders included. */
+  function mendCell(node) {
+    const styles = Object.entries(node.style).filter(([name]) => /^(?:padding|border)/.test(name))
+    node.style = Object.fromEntries(styles)
+  }
+
+  /** Bold digits, for which Temml asks for a font of text, are characters of their own, as bold letters are. */
+  function mendDigits(node) {
+    const { 'font-family': family, 'font-weight': weight, ...others } = node.style
+    if (family === undefined) return
+    node.style = others
+    const text = node.children[0]?.children?.[0]
+    if (weight !== 'bold' || text?.text === undefined) return
+    text.text = text.text.replace(/[0-9]/g, (digit) => String.fromCodePoint(0x1d7ce + Number(digit)))
+    node.style = {}
+  }
+
   // What reaches no further below its line than a descender does.
   const SHALLOW = new Set(['mi', 'mn', 'mo', 'mtext', 'mspace', 'mrow', 'mstyle', 'msup', 'mover'])
   const LARGE = /[∏∐∑∫-∳⨀-⨜]/
@@ -123,7 +195,9 @@ const typeset = (() => {
       if (isForbidden(node.text)) throw new Refusal('it makes a character that a page must not hold')
       return
     }
-    if (node.href !== undefined) throw new Refusal('references to equations cannot be resolved; link to a heading instead')
+    if (node.href !== undefined) throw new Refusal('a formula refers to no other one; write `[](#eq:name)` in the text')
+    if (node.type === 'mtd' && node.style.constructor !== Object) mendCell(node)
+    if (node.type === 'mstyle') mendDigits(node)
     checkAttributes(node)
     if (node.attributes !== undefined) {
       delete node.attributes.id // a label: nothing may refer to it, and it could be the id of a heading
@@ -135,7 +209,10 @@ const typeset = (() => {
     if (node.type === 'semantics' && node.children.slice(0, -1).every(isNothing)) throw new Refusal('it is empty')
   }
 
-  /** Temml's message without the position and the excerpt that follow it; the position, if it is one in `tex`. */
+  /**
+   * Temml's message without the position and the excerpt that follow it; the position, if it is one in `tex`, which is what
+   * Temml got.
+   */
   function explain(error, tex) {
     const start = error.position
     if (start === undefined) return { message: error.message, position: null }
@@ -156,14 +233,19 @@ const typeset = (() => {
     if (tex.length > MAX_SOURCE) return { message: `it is longer than ${MAX_SOURCE} characters`, position: null }
     const forbidden = isPlain(tex) ? -1 : tex.search(FORBIDDEN)
     if (forbidden >= 0) return { message: 'it holds a control character', position: forbidden }
+    const { text, places } = rewrite(tex)
     try {
-      const tree = temml.__renderToMathMLTree(tex, { ...OPTIONS, displayMode: display })
+      const tree = temml.__renderToMathMLTree(text, { ...OPTIONS, displayMode: display })
       mend(tree, 0)
+      tree.children[0].children.at(-1).children[0].text = tex // the annotation is what the author wrote
       const markup = tree.toMarkup()
       if (markup.length > MAX_MARKUP) throw new Refusal('it becomes too long')
       return markup
     } catch (error) {
-      if (error instanceof temml.ParseError) return explain(error, tex)
+      if (error instanceof temml.ParseError) {
+        const { message, position } = explain(error, text)
+        return { message, position: position === null || places === null ? position : places[position] }
+      }
       if (error instanceof Refusal) return { message: error.message, position: null }
       if (error instanceof RangeError && /call stack/.test(error.message)) {
         return { message: 'it is nested too deeply', position: null }

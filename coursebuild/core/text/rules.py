@@ -247,7 +247,7 @@ GROUPS: dict[str, dict[str, str]] = {
 _WARNINGS = frozenset(
     """
     draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
-    symbol-repeated footnote-unused image-alt
+    math-command symbol-repeated footnote-unused image-alt
     recording-caption recording-loose script-unrepeatable script-penetration script-writes
     script-connects
     output-noise report-stale bench-unrecorded lab-penetration lab-far lab-reset package-reduced

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import check_compiled, check_scenarios, mjcf_texts
-from coursebuild.core.checks.lessons import (
-    check_course,
-    check_document,
-    check_formulas,
-    document_formulas,
-)
+from coursebuild.core.checks.formulas import check_formulas, document_formulas
+from coursebuild.core.checks.lessons import check_course, check_document
 from coursebuild.core.checks.links import anchors, link_targets
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import CompileResult, Formula, MathError, ModelFacts
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.pipeline.check import judge
+from coursebuild.pipeline.load import load
+from support.fixture_cases import fixture_text
 from support.made_courses import BOX, document, facts, make_course, messages, rules_and_texts
+from support.rule_cases import Layout
 
 
 def test_one_document_is_checked_as_in_the_whole_course() -> None:
@@ -59,6 +60,17 @@ def test_a_wrong_formula_is_reported_at_each_place() -> None:
         assert rules_and_texts(diagnostics) == [f"math-syntax: {expected}"] * 2
         assert messages(diagnostics) == ["the formula does not parse: no good"] * 2
         assert [d.span.line for d in diagnostics] == [1, 3]
+
+
+@pytest.mark.engine
+def test_right_formulas_of_every_field_are_told_nothing(tmp_path: Path) -> None:
+    text = fixture_text("documents/right_formulas.md")
+    Layout.of(text).write(tmp_path)
+    course_load = load(tmp_path)
+    assert course_load.value is not None
+    diagnostics = judge(course_load.value, course_load.diagnostics).diagnostics
+    assert rules_and_texts(diagnostics) == []
+    assert len(document_formulas(make_course(text).documents[0])) >= 300
 
 
 MODEL = facts(
