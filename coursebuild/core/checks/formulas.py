@@ -8,6 +8,7 @@ formulas of its paragraph.
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import NamedTuple
@@ -49,10 +50,9 @@ _WITH_BRACES = frozenset(
 )
 """Commands whose argument stands in braces."""
 _LETTERS = re.compile(
-    r"(?<![\\A-Za-z])([A-Za-z]{2,})(?=(\s*(?:\\(?:left|[bB]igg?l?)\s*)?[(\[])|(\{)|(?![A-Za-z]))"
+    r"(?<![\\A-Za-z])([A-Za-z]{2,})(?![A-Za-z0-9])(?=(\s*(?:\\(?:left|[bB]igg?l?)\s*)?\()|(\{)|)"
 )
-_NAME = re.compile(r"\\[A-Za-z]+|(?<![A-Za-z\\])[A-Za-z](?![A-Za-z])")
-"""A command, or a letter of its own."""
+_LETTER = re.compile(r"(?<![A-Za-z\\])[A-Za-z](?![A-Za-z])")
 _BRACKET = re.compile(r"\\[{}]|\\.|[()\[\]]", re.DOTALL)
 _NAMED_BRACKET = re.compile(r"\\[lr](?:brack|brace|paren)(?![A-Za-z])")
 """The commands by which an author says that a bracket stands alone."""
@@ -80,7 +80,7 @@ def check_formulas(
     """What is wrong with the formulas of a document, at each place where one stands."""
     diagnostics: list[Diagnostic] = []
     uses = [*_formula_uses(document)]
-    names = {name for _, _, tex in uses for name in _NAME.findall(tex.text)}
+    letters = {letter for _, _, tex in uses for letter in _LETTER.findall(tex.text)}
     in_features = feature_block_ids(document)
     trees: dict[Formula, Element | None] = {}
     for _, group in groupby(uses, key=lambda use: id(use[0])):
@@ -95,7 +95,7 @@ def check_formulas(
             if (tree := trees[formula]) is not None:
                 typeset_ones.append((tex, tree))
                 # In JSON a backslash may need another one, so that nothing is written there.
-                diagnostics += _check_letters(tex, tree, names, id(block) not in in_features)
+                diagnostics += _check_letters(tex, tree, letters, id(block) not in in_features)
         diagnostics += _check_brackets(block, typeset_ones)
     return tuple(diagnostics)
 
@@ -116,10 +116,11 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
 def _parse(mathml: str) -> Element | None:
     """The tree of a formula without its TeX."""
     try:
-        root = ElementTree.fromstring(mathml)
+        (semantics,) = ElementTree.fromstring(mathml)
     except ElementTree.ParseError:  # characters that XML does not have
         return None
-    return root[0][0] if len(root) and len(root[0]) else None
+    semantics.remove(semantics[-1])
+    return semantics
 
 
 # --- letters
@@ -141,18 +142,17 @@ def _letter_runs(element: Element) -> Iterator[str]:
 
 
 def _check_letters(
-    tex: Excerpt, tree: Element, names: set[str], can_write: bool
+    tex: Excerpt, tree: Element, letters: set[str], can_write: bool
 ) -> Iterator[Diagnostic]:
     """Report commands without their backslash: the tree has a product of letters.
 
-    `names` are the commands and letters of the document: `pi` may well be a product where one of
-    its letters stands alone, and its command does not.
+    `letters` are those that stand alone in formulas of the document: of these `pi` is a product.
     """
     words = [*_LETTERS.finditer(tex.text)]
     runs = [run for run in _letter_runs(tree) if len(run) > 1] if words else []
     for word in words:
         name, bracket, brace = word.groups()
-        is_name = name in _GREEK and (len(name) > 2 or f"\\{name}" in names or not names & {*name})
+        is_name = name in _GREEK and not letters >= {*name}
         is_call = name in _FUNCTIONS and (bracket or brace)
         if not (is_name or is_call or (name in _WITH_BRACES and brace)):
             continue
@@ -212,18 +212,23 @@ def _check_brackets(
     ]
     at = 0
     while at < len(open_ones):
-        joint = [*open_ones[at][1]]
-        for end in range(at + 1, len(open_ones)):
-            joint += open_ones[end][1]
-            start, stop = open_ones[at][0].span().end, open_ones[end][0].span().start
-            between = _text_brackets(block.span.source.text[start:stop])
-            if _may_match(joint) and _may_match(between):  # a set such as `$\{1$, $2\}$`
-                at = end
-                break
-        else:
-            tex, brackets = open_ones[at]
-            yield from _unmatched_bracket(block, tex, brackets)
-        at += 1
+        end = _joint_end(open_ones, at)
+        if end is None:
+            yield from _unmatched_bracket(block, *open_ones[at])
+        at = (at if end is None else end) + 1
+
+
+def _joint_end(formulas: Sequence[tuple[Excerpt, list[_Bracket]]], at: int) -> int | None:
+    """The last one of several formulas that hold a set together, if it begins in this one."""
+    joint = [*formulas[at][1]]
+    for end in range(at + 1, len(formulas)):
+        before, after = formulas[end - 1][0].span(), formulas[end][0].span()
+        if not _may_match(_text_brackets(before.source.text[before.end : after.start])):
+            break  # a bracket of the prose may be the other one
+        joint += formulas[end][1]
+        if _may_match(joint):
+            return end
+    return None
 
 
 def _unmatched_bracket(
@@ -264,4 +269,8 @@ def _find_unmatched(brackets: Sequence[_Bracket]) -> int:
 
 
 def _text_brackets(text: str) -> Iterator[_Bracket]:
-    return (_Bracket(sign, _STEPS[sign]) for sign in text if sign in _STEPS)
+    """The brackets of a text, those of other scripts too."""
+    sides = {"Ps": (1,), "Pe": (-1,)}
+    for sign in text:
+        if (steps := _STEPS.get(sign) or sides.get(unicodedata.category(sign))) is not None:
+            yield _Bracket(sign, steps)
