@@ -11,8 +11,8 @@ from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.scripts.lines import MappedText, Side, plain_text, replace_ranges
-from coursebuild.core.scripts.numbers import Number, round_like, scan, scan_prose, within_half_unit
 from coursebuild.core.scripts.tables import RowCell, table_rows
+from coursebuild.core.text.numbers import Number, round_like, scan, scan_prose, within_half_unit
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import units_at
 

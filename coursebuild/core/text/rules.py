@@ -91,7 +91,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "markup-unread": "Markdown, or an attribute in braces, is incomplete, so readers would see "
         "its characters.",
         "markup-foreign": "Markup of another tool would be shown as it is written.",
-        "number-form": "A number has two points, a letter among its digits or a sign too many.",
+        "number-form": "A number that is given cannot be read.",
         "label-attribute": "A label cannot be read, or stands where no label may.",
         "table-cells": "A row of a table has more or fewer cells than its header.",
         "footnote-undefined": "A footnote is used but not defined.",
