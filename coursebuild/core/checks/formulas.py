@@ -156,7 +156,7 @@ def _check_letters(
         is_call = name in _FUNCTIONS and (bracket or brace)
         if not (is_name or is_call or (name in _WITH_BRACES and brace)):
             continue
-        if sum(run.count(name) for run in runs) < sum(name == other[1] for other in words):
+        if sum(run.count(name) for run in runs) < sum(name == match[1] for match in words):
             continue
         message = f"`{name}` would be shown as a product of letters"
         help = f"write `\\{name}`, or `\\mathrm{{{name}}}` for a name"
@@ -241,8 +241,8 @@ def _unmatched_bracket(
     signs = [bracket.sign for bracket in brackets if bracket.sign]
     place, sign = (0, len(tex.text)), brackets[index].sign
     if [place[0][-1] for place in places] == signs:
-        found = places[sum(bool(bracket.sign) for bracket in brackets[:index])]
-        place, sign = found.span(), found[0]
+        match = places[sum(bool(bracket.sign) for bracket in brackets[:index])]
+        place, sign = match.span(), match[0]
         is_edge = not tex.text[: place[0]].strip() or not tex.text[place[1] :].strip()
         inlines = walk_inlines(block_inlines(block))
         prose = "".join(inline.text for inline in inlines if isinstance(inline, Text))

@@ -1,5 +1,5 @@
 /**
- * Typesets formulas with Temml, whose global `temml` is loaded before this script.
+ * Typesets formulas with Temml and its mhchem, whose global `temml` is loaded before this script.
  *
  *   typeset(json)   json: [{tex, display}, …]; returns as JSON, for each, its MathML (a string) or
  *                   {message, position}, position being an offset in UTF-16 units into tex, or null
@@ -250,7 +250,7 @@ const typeset = (() => {
       if (error instanceof RangeError && /call stack/.test(error.message)) {
         return { message: 'it is nested too deeply', position: null }
       }
-      return { message: `it cannot be typeset (${error.message})`, position: null }
+      return { message: `it cannot be typeset (${error.message ?? [error].flat().at(-1)})`, position: null } // mhchem throws lists
     }
   }
 
