@@ -11,7 +11,6 @@ import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -58,7 +57,7 @@ _NAMED_BRACKET = re.compile(r"\\[lr](?:brack|brace|paren)(?![A-Za-z])")
 """The commands by which an author says that a bracket stands alone."""
 _STEPS = {"(": (1,), "{": (1,), ")": (-1,), "}": (-1,), "[": (1, -1), "]": (1, -1)}
 """By how much a bracket may change the number of those that are open."""
-_ANY_STEP = (-1, 0, 1)
+_EITHER = (-1, 0, 1)
 _INDEXED = ("msub", "msubsup", "munder", "munderover")
 
 
@@ -167,36 +166,38 @@ def _check_letters(
 # --- brackets
 
 
-class _Bracket(NamedTuple):
-    sign: str
-    """Empty for the missing one of `\\left.` or `\\right.`."""
-    steps: tuple[int, ...]
-
-
-def _brackets(element: Element) -> Iterator[_Bracket]:
+def _brackets(element: Element) -> Iterator[tuple[int, ...]]:
+    """What each bracket of a formula may be."""
     children = [*element]
     for before, child, after in zip(
         (None, *children), children, (*children[1:], None), strict=False
     ):
         text = child.text or ""
-        steps = _STEPS.get(text)
         if child.tag != "mo":
             # In words, as in `a) first`, a bracket need not have another one.
-            yield from (_Bracket(sign, _ANY_STEP) for sign in text if sign in _STEPS)
+            yield from (_EITHER for sign in text if sign in _STEPS)
             yield from _brackets(child)
-        elif steps is not None:
+        elif text in _STEPS:
             inside = after if text in "([{" else before
             is_operand = inside is not None and "separator" in inside.attrib  # as in `(q, (, z)`
-            yield _Bracket(text, _ANY_STEP if is_operand else steps)
+            yield _EITHER if is_operand else _STEPS[text]
         elif not text and "fence" in child.attrib:
-            yield _Bracket("", _ANY_STEP)
+            yield _EITHER  # as in `\\left.`
 
 
-def _may_match(brackets: Iterable[_Bracket]) -> bool:
+def _text_brackets(text: str) -> Iterator[tuple[int, ...]]:
+    """What each bracket of a text may be, those of other scripts too."""
+    sides = {"Ps": (1,), "Pe": (-1,)}
+    for sign in text:
+        if (steps := _STEPS.get(sign) or sides.get(unicodedata.category(sign))) is not None:
+            yield steps
+
+
+def _may_match(brackets: Iterable[tuple[int, ...]]) -> bool:
     """Whether each bracket may have another one, whatever kind it is of."""
     depths = {0}
-    for bracket in brackets:
-        depths = {depth + step for depth in depths for step in bracket.steps if depth + step >= 0}
+    for steps in brackets:
+        depths = {depth + step for depth in depths for step in steps if depth + step >= 0}
     return 0 in depths
 
 
@@ -214,11 +215,11 @@ def _check_brackets(
     while at < len(open_ones):
         end = _joint_end(open_ones, at)
         if end is None:
-            yield from _unmatched_bracket(block, *open_ones[at])
+            yield from _unmatched_bracket(block, open_ones[at][0])
         at = (at if end is None else end) + 1
 
 
-def _joint_end(formulas: Sequence[tuple[Excerpt, list[_Bracket]]], at: int) -> int | None:
+def _joint_end(formulas: Sequence[tuple[Excerpt, list[tuple[int, ...]]]], at: int) -> int | None:
     """The last one of several formulas that hold a set together, if it begins in this one."""
     joint = [*formulas[at][1]]
     for end in range(at + 1, len(formulas)):
@@ -231,46 +232,29 @@ def _joint_end(formulas: Sequence[tuple[Excerpt, list[_Bracket]]], at: int) -> i
     return None
 
 
-def _unmatched_bracket(
-    block: Block, tex: Excerpt, brackets: Sequence[_Bracket]
-) -> Iterator[Diagnostic]:
+def _unmatched_bracket(block: Block, tex: Excerpt) -> Iterator[Diagnostic]:
     if len(re.findall(r"\w+", tex.text)) <= 1:
         return  # it names the sign, or counts as in `a)`
-    index = _find_unmatched(brackets)
-    places = [place for place in _BRACKET.finditer(tex.text) if place[0][-1] in _STEPS]
-    signs = [bracket.sign for bracket in brackets if bracket.sign]
-    place, sign = (0, len(tex.text)), brackets[index].sign
-    if [place[0][-1] for place in places] == signs:
-        match = places[sum(bool(bracket.sign) for bracket in brackets[:index])]
-        place, sign = match.span(), match[0]
-        is_edge = not tex.text[: place[0]].strip() or not tex.text[place[1] :].strip()
-        inlines = walk_inlines(block_inlines(block))
-        prose = "".join(inline.text for inline in inlines if isinstance(inline, Text))
-        if is_edge and not _may_match(_text_brackets(prose)):
-            return  # it belongs to one of the sentence, as in `(where $x > 0)$`
-    message = f"`{sign}` has no matching bracket"
+    start, end = _find_unmatched(tex.text)
+    is_edge = not tex.text[:start].strip() or not tex.text[end:].strip()
+    inlines = walk_inlines(block_inlines(block))
+    prose = "".join(inline.text for inline in inlines if isinstance(inline, Text))
+    if is_edge and not _may_match(_text_brackets(prose)):
+        return  # it belongs to one of the sentence, as in `(where $x > 0)$`
+    message = f"`{tex.text[start:end]}` has no matching bracket"
     help = "write the missing one, or `\\lbrack`, `\\rbrack` where one stands alone"
-    yield diagnose("math-brackets", tex.span(*place), message, help=help)
+    yield diagnose("math-brackets", tex.span(start, end), message, help=help)
 
 
-def _find_unmatched(brackets: Sequence[_Bracket]) -> int:
-    """The first that closes nothing, or the last that nothing closes."""
-    unclosed: list[int] = []
-    for at, (sign, steps) in enumerate(brackets):
-        if len(steps) > 2:
-            continue
-        if steps == (1,) or sign == "[" or (sign == "]" and not unclosed):
-            unclosed.append(at)
-        elif unclosed:
+def _find_unmatched(tex: str) -> tuple[int, int]:
+    """Where the bracket is that closes nothing, or the last that nothing closes."""
+    unclosed: list[re.Match[str]] = []
+    for bracket in _BRACKET.finditer(tex):
+        sign = bracket[0][-1]
+        if sign in "([{" or (sign == "]" and not unclosed):
+            unclosed.append(bracket)
+        elif sign in _STEPS and not unclosed:
+            return bracket.span()
+        elif sign in _STEPS:
             unclosed.pop()
-        else:
-            return at
-    return unclosed[-1] if unclosed else 0
-
-
-def _text_brackets(text: str) -> Iterator[_Bracket]:
-    """The brackets of a text, those of other scripts too."""
-    sides = {"Ps": (1,), "Pe": (-1,)}
-    for sign in text:
-        if (steps := _STEPS.get(sign) or sides.get(unicodedata.category(sign))) is not None:
-            yield _Bracket(sign, steps)
+    return unclosed[-1].span() if unclosed else (0, len(tex))

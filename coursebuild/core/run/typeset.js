@@ -51,29 +51,6 @@ const typeset = (() => {
       .replace(/[pmb]\s*\{[^{}]*\}/g, 'l')
   }
 
-  /** A formula as Temml takes it, and where each of its characters stands in what the author wrote. */
-  function rewrite(tex) {
-    let text = tex
-    let places = null // each at its own
-    for (const [pattern, replacement] of REWRITES) {
-      const before = text
-      const shift = []
-      let end = 0
-      text = before.replace(pattern, (match, ...rest) => {
-        const start = rest.findLast((part) => typeof part === 'number')
-        const made = replacement(match, ...rest)
-        for (let i = end; i < start; i++) shift.push(i)
-        for (let i = 0; i < made.length; i++) shift.push(start + Math.min(i, match.length - 1))
-        end = start + match.length
-        return made
-      })
-      if (end === 0) continue
-      for (let i = end; i <= before.length; i++) shift.push(i)
-      places = places === null ? shift : shift.map((at) => places[at])
-    }
-    return { text, places }
-  }
-
   // Temml lets any word pass as a colour. These are the names of CSS Color Module Level 4.
   const COLOURS = new Set(
     (
@@ -210,10 +187,10 @@ const typeset = (() => {
   }
 
   /**
-   * Temml's message without the position and the excerpt that follow it; the position, if it is one in `tex`, which is what
-   * Temml got.
+   * Temml's message without the position and the excerpt that follow it; the position in `original`, as what Temml got ends
+   * in the same way behind it.
    */
-  function explain(error, tex) {
+  function explain(error, tex, original) {
     const start = error.position
     if (start === undefined) return { message: error.message, position: null }
     const marks = [` at position ${start + 1}: \n`, ' at end of input: ']
@@ -226,14 +203,15 @@ const typeset = (() => {
     const right = excerpt.slice(left.length).replace(/…$/, '')
     // In a macro that Temml defines, the position is one in that macro's own text.
     const isHere = excerpt.startsWith(left) && plain(tex.slice(start)).startsWith(right)
-    return { message: error.message.slice(0, at), position: isHere ? start : null }
+    const place = start + original.length - tex.length
+    return { message: error.message.slice(0, at), position: isHere && original.endsWith(tex.slice(start)) ? place : null }
   }
 
   function one({ tex, display }) {
     if (tex.length > MAX_SOURCE) return { message: `it is longer than ${MAX_SOURCE} characters`, position: null }
     const forbidden = isPlain(tex) ? -1 : tex.search(FORBIDDEN)
     if (forbidden >= 0) return { message: 'it holds a control character', position: forbidden }
-    const { text, places } = rewrite(tex)
+    const text = REWRITES.reduce((before, [pattern, replacement]) => before.replace(pattern, replacement), tex)
     try {
       const tree = temml.__renderToMathMLTree(text, { ...OPTIONS, displayMode: display })
       mend(tree, 0)
@@ -242,10 +220,7 @@ const typeset = (() => {
       if (markup.length > MAX_MARKUP) throw new Refusal('it becomes too long')
       return markup
     } catch (error) {
-      if (error instanceof temml.ParseError) {
-        const { message, position } = explain(error, text)
-        return { message, position: position === null || places === null ? position : places[position] }
-      }
+      if (error instanceof temml.ParseError) return explain(error, text, tex)
       if (error instanceof Refusal) return { message: error.message, position: null }
       if (error instanceof RangeError && /call stack/.test(error.message)) {
         return { message: 'it is nested too deeply', position: null }
