@@ -107,7 +107,10 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
     help = ""
     if command := re.search(r"unknown command \\([A-Za-z]+)", error.message):
         likely = nearest(command[1], _GREEK | _FUNCTIONS | _WITH_BRACES, cutoff=0.75)
-        help = f"did you mean `\\{likely}`?" if likely is not None else ""
+        at = tex.text.find(command[1])
+        if likely is not None and at >= 0:
+            place = tex.span(at, at + len(command[1]))
+            help = Fix(f"did you mean `\\{likely}`?", likely).at(place)
     message = f"the formula does not parse: {error.message}"
     return diagnose("math-syntax", span, message, help=help)
 

@@ -259,8 +259,8 @@ _NO_FIX = {
     bench-text binding-volatile draft-empty fence-unread field-missing field-repeated
     figure-unshown footnote-repeated footnote-unused heading-empty html-unbalanced image-alt
     io-order io-repeated io-stray lesson-planned-file link-text math-brackets math-unclosed
-    math-unread merge-conflict nesting-deep output-not-updatable prerequisite-cycle quiz-answer
-    quiz-gate recording-body recording-orphan symbol-formula symbol-repeated table-cells
+    math-unread merge-conflict nesting-deep number-form output-not-updatable prerequisite-cycle
+    quiz-answer quiz-gate recording-body recording-orphan symbol-formula symbol-repeated table-cells
     term-place
     """,
     "links may lead to either": """
