@@ -22,7 +22,7 @@ from pathlib import Path
 from markupsafe import Markup
 from msgspec.structs import replace
 
-from coursebuild.core.checks.lessons import document_formulas
+from coursebuild.core.checks.formulas import document_formulas
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course

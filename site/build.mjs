@@ -9,7 +9,7 @@
  *   css/NAME.css         css/site.css with its imports, and css/preview.css, css/scorm.css and css/slides.css, which only the preview,
  *                        packages and slides have
  *   mujoco/mujoco.wasm   the physics engine of js/lab-worker.js and js/lab-trial.js
- *   temml/temml.min.js   a classic script that defines the global `temml`
+ *   temml/temml.min.js   a classic script that defines the global `temml`, with chemistry (`\ce`, `\pu`)
  *   fonts/*.woff2        and fonts.json, which says what each file holds (see `readFaces`)
  *   licences/NAME.txt    the licence of every package of which a part is in OUT
  *
@@ -137,7 +137,11 @@ async function bundleStyles(out) {
 async function copyTemml(out) {
   const target = join(out, 'temml', 'temml.min.js')
   await mkdir(dirname(target), { recursive: true })
-  await copyFile(join(packageFolder('temml'), 'dist', 'temml.min.js'), target)
+  const chemistry = join(packageFolder('temml'), 'contrib', 'mhchem')
+  const [notice] = /\/\*{9}[\s\S]*?\*\/\n/.exec(await readFile(join(chemistry, 'mhchem.js'), 'utf8')) // it has a licence of its own
+  const parts = [join(packageFolder('temml'), 'dist', 'temml.min.js'), join(chemistry, 'mhchem.min.js')]
+  const [temml, mhchem] = await Promise.all(parts.map((path) => readFile(path, 'utf8')))
+  await writeFile(target, `${temml}\n${notice}${mhchem}`)
 }
 
 async function copyEngine(out) {

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.checks.lessons import check_formulas, document_formulas
+from coursebuild.core.checks.formulas import check_formulas, document_formulas
 from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import prepared_folder, template_texts

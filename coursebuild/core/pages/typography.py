@@ -30,6 +30,8 @@ from typing import Literal
 
 from markupsafe import Markup
 
+from coursebuild.core.text.units import UNITS_SHOWN
+
 LONG = 20
 """Characters; a shorter formula is not split."""
 WIDE = 22
@@ -168,29 +170,17 @@ def _glued(html: str) -> str:
 
 # --- numbers and their units
 
-_SI_UNIT = (
-    "(?:[YZEPTGMkhcdm\u00b5\u03bcunpf]|da)?"
-    "(?:bar|cd|eV|Gy|Hz|kat|lm|lx|mol|Pa|rad|sr|Sv|Wb|[ACFgHJKLlmNSsTtVW\u03a9\u2126])"
-)
-_UNIT = (
-    rf"(?:{_SI_UNIT}|min|kgf?|rpm|rev|fps|px|pt|arcmin|arcsec|[kMGT]i?B|B|bit|[hd]|°[CF]?|[%‰′″])"
-    r"(?:[²³⁻¹⁴⁶0-9]|\^-?[0-9])*"
-)
-_SPACES = "[ \u00a0\u202f]"
-_END = r"(?![^\W_])"
-_UNITS = rf"{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}(?:{_SPACES}{_UNIT}(?:[/·⋅*]{_UNIT})*{_END}){{0,3}}"
+_SPACE = "[ \u00a0\u202f]"
 _NUMBER = (
     r"[0-9][0-9.,]*(?<![.,])(?:[eE][+-]?[0-9]+|[ \u00a0\u2009]?[×·][ \u00a0\u2009]?10"
     r"(?:\^[-−]?[0-9]+|[⁻¹²³⁰⁴-⁹]+)?)?"
 )
 
-_WITH_UNITS = re.compile(rf"(?<=[0-9]) {_UNITS}")
+_WITH_UNITS = re.compile(rf"(?<=[0-9]) {UNITS_SHOWN}")
 _TITLE = re.compile(r"[0-9]+\.[0-9]+(?= [A-Z] [a-z])")
 """The number of a lesson before a title such as `A pendulum`: no amperes."""
-_UNITS_FIRST = rf"{_SPACES}?{_UNITS}"
-_QUANTITY = (
-    rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_SPACES}?{_UNITS})?|{_NUMBER}{_SPACES}?{_UNITS})"
-)
+_UNITS_FIRST = rf"{_SPACE}?{UNITS_SHOWN}"
+_QUANTITY = rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_UNITS_FIRST})?|{_NUMBER}{_UNITS_FIRST})"
 """Compiled when it is needed, as few pages do: it takes longer than all others together."""
 _LATIN_BEFORE = re.compile("[A-Za-z]\\s*(?:=\\s*)?$")
 _LATIN_AFTER = re.compile("[ \u00a0][A-Za-z]")

@@ -1,13 +1,14 @@
 /**
- * Typesets formulas with Temml, whose global `temml` is loaded before this script.
+ * Typesets formulas with Temml and its mhchem, whose global `temml` is loaded before this script.
  *
  *   typeset(json)   json: [{tex, display}, …]; returns as JSON, for each, its MathML (a string) or
  *                   {message, position}, position being an offset in UTF-16 units into tex, or null
  *
- * 1. Temml makes a tree of MathML nodes, or throws.
- * 2. The tree is mended where Temml's output is not valid HTML, and refused where it cannot be right:
+ * 1. What KaTeX and MathJax take and Temml does not is written as Temml takes it.
+ * 2. Temml makes a tree of MathML nodes, or throws.
+ * 3. The tree is mended where Temml's output is not valid HTML, and refused where it cannot be right:
  *    references that a script in the page would have to fill, colours and lengths that do not exist.
- * 3. The tree becomes text.
+ * 4. The tree becomes text.
  */
 
 'use strict'
@@ -18,6 +19,37 @@ const typeset = (() => {
   const MAX_DEPTH = 150 // nested elements; browsers flatten what is deeper than a few hundred
 
   const OPTIONS = { throwOnError: true, trust: false, strict: false, annotate: true, maxExpand: 1000 }
+
+  // Commands of LaTeX, MathJax and KaTeX that Temml has under another name.
+  const MACROS = {
+    '\\mbox': '\\text{#1}',
+    '\\mathds': '\\mathbb{#1}',
+    '\\mathbbm': '\\mathbb{#1}',
+    '\\R': '\\mathbb{R}',
+    '\\N': '\\mathbb{N}',
+    '\\Z': '\\mathbb{Z}',
+    '\\textdegree': '\\degree',
+  }
+  for (const name in MACROS) temml.__defineMacro(name, MACROS[name])
+
+  // What no macro can replace: the name of an environment, the columns of an array, a font's name as an index.
+  const REWRITES = [
+    [/\\begin\{eqnarray\*?\}/g, () => '\\begin{array}{rcl}'],
+    [/\\end\{eqnarray\*?\}/g, () => '\\end{array}'],
+    [/\\(begin|end)\{flalign(\*?)\}/g, (_, edge, star) => `\\${edge}{align${star}}`],
+    [/\\(?:begin|end)\{(?:math|displaymath)\}|\\(?:require|vspace\*?)\{[^{}]*\}/g, () => ''],
+    [/(\\begin\{array\})(?:\[[tcb]\])?\{((?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*)\}/g, (_, begin, columns) => `${begin}{${plainColumns(columns)}}`],
+    [/([_^])\s*\\(rm|bf|it|sf|tt|cal)\s*(?=\{)/g, (_, mark, font) => `${mark}\\math${font}`],
+    [/\\text(?:tt|rm|sf|bf|it)?\{[^{}$\\]*\}/g, (text) => text.replaceAll('_', '\\_')],
+  ]
+
+  /** The columns of an array without the spaces, widths and commands of LaTeX's `array` package; `*{3}{c}` is `ccc`. */
+  function plainColumns(columns) {
+    return columns
+      .replace(/\*\s*\{?\s*(\d{1,2})\s*\}?\s*(?:\{([^{}]*)\}|([lcr]))/g, (_, count, many, one) => (many ?? one).repeat(Number(count)))
+      .replace(/[@!<>]\s*\{(?:[^{}]|\{[^{}]*\})*\}/g, '')
+      .replace(/[pmb]\s*\{[^{}]*\}/g, 'l')
+  }
 
   // Temml lets any word pass as a colour. These are the names of CSS Color Module Level 4.
   const COLOURS = new Set(
@@ -90,6 +122,23 @@ const typeset = (() => {
     node.children = [inner]
   }
 
+  /** Temml gives a cell that is not written the state of its typesetter as a style, padding and borders included. */
+  function mendCell(node) {
+    const styles = Object.entries(node.style).filter(([name]) => /^(?:padding|border)/.test(name))
+    node.style = Object.fromEntries(styles)
+  }
+
+  /** Bold digits, for which Temml asks for a font of text, are characters of their own, as bold letters are. */
+  function mendDigits(node) {
+    const { 'font-family': family, 'font-weight': weight, ...others } = node.style
+    if (family === undefined) return
+    node.style = others
+    const text = node.children[0]?.children?.[0]
+    if (weight !== 'bold' || text?.text === undefined) return
+    text.text = text.text.replace(/[0-9]/g, (digit) => String.fromCodePoint(0x1d7ce + Number(digit)))
+    node.style = {}
+  }
+
   // What reaches no further below its line than a descender does.
   const SHALLOW = new Set(['mi', 'mn', 'mo', 'mtext', 'mspace', 'mrow', 'mstyle', 'msup', 'mover'])
   const LARGE = /[∏∐∑∫-∳⨀-⨜]/
@@ -123,7 +172,9 @@ const typeset = (() => {
       if (isForbidden(node.text)) throw new Refusal('it makes a character that a page must not hold')
       return
     }
-    if (node.href !== undefined) throw new Refusal('references to equations cannot be resolved; link to a heading instead')
+    if (node.href !== undefined) throw new Refusal('a formula refers to no other one; write `[](#eq:name)` in the text')
+    if (node.type === 'mtd' && node.style.constructor !== Object) mendCell(node)
+    if (node.type === 'mstyle') mendDigits(node)
     checkAttributes(node)
     if (node.attributes !== undefined) {
       delete node.attributes.id // a label: nothing may refer to it, and it could be the id of a heading
@@ -135,8 +186,11 @@ const typeset = (() => {
     if (node.type === 'semantics' && node.children.slice(0, -1).every(isNothing)) throw new Refusal('it is empty')
   }
 
-  /** Temml's message without the position and the excerpt that follow it; the position, if it is one in `tex`. */
-  function explain(error, tex) {
+  /**
+   * Temml's message without the position and the excerpt that follow it; the position in `original`, as what Temml got ends
+   * in the same way behind it.
+   */
+  function explain(error, tex, original) {
     const start = error.position
     if (start === undefined) return { message: error.message, position: null }
     const marks = [` at position ${start + 1}: \n`, ' at end of input: ']
@@ -149,26 +203,29 @@ const typeset = (() => {
     const right = excerpt.slice(left.length).replace(/…$/, '')
     // In a macro that Temml defines, the position is one in that macro's own text.
     const isHere = excerpt.startsWith(left) && plain(tex.slice(start)).startsWith(right)
-    return { message: error.message.slice(0, at), position: isHere ? start : null }
+    const place = start + original.length - tex.length
+    return { message: error.message.slice(0, at), position: isHere && original.endsWith(tex.slice(start)) ? place : null }
   }
 
   function one({ tex, display }) {
     if (tex.length > MAX_SOURCE) return { message: `it is longer than ${MAX_SOURCE} characters`, position: null }
     const forbidden = isPlain(tex) ? -1 : tex.search(FORBIDDEN)
     if (forbidden >= 0) return { message: 'it holds a control character', position: forbidden }
+    const text = REWRITES.reduce((before, [pattern, replacement]) => before.replace(pattern, replacement), tex)
     try {
-      const tree = temml.__renderToMathMLTree(tex, { ...OPTIONS, displayMode: display })
+      const tree = temml.__renderToMathMLTree(text, { ...OPTIONS, displayMode: display })
       mend(tree, 0)
+      tree.children[0].children.at(-1).children[0].text = tex // the annotation is what the author wrote
       const markup = tree.toMarkup()
       if (markup.length > MAX_MARKUP) throw new Refusal('it becomes too long')
       return markup
     } catch (error) {
-      if (error instanceof temml.ParseError) return explain(error, tex)
+      if (error instanceof temml.ParseError) return explain(error, text, tex)
       if (error instanceof Refusal) return { message: error.message, position: null }
       if (error instanceof RangeError && /call stack/.test(error.message)) {
         return { message: 'it is nested too deeply', position: null }
       }
-      return { message: `it cannot be typeset (${error.message})`, position: null }
+      return { message: `it cannot be typeset (${error.message ?? [error].flat().at(-1)})`, position: null } // mhchem throws lists
     }
   }
 

@@ -11,7 +11,8 @@ from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.scripts.lines import MappedText, Side, plain_text, replace_ranges
-from coursebuild.core.scripts.numbers import (
+from coursebuild.core.scripts.tables import RowCell, table_rows
+from coursebuild.core.text.numbers import (
     Number,
     has_groups,
     round_like,
@@ -19,7 +20,6 @@ from coursebuild.core.scripts.numbers import (
     scan_prose,
     within_half_unit,
 )
-from coursebuild.core.scripts.tables import RowCell, table_rows
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.text.units import units_at
 

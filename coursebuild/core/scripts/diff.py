@@ -31,7 +31,7 @@ from coursebuild.core.model import Comparison, Mode, Table
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, StepKind, align, pair, same_lines
 from coursebuild.core.scripts.lines import LineMatcher, Side
-from coursebuild.core.scripts.numbers import (
+from coursebuild.core.text.numbers import (
     Number,
     agreeing_digits,
     difference,

@@ -37,7 +37,6 @@ from coursebuild.core.scripts.lines import (
     replace_ranges,
     same_number,
 )
-from coursebuild.core.scripts.numbers import round_like
 from coursebuild.core.scripts.tables import (
     HEADER_HELP,
     RowCell,
@@ -46,6 +45,7 @@ from coursebuild.core.scripts.tables import (
     unit_changes,
 )
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
+from coursebuild.core.text.numbers import round_like
 from coursebuild.core.text.source import Excerpt, Span
 
 _FENCE = re.compile(r"`{3,}|~{3,}")

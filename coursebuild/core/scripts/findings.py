@@ -27,9 +27,9 @@ from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.lines import ELLIPSIS, LineMatcher, Side
-from coursebuild.core.scripts.numbers import Number, only_number, scan, within_tolerance
 from coursebuild.core.scripts.tables import HEADER_HELP, TableMatcher, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
+from coursebuild.core.text.numbers import Number, only_number, scan, within_tolerance
 from coursebuild.core.text.source import Excerpt
 
 _MAX_NOTES = 3

@@ -21,7 +21,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Filter, Mode
-from coursebuild.core.scripts.numbers import Number, scan, within_half_unit, within_tolerance
+from coursebuild.core.text.numbers import Number, scan, within_half_unit, within_tolerance
 from coursebuild.core.text.patterns import replacements
 
 _LINE_END = re.compile(r"\r\n?|\n")

@@ -36,8 +36,8 @@ from coursebuild.core.scripts.bound_numbers import printed_lines
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import quote
 from coursebuild.core.scripts.lines import same_number
-from coursebuild.core.scripts.numbers import Number, difference, only_number, round_like, unit
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.text.numbers import Number, difference, only_number, round_like, unit
 from coursebuild.core.text.source import Span
 
 PERTURBATION = 1e-12

@@ -34,7 +34,7 @@ from coursebuild.core.scripts.lines import (
     plain_text,
     same_number,
 )
-from coursebuild.core.scripts.numbers import Number, relative_error
+from coursebuild.core.text.numbers import Number, relative_error
 from coursebuild.core.text.source import Span
 from coursebuild.core.text.units import units_at
 

@@ -20,7 +20,6 @@ from coursebuild.core.syntax.markup_kinds import BROKEN
 from coursebuild.core.syntax.mentions import (
     TextPiece,
     check_link_text,
-    check_numerals,
     check_scheme,
     classify,
     link_mentions,
@@ -37,6 +36,7 @@ from coursebuild.core.syntax.unread_markup import (
     is_known_kind,
 )
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
+from coursebuild.core.text.numbers import find_unread
 from coursebuild.core.text.source import Excerpt, Span
 
 MAX_DEPTH = 60
@@ -131,7 +131,6 @@ class _TokenReader:
         if not html:
             self.state.diagnostics += find_repetitions(self.content)
             self.state.diagnostics += check_numbered_lines(self.content)
-            self.state.diagnostics += check_numerals(self.content, self.texts)
         for diagnostic in check_unread_markup(self.content, self.texts, html=html):
             self.report(diagnostic)
         if not html and not self.open_literals:
@@ -293,8 +292,11 @@ class _TokenReader:
             start, end = start + 1, end - 1
         place = self.content.span(start, end)
         if token.type == "number_given":
-            text = (start, token.content)
-            self.state.diagnostics += check_numerals(self.content, [text], is_alone=True)
+            if (unread := find_unread(token.content)) is not None:
+                span_of_number = self.content.span(start + unread[0], start + unread[1])
+                message = f"`{span_of_number.text}` cannot be read as a number"
+                help = "write it as `0.5`, `1e-5` or `3 × 10⁻⁵`, and a range as `3–5`"
+                self.report(diagnose("number-form", span_of_number, message, help=help))
             return model.NumberBinding(
                 span, token.content, place, None, collapse_spaces(token.info)
             )
@@ -373,12 +375,6 @@ _ATTRIBUTE = re.compile(r'[A-Za-z][\w:-]*="[^"]*"')
 _NO_EQUALS = re.compile(r'([A-Za-z]\w*)\W?"[\w. -]*"')
 _LONE_DASH = re.compile(r'([A-Za-z]\w*)(?:[-+;]|(?<=\w\w\w))"[^"]*"')
 _LATE_QUOTE = re.compile(r'\b([A-Za-z]\w*)=(?:[-.]?\d[-\d. ]*"|="[-\d. ]+")')
-_BROKEN_VALUE = re.compile(
-    r'\b[A-Za-z]\w*="(?:(?:[^"]*\s)?([-+]?\d+\.\.+\d+|[-+]?(?:\d*\.\d*[oOlI]|[oOlI]\.)\d*'
-    r"|(?<=[\d.]\s)[oOl]|[-+]?0\d+(?:\.\d+)?(?=\s+[-\d.])|(?<=[\d.]\s)[-+]?0\d+(?:\.\d+)?)"
-    r'(?=[\s"])|-(?= -?\w+")|[^"\s]+ -(?="))'
-)
-"""The value of an attribute with a part that is a number but for a slip."""
 _NO_COMPARISON = re.compile(
     r"(?:while|if|elif|assert) (?!.*(?:&| then\b))[^(]*?\w (<<|>>|=<|=) (?!(?<=[<>] )\d+\b)"
 )
@@ -421,11 +417,6 @@ def _check_code(content: Excerpt, start: int, end: int, code: str) -> Iterator[D
     if bracket := re.search(r"\A[(\[{]|(?<=\w)[()\[\]{}](?=\w)|(?<=\w\w)[)\]}]\Z", rest):
         message = f"`{bracket[0]}` has no matching bracket"
         yield diagnose("markup-unread", span, message, help="write the missing one, or a blank")
-    if broken := _BROKEN_VALUE.search(code):
-        part = broken[1] or "-"
-        message = f"`{part}` stands in the value of an attribute, and no number is written so"
-        help = "write a number with one point and no needless zero, and a blank between two"
-        yield diagnose("number-form", span, message, help=help)
     if slip := _NO_COMPARISON.match(code):
         sign = {"=": "==", "=<": "<="}.get(slip[1], slip[1][0])
         help = f"write `{sign}`"

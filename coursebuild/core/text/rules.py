@@ -91,7 +91,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "markup-unread": "Markdown, or an attribute in braces, is incomplete, so readers would see "
         "its characters.",
         "markup-foreign": "Markup of another tool would be shown as it is written.",
-        "number-form": "A number has two points, a letter among its digits or a sign too many.",
+        "number-form": "A number that is given cannot be read.",
         "label-attribute": "A label cannot be read, or stands where no label may.",
         "table-cells": "A row of a table has more or fewer cells than its header.",
         "footnote-undefined": "A footnote is used but not defined.",
@@ -247,7 +247,7 @@ GROUPS: dict[str, dict[str, str]] = {
 _WARNINGS = frozenset(
     """
     draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
-    symbol-repeated footnote-unused image-alt
+    math-command symbol-repeated footnote-unused image-alt
     recording-caption recording-loose script-unrepeatable script-penetration script-writes
     script-connects
     output-noise report-stale bench-unrecorded lab-penetration lab-far lab-reset package-reduced
@@ -259,8 +259,8 @@ _NO_FIX = {
     bench-text binding-volatile draft-empty fence-unread field-missing field-repeated
     figure-unshown footnote-repeated footnote-unused heading-empty html-unbalanced image-alt
     io-order io-repeated io-stray lesson-planned-file link-text math-brackets math-unclosed
-    math-unread merge-conflict nesting-deep output-not-updatable prerequisite-cycle quiz-answer
-    quiz-gate recording-body recording-orphan symbol-formula symbol-repeated table-cells
+    math-unread merge-conflict nesting-deep number-form output-not-updatable prerequisite-cycle
+    quiz-answer quiz-gate recording-body recording-orphan symbol-formula symbol-repeated table-cells
     term-place
     """,
     "links may lead to either": """

@@ -55,6 +55,18 @@ _GROUP = rf"(?:{_FACTOR_TEXT}|\({_PRODUCT}\){_POWER}?)"
 _UNIT = re.compile(rf"{_GROUP}(?:{_OPERATOR}{_GROUP})*")
 _UNIT_NAME = re.compile(_WORD)
 
+_SI_UNIT = (
+    "(?:[YZEPTGMkhcdm\u00b5\u03bcunpf]|da)?"
+    "(?:bar|cd|eV|Gy|Hz|kat|lm|lx|mol|Pa|rad|sr|Sv|Wb|[ACFgHJKLlmNSsTtVW\u03a9\u2126])"
+)
+_SHOWN_UNIT = (
+    rf"(?:{_SI_UNIT}|min|kgf?|rpm|rev|fps|px|pt|arcmin|arcsec|[kMGT]i?B|B|bit|[hd]|°[CF]?|[%‰′″])"
+    r"(?:[²³⁻¹⁴⁶0-9]|\^-?[0-9])*"
+)
+_SHOWN_PRODUCT = rf"{_SHOWN_UNIT}(?:[/·⋅*]{_SHOWN_UNIT})*(?![^\W_])"
+UNITS_SHOWN = rf"{_SHOWN_PRODUCT}(?:[ \u00a0\u202f]{_SHOWN_PRODUCT}){{0,3}}"
+"""The pattern of the units right behind a number in prose."""
+
 
 def with_unit(number: str, unit: str) -> str:
     """Return a number's text with its unit; only the degree stands at the digits."""

@@ -26,7 +26,6 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import Mathml, Outcome, ScriptRun
 from coursebuild.core.scripts.lines import LineMatcher, MappedText, apply_filters
-from coursebuild.core.scripts.numbers import Number, scan_prose
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -37,6 +36,7 @@ from coursebuild.core.text.diagnostics import (
     did_you_mean,
     is_one_edit,
 )
+from coursebuild.core.text.numbers import Number, scan_prose
 from coursebuild.core.text.source import Excerpt
 from coursebuild.core.text.units import conversions, units_at
 from coursebuild.features.lab.model import Lab

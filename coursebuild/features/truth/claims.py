@@ -30,10 +30,10 @@ from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.model.results import ScriptRun
-from coursebuild.core.scripts.numbers import Number, scan_prose
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
+from coursebuild.core.text.numbers import Number, scan_prose
 from coursebuild.core.text.source import Excerpt, Span
-from coursebuild.core.text.units import find_unit
+from coursebuild.core.text.units import UNITS_SHOWN, find_unit
 from coursebuild.features.arithmetic.evaluate import FormulaComparison, read_numeral
 from coursebuild.features.arithmetic.expressions import Expression
 from coursebuild.features.arithmetic.statements import FormulaSide, read_statements
@@ -42,7 +42,6 @@ from coursebuild.features.arithmetic.symbol_values import check_formulas
 _PATH = re.compile(r"[\w.-]+(?:/[\w.-]+)+\.[a-z]+|(?:content|examples|lib|models|runs)/.*")
 """A source that is a file, also where its name is misspelt."""
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+(?:_\d{3})*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-_SOURCE_UNIT = re.compile(r"\s*([^\W\d][^\d]*|°|%)$")
 
 
 class NamedNumber(Struct, frozen=True):
@@ -71,8 +70,8 @@ def named_numbers(inlines: Iterable[model.Inline]) -> Iterator[NamedNumber]:
             continue
         if isinstance(inline, model.NumberBinding):
             numbers = tuple(scan_prose(inline.text))
-            unit_text = _SOURCE_UNIT.search(inline.text, numbers[-1].end) if numbers else None
-            unit = find_unit(unit_text[1]) if unit_text is not None else None
+            unit_text = inline.text[numbers[-1].end :].strip() if numbers else ""
+            unit = find_unit(unit_text) if unit_text else None
             size = float(unit.size) if unit is not None else 1.0
             for number in numbers:
                 value, step = float(number.value), 10.0**number.place
@@ -126,10 +125,7 @@ _NO_SOURCE = "unsourced"
 
 _COUNTS = 12
 _YEARS = range(1600, 2100)
-_UNIT = re.compile(
-    r"[\s\u00a0\u202f]*(?:[%‰°]|(?:per cent|[mkµn]?(?:rad|Hz|Pa|[gmsNJWVA])|c?m|min|h|[kMG]i?B)"
-    r"(?![\w’']))"
-)
+_UNIT = re.compile(rf"[\s\u00a0\u202f]*(?:{UNITS_SHOWN})")
 _DECIMAL = re.compile(r"\d\.\d")
 _MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
 """Every formula with claims matches this."""

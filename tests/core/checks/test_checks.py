@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import check_compiled, check_scenarios, mjcf_texts
-from coursebuild.core.checks.lessons import (
-    check_course,
-    check_document,
-    check_formulas,
-    document_formulas,
-)
+from coursebuild.core.checks.formulas import check_formulas, document_formulas
+from coursebuild.core.checks.lessons import check_course, check_document
 from coursebuild.core.checks.links import anchors, link_targets
+from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import CompileResult, Formula, MathError, ModelFacts
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.pipeline.check import judge
+from coursebuild.pipeline.load import load
+from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.reader import Reader
+from support.fixture_cases import fixture_text
 from support.made_courses import BOX, document, facts, make_course, messages, rules_and_texts
+from support.rule_cases import Layout
 
 
 def test_one_document_is_checked_as_in_the_whole_course() -> None:
@@ -59,6 +63,21 @@ def test_a_wrong_formula_is_reported_at_each_place() -> None:
         assert rules_and_texts(diagnostics) == [f"math-syntax: {expected}"] * 2
         assert messages(diagnostics) == ["the formula does not parse: no good"] * 2
         assert [d.span.line for d in diagnostics] == [1, 3]
+
+
+@pytest.mark.engine
+def test_right_formulas_of_every_field_are_told_nothing(tmp_path: Path) -> None:
+    text = fixture_text("documents/right_formulas.md")
+    assert len(document_formulas(make_course(text).documents[0])) >= 300
+    mistake = "\nIt takes $O(\\sqrt{n}$) steps.\n"
+    for name, added, expected in (("right", "", []), ("wrong", mistake, ["math-brackets: ("])):
+        root = tmp_path / name
+        Layout.of(text + added).write(root)
+        with Reader(Options(root, 1, Store(root))) as reader:
+            course_load = load(root, reader)
+        assert course_load.value is not None
+        diagnostics = judge(course_load.value, course_load.diagnostics).diagnostics
+        assert rules_and_texts(diagnostics) == expected
 
 
 MODEL = facts(

@@ -12,8 +12,8 @@ from coursebuild.core.model import Document, Script, document_blocks
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.bindings import PrintedOutputs, check_bindings, dependent_bindings
 from coursebuild.core.scripts.compare import verify
-from coursebuild.core.scripts.numbers import Number, round_like, scan, scan_prose
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.numbers import Number, round_like, scan, scan_prose
 from support.fixture_cases import fixture_tables
 from support.growth import processor_time_growth
 from support.sample_lessons import course, describe, document, make_run

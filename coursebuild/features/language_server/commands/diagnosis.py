@@ -18,8 +18,8 @@ from coursebuild.core.model import CodeSpan, NumberBinding, Text, document_inlin
 from coursebuild.core.scripts.bindings import PrintedOutputs
 from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.findings import output_findings
-from coursebuild.core.scripts.numbers import scan_prose
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
+from coursebuild.core.text.numbers import scan_prose
 from coursebuild.core.text.rules import rule_address
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.language_server.commands.texts import OpenTexts, Places

@@ -62,6 +62,8 @@ _POWER = re.compile(
     rf"\s*[×·]\s*10(?:\^\{{?(?P<caret>{_SIGN}?[0-9]{{1,4}})\}}?|(?P<raised>[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{{1,4}}))(?!\w)"
 )
 
+_UNREAD = re.compile(rf"\^\W*[0-9]+|(?P<bad>(?<![\w)\]]){_SIGN}(?={_SIGN}+\.?[0-9])|[0-9]+)")
+
 
 class Number(Struct, frozen=True):
     """A number and the half-open range `[start, end)` of its text."""
@@ -145,6 +147,21 @@ def scan_prose(text: str) -> tuple[Number, ...]:
         value, place = number.value.scaleb(shift, _EXACT), number.place + shift
         numbers.append(Number(start, end, text[start:end], value, place, is_integer=False))
     return tuple(numbers)
+
+
+def find_unread(text: str) -> tuple[int, int] | None:
+    """Where a text that is to give numbers has one that is none: `O.1 kg`, `0..5 s`, `--2 m`.
+
+    Powers of units, versions, dates and what else only looks like a number are as they are meant.
+    """
+    tokens = [*_TOKEN.finditer(text)]
+    if all(token["word"] for token in tokens):
+        tokens = []
+    for piece in _UNREAD.finditer(text):
+        if piece["bad"] and not any(t.start() <= piece.start() < t.end() for t in tokens):
+            start = max(text.rfind(" ", 0, piece.start()) + 1, 0)
+            return start, start + len(text[start:].split()[0])
+    return None
 
 
 def difference(a: Decimal, b: Decimal) -> Decimal:

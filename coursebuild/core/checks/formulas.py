@@ -1,0 +1,266 @@
+"""Check formulas: what cannot be typeset, brackets that belong to none, commands in letters.
+
+What a formula is, its MathML says; the TeX only tells the place. What may be right is not told: an
+interval may be open, so that `[` and `]` may each begin or end one, and a set may stand in several
+formulas of its paragraph.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from coursebuild.core.model import (
+    Block,
+    Document,
+    Text,
+    block_inlines,
+    feature_block_ids,
+    find_formulas,
+    walk_inlines,
+)
+from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, nearest
+from coursebuild.core.text.source import Excerpt
+
+_GREEK = frozenset(
+    """
+    alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta iota kappa lambda mu nu xi pi
+    rho sigma tau upsilon phi varphi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi
+    Psi Omega
+    """.split()
+)
+_FUNCTIONS = frozenset(
+    """
+    arccos arcsin arctan arg cos cosh cot coth csc deg det dim exp gcd inf ker lim log max min sec
+    sin sinh sup tan tanh
+    """.split()
+)
+"""Those of TeX that are longer than two letters; they are meant where a bracket follows."""
+_WITH_BRACES = frozenset(
+    """
+    bar boldsymbol ddot dfrac dot frac hat mathbb mathbf mathcal mathrm overline sqrt text tfrac
+    tilde vec
+    """.split()
+)
+"""Commands whose argument stands in braces."""
+_LETTERS = re.compile(
+    r"(?<![\\A-Za-z])([A-Za-z]{2,})(?![A-Za-z0-9])(?=(\s*(?:\\(?:left|[bB]igg?l?)\s*)?\()|(\{)|)"
+)
+_LETTER = re.compile(r"(?<![A-Za-z\\])[A-Za-z](?![A-Za-z])")
+_BRACKET = re.compile(r"\\[{}]|\\.|[()\[\]]", re.DOTALL)
+_NAMED_BRACKET = re.compile(r"\\[lr](?:brack|brace|paren)(?![A-Za-z])")
+"""The commands by which an author says that a bracket stands alone."""
+_STEPS = {"(": (1,), "{": (1,), ")": (-1,), "}": (-1,), "[": (1, -1), "]": (1, -1)}
+"""By how much a bracket may change the number of those that are open."""
+_EITHER = (-1, 0, 1)
+_INDEXED = ("msub", "msubsup", "munder", "munderover")
+
+
+def _formula_uses(document: Document) -> Iterator[tuple[Block, Formula, Excerpt]]:
+    """Every formula with its TeX in the text; empty ones were reported by the parser."""
+    for block, formula in find_formulas(document):
+        if formula.tex.text.strip():
+            yield block, Formula(formula.tex.text, formula.display), formula.tex
+        label = formula.label
+        if label is not None and label.domain is not None and label.conditions:
+            yield block, Formula(label.conditions, display=False), label.domain
+
+
+def document_formulas(document: Document) -> tuple[Formula, ...]:
+    """Each different formula of one document, in order of first use."""
+    return tuple(dict.fromkeys(formula for _, formula, _ in _formula_uses(document)))
+
+
+def check_formulas(
+    document: Document, typeset: Mapping[Formula, str | MathError]
+) -> tuple[Diagnostic, ...]:
+    """What is wrong with the formulas of a document, at each place where one stands."""
+    diagnostics: list[Diagnostic] = []
+    uses = [*_formula_uses(document)]
+    letters = {letter for _, _, tex in uses for letter in _LETTER.findall(tex.text)}
+    in_features = feature_block_ids(document)
+    trees: dict[Formula, Element | None] = {}
+    for _, group in groupby(uses, key=lambda use: id(use[0])):
+        typeset_ones: list[tuple[Excerpt, Element]] = []
+        for block, formula, tex in group:
+            result = typeset[formula]
+            if isinstance(result, MathError):
+                diagnostics.append(_syntax_error(tex, result))
+                continue
+            if formula not in trees:
+                trees[formula] = _parse(result)
+            if (tree := trees[formula]) is not None:
+                typeset_ones.append((tex, tree))
+                # In JSON a backslash may need another one, so that nothing is written there.
+                diagnostics += _check_letters(tex, tree, letters, id(block) not in in_features)
+        diagnostics += _check_brackets(block, typeset_ones)
+    return tuple(diagnostics)
+
+
+def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
+    span = tex.span()
+    if error.position is not None:
+        at = min(error.position, len(tex.text) - 1)
+        span = tex.span(at, at + 1)
+    help = ""
+    if command := re.search(r"unknown command \\([A-Za-z]+)", error.message):
+        likely = nearest(command[1], _GREEK | _FUNCTIONS | _WITH_BRACES, cutoff=0.75)
+        at = tex.text.find(command[1])
+        if likely is not None and at >= 0:
+            place = tex.span(at, at + len(command[1]))
+            help = Fix(f"did you mean `\\{likely}`?", likely).at(place)
+    message = f"the formula does not parse: {error.message}"
+    return diagnose("math-syntax", span, message, help=help)
+
+
+def _parse(mathml: str) -> Element | None:
+    """The tree of a formula without its TeX."""
+    try:
+        (semantics,) = ElementTree.fromstring(mathml)
+    except ElementTree.ParseError:  # characters that XML does not have
+        return None
+    semantics.remove(semantics[-1])
+    return semantics
+
+
+# --- letters
+
+
+def _letter_runs(element: Element) -> Iterator[str]:
+    """The letters that stand beside each other as names of their own; indices are words."""
+    run = ""
+    for at, child in enumerate(element):
+        text = child.text or ""
+        if child.tag == "mi" and len(text) == 1 and text.isascii():
+            run += text
+            continue
+        yield run
+        run = ""
+        if at != 1 or element.tag not in _INDEXED:
+            yield from _letter_runs(child)
+    yield run
+
+
+def _check_letters(
+    tex: Excerpt, tree: Element, letters: set[str], can_write: bool
+) -> Iterator[Diagnostic]:
+    """Report commands without their backslash: the tree has a product of letters.
+
+    `letters` are those that stand alone in formulas of the document: of these `pi` is a product.
+    """
+    words = [*_LETTERS.finditer(tex.text)]
+    runs = [run for run in _letter_runs(tree) if len(run) > 1] if words else []
+    for word in words:
+        name, bracket, brace = word.groups()
+        is_name = name in _GREEK and not letters >= {*name}
+        is_call = name in _FUNCTIONS and (bracket or brace)
+        if not (is_name or is_call or (name in _WITH_BRACES and brace)):
+            continue
+        if sum(run.count(name) for run in runs) < sum(name == match[1] for match in words):
+            continue
+        message = f"`{name}` would be shown as a product of letters"
+        help = f"write `\\{name}`, or `\\mathrm{{{name}}}` for a name"
+        fix = Fix(help, f"\\{name}" if can_write else None)
+        yield diagnose("math-command", tex.span(*word.span(1)), message, help=fix)
+
+
+# --- brackets
+
+
+def _brackets(element: Element) -> Iterator[tuple[int, ...]]:
+    """What each bracket of a formula may be."""
+    children = [*element]
+    for before, child, after in zip(
+        (None, *children), children, (*children[1:], None), strict=False
+    ):
+        text = child.text or ""
+        if child.tag != "mo":
+            # In words, as in `a) first`, a bracket need not have another one.
+            yield from (_EITHER for sign in text if sign in _STEPS)
+            yield from _brackets(child)
+        elif text in _STEPS:
+            inside = after if text in "([{" else before
+            is_operand = inside is not None and "separator" in inside.attrib  # as in `(q, (, z)`
+            yield _EITHER if is_operand else _STEPS[text]
+        elif not text and "fence" in child.attrib:
+            yield _EITHER  # as in `\\left.`
+
+
+def _text_brackets(text: str) -> Iterator[tuple[int, ...]]:
+    """What each bracket of a text may be, those of other scripts too."""
+    sides = {"Ps": (1,), "Pe": (-1,)}
+    for sign in text:
+        if (steps := _STEPS.get(sign) or sides.get(unicodedata.category(sign))) is not None:
+            yield steps
+
+
+def _may_match(brackets: Iterable[tuple[int, ...]]) -> bool:
+    """Whether each bracket may have another one, whatever kind it is of."""
+    depths = {0}
+    for steps in brackets:
+        depths = {depth + step for depth in depths for step in steps if depth + step >= 0}
+    return 0 in depths
+
+
+def _check_brackets(
+    block: Block, formulas: Sequence[tuple[Excerpt, Element]]
+) -> Iterator[Diagnostic]:
+    """Report brackets that have no other one in any formula of their block."""
+    all_brackets = [(tex, [*_brackets(tree)]) for tex, tree in formulas]
+    open_ones = [
+        (tex, brackets)
+        for tex, brackets in all_brackets
+        if not _may_match(brackets) and not _NAMED_BRACKET.search(tex.text)
+    ]
+    at = 0
+    while at < len(open_ones):
+        end = _joint_end(open_ones, at)
+        if end is None:
+            yield from _unmatched_bracket(block, open_ones[at][0])
+        at = (at if end is None else end) + 1
+
+
+def _joint_end(formulas: Sequence[tuple[Excerpt, list[tuple[int, ...]]]], at: int) -> int | None:
+    """The last one of several formulas that hold a set together, if it begins in this one."""
+    joint = [*formulas[at][1]]
+    for end in range(at + 1, len(formulas)):
+        before, after = formulas[end - 1][0].span(), formulas[end][0].span()
+        if not _may_match(_text_brackets(before.source.text[before.end : after.start])):
+            break  # a bracket of the prose may be the other one
+        joint += formulas[end][1]
+        if _may_match(joint):
+            return end
+    return None
+
+
+def _unmatched_bracket(block: Block, tex: Excerpt) -> Iterator[Diagnostic]:
+    if len(re.findall(r"\w+", tex.text)) <= 1:
+        return  # it names the sign, or counts as in `a)`
+    start, end = _find_unmatched(tex.text)
+    is_edge = not tex.text[:start].strip() or not tex.text[end:].strip()
+    inlines = walk_inlines(block_inlines(block))
+    prose = "".join(inline.text for inline in inlines if isinstance(inline, Text))
+    if is_edge and not _may_match(_text_brackets(prose)):
+        return  # it belongs to one of the sentence, as in `(where $x > 0)$`
+    message = f"`{tex.text[start:end]}` has no matching bracket"
+    help = "write the missing one, or `\\lbrack`, `\\rbrack` where one stands alone"
+    yield diagnose("math-brackets", tex.span(start, end), message, help=help)
+
+
+def _find_unmatched(tex: str) -> tuple[int, int]:
+    """Where the bracket is that closes nothing, or the last that nothing closes."""
+    unclosed: list[re.Match[str]] = []
+    for bracket in _BRACKET.finditer(tex):
+        sign = bracket[0][-1]
+        if sign in "([{" or (sign == "]" and not unclosed):
+            unclosed.append(bracket)
+        elif sign in _STEPS and not unclosed:
+            return bracket.span()
+        elif sign in _STEPS:
+            unclosed.pop()
+    return unclosed[-1].span() if unclosed else (0, len(tex))
