@@ -26,14 +26,15 @@ COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("check",),
         ("check", "--sandbox", "--strict"),
         ("check", "--fix"),
+        ("check", "--propose"),
         ("check", "--sensitivity"),
         ("check", "--truth"),
         ("check", "--against", "3.9.1"),
     ),
     "completion": (("completion", "bash"), ("completion", "bash", "--", "bench", "-")),
     "diet": (("diet", "--quick"),),
-    "diff": (("diff", "HEAD"),),
-    "doctor": (("doctor",),),
+    "diff": (("diff", "HEAD"), ("diff", "HEAD", "--sandbox")),
+    "doctor": (("doctor",), ("doctor", "--install-engine")),
     "explain": (("explain", "link-text"), ("explain", "1.1"), ("explain", "models/box.xml")),
     "export": tuple(
         ("export", exporter.name, *(("1.1",) if exporter.of_lesson else ()))
@@ -43,7 +44,9 @@ COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "extract": (("extract",),),
     "fmt": (("fmt",), ("fmt", "--check")),
     "help": (("help",), ("help", "bench"), ("--version",)),
-    "import": (("import", "content/lessons", "--out", "../imported"),),
+    "import": tuple(
+        ("import", "content/lessons", "--out", "../imported", *more) for more in ((), ("--sandbox",))
+    ),
     "init": (("init", "new"),),
     "new": (("new", "lesson", "1.2", "B"), ("new", "feature", "x"), ("new", "model", "y")),
     "rename": (("rename", "1.1", "1.2"),),
