@@ -105,16 +105,16 @@ def find_program(name: str) -> str | None:
 
 def environment(*names: str, **variables: str) -> dict[str, str]:
     """The variables that every process gets, and these; `LC_*` stands for all that begin so."""
-    wanted = {*_COMMON, *names}
-    prefixes = tuple(name[:-1] for name in wanted if name.endswith("*"))
-    chosen = {
+    patterns = {*_COMMON, *names}
+    prefixes = tuple(name[:-1] for name in patterns if name.endswith("*"))
+    values = {
         name: value
         for name, value in os.environ.items()
-        if name in wanted or name.startswith(prefixes)
+        if name in patterns or name.startswith(prefixes)
     }
-    if "PATH" in chosen:
-        chosen["PATH"] = _absolute_places(chosen["PATH"])
-    return {**chosen, "PYTHONSAFEPATH": "1", **variables}
+    if "PATH" in values:
+        values["PATH"] = _absolute_places(values["PATH"])
+    return {**values, "PYTHONSAFEPATH": "1", **variables}
 
 
 def _absolute_places(path: str) -> str:

@@ -389,18 +389,18 @@ class _Git:
 
     def copy_tree(self, revision: str, folder: Path) -> None:
         """Write the files of a revision, of the course's folder alone, into a folder."""
-        wanted = []
+        files = []
         for entry in self.ask("ls-tree", "-r", "-z", revision).split(b"\0")[:-1]:
             head, _, name = entry.partition(b"\t")
             mode, kind, digest = head.split()
             path = os.fsdecode(name)
             if kind == b"blob" and not {"", ".", "..", ".git"} & {*path.split("/")}:
-                wanted.append((mode == b"120000", path, digest))
-        wanted.sort()  # links come last, so that no file is written through one
-        names = b"".join(b"%s\n" % digest for *_, digest in wanted)
+                files.append((mode == b"120000", path, digest))
+        files.sort()  # links come last, so that no file is written through one
+        names = b"".join(b"%s\n" % digest for *_, digest in files)
         contents = io.BytesIO(self.ask("cat-file", "--batch", stdin=names))
         try:
-            for is_link, path, _ in wanted:
+            for is_link, path, _ in files:
                 *_, size = contents.readline().split()
                 data = contents.read(int(size) + 1)[:-1]
                 target = folder / path

@@ -92,8 +92,8 @@ def _make_repository(root: Path) -> bool:
     if git is None or any((folder / ".git").exists() for folder in (root, *root.parents)):
         return False
     command = [git, "-c", "init.defaultBranch=main", "init", "--quiet", str(root)]
-    made = gate.finish(command, gate.environment())
-    if made.status:
-        errors = made.errors.decode("utf-8", "replace").strip()
+    answer = gate.finish(command, gate.environment())
+    if answer.status:
+        errors = answer.errors.decode("utf-8", "replace").strip()
         Progress().say(f"no Git repository was made: {errors}")
-    return made.status == 0
+    return answer.status == 0
