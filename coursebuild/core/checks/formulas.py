@@ -211,11 +211,10 @@ def _check_brackets(
     block: Block, formulas: Sequence[tuple[Excerpt, Element]]
 ) -> Iterator[Diagnostic]:
     """Report brackets that have no other one in any formula of their block."""
-    all_brackets = [(tex, [*_brackets(tree)]) for tex, tree in formulas]
     open_ones = [
         (tex, brackets)
-        for tex, brackets in all_brackets
-        if not _may_match(brackets) and not _NAMED_BRACKET.search(tex.text)
+        for tex, tree in formulas
+        if not _may_match(brackets := [*_brackets(tree)]) and not _NAMED_BRACKET.search(tex.text)
     ]
     at = 0
     while at < len(open_ones):

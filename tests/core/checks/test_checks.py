@@ -70,9 +70,9 @@ def test_right_formulas_of_every_field_are_told_nothing(tmp_path: Path) -> None:
     text = fixture_text("documents/right_formulas.md")
     assert len(document_formulas(make_course(text).documents[0])) >= 300
     mistake = "\nIt takes $O(\\sqrt{n}$) steps.\n"
-    for name, added, expected in (("right", "", []), ("wrong", mistake, ["math-brackets: ("])):
+    for name, line, expected in (("right", "", []), ("wrong", mistake, ["math-brackets: ("])):
         root = tmp_path / name
-        Layout.of(text + added).write(root)
+        Layout.of(text + line).write(root)
         with Reader(Options(root, 1, Store(root))) as reader:
             course_load = load(root, reader)
         assert course_load.value is not None
