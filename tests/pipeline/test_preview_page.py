@@ -196,7 +196,7 @@ def test_preview_has_no_accessibility_fault(make: Make, browser: Browser) -> Non
         with PreviewPage(browser, preview, LESSON) as window:
             page = window.page
             see(page.get_by_role("button", name="Accept this output"))
-            page.get_by_role("button", name="2 mistakes").click()
+            page.locator(".preview-button").click()
             see(page.get_by_role("region", name="Problems"))
             page.evaluate(axe)
             for scheme in ("light", "dark"):
@@ -372,5 +372,6 @@ def test_script_that_runs_and_fails_is_marked(make: Make, browser: Browser) -> N
         expect(mark).to_have_count(0)
         folder.replace(folder.lesson(), "print(", "raise ValueError('no')\nprint(")
         expect(mark).to_have_text("The script failed.")
+        page.locator(".preview-button").click()
         panel = page.get_by_role("region", name="Problems")
         expect(panel).to_contain_text("ValueError: no")
