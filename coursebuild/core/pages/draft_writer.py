@@ -49,7 +49,7 @@ class DraftWriter(PageWriter, frozen=True):
         """Marks of mistakes outside of the blocks that were drawn."""
         return Markup(self._marks(at for at, _ in self.mistakes))
 
-    def _is_broken(self, node: model.Located) -> bool:
+    def _is_broken(self, node: model.Inline | model.Block) -> bool:
         return any(node.span.start <= at < node.span.end for at, error in self.mistakes if error)
 
     def _link(self, link: model.Link) -> str:
