@@ -13,6 +13,7 @@ The modules that parse and draw are imported when there is something to do.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import importlib
 import pickle
@@ -329,7 +330,13 @@ class Reader:
             document = None if whole is None else whole.document
             renderer = self._renderer_for(request, whole)
             inputs = request.inputs
-            head, html, context = draw(inputs, document, renderer, request.mistakes)
+            if request.mistakes:
+                from coursebuild.core.pages.draft_writer import DraftWriter
+
+                make_writer = functools.partial(DraftWriter, mistakes=request.mistakes)
+                head, html, context = draw(inputs, document, renderer, make_writer)
+            else:
+                head, html, context = draw(inputs, document, renderer)
             body = isolate_formulas(html) if direction(request.language) == "rtl" else html
             page_record, body = record(head, body, request.base_url, context)
             all_notes = {

@@ -154,8 +154,8 @@ class Answers:
         reason = self._session.unreadable(name)
         if reason is not None or self._session.files.has_page(name):
             words = self._words("preview.blocked")
-            text = words if reason is None else f"{reason.span.path}: {reason.message}"
-            return HTTPStatus.OK, HTML, self._add_preview(self._message_page(text), name, "")
+            message = words if reason is None else f"{reason.span.path}: {reason.message}"
+            return HTTPStatus.OK, HTML, self._add_preview(self._message_page(message), name, "")
         missing = self._session.find("404.html")
         if missing is None:
             missing = self._message_page(self._words("preview.unbuilt"))

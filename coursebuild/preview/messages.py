@@ -10,7 +10,7 @@ import base64
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from operator import attrgetter
 from typing import Any
 
@@ -117,6 +117,7 @@ def accept(session: Session, path: str, ids: str) -> str:
 def _collect_news(session: Session, path: str) -> dict[str, Any]:
     document, library = session.files.document(path), session.library
     report = report_now(session)
+    marks = {at for at, _ in session.mistakes(document)} if document is not None else set()
     document_path = "" if document is None else document.source.path
 
     def rank(d: Diagnostic) -> tuple[bool, ...]:
@@ -124,7 +125,7 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
 
     diagnostics = sorted(report.diagnostics, key=rank)[:_MAX_DIAGNOSTICS]
     news: dict[str, Any] = {
-        "problems": [_describe_mistake(session, d, document) for d in diagnostics],
+        "problems": [_describe_mistake(session, d, document, marks) for d in diagnostics],
         "more": max(0, len(report.diagnostics) - _MAX_DIAGNOSTICS),
         "busy": session.busy,
         "trouble": session.trouble,
@@ -152,7 +153,7 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
 
 
 def _describe_mistake(
-    session: Session, diagnostic: Diagnostic, document: Document | None
+    session: Session, diagnostic: Diagnostic, document: Document | None, marks: Collection[int]
 ) -> dict[str, Any]:
     span, offer = diagnostic.span, {}
     if len({edit.span.source for edit in diagnostic.edits}) == 1:
@@ -162,7 +163,8 @@ def _describe_mistake(
             fixed = Source(offered.path, offered.new.decode()).line_text(first.span.line)
             offer = {"offer": offered, "fixed": fixed}
     is_here = document is not None and span.path == document.source.path
-    has_mark = document is not None and is_marked(diagnostic, document)
+    is_in_text = document is not None and is_marked(diagnostic, document)
+    has_mark = is_in_text and span.start in marks
     line = span.source.line_text(span.line)
     end = len(line) if span.end_line > span.line else span.end_column - 1
     return {

@@ -134,12 +134,13 @@ class Session:
             )
 
     def mistakes(self, document: Document) -> Mistakes:
-        """Where the text of a document has mistakes that are marked when its page is drawn."""
-        return tuple(
-            sorted(
-                {(d.span.start, d.is_error) for d in self.diagnostics() if is_marked(d, document)}
-            )
-        )
+        """Where mistakes are marked when the page of a document is drawn.
+
+        Without errors it is drawn as a build does, which then need not draw it again.
+        """
+        diagnostics = [d for d in self.diagnostics() if is_marked(d, document)]
+        has_errors = any(d.is_error for d in diagnostics)
+        return tuple(sorted({(d.span.start, d.is_error) for d in diagnostics if has_errors}))
 
     def files_elsewhere(self) -> frozenset[str]:
         """The files of lessons and pages, and other files of which they show parts."""

@@ -11,8 +11,9 @@ import pytest
 
 from coursebuild.preview.session import Session, is_marked
 from support.fixture_cases import FIXTURES, read_cases
+from support.preview_process import serve_preview
 from support.rule_cases import FIRST, parts
-from support.scratch_course import Folder
+from support.scratch_course import GOOD, Folder, Make
 
 pytestmark = pytest.mark.site
 
@@ -53,9 +54,27 @@ def test_every_mistake_of_a_document_leaves_its_page_readable(tmp_path: Path) ->
             html = "" if page is None else page.decode()
             marks = re.findall(r'id="mistake:(\d+)"', html)
             diagnostics = session.diagnostics()
-            places = {d.span.start for d in diagnostics if is_marked(d, owner.document)}
+            document_diagnostics = [d for d in diagnostics if is_marked(d, owner.document)]
+            places = {
+                d.span.start
+                for d in document_diagnostics
+                if any(d.is_error for d in document_diagnostics)
+            }
             if sorted(map(int, marks)) != sorted(places) or "The end of it." not in text_of(html):
                 offenders.append((title, sorted(marks), sorted(places)))
         assert offenders == []
     finally:
         session.close()
+
+
+def test_a_file_that_cannot_be_read_is_replaced_by_its_message(make: Make) -> None:
+    folder = make(GOOD, "## Two\n\nText.\n")
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("checked: everything holds")
+        path = folder.root / folder.lesson(2)
+        path.unlink()
+        path.mkdir()
+        preview.wait_for_line("error[file-unreadable]")
+        status, _, body = preview.get("/lessons/1.2-two.html")
+        assert (status, folder.lesson(2).encode() in body) == (200, True), body
+        assert b"hello" in preview.get("/lessons/1.1-one.html")[2]

@@ -5,13 +5,17 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser, expect
 
+from support.lab_page import wait_for_condition
+from support.preview_page import LESSON
 from support.preview_process import Preview, serve_preview
 from support.scratch_course import GOOD, Folder, Make
+from support.static_host import Host
 
 pytestmark = pytest.mark.site
 
@@ -89,10 +93,10 @@ def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> No
     folder = make(GOOD)
     folder.replace("content/course.toml", "[course]", '[course]\nbase_url = "https://x.org/a/b"')
     with serve_preview(folder, *(f"--embed={origin}" for origin in origins)) as preview:
-        framed = {**LINK, DEST: "iframe"}
-        cookie = preview.get(f"/?token={preview.token}", **framed)[1]["Set-Cookie"]
+        frame_headers = {**LINK, DEST: "iframe"}
+        cookie = preview.get(f"/?token={preview.token}", **frame_headers)[1]["Set-Cookie"]
         assert cookie.endswith("; HttpOnly; SameSite=None; Secure; Partitioned")
-        status, headers, _ = preview.get("/", **framed)
+        status, headers, _ = preview.get("/", **frame_headers)
         policy = "frame-ancestors vscode-webview: https://*.example.org:8080"
         assert (status, headers["Content-Security-Policy"]) == (200, policy)
         assert preview.get("/", **{SITE: "cross-site", DEST: "script"})[0] == 403
@@ -114,9 +118,9 @@ def test_whoever_asks_needs_the_token_of_the_link(preview: Preview) -> None:
         for path in (*paths, "http://evil.example?token=x"):
             status, headers, body = preview.get(path, Host="evil.example", Cookie=cookie)
             assert (status, body, headers | PRIVATE == headers) == (403, denied, True), path
-        here = {"Origin": "http://localhost", "Host": "localhost", "Cookie": cookie}
+        own_origin = {"Origin": "http://localhost", "Host": "localhost", "Cookie": cookie}
         for command in ("accept", "open", "else"):
-            assert preview.get(f"/.coursebuild/{command}", "POST", b"{}", **here)[0] == 403
+            assert preview.get(f"/.coursebuild/{command}", "POST", b"{}", **own_origin)[0] == 403
     assert preview.get("/", Cookie=f"a=b; {preview.cookie}", Host="laptop.local")[0] == 200
     assert preview.get("/", **{SITE: "cross-site"})[0] == 403
 
@@ -140,10 +144,10 @@ def test_token_of_the_link_becomes_a_cookie(preview: Preview) -> None:
 
 def test_link_stays_good_after_a_restart(make: Make) -> None:
     """It belongs to the course and its user; without a place for a key it is made each time."""
-    folder, other = make(GOOD), make(GOOD, name="other")
+    folder, other_folder = make(GOOD), make(GOOD, name="other")
     nowhere = {"XDG_STATE_HOME": str(folder.root)}
     tokens = []
-    for course, env in ((folder, {}), (folder, {}), (other, {}), *[(folder, nowhere)] * 2):
+    for course, env in ((folder, {}), (folder, {}), (other_folder, {}), *[(folder, nowhere)] * 2):
         with serve_preview(course, env=env) as preview:
             assert preview.get("/")[0] == 200
             tokens.append(preview.token)
@@ -194,3 +198,98 @@ def listening(preview: Preview) -> list[str]:
 
 def test_preview_listens_on_the_loopback_only(preview: Preview) -> None:
     assert listening(preview) == ["0100007F"]
+
+
+# --- in browsers
+
+
+@pytest.fixture
+def browser(browsers: Mapping[str, Browser]) -> Browser:
+    return browsers["plain"]
+
+
+ATTACK = """
+<!DOCTYPE html><html lang=en><title>Elsewhere</title><body>
+<form method=post enctype=text/plain action=ADDRESS.coursebuild/accept><button>Go</button></form>
+<a href="LINK">Link</a>
+<script>
+  window.draft = 'nothing'
+  window.coursebuildSearch = { take: (...all) => { window.draft = all } }
+</script>
+<iframe src="ADDRESS"></iframe>
+"""
+STEAL = """async (address) => {
+  const said = {}
+  const add = (name, element, attribute) => new Promise((done) => {
+    element.addEventListener('load', () => done(said[name] = 'loaded'))
+    element.addEventListener('error', () => done(said[name] = 'refused'))
+    element[attribute] = address + name
+    document.body.append(element)
+  })
+  await add('search/index.js', document.createElement('script'), 'src')
+  await add('files/pic.svg', document.createElement('img'), 'src')
+  for (const mode of ['cors', 'no-cors']) {
+    const answer = fetch(address, { mode, credentials: 'include' })
+    said[mode] = await answer.then(() => 'loaded', () => 'refused')
+  }
+  const source = new EventSource(address + '.coursebuild/events?page=index.html')
+  said.events = await new Promise((done) => {
+    source.addEventListener('hello', () => done('loaded'))
+    source.addEventListener('error', () => done('refused'))
+  })
+  return said
+}"""
+
+
+@pytest.mark.browser
+def test_page_of_another_origin_can_only_link_to_the_preview(
+    make: Make, browser: Browser, tmp_path: Path
+) -> None:
+    """From another site, and from another port of this one."""
+    folder = make(GOOD + "![A](../pic.svg)\n")
+    folder.write("content/pic.svg", '<svg xmlns="http://www.w3.org/2000/svg"/>')
+    with Host(tmp_path) as host, serve_preview(folder) as preview:
+        preview.wait_for_line("checked: ")
+        address = f"http://127.0.0.1:{preview.port}/"
+        attack = ATTACK.replace("ADDRESS", address).replace("LINK", preview.link)
+        (tmp_path / "index.html").write_text(attack)
+        for url in (host.url, host.url.replace("localhost", "127.0.0.1")):
+            with browser.new_context() as context:
+                page = context.new_page()
+                page.goto(preview.link)  # whoever has its cookie is safe as well
+                expect(page.locator("h1").first).to_have_text("Scratch")
+                page.goto(url)
+                (frame,) = page.main_frame.child_frames
+                wait_for_condition(page, lambda frame=frame: frame.url.startswith("chrome-error:"))
+                answer = page.evaluate(STEAL, address)
+                assert set(answer.values()) == {"refused"}, answer
+                assert page.evaluate("window.draft") == "nothing"
+                page.get_by_role("button", name="Go").click()
+                expect(page.locator("body")).to_have_text(re.compile("of other origins"))
+                page.go_back()
+                page.get_by_role("link", name="Link").click()
+                expect(page.locator("h1").first).to_have_text("Scratch")
+
+
+FRAME = "<!DOCTYPE html><html lang=en><title>Editor</title><iframe src='{}'></iframe>"
+
+
+@pytest.mark.browser
+def test_preview_in_the_frame_of_an_editor_follows_and_accepts(
+    make: Make, browser: Browser, tmp_path: Path
+) -> None:
+    """Browsers send no strict cookie from a frame in a page of another site."""
+    folder = make(GOOD.replace("3.14159\n```", "3\n```"))
+    with Host(tmp_path) as host, serve_preview(folder, "--embed", host.url.rstrip("/")) as preview:
+        link = preview.link.replace("/?", f"/{LESSON}?")
+        (tmp_path / "index.html").write_text(FRAME.format(link))
+        with browser.new_context() as context:
+            page = context.new_page()
+            page.goto(host.url)
+            frame = page.frame_locator("iframe")
+            accept = frame.get_by_role("button", name="Accept this output")
+            accept.click()
+            expect(accept).to_have_count(0)
+            frame.get_by_role("link", name="Scratch").first.click()
+            expect(frame.locator("h1").first).to_have_text("Scratch")
+    assert "hello 3.14159" in folder.text(folder.lesson())

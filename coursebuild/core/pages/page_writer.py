@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
-from functools import cached_property
 from typing import TypeAlias, assert_never
 
 from markupsafe import Markup, escape
@@ -21,7 +20,6 @@ from coursebuild.core.pages.context import (
     AddedParts,
     HighlightedFile,
     LessonGraph,
-    Mistakes,
     PageContext,
     PageHead,
     PageInputs,
@@ -66,60 +64,11 @@ class OutputView(Struct, frozen=True):
 
 
 class PageWriter(PageContext, frozen=True):
-    """A page that can be written whole: its special blocks are drawn here, or by their feature.
-
-    In a preview a document is drawn with its `mistakes`. Each has a mark before the block in which
-    it stands; a link with an error is its text, and so is an image. HTML with an error is shown as
-    source: it might swallow what follows, or run.
-    """
-
-    mistakes: Mistakes = ()
-
-    def _block(self, block: model.Block) -> str:
-        if not self.mistakes:
-            return super()._block(block)
-        if isinstance(block, model.Paragraph) and block.figure:
-            images = (part for part in block.children if isinstance(part, model.Image))
-            block = replace(block, figure=not any(map(self._is_broken, images)))
-        if isinstance(block, model.HtmlBlock) and self._is_broken(block):
-            html = str(self.code("html", block.html))
-        else:
-            html = super()._block(block)
-        span = block.span
-        marks = self._marks(at for at, _ in self.mistakes if span.start <= at <= span.end)
-        return "".join((marks, html))
-
-    @cached_property
-    def _marked(self) -> set[int]:
-        return set()
-
-    def _marks(self, places: Iterable[int]) -> str:
-        """Marks of mistakes, each only once on a page."""
-        new = [at for at in dict.fromkeys(places) if at not in self._marked]
-        self._marked.update(new)
-        return "".join(f'<span id="mistake:{at}"></span>' for at in new)
+    """A page that can be written whole: its special blocks are drawn here, or by their feature."""
 
     def other_marks(self) -> Markup:
-        """Marks of mistakes outside of the blocks that were drawn."""
-        return Markup(self._marks(at for at, _ in self.mistakes))
-
-    def _is_broken(self, node: model.Located) -> bool:
-        return any(node.span.start <= at < node.span.end for at, error in self.mistakes if error)
-
-    def _link(self, link: model.Link) -> str:
-        if self.mistakes and (self._is_broken(link) or not self.href(link.target)):
-            return self._inlines(link.children) or escape(link.span.text)
-        return super()._link(link)
-
-    def _inline(self, inline: model.Inline) -> str:
-        if isinstance(inline, model.RawInline) and self._is_broken(inline):
-            return f"<code>{escape(inline.html)}</code>"
-        return super()._inline(inline)
-
-    def _image(self, image: model.Image) -> str:
-        if self.mistakes and self._is_broken(image):
-            return escape(image.alt)
-        return super()._image(image)
+        """What is shown before the text, of mistakes outside of its blocks."""
+        return Markup()
 
     def figure(self, block: model.Paragraph, image: model.Image, caption: Markup) -> Markup:
         """An image with its caption; a script's figure links to the script and its data."""
@@ -193,24 +142,10 @@ class PageWriter(PageContext, frozen=True):
                     path = block.source.path
                     html = self.template("blocks/source_part.html", path=path, code=html)
             case model.FeatureBlock():
-                html = self._feature_block(block)
+                html = kind_of_block(block).draw(self, block)
             case _:
                 assert_never(block)
         return html + Markup("\n") if html else html
-
-    def _feature_block(self, block: model.FeatureBlock) -> Markup:
-        """A block of a feature; its source, if it has errors for which nothing can be drawn."""
-        is_broken, marked = self._is_broken(block), set(self._marked)
-        try:
-            html = kind_of_block(block).draw(self, block)
-        except Exception:
-            if not is_broken:
-                raise
-            html = Markup()
-        if is_broken and not html.striptags():
-            self._marked.intersection_update(marked)
-            html = self.code("", block.span.text)
-        return html
 
     def _script(self, block: model.Script, recordings: tuple[model.Recording, ...]) -> Markup:
         """A script and the outputs that belong to it, as one object."""
@@ -426,10 +361,10 @@ def draw(
     inputs: PageInputs,
     document: model.Document | None,
     renderer: Renderer,
-    mistakes: Mistakes = (),
+    make_writer: Callable[..., PageWriter] = PageWriter,
 ) -> tuple[PageHead, Markup, PageContext | None]:
     """Draw a page: return its head, its body and the context of its document."""
-    page: PageContext | None = None
+    page: PageWriter | None = None
     values = dict(inputs.values)
     for name, value in inputs.values.items():
         match value:
@@ -446,12 +381,10 @@ def draw(
                 pass
     head = inputs.head
     if document is not None and inputs.document_inputs is not None:
-        page = PageWriter(
-            renderer, inputs.document_inputs, urls.Place(head.path), document, mistakes
-        )
+        page = make_writer(renderer, inputs.document_inputs, urls.Place(head.path), document)
         values["contents"] = contents(page, document)
-        written = article(page, document)
-        values["article"] = page.other_marks() + written
+        text_html = article(page, document)
+        values["article"] = page.other_marks() + text_html
         values["title_anchor"] = document.title_anchor
         if head.kind == "page":
             first = next((b for b in document.blocks if isinstance(b, model.Paragraph)), None)
