@@ -189,7 +189,7 @@ def finish(
         TimeoutError: it took longer than these seconds.
     """
     with contextlib.ExitStack() as resources:
-        it = resources.enter_context(
+        process = resources.enter_context(
             start(
                 command,
                 environment,
@@ -201,15 +201,15 @@ def finish(
             )
         )
         try:
-            output, errors = it.communicate(stdin, seconds)
+            output, errors = process.communicate(stdin, seconds)
         except subprocess.TimeoutExpired:
             raise TimeoutError(f"it takes longer than {seconds:g} s") from None
         finally:
-            if it.returncode is None:
+            if process.returncode is None:
                 with contextlib.suppress(OSError):
-                    os.killpg(it.pid, signal.SIGKILL)
-                it.wait()
-    return Completed(it.returncode, output, errors or b"")
+                    os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+    return Completed(process.returncode, output, errors or b"")
 
 
 def become(command: Sequence[str], environment: Mapping[str, str]) -> NoReturn:
