@@ -16,6 +16,7 @@ from coursebuild.pipeline.check import check
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.verify import read_shard
 from coursebuild.report import Report
+from coursebuild.report.values import plural, with_hints
 
 EXAMPLES = """\
 examples:
@@ -33,6 +34,7 @@ examples:
 _FLAGS = {
     "--fix": "fix mistakes that have a single cure; `undo` reverts it",
     "--unsafe": "with --fix: also make fixes that are only likely to be right",
+    "--hints": "also show what is only likely to be a mistake",
     "--sensitivity": "repeat recorded runs, move initial states, halve timesteps, and report which "
     "digits hold",
     "--truth": "list numbers and arithmetic that nothing proves",
@@ -68,7 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.fix:
         from coursebuild.pipeline.fix import fix
 
-        if conflicts := _special_options(arguments):
+        conflicts = _special_options(arguments) + (["--hints"] if arguments.hints else [])
+        if conflicts:
             raise UsageError(f"--fix cannot be combined with {conflicts[0]}")
         options = options_of(arguments)
         report = fix(options, tuple(arguments.lessons), unsafe=arguments.unsafe)
@@ -84,8 +87,13 @@ def run(arguments: argparse.Namespace) -> int:
             truth=arguments.truth,
         )
         safe = sum(diagnostic.safe for diagnostic in report.diagnostics)
-        hint = f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}"
-        return replace(report, remarks=(*report.remarks, *([hint] if safe else [])))
+        cure = f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}"
+        remarks = [*report.remarks, *([cure] if safe else [])]
+        if arguments.hints:
+            return replace(report, remarks=tuple(remarks), diagnostics=with_hints(report))
+        if report.hints:
+            remarks.append(f"{plural(len(report.hints), 'hint')}: `check --hints` shows them")
+        return replace(report, remarks=tuple(remarks))
 
     # Other formats say how long it took, which the report of before would not.
     if arguments.format != "text" or arguments.long or _special_options(arguments):
@@ -109,7 +117,9 @@ def _compare_with_version(arguments: argparse.Namespace) -> int:
 
     conflicts = [] if arguments.format in ("text", "json") else [f"--format {arguments.format}"]
     conflicts += _special_options(arguments)
-    conflicts += [f"--{name}" for name in ("sandbox", "strict", "fix") if getattr(arguments, name)]
+    conflicts += [
+        f"--{name}" for name in ("sandbox", "strict", "fix", "hints") if getattr(arguments, name)
+    ]
     conflicts += [arguments.executor[0].option] if arguments.executor else []
     if conflicts:
         raise UsageError(f"--against cannot be combined with {conflicts[0]}")

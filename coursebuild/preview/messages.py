@@ -133,6 +133,11 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
             }
             for d in diagnostics
         ],
+        "hints": [
+            _describe_mistake(session, d, document_path)
+            for d in report.hints
+            if d.span.path == document_path
+        ],
         "more": max(0, len(report.diagnostics) - _MAX_DIAGNOSTICS),
         "kept": session.files.is_outdated(path),
         "busy": session.busy,

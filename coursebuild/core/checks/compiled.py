@@ -34,9 +34,9 @@ from coursebuild.core.text.diagnostics import (
     Note,
     diagnose,
     did_you_mean,
-    nearest,
     propose,
 )
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 INCLUDED_ROOT = re.compile(r"\s*+(?>(?:<(?:\?.*?\?|!--.*?--)>\s*+)*)<mujocoinclude\b", re.DOTALL)
@@ -209,7 +209,7 @@ def _propose_name(
     if len(parts) < len(misspelling.places) or any(part.text != word for part in parts):
         return None
     place, *copies = (part.span() for part in parts)
-    fix = propose(word, likely, misspelling.candidates)
+    fix = propose(word, likely)
     if fix.new is not None:
         edits = tuple(Edit(span, likely) for span in copies)
         fix = Fix(fix, fix.new, fix.old, edits=edits, safe=fix.safe)

@@ -19,15 +19,8 @@ from coursebuild.core.model import (
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.registry import features
-from coursebuild.core.text.diagnostics import (
-    Diagnostic,
-    Fix,
-    Note,
-    diagnose,
-    did_you_mean,
-    nearest,
-    propose,
-)
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean, propose
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt, Span
 
 
@@ -208,9 +201,9 @@ def check_formulas(
         if command := re.search(r"unknown command \\([A-Za-z]+)", result.message):
             at = tex.text.find(command[1])
             place = span if at < 0 else tex.span(at, at + len(command[1]))
-            likely = nearest(command[1], _COMMANDS, cutoff=0.75)
+            likely = nearest(command[1], _COMMANDS)
             if likely is not None:
-                help = propose(command[1], likely, _COMMANDS).at(place)
+                help = propose(command[1], likely).at(place)
         diagnostics.append(diagnose("math-syntax", span, message, help=help))
     return tuple(diagnostics)
 

@@ -19,9 +19,9 @@ from coursebuild.core.text.diagnostics import (
     Note,
     diagnose,
     did_you_mean,
-    nearest,
     propose,
 )
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Span
 
 _HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
@@ -226,7 +226,7 @@ class _Checker(Struct, frozen=True):
         if likely is None:
             return "files that pages may use lie in content/"
         new = posixpath.relpath(files[likely], posixpath.dirname(self.document.source.path))
-        fix = propose(name, likely, files)
+        fix = propose(name, likely)
         return Fix(f"did you mean `{files[likely]}`?", fix.new and new, address, safe=fix.safe)
 
     def check_media(self, subject: str, url: str, span: Span) -> Iterator[Diagnostic]:

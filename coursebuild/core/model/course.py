@@ -31,8 +31,6 @@ class Words(Struct, frozen=True):
     """
 
     output: tuple[str, ...] = ("Output",)
-    unlike: tuple[str, ...] = ("Outfit", "Outlet", "Outset")
-    """Words that differ from these by a letter or two, and that nobody misspelt."""
     lesson: tuple[str, ...] = ("Lesson",)
     lessons: tuple[str, ...] = ("Lessons",)
     level: tuple[str, ...] = ("Level",)

@@ -46,7 +46,8 @@ from coursebuild.core.scripts.bound_numbers import (
 )
 from coursebuild.core.scripts.lines import canonicalize
 from coursebuild.core.scripts.numbers import Number, difference
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean
+from coursebuild.core.text.near import nearest
 
 _SILENT_OUTCOMES = (
     Outcome.FAILED,
