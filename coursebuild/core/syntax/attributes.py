@@ -149,7 +149,7 @@ def value_text(value: Excerpt | None) -> str:
 
 
 _UNREAD = re.compile(
-    r"(?<=`)(?<!\\`)\{\s*(?P<binding>out|given|code)\b[^{}\n]*\}?"
+    r"(?<=`)(?<!\\`)\{\s*(?P<binding>out|given|code)\b[^{}`\n]*\}?"
     r"|(?<=\$)(?<!\\\$)\{\s*(?P<symbol>symbol|unit|value)\b[^{}\n]*\}?"
     r"|(?<=\])(?<!\\\])\{\s*(?P<term>term)\b[^{}\n]*\}?"
 )

@@ -57,7 +57,7 @@ def check_marks(content: Excerpt, start: int, text: str) -> Iterator[Diagnostic]
         return
     line = content.text[start:].partition("\n")[0].rstrip()
     for mark, (subject, help) in _MARKS.items():
-        if line.startswith(mark):
+        if line.startswith(mark) and line.strip(":"):  # the end of a block is no second mistake
             message = f"`{shorten(line)}` would be shown as written: it is {subject}"
             place = content.span(start, start + len(line))
             yield diagnose("markup-foreign", place, message, help=help)

@@ -29,9 +29,9 @@ def distance(first: str, second: str) -> int:
     above = list(range(len(second) + 1))
     for i, letter in enumerate(first, 1):
         row = [i]
-        for j, other in enumerate(second, 1):
-            row.append(min(above[j] + 1, row[-1] + 1, above[j - 1] + (letter != other)))
-            if i > 1 and j > 1 and letter == second[j - 2] and first[i - 2] == other:
+        for j, goal in enumerate(second, 1):
+            row.append(min(above[j] + 1, row[-1] + 1, above[j - 1] + (letter != goal)))
+            if i > 1 and j > 1 and letter == second[j - 2] and first[i - 2] == goal:
                 row[j] = min(row[j], two_above[j - 2] + 1)
         two_above, above = above, row
     return above[-1]

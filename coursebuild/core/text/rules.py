@@ -248,12 +248,12 @@ _WARNINGS = frozenset(
 
 _NO_FIX = {
     "only you know what was meant": """
-    bench-text binding-volatile draft-empty field-missing field-repeated
+    bench-text binding-attribute binding-volatile draft-empty field-missing field-repeated
     figure-unshown footnote-repeated footnote-unused heading-empty html-unbalanced image-alt
     io-order io-repeated io-stray lesson-planned-file link-text math-brackets math-unclosed
-    merge-conflict nesting-deep output-not-updatable prerequisite-cycle quiz-answer
+    markup-foreign merge-conflict nesting-deep output-not-updatable prerequisite-cycle quiz-answer
     quiz-gate recording-body recording-orphan symbol-formula symbol-repeated table-cells
-    term-place
+    term-attribute term-place
     """,
     "links may lead to either": """
     anchor-repeated id-repeated question-id-repeated quiz-id-repeated script-repeated

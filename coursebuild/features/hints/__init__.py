@@ -80,7 +80,7 @@ def unread_marks(document: Document) -> Iterator[Diagnostic]:
             cells = tuple(cell for row in (block.header, *block.rows) for cell in row)
         runs = [cell.children for cell in cells] or [model.block_inlines(block)]
         for inlines in runs if not isinstance(block, model.HtmlFlow) else ():
-            text, places = _written(inlines)
+            text, places = _source_text(inlines)
             mark = find_mark(text) if _MARKS.search(text) else None
             if mark is not None:
                 span = document.source.span(places[mark.start()], places[mark.end() - 1] + 1)
@@ -89,7 +89,7 @@ def unread_marks(document: Document) -> Iterator[Diagnostic]:
                 yield diagnose("shown-as-written", span, message, help=help)
 
 
-def _written(inlines: Iterable[model.Inline]) -> tuple[str, list[int]]:
+def _source_text(inlines: Iterable[model.Inline]) -> tuple[str, list[int]]:
     """The texts of a paragraph as they are written, and where each character stands."""
     text, places = "", list[int]()
     for inline in model.walk_inlines(inlines):
@@ -187,9 +187,9 @@ def odd_angles(course: Course, documents: Collection[Document]) -> Iterator[Diag
                     continue
                 start = place.start + values.start(2) + values[2].index(number)
                 span = Span(place.source, start, start + len(number))
-                other = "radians" if unit == "degree" else "degrees"
-                message = f"`{number}` has the look of {other}, and this model reads {unit}s"
-                help = f'write it in {unit}s, or `angle="{other[:-1]}"` on `<compiler>`'
+                likely = "radians" if unit == "degree" else "degrees"
+                message = f"`{number}` has the look of {likely}, and this model reads {unit}s"
+                help = f'write it in {unit}s, or `angle="{likely[:-1]}"` on `<compiler>`'
                 yield diagnose("angle-unit", span, message, help=help)
                 break
 
@@ -211,6 +211,7 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
     yield from odd_angles(course, documents)
 
 
+_NO_FIX = "a hint is only likely"
 FEATURE = Feature(
     name="hints",
     needs=("names",),
@@ -219,8 +220,13 @@ FEATURE = Feature(
     ),
     check=check,
     rules=(
-        Rule("shown-as-written", "hint", "A character of Markdown would be shown."),
-        Rule("name-near", "hint", "A name that is used once is one letter from another."),
-        Rule("angle-unit", "hint", "An angle has the look of degrees where radians are read."),
+        Rule("shown-as-written", "hint", "A character of Markdown would be shown.", _NO_FIX),
+        Rule("name-near", "hint", "A name that is used once is one letter from another.", _NO_FIX),
+        Rule(
+            "angle-unit",
+            "hint",
+            "An angle has the look of degrees where radians are read.",
+            _NO_FIX,
+        ),
     ),
 )

@@ -86,7 +86,7 @@ class Resolver:
             case "path":
                 return self._path(claim.name.split("."), names)
             case "defined":
-                return self._defined(*claim.name.split(" "))
+                return self._linked_name(*claim.name.split(" "))
             case "element" | "attribute":
                 answer = self._mjcf(*claim.name.split(" "))
                 return answer if isinstance(answer, KnownName) and self.has_engine else None
@@ -173,7 +173,7 @@ class Resolver:
         href = class_href(self.engine, first_class)
         return KnownName(href, member.text, member.doc, member.extent, engine=True)
 
-    def _defined(self, path: str, name: str) -> Answer:
+    def _linked_name(self, path: str, name: str) -> Answer:
         """Whether the script to which the name is linked has it."""
         script = self.scripts.get(path)
         if script is None:

@@ -19,7 +19,7 @@ from coursebuild.features.hints import unread_marks
 from support.fixture_cases import fixture_text
 from support.scratch_course import Folder, block
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 MakeCourse = Callable[..., Folder]
 SIMULATION = """import mujoco
 
