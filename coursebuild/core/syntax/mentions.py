@@ -116,13 +116,13 @@ def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> D
             return None
         message, help = "this link has no text, so no reader sees it", "write one in the brackets"
         return diagnose("link-text", span, message, help=help)
-    match target, children:
-        case LessonTarget(id=name), (Text(text=text),) if number := _NUMBERED.fullmatch(text):
-            if number[1] != name:
-                message = f"the text of this link says `{number[1]}`, and it leads to `{name}`"
-                help = "name the same lesson in both"
-                return diagnose("link-text", span, message, help=help)
-    return None
+    first = children[0]
+    number = _NUMBERED.fullmatch(first.text) if isinstance(first, Text) else None
+    if number is None or len(children) > 1 or not isinstance(target, LessonTarget):
+        return None
+    message = f"the text of this link says `{number[1]}`, and it leads to `{target.id}`"
+    help = "name the same lesson in both"
+    return diagnose("link-text", span, message, help=help) if number[1] != target.id else None
 
 
 _LESSON = r"[0-9]+(?:\.[0-9]+)+(?!\w)"

@@ -57,8 +57,9 @@ def check_code_above(above: Sequence[model.Block], block: model.Block) -> Iterat
     Readers would take it for what that code prints.
     """
     before = above[-1] if above else None
-    is_code = isinstance(before, model.CodeBlock | model.PlainCode)
-    if not is_code or not isinstance(block, model.Recording) or block.script is None:
+    if not isinstance(before, model.CodeBlock | model.PlainCode):
+        return
+    if not isinstance(block, model.Recording) or block.script is None:
         return
     if posixpath.basename(block.script) not in before.code.text:
         message = "nothing runs the code above this output"
