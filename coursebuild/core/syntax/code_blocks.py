@@ -81,7 +81,7 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
                 message = "a text of a quiz or lab cannot show a file"
             help = "name it from the project's folder, as in `show=src/pkg/x.py#function`"
             diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
-    code = PlainCode(fence.span, fence.body, fragment is not None and file is None, source)
+    code = PlainCode(fence.span, fence.body, source)
     return Parsed(script or code, tuple(diagnostics))
 
 
