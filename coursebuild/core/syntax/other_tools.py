@@ -52,12 +52,16 @@ _FIRST_LETTERS = "".join({mark[0] for mark in _MARKS})
 
 
 def check_marks(content: Excerpt, start: int, text: str) -> Iterator[Diagnostic]:
-    """Warn of a mark of another tool, if this text of a block's content begins a line with one."""
+    """Warn of a mark of another tool, if this text of a block's content begins a line with one.
+
+    The end of a block is no second mistake, and a sentence after `!!!` none at all.
+    """
     if text[0] not in _FIRST_LETTERS or content.text[:start].rpartition("\n")[2].strip():
         return
     line = content.text[start:].partition("\n")[0].rstrip()
     for mark, (subject, help) in _MARKS.items():
-        if line.startswith(mark) and line.strip(":"):  # the end of a block is no second mistake
+        rest = line.removeprefix(mark)
+        if rest != line and line.strip(":") and not rest[:1].isupper():
             message = f"`{shorten(line)}` would be shown as written: it is {subject}"
             place = content.span(start, start + len(line))
             yield diagnose("markup-foreign", place, message, help=help)
