@@ -1,7 +1,7 @@
 """Change a course in small ways as hands do, check each change, and count what nobody is told of.
 
 Run: python benchmarks/mistakes.py [--seed 37 …] [--count 1200] [--kinds KIND …] [--jobs 2]
-         [--course DIR] [--list END …] [--minutes N] [--docs]
+         [--course DIR] [--list END …] [--minutes N]
 
 The course is verified once. Then each change of a lesson, a page, the map or what is declared of a
 model is checked in memory, in a copy of the course; of scripts and labs those run whose text has
@@ -29,7 +29,6 @@ import time
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from datetime import date
 from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any
@@ -40,7 +39,6 @@ from msgspec.structs import replace
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT)]
 
-from benchmarks.measure.report import put_into  # noqa: E402
 from benchmarks.slips.changes import KINDS, Change, make_change  # noqa: E402
 from benchmarks.slips.pages import compare_pages  # noqa: E402
 from benchmarks.slips.reasons import REASONS  # noqa: E402
@@ -52,14 +50,12 @@ from coursebuild.core.pages.page_list import page_list  # noqa: E402
 from coursebuild.core.registry import unproven  # noqa: E402
 from coursebuild.core.run.script_server import ScriptServer  # noqa: E402
 from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
-from coursebuild.features.names.resolve import resolver_of  # noqa: E402
 from coursebuild.pipeline.check import judge  # noqa: E402
 from coursebuild.pipeline.options import Options, open_store  # noqa: E402
 from coursebuild.pipeline.verify import verify  # noqa: E402
 from coursebuild.preview.run_history import script_keys  # noqa: E402
 from coursebuild.preview.session import Session  # noqa: E402
 
-DOCS = ROOT / "docs/explanation/mistakes.md"
 ENDS = ("at its place", "in its result", "elsewhere", "same", "prose", "reason", "silent")
 WIDTH = 300
 """Characters of a change that are listed."""
@@ -98,6 +94,7 @@ class Checker:
             path.relative_to(root).as_posix(): path.read_text("utf-8")
             for path in sorted(root.glob("models/*.toml"))
         }
+        self.words = {word for text in self.texts.values() for word in re.findall(r"\w+", text)}
         self.runs = {run.path: run for run in self.verification.results.runs}
         self.keys = script_keys(course)
         self.pages: dict[str, bytes] = {}
@@ -135,8 +132,7 @@ class Checker:
             self.session.take_results(self._course, self.verification)
         if verdict != "other":
             return Outcome(change, verdict)
-        known_names = resolver_of(self._course).guesses.plain_words
-        reason = find_reason(change, old, claims, known_names)
+        reason = find_reason(change, old, claims, self.words)
         return Outcome(change, "reason" if reason else "silent", reason)
 
     def _diagnose(self, path: str, new: str) -> list[Diagnostic]:
@@ -225,7 +221,7 @@ def find_reason(
 ) -> str:
     """Why a change is no mistake that can be known; empty where it should be.
 
-    `known_names`: the names that the course can tell.
+    `known_names`: the words of the course.
     """
     new, start = change.apply(old), change.start
     end = max(start + len(change.text), start + 1)
@@ -336,12 +332,12 @@ def run(
             pool.shutdown(cancel_futures=True)
 
 
-def table(outcomes: Sequence[Outcome], *, is_short: bool = False) -> list[str]:
-    """The counts by kind, and what they come to; or only of kinds of which some went unnoticed."""
+def table(outcomes: Sequence[Outcome]) -> list[str]:
+    """The counts by kind, and what they come to."""
     lines = [f"| kind of change | tried | {' | '.join(ENDS)} |", "| --- |" + " ---: |" * 8]
     for kind in [*KINDS, ""]:
         ends = Counter(o.end for o in outcomes if not kind or o.change.kind == kind)
-        if ends and not (is_short and kind and not (ends["silent"] or ends["elsewhere"])):
+        if ends:
             cells = (str(ends[end] or "") for end in ENDS)
             lines.append(f"| {kind or '**all**'} | {ends.total()} | {' | '.join(cells)} |")
     rest = [o for o in outcomes if o.change.kind not in ("numbers in prose", "inline code")]
@@ -356,8 +352,6 @@ def table(outcomes: Sequence[Outcome], *, is_short: bool = False) -> list[str]:
             "",
             f"Of {total} {title}, {silent:.1f} % were silent, {elsewhere:.1f} % elsewhere.",
         ]
-    if is_short:
-        return lines
     reasons = Counter(o.note for o in outcomes if o.end == "reason")
     lines += ["", "| reason | changes |", "| --- | ---: |"] if reasons else []
     return lines + [f"| {reason} | {count} |" for reason, count in reasons.most_common()]
@@ -386,7 +380,6 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=float("inf"), help="stop after so long")
     parser.add_argument("--course", type=Path, default=ROOT)
     parser.add_argument("--list", nargs="*", choices=ENDS, default=["silent", "elsewhere"])
-    parser.add_argument("--docs", action="store_true", help=f"put the table into {DOCS.name}")
     arguments = parser.parse_args()
     course: Path = arguments.course.resolve()
     outcomes: list[Outcome] = []
@@ -400,10 +393,6 @@ def main() -> int:
             break
     lines = table(outcomes)
     print("", *lines, sep="\n")
-    if arguments.docs:
-        command = " ".join(sys.argv).replace(str(ROOT) + "/", "")
-        head = f"`python {command}`, {date.today().isoformat()}:"
-        put_into(DOCS, "\n".join([head, "", *table(outcomes, is_short=True)]))
     return 0
 
 

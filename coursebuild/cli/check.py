@@ -19,7 +19,7 @@ from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.verify import read_shard
 from coursebuild.report import Report
 from coursebuild.report.text import diagnostic_text, visible_lines
-from coursebuild.report.values import plural
+from coursebuild.report.values import plural, with_hints
 
 EXAMPLES = """\
 examples:
@@ -38,6 +38,7 @@ examples:
 _FLAGS = {
     "--fix": "mend mistakes of form, without changing any word or number; `undo` reverts it",
     "--propose": "ask about each change that you should decide; without a terminal, list them",
+    "--hints": "also show what is only likely to be a mistake",
     "--sensitivity": "repeat recorded runs, move initial states, halve timesteps, and report which "
     "digits hold",
     "--truth": "list numbers and arithmetic that nothing proves",
@@ -82,12 +83,16 @@ def run(arguments: argparse.Namespace) -> int:
         )
         safe = sum(diagnostic.safe for diagnostic in report.diagnostics)
         proposals = sum(bool(d.edits) and not d.safe for d in report.diagnostics)
-        hints = []
+        remarks = [*report.remarks]
         if safe:
-            hints.append(f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}")
+            remarks.append(f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}")
         if proposals:
-            hints.append(f"`coursebuild check --propose` has {plural(proposals, 'proposal')}")
-        return replace(report, remarks=(*report.remarks, *hints))
+            remarks.append(f"`coursebuild check --propose` has {plural(proposals, 'proposal')}")
+        if arguments.hints:
+            return replace(report, remarks=tuple(remarks), diagnostics=with_hints(report))
+        if report.hints:
+            remarks.append(f"{plural(len(report.hints), 'hint')}: `check --hints` shows them")
+        return replace(report, remarks=tuple(remarks))
 
     # Other formats say how long it took, which the report of before would not.
     if arguments.format != "text" or arguments.long or _special_options(arguments):
@@ -141,7 +146,9 @@ def _compare_with_version(arguments: argparse.Namespace) -> int:
     conflicts = [] if arguments.format in ("text", "json") else [f"--format {arguments.format}"]
     conflicts += _special_options(arguments)
     conflicts += [
-        f"--{name}" for name in ("sandbox", "strict", "fix", "propose") if getattr(arguments, name)
+        f"--{name}"
+        for name in ("sandbox", "strict", "fix", "propose", "hints")
+        if getattr(arguments, name)
     ]
     conflicts += [arguments.executor[0].option] if arguments.executor else []
     if conflicts:

@@ -215,7 +215,7 @@ class _Parser(argparse.ArgumentParser):
         option = re.match("unrecognized arguments: (--[^ =]+)", message)
         if option is None:
             super().error(message)
-        from coursebuild.core.text.diagnostics import nearest
+        from coursebuild.core.text.near import nearest
 
         options = [name[2:] for name in self._option_string_actions if name.startswith("--")]
         closest = nearest(option[1][2:], options)

@@ -40,7 +40,7 @@ from coursebuild.core.run.dependencies import Kind, describe, is_there, sought_f
 from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.extract import extract, jobs
-from coursebuild.core.text.diagnostics import nearest
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.rules import RULES, Rule
 from coursebuild.numerics.reports.records import BENCH, ENGINES
 from coursebuild.pipeline.load import load_course

@@ -123,7 +123,7 @@ def find_clash(candidate: Feature, installed: Iterable[Feature]) -> str:
         return f"a page cannot be called `{odd[0]}`: use small letters, digits and `-`"
     for rule in candidate.rules:
         if rule.severity not in get_args(Severity):
-            return f"the severity of `{rule.name}` is neither `error` nor `warning`"
+            return f"the severity of `{rule.name}` is not `error`, `warning` or `hint`"
     core_rules = RULES.keys() - _names(_of_course, "rules")
     for field, core_names, message in (
         ("rules", core_rules, "there is already a rule `{}`"),

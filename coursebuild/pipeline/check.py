@@ -213,8 +213,10 @@ def judge(
             for silence in silences
         )
 
+    unsilenced = [d for d in relevant if not is_silenced(d)]
+    hints = tuple(d for d in unsilenced if d.severity == "hint")
     reported = tuple(
-        replace(d, strict=strict and d.rule not in mild) for d in relevant if not is_silenced(d)
+        replace(d, strict=strict and d.rule not in mild) for d in unsilenced if d.severity != "hint"
     )
     errors = sum(d.is_error for d in reported)
     summary = Summary(
@@ -224,14 +226,15 @@ def judge(
         skipped=sum(line.status == "skipped" for line in scripts),
         errors=errors,
         warnings=len(reported) - errors,
-        silenced=len(relevant) - len(reported),
+        hints=len(hints),
+        silenced=len(relevant) - len(unsilenced),
         seconds=0.0 if began is None else time.monotonic() - began,
         cached=sum(line.cached for line in scripts),
         unproven=len(unrun),
         reasons=tuple(dict.fromkeys(name for _, _, names in unrun for name in names)),
         unrepeated=sum(line.unrepeated for line in scripts),
     )
-    return Report(reported, tuple(scripts), summary, remarks, labs)
+    return Report(reported, tuple(scripts), summary, remarks, labs, hints=hints)
 
 
 _Unrun: TypeAlias = tuple[Script, ScriptLine, tuple[str, ...]]

@@ -42,7 +42,8 @@ from coursebuild.core.pages.materials import words_for
 from coursebuild.core.registry import read_references
 from coursebuild.core.run.script_environment import course_environment, engine_version
 from coursebuild.core.scripts.edit import check_source_parts, shown_files
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Source, Span
 
 if TYPE_CHECKING:

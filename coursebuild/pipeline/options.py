@@ -29,7 +29,8 @@ from coursebuild.core.files.write import undo_changes
 from coursebuild.core.model import Course, Lesson, Owner
 from coursebuild.core.run.run_store import RunStore
 from coursebuild.core.run.script_environment import course_environment
-from coursebuild.core.text.diagnostics import did_you_mean, nearest
+from coursebuild.core.text.diagnostics import did_you_mean
+from coursebuild.core.text.near import nearest
 from coursebuild.report.text import clip
 
 if TYPE_CHECKING:

@@ -38,9 +38,9 @@ from coursebuild.core.text.diagnostics import (
     Parsed,
     diagnose,
     did_you_mean,
-    nearest,
     sort_diagnostics,
 )
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.reports.case_report import exact_file
 from coursebuild.pipeline.options import UsageError

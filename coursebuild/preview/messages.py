@@ -126,6 +126,11 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
     diagnostics = sorted(report.diagnostics, key=rank)[:_MAX_DIAGNOSTICS]
     news: dict[str, Any] = {
         "problems": [_describe_mistake(session, d, document, marks) for d in diagnostics],
+        "hints": [
+            _describe_mistake(session, d, document, marks)
+            for d in report.hints
+            if document is not None and d.span.path == document.source.path
+        ],
         "more": max(0, len(report.diagnostics) - _MAX_DIAGNOSTICS),
         "busy": session.busy,
         "trouble": session.trouble,

@@ -103,6 +103,8 @@ def _add_case(suite: Element, group: str, name: str, seconds: float) -> Element:
 
 # --- SARIF
 
+_SARIF_LEVELS = {"error": "error", "warning": "warning", "hint": "note"}
+
 
 def to_sarif(report: Report) -> str:
     """The report as SARIF 2.1.0; columns count code points."""
@@ -111,7 +113,7 @@ def to_sarif(report: Report) -> str:
         {
             "id": name,
             "shortDescription": {"text": RULES[name].summary},
-            "defaultConfiguration": {"level": RULES[name].severity},
+            "defaultConfiguration": {"level": _SARIF_LEVELS[RULES[name].severity]},
         }
         for name in rule_names
     ]
@@ -137,7 +139,7 @@ def _result(d: Diagnostic, rule: int, folder: str) -> dict[str, Any]:
     result: dict[str, Any] = {
         "ruleId": d.rule,
         "ruleIndex": rule,
-        "level": d.severity,
+        "level": _SARIF_LEVELS[d.severity],
         "message": {"text": _message(d)},
         "locations": [_location(d.span, folder)],
     }
@@ -193,11 +195,13 @@ def _message(d: Diagnostic) -> str:
 
 # --- annotations
 
+_COMMANDS = {"error": "error", "warning": "warning", "hint": "notice"}
+
 
 def to_annotations(report: Report) -> str:
     """One workflow command for each diagnostic; CI services show it beside the changed lines."""
     return "".join(
-        f"::{d.severity} file={_escape_property(report.folder + d.span.path)},"
+        f"::{_COMMANDS[d.severity]} file={_escape_property(report.folder + d.span.path)},"
         f"line={d.span.line},col={d.span.column},"
         f"endLine={d.span.end_line},endColumn={d.span.end_column},"
         f"title={_escape_property(d.rule)}::{_escape_data(_message(d))}\n"

@@ -203,7 +203,7 @@ def lab_line(line: TrialLine, style: Style) -> str:
 def diagnostic_text(diagnostic: Diagnostic, style: Style) -> str:
     """One diagnostic in full, without a final newline."""
     span = diagnostic.span
-    colour = RED if diagnostic.is_error else YELLOW
+    colour = {"error": RED, "warning": YELLOW, "hint": BLUE}[diagnostic.severity]
     head = style.paint(f"{diagnostic.severity}[{diagnostic.rule}]", colour)
     gutter = max(len(str(span.line)), 3)
     pad = " " * gutter

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.results import TrialLine
 from coursebuild.core.scripts.sensitivity import Sensitivity
-from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.core.text.source import Span
 
 
@@ -60,6 +60,7 @@ class Summary(Struct, frozen=True):
     """What kept them from it: missing modules, `norun`."""
     unrepeated: int = 0
     """Scripts that were recorded from their only run."""
+    hints: int = 0
 
 
 class Report(Struct, frozen=True):
@@ -75,6 +76,8 @@ class Report(Struct, frozen=True):
     its root; `None` where they are not known."""
     sensitivity: tuple[Sensitivity, ...] | None = None
     """Which printed digits hold; `None` where that was not measured."""
+    hints: tuple[Diagnostic, ...] = ()
+    """What is likely a mistake, which changes nothing."""
     folder: str = ""
     """Where the course lies in the repository, for services that know only this: `lectures/`."""
 
@@ -82,6 +85,11 @@ class Report(Struct, frozen=True):
     def ok(self) -> bool:
         """Whether there are no errors."""
         return all(not d.is_error for d in self.diagnostics)
+
+
+def with_hints(report: Report) -> tuple[Diagnostic, ...]:
+    """The diagnostics of a report with its hints among them, in their order."""
+    return sort_diagnostics((*report.diagnostics, *report.hints))
 
 
 def unchanged_report(report: Report, remark: str) -> Report:

@@ -76,7 +76,7 @@ BROKEN = {
     SHOUT.replace('"shout",\n    f', '"quiz",\n    f'): ": two features are called `quiz`",
     SHOUT.replace('Rule("shout"', 'Rule("output-drift"'): ": there is already a rule",
     SHOUT.replace('"error"', '"Error"'): (
-        ": the severity of `shout` is neither `error` nor `warning`"
+        ": the severity of `shout` is not `error`, `warning` or `hint`"
     ),
     SHOUT.replace('name="shout",\n    f', 'name="shout",\n    check=print,\n    f'): (
         ": it would see no `shout` of the course: its block has no `summary`"

@@ -96,7 +96,7 @@ WRONG_USAGE = [
     ),
     ("check --frob=1", "no option `--frob`; `coursebuild check --help` lists them\n"),
     ("check --quite", "coursebuild: there is no option `--quite`; did you mean `--quiet`?\n"),
-    ("che", "there is no command `che`; did you mean `check`?"),
+    ("chek", "there is no command `chek`; did you mean `check`?"),
     ("check --form json", "there is no option `--form`"),
     ("check --format yaml", "invalid choice: 'yaml'"),
     ("build extra", "unrecognized arguments: extra"),

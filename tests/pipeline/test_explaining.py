@@ -246,7 +246,7 @@ def test_explain_tells_what_a_rule_means_anywhere(tmp_path: Path) -> None:
     assert "\n    warning[footnote-unused]: " in result.out
     page = (ROOT / "docs/reference/rules.md").read_text()
     texts = "".join(folder.main("explain", name).out for name in RULES)
-    assert len(re.findall(r"^    (error|warning)\[", texts, re.MULTILINE)) == len(RULES)
+    assert len(re.findall(r"^    (error|warning|hint)\[", texts, re.MULTILINE)) == len(RULES)
     assert all(line in page for line in texts.splitlines())
     rule = json.loads(folder.main("explain", "footnote-unused", "--format", "json").out)
     assert (rule["name"], rule["severity"]) == ("footnote-unused", "warning")

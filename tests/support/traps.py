@@ -45,7 +45,7 @@ COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "fmt": (("fmt",), ("fmt", "--check")),
     "help": (("help",), ("help", "bench"), ("--version",)),
     "import": tuple(
-        ("import", "content/lessons", "--out", "../imported", *more) for more in ((), ("--sandbox",))
+        ("import", "content/lessons", "--out", "../new", *more) for more in ((), ("--sandbox",))
     ),
     "init": (("init", "new"),),
     "new": (("new", "lesson", "1.2", "B"), ("new", "feature", "x"), ("new", "model", "y")),

@@ -34,9 +34,9 @@ from coursebuild.core.text.diagnostics import (
     Note,
     diagnose,
     did_you_mean,
-    nearest,
     propose,
 )
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 INCLUDED_ROOT = re.compile(r"\s*+(?>(?:<(?:\?.*?\?|!--.*?--)>\s*+)*)<mujocoinclude\b", re.DOTALL)

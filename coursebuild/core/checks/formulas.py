@@ -24,7 +24,8 @@ from coursebuild.core.model import (
     walk_inlines,
 )
 from coursebuild.core.model.results import Formula, MathError
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt
 
 _GREEK = frozenset(
@@ -109,7 +110,7 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
         span = tex.span(at, at + 1)
     help = ""
     if command := re.search(r"unknown command \\([A-Za-z]+)", error.message):
-        likely = nearest(command[1], _GREEK | _FUNCTIONS | _WITH_BRACES, cutoff=0.75)
+        likely = nearest(command[1], _GREEK | _FUNCTIONS | _WITH_BRACES)
         at = tex.text.find(command[1])
         if likely is not None and at >= 0:
             place = tex.span(at, at + len(command[1]))

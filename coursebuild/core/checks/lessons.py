@@ -16,12 +16,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.registry import features
-from coursebuild.core.text.diagnostics import (
-    Diagnostic,
-    Note,
-    diagnose,
-    did_you_mean,
-)
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
 from coursebuild.core.text.source import Span
 
 

@@ -19,9 +19,9 @@ from coursebuild.core.text.diagnostics import (
     Note,
     diagnose,
     did_you_mean,
-    nearest,
     propose,
 )
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Span
 
 _HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)

@@ -253,10 +253,9 @@ class SourcePart(Struct, frozen=True):
 
 
 class PlainCode(Labelled, frozen=True):
-    """A Python block without `file=`, shown but not run; a `fragment` need not parse."""
+    """A Python block without `file=`, shown but not run."""
 
     code: Excerpt
-    fragment: bool
     source: SourcePart | None = None
 
 

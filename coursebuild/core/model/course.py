@@ -31,8 +31,6 @@ class Words(Struct, frozen=True):
     """
 
     output: tuple[str, ...] = ("Output",)
-    unlike: tuple[str, ...] = ("Outfit", "Outlet", "Outset")
-    """Words that differ from these by a letter or two, and that nobody misspelt."""
     lesson: tuple[str, ...] = ("Lesson",)
     lessons: tuple[str, ...] = ("Lessons",)
     level: tuple[str, ...] = ("Level",)
@@ -242,7 +240,7 @@ class Pace(Struct, frozen=True, forbid_unknown_fields=True):
 class Silence(Struct, frozen=True, forbid_unknown_fields=True):
     """A warning that is not shown."""
 
-    rule: Annotated[str, describe("the name of a warning", pattern=r"\S")]
+    rule: Annotated[str, describe("the name of a warning or a hint", pattern=r"\S")]
     reason: Annotated[str, describe("why")] = ""
     path: Annotated[
         Annotated[str, Meta(pattern=r"\S")] | None,

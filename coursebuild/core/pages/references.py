@@ -16,7 +16,7 @@ from coursebuild.core.model import linked_lines
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.html_xml import elements_with
-from coursebuild.core.text.diagnostics import nearest
+from coursebuild.core.text.near import nearest
 
 _ADDRESSES = {
     "a": ("href",),
@@ -75,7 +75,7 @@ def check_links(files: Iterable[OutputFile], base_url: str = "") -> tuple[Broken
             reason, suggestion = anchor, None
             if target and target not in contents:
                 reason = f"no file `{target}` in the site"
-                suggestion = nearest(target, contents, cutoff=0.7)
+                suggestion = nearest(target, contents)
             elif target:
                 ids = pages[target][0] if target in pages else None
                 if ids is None or anchor in ("", "top") or has_anchor(ids, anchor):

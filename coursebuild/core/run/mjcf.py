@@ -15,7 +15,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import functools
 import os
 import re
@@ -39,6 +38,7 @@ from coursebuild.core.run import compile_main, mujoco_files
 from coursebuild.core.run.child import LIMITS, JsonChild
 from coursebuild.core.run.mujoco_files import ModelFiles
 from coursebuild.core.run.script_environment import engine_version
+from coursebuild.core.text.near import near
 from coursebuild.core.values import fingerprint
 
 _ONE = 0.5
@@ -190,7 +190,7 @@ class _Compiler(JsonChild):
         for file, content in texts.items():
             for places, known_names in _suspects(result, content, schema, (*names, *keywords)):
                 word = content[slice(*places[0])]
-                likely = difflib.get_close_matches(word, sorted({*known_names} - {word}), _TRIED)
+                likely = near(word, known_names)[:_TRIED]
                 passing, changing = list[str](), list[str]()
                 for candidate in likely:
                     new_text = content

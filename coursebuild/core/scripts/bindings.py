@@ -45,7 +45,8 @@ from coursebuild.core.scripts.bound_numbers import (
     text_places,
 )
 from coursebuild.core.scripts.lines import canonicalize
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.numbers import Number, difference
 
 _SILENT_OUTCOMES = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from unicodedata import normalize
 
 from msgspec import Struct, field
@@ -13,7 +13,6 @@ from coursebuild.core.model import (
     Inline,
     Meaning,
     NumberBinding,
-    Text,
     plain_text,
     walk_inlines,
 )
@@ -26,16 +25,12 @@ from coursebuild.core.text.diagnostics import (
     Parsed,
     diagnose,
     did_you_mean,
-    misspelt,
-    propose,
 )
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
 
-TERM = re.compile(r"(\{\s*(?:term|terms|therm|tern|trem|tem|ter)\b[^{}]{0,400}\}?)", re.I)
-SYMBOL = re.compile(
-    r"(\{\s*(?:s[iy]m\w{0,6}|meaning|unit|units|value|given)\b[^{}]{0,400}\}?)", re.I
-)
+TERM = re.compile(r"(\{\s*term\b[^{}]{0,400}\}?)")
+SYMBOL = re.compile(r"(\{\s*(?:symbol|unit|value|given)\b[^{}]{0,400}\}?)")
 LABEL = re.compile(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 """The attributes of a term, a symbol or a formula; group 1 is the braces, the last of which may be
 missing."""
@@ -87,10 +82,8 @@ def read_pairs(
         if misquoted := check_quotes(braces, pair.start(1), rule):
             return misquoted[0]
         if key not in keys:
-            suggestion = did_you_mean(key, keys)
-            if len(keys) == 1:
-                suggestion = Fix(help, keys[0] if misspelt(key, keys) else None, key, safe=True)
-            return diagnose(rule, span, f"`{key}` is not a known key here", help=suggestion or help)
+            suggestion = (did_you_mean(key, keys) if len(keys) > 1 else "") or help
+            return diagnose(rule, span, f"`{key}` is not a known key here", help=suggestion)
         if key in values:
             return diagnose(rule, span, f"`{key}` is given twice", help=help)
         group = pair.lastindex or 1
@@ -155,6 +148,30 @@ def value_text(value: Excerpt | None) -> str:
     return "" if value is None else collapse_spaces(value.text)
 
 
+_UNREAD = re.compile(
+    r"(?<=`)(?<!\\`)\{\s*(?P<binding>out|given|code)\b[^{}`\n]*\}?"
+    r"|(?<=\$)(?<!\\\$)\{\s*(?P<symbol>symbol|unit|value)\b[^{}\n]*\}?"
+    r"|(?<=\])(?<!\\\])\{\s*(?P<term>term)\b[^{}\n]*\}?"
+)
+"""Braces directly after code, a formula or a bracket that begin as an attribute there does."""
+_BINDING_HELP = (
+    "write `{out}`, `{out=examples/x.py}`, `{given}` or `{code}`; write `\\{` for a brace that "
+    "readers should see"
+)
+_HELPS = {"binding": _BINDING_HELP, "symbol": _SYMBOL_HELP, "term": _TERM_HELP}
+
+
+def check_unread_attributes(content: Excerpt, start: int, text: str) -> Iterator[Diagnostic]:
+    """Report the attributes that begin in a text of a block's content: what is read is no text."""
+    for match in _UNREAD.finditer(content.text, start) if "{" in text else ():
+        if match.start() >= start + len(text):
+            break
+        kind = match.lastgroup or ""
+        message = f"`{collapse_spaces(match[0])}` cannot be read"
+        place = content.span(*match.span())
+        yield diagnose(f"{kind}-attribute", place, message, help=_HELPS[kind])
+
+
 def split_label(text: Excerpt) -> tuple[Excerpt, Excerpt | None]:
     """A caption or an info string, and the label in braces at its end, if there is one."""
     match = _LAST_LABEL.search(text.text) if "{#" in text.text else None
@@ -197,9 +214,6 @@ def read_attributes(content: Excerpt) -> Parsed[Attributes]:
     for word in (inner.slice(*match.span()) for match in _WORD.finditer(inner.text)):
         if _WHOLE_ID.fullmatch(word.text) and name is None:
             name = word
-        elif misspelt(word.text, [".further"]):
-            fix = propose(word.text, ".further")
-            return _reject(title, word, f"no class `{word.text}`", fix)
         elif _CLASS.fullmatch(word.text):
             classes.append(word.text[1:])
         elif word.text.startswith("#") and name is not None:
@@ -273,17 +287,6 @@ def check_heading(
         isinstance(inline, Image) for inline in walk_inlines(children)
     ):
         diagnostics.append(diagnose("heading-empty", span, "the heading has no text"))
-    if re.match(r"#+[^\W\d_]", plain_text(children)):
-        message, help = "a `#` would be shown before the title", "write all `#` before the blank"
-        diagnostics.append(diagnose("markup-unread", span.first_line(), message, help=help))
-    last = children[-1] if children else None
-    braces = re.search(r"(?<=\s)\{[^{}\s]{2,}\}?$", last.text) if isinstance(last, Text) else None
-    if braces is not None and not re.match(r"\{[#.:]|\{(?:further|symbol|term)\b", braces[0]):
-        at = span.text.rindex(braces[0])
-        message = f"`{braces[0]}` would be shown as written: it is no attribute of the heading"
-        help = "write `{#id .class}`, or `\\{` for braces that readers should see"
-        place = span.source.span(span.start + at, span.start + at + len(braces[0]))
-        diagnostics.append(diagnose("markup-unread", place, message, help=help))
     before = span.source.text[: span.start].rstrip().rpartition("\n")[2]
     if before == "---" and re.fullmatch(r"[a-z][\w-]*: .*\n-+", span.text.strip(), re.DOTALL):
         message, help = "front matter stands in the text, which would show it", "delete it"

@@ -24,10 +24,10 @@ from coursebuild.core.syntax.fence import (
     find_likely_start,
     split_words,
 )
+from coursebuild.core.syntax.other_tools import check_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.python_syntax import check_syntax, find_windows
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
-from coursebuild.core.syntax.unread_markup import check_kind
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, Parsed, diagnose, write
 from coursebuild.core.text.source import Excerpt
 
@@ -67,8 +67,8 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
     if show is not None and (has_file or fragment is not None):
         message = "a block shows a part of a file, or it is a script or a fragment of its own"
         diagnostics.append(diagnose("fence-key-value", show.span, message))
-    elif show is None and (fragment is None or has_file):
-        diagnostics += check_syntax(fence.body, script=has_file)
+    elif has_file:  # what is only shown may be a part, a session or of another version
+        diagnostics += check_syntax(fence.body)
     script = None if file is None else _build_script(fence, file, keys.value, diagnostics)
     source = None
     if show is not None and not has_file:
@@ -81,7 +81,7 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
                 message = "a text of a quiz or lab cannot show a file"
             help = "name it from the project's folder, as in `show=src/pkg/x.py#function`"
             diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
-    code = PlainCode(fence.span, fence.body, fragment is not None and file is None, source)
+    code = PlainCode(fence.span, fence.body, source)
     return Parsed(script or code, tuple(diagnostics))
 
 

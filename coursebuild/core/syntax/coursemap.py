@@ -311,12 +311,12 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
     for node, silence in decoding.find_structs(model.Silence):
         rule = RULES.get(silence.rule)
         if rule is None:
-            warning_names = [name for name, entry in RULES.items() if entry.severity == "warning"]
+            names = [name for name, entry in RULES.items() if entry.severity != "error"]
             message = f"there is no rule {format_name(silence.rule)}"
-            help = did_you_mean(silence.rule, warning_names)
+            help = did_you_mean(silence.rule, names)
             yield diagnose("silence-rule", node.place("rule"), message, help=help)
         elif rule.severity == "error":
-            message = f"`{silence.rule}` is an error; only warnings can be silenced"
+            message = f"`{silence.rule}` is an error; only warnings and hints can be silenced"
             yield diagnose("silence-rule", node.place("rule"), message)
         if not silence.reason.strip():
             message, help = "the silence gives no reason", 'say why: `reason = "…"`'

@@ -36,14 +36,8 @@ from coursebuild.core.syntax.nodes import (
     wrong_type_message,
 )
 from coursebuild.core.text.characters import REORDERING
-from coursebuild.core.text.diagnostics import (
-    Diagnostic,
-    Note,
-    diagnose,
-    did_you_mean,
-    nearest,
-    propose,
-)
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, propose
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Span
 
 S = TypeVar("S", bound=Struct)
@@ -284,7 +278,7 @@ class _Decoder:
             return self.report_wrong_type(tag_node, inspect.StrType(), tag, help)
         owners = {key: _variants_with_field(key, variants) for key in node.members}
         for key, member in node.members.items():
-            if not owners[key] and nearest(key, [tag], cutoff=0.7):
+            if not owners[key] and nearest(key, [tag]):
                 message, place = f"unknown field {format_name(key)}", member.key.span
                 return self.report("field-unknown", place, message, propose(key, tag))
         implied = next((t for t, v in variants.items() if getattr(v.cls, "implied", False)), None)

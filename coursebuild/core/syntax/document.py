@@ -67,8 +67,6 @@ def parse_document(
     if conflict is not None:  # the rest follows from it
         return Parsed(document, (conflict,))
     state.diagnostics += (*_check_placement(document), *_check_ids(document))
-    if len({stands_before for stands_before, _ in state.stars}) == 1:  # else it is a footnote
-        state.diagnostics += (diagnostic for _, diagnostic in state.stars)
     if (at := source.text.find("\0")) >= 0:
         message = "the text contains a NUL character"
         places = [match.start() for match in re.finditer("\0", source.text)]

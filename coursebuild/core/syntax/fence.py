@@ -219,7 +219,7 @@ class Fence(Struct, frozen=True):
 
     @property
     def kind(self) -> str:
-        return kind_of(self.info).text
+        return kind_of(self.info).text.lower()
 
     def keys(
         self, *, values: Sequence[str] = (), flags: Sequence[str] = (), has_name: bool = False
@@ -263,7 +263,8 @@ class Fence(Struct, frozen=True):
 
     def code(self) -> CodeBlock:
         """The fence as an ordinary code block."""
-        return CodeBlock(self.span, unescapeAll(self.kind), unescapeAll(self.info.text), self.body)
+        kind, info = kind_of(self.info).text, self.info.text
+        return CodeBlock(self.span, unescapeAll(kind), unescapeAll(info), self.body)
 
 
 def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:

@@ -14,7 +14,6 @@ from typing import NamedTuple
 from urllib.parse import unquote
 
 from coursebuild.core.model import (
-    CodeSpan,
     ExampleTarget,
     Inline,
     LessonTarget,
@@ -31,7 +30,8 @@ from coursebuild.core.model import (
 from coursebuild.core.model.course import Words
 from coursebuild.core.model.inlines import LABEL_KINDS
 from coursebuild.core.syntax.attributes import term_id
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, misspelt, nearest, propose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, propose
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt, Span
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
@@ -78,7 +78,7 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
     if scheme in LABEL_KINDS:
         help = Fix(f"did you mean `#{url}`?", f"#{url}")
         return diagnose("link-scheme", span, f"no link scheme `{match[1]}:`", help=help)
-    likely = nearest(scheme, (*_COURSE_SCHEMES, "https", "mailto"), cutoff=0.75)
+    likely = nearest(match[1], (*_COURSE_SCHEMES, "https", "mailto"))
     if likely is None or scheme in _OTHER_SCHEMES:
         return None
     fix = propose(f"{match[1]}:", f"{likely}:")
@@ -101,7 +101,7 @@ _NUMBERED = re.compile(r"(?:[^\W\d_]+ )?(\d+(?:\.\d+)+)")
 
 
 def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> Diagnostic | None:
-    """The diagnostic of a text that is missing, another lesson, or almost its target's name."""
+    """The diagnostic of a text or address that is missing, or a text that names another lesson."""
     if target == UrlTarget(""):
         message, help = "this link has no address", "write one in the brackets behind its text"
         return diagnose("link-text", span, message, help=help)
@@ -111,18 +111,13 @@ def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> D
             return None
         message, help = "this link has no text, so no reader sees it", "write one in the brackets"
         return diagnose("link-text", span, message, help=help)
-    match target, children:
-        case LessonTarget(id=name), (Text(text=text),) if number := _NUMBERED.fullmatch(text):
-            label, kind = number[1], "lesson"
-        case ModelTarget(name=name), (CodeSpan(text=label),) if misspelt(label, (name,)):
-            kind = "model"
-        case ExampleTarget(path=name), (CodeSpan(text=label),) if misspelt(label, (name,)):
-            kind = "script"
-        case _:
-            return None
-    message = f"the text of this link says `{label}`, and it leads to the {kind} `{name}`"
-    help = "name the same one in both"
-    return diagnose("link-text", span, message, help=help) if label != name else None
+    first = children[0]
+    number = _NUMBERED.fullmatch(first.text) if isinstance(first, Text) else None
+    if number is None or len(children) > 1 or not isinstance(target, LessonTarget):
+        return None
+    message = f"the text of this link says `{number[1]}`, and it leads to `{target.id}`"
+    help = "name the same lesson in both"
+    return diagnose("link-text", span, message, help=help) if number[1] != target.id else None
 
 
 _LESSON = r"[0-9]+(?:\.[0-9]+)+(?!\w)"

@@ -40,8 +40,6 @@ class ParsingState:
         self.closes_indented = False
         """Whether a fence above was indented, so that its closing line seems to open a fence."""
         self.level = 1
-        self.stars: list[tuple[bool, Diagnostic]] = []
-        """Stars of which one may be a footnote's, with whether it stands before its word."""
         self.notes = FootnoteList(self.report)
         self.anchors = Anchors(self.report)
 

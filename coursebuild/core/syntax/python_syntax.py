@@ -49,8 +49,8 @@ def find_windows(code: Excerpt) -> Iterator[Diagnostic]:
             return
 
 
-def check_syntax(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
-    """Report where and why a piece of Python does not parse, if it does not."""
+def check_syntax(code: Excerpt) -> Iterator[Diagnostic]:
+    """Report where and why a script does not parse, if it does not."""
     error = _compile_error(code.text)
     if error is None:
         return
@@ -74,8 +74,6 @@ def check_syntax(code: Excerpt, *, script: bool) -> Iterator[Diagnostic]:
     message, _, help = _LINE_REFERENCE.sub(lesson_line, error.msg).partition(". ")
     if row.text.lstrip().startswith(("%", "!")):
         help = f"`{row.text.split()[0]}` is a command of Jupyter: leave it out"
-    if not help and not script:
-        help = "write `fragment` after `python` if it is not meant to be complete"
     message, place = _lower_first(message), row.span(start, end)
     fix = Fix(_lower_first(help), edits=_python_edits(row, message, place), safe=True)
     yield diagnose("python-syntax", place, message, help=fix)

@@ -7,34 +7,21 @@ from __future__ import annotations
 
 import posixpath
 import re
+from collections.abc import Iterator, Sequence
 from decimal import Decimal
 
 from coursebuild.core import model
 from coursebuild.core.model.blocks import volatile_pattern
 from coursebuild.core.model.course import Words
-from coursebuild.core.syntax.attributes import split_label
 from coursebuild.core.syntax.fence import Fence, FenceKeys, Word
+from coursebuild.core.syntax.other_tools import is_known_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.syntax.unread_markup import is_known_kind
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, misspelt
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.patterns import matches_empty_text, pattern_mistake
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.source import Span
 
 FIGURE, TABLE, OUTPUT_KIND = "Figure:", "Table:", "output"
 _BODY_KINDS = ("text", OUTPUT_KIND)
-_FIRST_WORD = re.compile(r"([^\s:,*`]{3,12})(?![^\s:,])[^\S\n]*(:?)")
-_NEAR_CAPTION = re.compile(
-    r"\s*(?:(?:the|expected|recorded|sample|printed|its)\s+){0,2}outputs?\b.{0,40}\s*",
-    re.IGNORECASE | re.DOTALL,
-)
-_OUTPUT_SENTENCE = re.compile(
-    r"(?:.{0,80}[.;:!?]\s+)?[^.;:!?]{0,60}"
-    r"\b(?:print(?:s|ed)?|outputs?|writes|gives|yields|returns|results?)\b[^.;!?]{0,60}:\s*",
-    re.IGNORECASE | re.DOTALL,
-)
-"""A sentence before an output, as in "On this machine it prints (abridged):"."""
-_OUTPUT_KINDS = ("text", "", "console", "plain", "plaintext", "txt")
-"""Kinds of blocks that may show an output without being one."""
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _VALUES = ("rtol", "atol", "volatile")
 _FLAGS = ("exact", "digits", "ellipsis", "volatile")
@@ -43,77 +30,42 @@ ILLUSTRATION = "illustration"
 """The flag of a `text` fence that resembles an output and is none."""
 
 
-def is_caption(inlines: tuple[model.Inline, ...], words: Words) -> bool:
-    """Whether a paragraph begins with a word for "output" and ends with a colon."""
-    return _match_caption(inlines, words) is not None
+def is_caption(inlines: tuple[model.Inline, ...], words: Words, *, has_script: bool) -> bool:
+    """Whether a paragraph is a caption: `Output:`, and below a script `Output (again):` as well.
+
+    Instead of what stands in brackets there may be what follows a comma. A sentence that begins
+    with the word is none.
+    """
+    match = _match_caption(inlines, words)
+    return match is not None and (has_script or not match[1])
 
 
 def _is_bare(caption: tuple[model.Inline, ...], words: Words) -> bool:
     match = _match_caption(caption, words)
-    return match is not None and not match[1].strip()
+    return match is not None and not match[1]
 
 
 def _match_caption(caption: tuple[model.Inline, ...], words: Words) -> re.Match[str] | None:
     names = "|".join(map(re.escape, words.output))
-    return re.fullmatch(rf"\s*(?:{names})\b(.*):\s*", model.plain_text(caption), re.DOTALL)
+    pattern = rf"\s*(?:{names})(\s*\([^()]*\)|,[^:]*)?\s*:\s*"
+    return re.fullmatch(pattern, model.plain_text(caption))
 
 
-def find_misspelt_caption(
-    content: Excerpt, names: tuple[str, ...], unlike: tuple[str, ...] = ()
-) -> Diagnostic | None:
-    """The diagnostic of a paragraph that begins with a misspelt name and ends with a colon.
+def check_code_above(above: Sequence[model.Block], block: model.Block) -> Iterator[Diagnostic]:
+    """Report an output below code that nothing runs, unless the code names the output's script.
 
-    One that consists of the name may lack the colon. Words in `unlike` are not misspelt.
+    Readers would take it for what that code prints.
     """
-    content = split_label(content)[0]
-    match = _FIRST_WORD.match(content.text)
-    is_alone = match is not None and match.end() == len(content.text)
-    if match is None or not (is_alone or match[2] or content.text.endswith(":")):
-        return None
-    is_name = match[1] in names
-    word = match[1] if is_name else misspelt(match[1], names)
-    if word is None or match[1] in unlike or (is_name and (match[2] or not is_alone)):
-        return None
-    message = f"`{content.text[: match.end()].rstrip()}` is not a caption"
-    place = content.span(0, len(match[0].rstrip()))
-    new = word if content.text.startswith(",", match.end()) else f"{word}:"
-    fix = Fix(f"did you mean `{new}`?", new, safe=is_name)
-    return diagnose("recording-misspelt", place, message, help=fix)
-
-
-def check_near_caption(
-    inlines: tuple[model.Inline, ...], span: Span, info: str, words: Words
-) -> list[Diagnostic]:
-    """Warn if a paragraph looks like the caption of the fence below it, whose info is given."""
-    kind, *keys = info.split() or [""]
-    text = model.plain_text(inlines)
-    is_near = kind == "text" and (
-        _NEAR_CAPTION.fullmatch(text)
-        or re.fullmatch(
-            rf"(?:\w+\s+){{0,2}}(?:{'|'.join(words.output)})\b.{{0,40}}:\s*", text, re.I
-        )
-    )
-    if (
-        ILLUSTRATION in keys
-        or kind not in _OUTPUT_KINDS
-        or not (is_near or _OUTPUT_SENTENCE.fullmatch(text))
-    ):
-        return []
-    message = "this looks like the caption of a recorded output, but nothing is compared"
-    return [diagnose("recording-caption", span, message, help=_help_to_mark(words))]
-
-
-def _help_to_mark(words: Words) -> str:
-    return (
-        "begin the fence with ```` ```output ````, or write a paragraph "
-        f"`{words.output[0]}:` above it; mark any other text as `text {ILLUSTRATION}`"
-    )
-
-
-def diagnose_missing_caption(fence: Span, words: Words) -> Diagnostic:
-    """The warning for a `text` block directly below a script."""
-    message = "this looks like the output of the script above it, but nothing is compared"
-    return diagnose("recording-caption", fence.first_line(), message, help=_help_to_mark(words))
+    before = above[-1] if above else None
+    if not isinstance(before, model.CodeBlock | model.PlainCode):
+        return
+    if not isinstance(block, model.Recording) or block.script is None:
+        return
+    if posixpath.basename(block.script) not in before.code.text:
+        message = "nothing runs the code above this output"
+        help = f"put it below `{block.script}`, which it is compared with, or make it a block of "
+        help += f"kind `text {ILLUSTRATION}`, without a caption"
+        yield diagnose("recording-orphan", block.caption_span, message, help=help)
 
 
 def record_fence(

@@ -12,33 +12,26 @@ from coursebuild.core.syntax.attributes import LABEL, check_heading, read_attrib
 from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.code_blocks import read_block
 from coursebuild.core.syntax.containers import (
-    check_item,
-    check_neighbours,
-    check_numbers,
-    check_quotation,
     read_head,
     read_table,
 )
 from coursebuild.core.syntax.fence import read_fence
-from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
+from coursebuild.core.syntax.html import Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_tree import read_inlines
+from coursebuild.core.syntax.other_tools import check_indented_fence
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
-    OUTPUT_KIND,
     TABLE,
+    check_code_above,
     check_missing_body,
-    check_near_caption,
-    diagnose_missing_caption,
     diagnose_wrong_body,
-    find_misspelt_caption,
     is_caption,
     read_figure,
     record_fence,
     record_table,
 )
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
-from coursebuild.core.syntax.unread_markup import check_indented_fence, check_unread_markup
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -96,7 +89,7 @@ class TextReader:
                 break
             block = _READERS[token.type](self, token)
             if block is not None:
-                self.state.diagnostics += check_neighbours(blocks, block)
+                self.state.diagnostics += check_code_above(blocks, block)
                 blocks.append(block)
         self.balance.leave()
         return tuple(blocks)
@@ -118,9 +111,7 @@ class TextReader:
             recording = self._read_recording(children, span)
             if recording is not None:
                 return recording
-        elif not self.nested and (info := self._peek_info()) is not None:
-            self.state.diagnostics += check_near_caption(children, span, info, self.state.words)
-        if not self.nested and self._is_figure(content):
+        if not self.nested and content.text.startswith(FIGURE):
             children, shows_image = read_figure(children, span, self.state.figures)
             return model.Paragraph(span, children, token.hidden, shows_image)
         return model.Paragraph(span, children, token.hidden)
@@ -148,7 +139,7 @@ class TextReader:
         if not any(word in caption.text[:24] for word in words):
             return None
         inlines, recording = self.inlines(caption), None
-        if is_caption(inlines, self.state.words):
+        if self._is_caption(caption, inlines):
             recording = self._read_recording(inlines, caption.span())
         if recording is not None and isinstance(recording.body, model.Table):
             label = self.state.take_label(braces, "tab")
@@ -161,35 +152,15 @@ class TextReader:
         return recording or model.Paragraph(span, inlines)
 
     def _is_caption(self, content: Excerpt, inlines: tuple[model.Inline, ...]) -> bool:
-        """Whether a paragraph is the caption of an output; a misspelt one is, with a diagnostic."""
+        """Whether a paragraph is the caption of an output, which begins with a word for it."""
         words = self.state.words
-        if any(name in content.text[:24] for name in words.output) and is_caption(inlines, words):
-            return True
-        token = self._peek()
-        if token is None or (token.type, token.info.split()[:1]) not in _BODIES:
+        if not any(name in content.text[:24] for name in words.output):
             return False
-        if self.state.script is None and not self.state.has_invalid_script:
-            return False
-        mistake = find_misspelt_caption(content, words.output, words.unlike)
-        if mistake is not None:
-            self.state.report(mistake)
-        return mistake is not None
-
-    def _is_figure(self, content: Excerpt) -> bool:
-        """Whether a paragraph shows a figure; a misspelt one does, with a diagnostic."""
-        if content.text.startswith(FIGURE) or not self.state.figures:
-            return content.text.startswith(FIGURE)
-        mistake = find_misspelt_caption(content, (FIGURE[:-1],))
-        if mistake is not None:
-            self.state.report(mistake)
-        return mistake is not None
+        has_script = self.state.script is not None or self.state.has_invalid_script
+        return is_caption(inlines, words, has_script=has_script)
 
     def _peek(self) -> PositionedToken | None:
         return self.tokens[self.index] if self.index < len(self.tokens) else None
-
-    def _peek_info(self) -> str | None:
-        token = self._peek()
-        return token.info if token is not None and token.type == "fence" else None
 
     def _read_heading(self, token: PositionedToken) -> model.Heading:
         self.index += 2
@@ -213,13 +184,7 @@ class TextReader:
 
     def _read_fence(self, token: PositionedToken) -> model.Block:
         fence = read_fence(token, self.base, nested=self.nested)
-        block = read_block(fence, self.state, self.texts)
-        if isinstance(block, model.Script) and not block.norun:
-            info = self._peek_info() or ""
-            if info.split() == ["text"]:  # with keys, these are reported instead
-                place = self.span(self.tokens[self.index])
-                self.state.report(diagnose_missing_caption(place, self.state.words))
-        return block
+        return read_block(fence, self.state, self.texts)
 
     def _read_code(self, token: PositionedToken) -> model.CodeBlock:
         code = token.text
@@ -236,18 +201,9 @@ class TextReader:
             children = self.inlines(content, html=True)
             if self.nested or any(isinstance(child, model.Math) for child in children):
                 return model.HtmlFlow(content.span(), children)
-        else:  # check the tags, and the texts between them
-            texts: list[tuple[int, str]] = []
-            end, literals = 0, 0
+        else:
             for tag in tags(html.text):
                 self.balance.add(tag, html)
-                if not literals:
-                    texts.append((end, html.text[end : tag.start]))
-                if tag.name in LITERAL and not tag.is_complete:
-                    literals = max(0, literals + (-1 if tag.is_end_tag else 1))
-                end = tag.end
-            texts.append((end, html.text[end:]))
-            self.state.diagnostics += check_unread_markup(html, texts, html=True)
         text = html.text if html.text.endswith("\n") else html.text + "\n"
         return model.HtmlBlock(self.span(token), text, find_media(html), find_forbidden(html))
 
@@ -271,7 +227,6 @@ class TextReader:
 
     def _read_quote(self, token: PositionedToken) -> model.BlockQuote | model.Callout:
         span, first_token = self.span(token), self.tokens[self.index]
-        self.state.diagnostics += check_quotation(span)
         if first_token.type == "paragraph_open":
             head = read_head(trim(first_token.text), self.state.callouts)
             if head is not None:
@@ -294,11 +249,8 @@ class TextReader:
             blocks = self._read_blocks("list_item_close")
             marker = self.base.span(item.start, item.start + len(item.info) + 1)
             span = marker.to(blocks[-1].span) if blocks else marker
-            self.state.diagnostics += check_item(span)
             items.append(model.ListItem(span, blocks, item.meta.get("checked")))
         self.index += 1
-        if ordered:
-            self.state.diagnostics += check_numbers([item.span for item in items])
         return model.ListBlock(
             self.span(token), tuple(items), int(token.attrs.get("start", 1)) if ordered else None
         )
@@ -339,13 +291,6 @@ class TextReader:
         return None
 
 
-_BODIES: tuple[tuple[str, list[str]], ...] = (
-    ("fence", ["text"]),
-    ("fence", [OUTPUT_KIND]),
-    ("fence", []),
-    ("table_open", []),
-)
-"""Types of tokens, with the kinds of fences, that may be the body of a recorded output."""
 _READERS: dict[str, Callable[[TextReader, PositionedToken], model.Block | None]] = {
     "paragraph_open": TextReader._read_paragraph,
     "heading_open": TextReader._read_heading,

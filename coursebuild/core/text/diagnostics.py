@@ -7,7 +7,6 @@ only (`keeps_words`); all others are proposed, for a human to decide.
 
 from __future__ import annotations
 
-import functools
 import re
 import unicodedata
 from collections.abc import Iterable
@@ -15,6 +14,7 @@ from typing import Generic, TypeVar
 
 from msgspec import Struct
 
+from coursebuild.core.text.near import have_other_ids, nearest
 from coursebuild.core.text.rules import RULES, Severity
 from coursebuild.core.text.source import Source, Span
 
@@ -102,7 +102,8 @@ class Diagnostic(Struct, frozen=True):
     @property
     def severity(self) -> Severity:
         """The severity of its rule, or of every rule where warnings count as errors."""
-        return "error" if self.strict else RULES[self.rule].severity
+        severity = RULES[self.rule].severity
+        return "error" if self.strict and severity == "warning" else severity
 
     @property
     def is_error(self) -> bool:
@@ -180,106 +181,6 @@ class Parsed(Struct, Generic[T_co], frozen=True):
     diagnostics: tuple[Diagnostic, ...] = ()
 
 
-def nearest(name: str, names: Iterable[str], *, cutoff: float = 0.6) -> str | None:
-    """The one of `names` that is most like `name`, if any is alike enough; of several the first.
-
-    Numbers are never alike: `1.3` is another lesson than `1.2`, not a misspelt one.
-    """
-    import difflib
-
-    if not any(map(str.isalpha, name)):
-        return None
-    matches = difflib.get_close_matches(name, sorted(set(names)), n=1, cutoff=cutoff)
-    return matches[0] if matches else None
-
-
-def misspelt(word: str, names: Iterable[str]) -> str | None:
-    """The one of `names` that a word differs from by a letter, or by two if the name is long.
-
-    A letter may be dropped, added, changed or swapped with the next one, or be a capital.
-    """
-    for name in sorted(set(names) - {word}):
-        difference = _difference(word.lower(), name.lower())
-        if difference <= (1 if len(name) < 5 else 2) and difference < len(name):
-            return name
-    return None
-
-
-def _difference(first: str, second: str) -> int:
-    import difflib
-
-    blocks = difflib.SequenceMatcher(None, first, second, False).get_matching_blocks()
-    return max(len(first), len(second)) - sum(block.size for block in blocks)
-
-
-_LETTERS = "abcdefghijklmnopqrstuvwxyz_"
-_ROWS = (
-    "1234567890-=", "qwertyuiop[]", "asdfghjkl;'", "zxcvbnm,./", "qwertzuiop", "azertyuiop",
-    "ASDFGHJKL", "QWERTYUIOP", "ZXCVBNM<>?",
-)  # fmt: skip
-_NEARBY = {
-    key: {
-        row[n]
-        for row in _ROWS
-        if key in row
-        for n in (row.index(key) - 1, row.index(key) + 1)
-        if 0 <= n < len(row) and {key, row[n]} != {"x", "z"}
-    }
-    for key in "".join(_ROWS)
-    if not key.isdigit()
-}
-"""The keys beside each on usual keyboards; `x` and `z` are names of axes."""
-
-
-@functools.lru_cache(maxsize=256)
-def slips_of(name: str) -> frozenset[str]:
-    """What a hand may have meant that doubled, swapped, mistyped or dropped one letter of a name.
-
-    Of 3,238 words that strangers' pages have once in inline code, some 10 are such a slip of a name
-    of MuJoCo or of the page itself, and half of these are mistakes. Plurals are none, and short
-    names differ in their first letter.
-    """
-    slips: set[str] = set()
-    for n, letter in enumerate(name):
-        head, tail = name[:n], name[n + 1 :]
-        if n and letter == name[n - 1] and letter.isalpha():
-            slips.add(head + tail)
-        if tail:
-            slips.add(head + tail[0] + letter + tail[1:])
-        if n or len(name) > 4:
-            slips |= {head + dropped + letter + tail for dropped in (*_LETTERS, "-", "/", ".")}
-            slips |= {
-                head + near + tail for near in _NEARBY.get(letter, "") if tail or head[-1] != "e"
-            }
-    slips |= {name + letter for letter in _LETTERS if letter != "s" or name.endswith("s")}
-    return frozenset(slips - {name})
-
-
-def is_one_edit(word: str, name: str) -> bool:
-    """Whether a letter of a name was dropped, added, mistyped or swapped with the next one.
-
-    Endings, as of a plural, and other digits are no slips; a short name has another letter only
-    where its key is beside the right one.
-    """
-    shorter, longer = sorted((word, name), key=len)
-    if len(longer) - len(shorter) > 1 or longer in (f"{shorter}s", f"{shorter}d", f"{shorter}r"):
-        return False
-    if re.findall("[0-9]", word) != re.findall("[0-9]", name) or not word.isascii():
-        return False
-    pairs = enumerate(zip(word, name, strict=False))
-    start = next((n for n, (a, b) in pairs if a != b), len(shorter))
-    rest, longer_rest = shorter[start:], longer[start:]
-    if len(shorter) < len(longer):
-        is_doubled = word[start - 1 : start] == word[start : start + 1]
-        return rest == longer_rest[1:] and (len(name) > 3 or is_doubled)
-    if len(name) < 4:
-        return False
-    if rest[1:] == longer_rest[1:]:
-        is_beside = word[start:].lower()[:1] in _NEARBY.get(name[start:].lower()[:1], ())
-        return len(name) > 6 or is_beside
-    return rest[1::-1] == longer_rest[:2] and rest[2:] == longer_rest[2:]
-
-
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     """The fix that writes the nearest known name, or a help that lists them if few; or nothing."""
     names = sorted(set(known_names))
@@ -288,19 +189,14 @@ def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     return "known: " + ", ".join(f"`{n}`" for n in names) if 0 < len(names) <= 12 else ""
 
 
-_IDS = re.compile(r"\d+|(?<![^\W_])[^\W\d_](?![^\W_])")
-
-
 def propose(name: str, likely: str) -> Fix:
-    """The fix that writes the likely name for another, if a human finds it so.
+    """The fix that writes the likely name for another one, where its author says so.
 
     Names that differ in numbers or single letters are of different things: there it has no
     edit.
     """
     help = f"did you mean `{likely}`?"
-    if _IDS.findall(name.lower()) != _IDS.findall(likely.lower()):
-        return Fix(help)
-    return Fix(help, likely, name)
+    return Fix(help) if have_other_ids(name, likely) else Fix(help, likely, name)
 
 
 def sort_diagnostics(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:

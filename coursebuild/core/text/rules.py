@@ -11,8 +11,10 @@ from msgspec import Struct
 
 from coursebuild import MANUAL
 
-Severity: TypeAlias = Literal["error", "warning"]
-"""An error keeps the site from being published; a warning can be silenced, with a reason."""
+Severity: TypeAlias = Literal["error", "warning", "hint"]
+"""An error is certain, and keeps the site from being published. A warning is certain too, but
+readers lose little; it can be silenced, with a reason. A hint is likely only, and changes
+nothing."""
 
 
 class Rule(Struct, frozen=True):
@@ -86,14 +88,10 @@ GROUPS: dict[str, dict[str, str]] = {
         "heading-empty": "A heading has no text.",
         "heading-attributes": "The attributes after a heading cannot be read.",
         "anchor-repeated": "Two things on a page have the same anchor.",
-        "text-repeated": "A line begins with the same words twice, or a heading or a row of a "
-        "table is repeated.",
-        "markup-unread": "Markdown, or an attribute in braces, is incomplete, so readers would see "
-        "its characters.",
-        "markup-foreign": "Markup of another tool would be shown as it is written.",
+        "markup-foreign": "A block of another tool would be shown as it is written.",
         "number-form": "A number that is given cannot be read.",
         "label-attribute": "A label cannot be read, or stands where no label may.",
-        "table-cells": "A row of a table has more or fewer cells than its header.",
+        "table-cells": "A row of a table has more cells than its header.",
         "footnote-undefined": "A footnote is used but not defined.",
         "footnote-unused": "A footnote is defined but not used.",
         "footnote-repeated": "A footnote is defined twice.",
@@ -112,15 +110,12 @@ GROUPS: dict[str, dict[str, str]] = {
         "fence-key-unknown": "This kind of block has no such key.",
         "fence-key-repeated": "A fence has the same key twice.",
         "fence-key-value": "A key of a fence has a value that it does not take.",
-        "fence-kind-near": "The kind of a code block looks misspelt.",
-        "fence-unread": "A code block holds JSON, and its kind is not a known one.",
     },
     "Formulas, terms and symbols": {
         "math-syntax": "A formula cannot be read.",
         "math-command": "A command in a formula has lost its backslash.",
         "math-brackets": "The brackets of a formula do not match.",
         "math-unclosed": "A displayed formula is not closed.",
-        "math-unread": "A dollar sign looks like part of a formula, but is none.",
         "term-attribute": "The attribute that defines a term cannot be read.",
         "term-place": "A term is defined outside a paragraph.",
         "term-repeated": "The course defines a term twice.",
@@ -162,7 +157,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "source-part": "A block differs from the file that it shows.",
         "script-unproven": "A script was not run, so nothing proves its output.",
         "script-repeated": "Two blocks have the same path.",
-        "python-syntax": "A Python block cannot be parsed.",
+        "python-syntax": "A script cannot be parsed.",
         "example-edited": "An extracted file was changed by hand.",
         "script-failed": "A script exited with an error.",
         "script-timeout": "A script ran past its time limit.",
@@ -181,8 +176,6 @@ GROUPS: dict[str, dict[str, str]] = {
         "script-connects": "A script uses the network.",
     },
     "Recorded outputs": {
-        "recording-caption": "A `text` block looks like a recorded output, but is not compared.",
-        "recording-misspelt": "The caption of an output or a figure looks misspelt.",
         "recording-orphan": "A recorded output has no script above it, or code that nothing runs.",
         "recording-body": "Below `Output:` is neither an output block nor a table with rows, "
         "or nothing of it is compared.",
@@ -247,21 +240,20 @@ GROUPS: dict[str, dict[str, str]] = {
 _WARNINGS = frozenset(
     """
     draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
-    math-command symbol-repeated footnote-unused image-alt
-    recording-caption recording-loose script-unrepeatable script-penetration script-writes
-    script-connects
+    markup-foreign math-command symbol-repeated footnote-unused image-alt recording-loose
+    script-unrepeatable script-penetration script-writes script-connects
     output-noise report-stale bench-unrecorded lab-penetration lab-far lab-reset package-reduced
     """.split()
 )
 
 _NO_FIX = {
     "only you know what was meant": """
-    bench-text binding-volatile draft-empty fence-unread field-missing field-repeated
+    bench-text binding-attribute binding-volatile draft-empty field-missing field-repeated
     figure-unshown footnote-repeated footnote-unused heading-empty html-unbalanced image-alt
     io-order io-repeated io-stray lesson-planned-file link-text math-brackets math-unclosed
-    math-unread merge-conflict nesting-deep number-form output-not-updatable prerequisite-cycle
+    markup-foreign merge-conflict nesting-deep number-form output-not-updatable prerequisite-cycle
     quiz-answer quiz-gate recording-body recording-orphan symbol-formula symbol-repeated table-cells
-    term-place
+    term-attribute term-place
     """,
     "links may lead to either": """
     anchor-repeated id-repeated question-id-repeated quiz-id-repeated script-repeated

@@ -14,7 +14,8 @@ from typing import Any, TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, nearest
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt
 
 Dimension: TypeAlias = tuple[tuple[str, Fraction], ...]
@@ -197,7 +198,7 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
         pairs = ((first, word.removeprefix(first)) for first in _PRODUCT_UNITS)
         products = (f"{a} {b}" for a, b in pairs if b != word and b in _PRODUCT_UNITS)
         likely = next(units, "") or next(products, "")
-        likely = likely or nearest(word, (*COMMON, *_NAMES), cutoff=0.6) or ""
+        likely = likely or nearest(word, (*COMMON, *_NAMES)) or ""
         likely = _NAMES.get(likely, likely)
         help = "leave it out, and name in words what is counted"
         if likely:

@@ -13,15 +13,8 @@ from coursebuild.core.model import FeatureBlock, Inline
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.syntax.spans import trim
-from coursebuild.core.text.diagnostics import (
-    Diagnostic,
-    Edit,
-    Fix,
-    Note,
-    Parsed,
-    diagnose,
-    nearest,
-)
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, Parsed, diagnose
+from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt, Span
 
 LABELS = ("INPUT", "PROCESS", "OUTPUT")
@@ -100,7 +93,7 @@ def _diagnose_missing(
     notes, fix = [], Fix("")
     for line in (line for part in all_parts for line in part.lines):
         word = _LIKE_LABEL.match(line.text)
-        if word is not None and nearest(word[1].upper(), LABELS, cutoff=0.75) == label:
+        if word is not None and label in (word[1], nearest(word[1], LABELS)):
             span = line.span(word.start(1), word.end())
             notes.append(Note(f"`{span.text}` is read as text", span))
             edit = Edit(span, f"{label}:")

@@ -1,13 +1,12 @@
-"""Names in inline code are claims: each one means something, or is a mistake.
+"""Names in inline code: linked to what they mean, and a mistake where they certainly mean nothing.
 
 1. `claims` finds them in a document, and what its code defines.
-2. `known_names` lists those of MuJoCo, MJCF and imported modules, by a child (`introspect`).
+2. `known_names` lists those of MuJoCo and MJCF, by a child (`introspect`).
 3. `resolve` says what a name means; its page links to that, an editor shows it.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterator
 from fnmatch import fnmatchcase
 
@@ -19,7 +18,7 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
-from coursebuild.features.names.claims import GUESSES, course_names, document_names, names_of
+from coursebuild.features.names.claims import course_names, document_names, names_of
 from coursebuild.features.names.known_names import (
     EngineTable,
     KnownName,
@@ -34,48 +33,25 @@ _HELP = "say `{code}` after it if it is no name, or list it under `names` in `[v
 
 def reference(course: Course, store: Store, interpreter: Interpreter | None) -> EngineTable | None:
     """Return the names of the installed MuJoCo, if the course names anything."""
-    documents = course_names(course)
-    paths = {"mujoco.x", "numpy.x"}
-    for names in documents:
-        paths |= {f"{module}.x" for module in names.imports.values()}
-        for claim in names.claims:
-            root, dot, rest = re.sub(r"[()\[\]]+", "", claim.name).partition(".")
-            module = names.imports.get(root, "numpy" if root == "np" else "")
-            paths |= {f"{module}.{rest}"} if dot and module else set()
-    modules = {path[: dot.start()] for path in paths for dot in re.finditer(r"\.", path)}
-    is_asked = any(claim.kind not in GUESSES for names in documents for claim in names.claims)
-    return engine_names(store, interpreter, modules) if is_asked else None
+    is_asked = any(names.claims for names in course_names(course))
+    return engine_names(store, interpreter) if is_asked else None
 
 
 def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:
-    """Report names that mean nothing."""
+    """Report names that certainly mean nothing."""
     free = {id(page.document) for page in course.pages if not page.names}
     resolver = resolver_of(course)
     for document in documents:
         note = names_of(document)
         if note is None or id(document) in free:
             continue
-        known_codes, reported = set[int](), set[int]()
         for claim, code, span in note.claims:
-            if span.start in reported or (claim.kind == "token" and code.start in known_codes):
-                continue
             answer = resolver.resolve(claim, note.names)
-            if answer is not None and claim.kind not in ("word", "call"):
-                known_codes.add(code.start)
             if not isinstance(answer, Unknown):
                 continue
-            text = code.text.strip("` ")
-            if claim.kind in ("plain", "token"):
-                pattern = re.compile(rf"(?<!\w){re.escape(claim.name)}(?!\w)")
-                texts = (source.text for source in course.sources if claim.name in source.text)
-                if sum(len(pattern.findall(text)) for text in texts) > 1:
-                    continue  # used more than once, so it is no slip
-            if any(
-                fnmatchcase(word, name) for word in (text, answer.part) for name in course.names
-            ):
+            words = (code.text.strip("` "), answer.part)
+            if any(fnmatchcase(word, name) for word in words for name in course.names):
                 continue
-            known_codes.add(code.start)
-            reported.add(span.start)
             at = code.source.text.find(answer.part, span.start, code.end)
             place = code.source.span(at, at + len(answer.part)) if at >= 0 else span
             yield diagnose("name-unknown", place, answer.message, help=answer.help or _HELP)
@@ -92,7 +68,7 @@ def lost_names(course: Course, python: str) -> Iterator[Diagnostic]:
     ]
     if not uses or resolver.engine is None:
         return
-    engine = list_names(python, resolver.engine.modules)
+    engine = list_names(python)
     other_resolver = Resolver(course, engine)
     for claim, span, names, meaning in uses:
         answer = other_resolver.resolve(claim, names)
@@ -134,7 +110,5 @@ FEATURE = Feature(
     code_links=code_links,
     against=lost_names,
     check=check,
-    rules=(
-        Rule("name-unknown", "error", "Inline code looks like a name, but nothing has this name."),
-    ),
+    rules=(Rule("name-unknown", "error", "Inline code names what certainly does not exist."),),
 )

@@ -1,14 +1,11 @@
-"""Finds names in a document: what its inline code says that there is, and what its code defines.
+"""Finds names in a document: what its inline code may name, and what its code defines.
 
 Entry points: `document_names`, what `resolve` must know of a document; `claims_of`, the claims of
 one piece of inline code; `Claim` and `CodeNames`.
 
-Inline code is a claim only where it has the shape of a name: a call, a dotted name, a word with an
+Inline code may be a name where it has the shape of one: a call, a dotted name, a word with an
 underscore or one that begins as MuJoCo's do, elements and attributes of MJCF, a command or an
-option of coursebuild, a table of the course map, a file of the course. Any other word may be one:
-it is "plain", and wrong only where it is a name but for a slip of the hand. So is a "token", which
-stands between blanks and is more than a word; "torn" is a word that goes on behind its backtick,
-and "half" what has one bracket of an element.
+option of coursebuild, a table of the course map, a file of the course.
 """
 
 from __future__ import annotations
@@ -16,8 +13,7 @@ from __future__ import annotations
 import ast
 import functools
 import re
-from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Literal, TypeAlias
 
 import msgspec
@@ -34,16 +30,15 @@ Kind: TypeAlias = Literal[
     "path",
     "element",
     "attribute",
+    "mjcf",
+    "defined",
     "command",
     "option",
     "table",
     "file",
-    "value",
-    "plain",
-    "token",
-    "torn",
-    "half",
 ]
+"""`mjcf` is an element, perhaps with an attribute, in code that begins with `<mujoco`; `defined` a
+function in a link to a script."""
 
 _SHAPE = re.compile(
     r"[A-Za-z0-9]_[A-Za-z0-9]|\w\.[A-Za-z]|\w\(|\b[Mm]j[A-Z]|=[\"]|\A<[/A-Za-z]|>\Z|--\w|/|\[\w"
@@ -53,17 +48,9 @@ _SHAPE = re.compile(
 ENGINE_WORD = re.compile(r"(?:mj[A-Z]|mj[a-z]{0,2}_|mjt[A-Z]|Mj[A-Z])\w+")
 """A name that only MuJoCo has."""
 _ATTRIBUTES = re.compile(r'\s*([A-Za-z_][\w:-]*)\s*=\s*"[^"]*"')
-_VALUES = re.compile(r'[A-Za-z_][\w:-]*\s*=\s*"([a-zA-Z]{4,})"')
 _TAG = re.compile(rf"<(/?)([A-Za-z]\w*)((?:{_ATTRIBUTES.pattern[:-7]}\"[^\"]*\")*)\s*/?>")
-_HALF = re.compile(
-    r"(?=.*[<>])(?!<.*>\Z)[^\w\s]?/?[A-Za-z]\w*/?[^\w\s]?|<\w+/\w+>|<<[a-z]+[ >/].*"
-    r"|<\w*[^\w\s<>/]\w*>"
-)
-"""Perhaps an element that lost a bracket."""
 _TABLE = re.compile(r"(\[\[?)([a-z][\w.]*)\]\]?(?: (\w+)(?: =.*)?)?")
 _FILE = re.compile(r"(?:content|examples|models)/(?!.*[A-Z]{3})[\w./-]*\w\.[a-z]+")
-_NEAR_FILE = re.compile(r"(?!.*[A-Z]{3})[\w.-]+/[\w./-]*\w\.(?:md|py|toml|xml)")
-"""What is a file of the course only if it is like the name of one."""
 _CODE_WORD = re.compile(
     r"\b\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
     r"|(?<=\")[A-Za-z]\w+(?=\")"
@@ -72,31 +59,9 @@ _CODE_WORD = re.compile(
 _CODE = (
     model.Script | model.PlainCode | model.CodeBlock | model.Mjcf | model.FeatureBlock
 ) | model.Recording
-_PLAIN = re.compile(
-    r"(?<![\w.\\/-])(?<!\A[,;])_?[A-Za-z]\w+[^\W_]"
-    r"(?:\.(?:md|py|toml|xml)\b)?(?![\w./\\-])"
-)
-"""A word of inline code that is no part of a path."""
-_TOKEN = re.compile(
-    r"(?<!\S)(?=\S*[A-Za-z_]{4})(?!\w+(?!\S))\S{6,}(?!\S)"
-    r"|(?<!\S)\w*[\\<;,'\[\]]\w{3,}(?!\S)|(?<!\S)\w{3,}[\\'´](?!\S)"
-)
-"""What stands between blanks, with a word of some length and more than that."""
-_TAIL = re.compile(r"(?<!\s`)[A-Za-z0-9]+(?![\w{}=`])")
-"""Letters or digits directly after code that are no broken attribute."""
-ENDINGS = {
-    "en": "s es d ed ing er ers th st nd rd".split(),
-    "de": "s es n en e em er t te ten m r".split(),
-    "es": "s es n".split(),
-    "fr": "s es e".split(),
-}
-"""What may stand directly behind code, as in "two `geom`s"; other languages have more long ones."""
-_MOST_PLAIN = 3
-"""How many uses of a plain word are kept of a document: what is used again is no slip."""
+_CALLED = re.compile(r"([A-Za-z_]\w*)\(.*\)")
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
 _DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-GUESSES = frozenset("value plain token torn half".split())
-"""Kinds of claims that are none where nothing is called like them."""
 
 
 class Claim(Struct, frozen=True, array_like=True):
@@ -105,8 +70,8 @@ class Claim(Struct, frozen=True, array_like=True):
     kind: Kind
     name: str
     """Parts of a path are joined by dots; `()` and `[]` after one say that it is called or
-    indexed. An attribute has the elements before it, as in `joint damping`; a torn name has a
-    blank before its letters behind the backtick."""
+    indexed. An attribute has its element before it, as in `joint damping`, and a defined name the
+    path of its script."""
     linked: bool
     """Whether the whole code can link to what this name means."""
 
@@ -122,9 +87,8 @@ class CodeNames(Struct, frozen=True):
     imports: dict[str, str]
     """The modules and the parts of modules that they import, by the names that they have there."""
     variables: dict[str, str]
-    """Variables that hold a structure of MuJoCo, each with its class."""
-    members: dict[str, frozenset[str]]
-    """The attributes that scripts use of each of their variables."""
+    """Variables of its scripts, each with the class of MuJoCo of which it always is; empty for one
+    that may be anything else."""
 
 
 class DocumentNames(Struct, frozen=True, dict=True):
@@ -157,21 +121,14 @@ def course_names(course: model.Course) -> tuple[CodeNames, ...]:
     return tuple(note.names for note in map(names_of, course.documents) if note is not None)
 
 
-@functools.lru_cache(maxsize=256)
-def words_of(text: str) -> frozenset[str]:
-    """Return the words of code."""
-    return frozenset(re.findall(r"[A-Za-z]\w*", text))
-
-
 def document_names(document: model.Document) -> DocumentNames | None:
     """Return the names of a document; `None` if it has neither claims nor code."""
     claims: list[Claim] = []
     codes: list[Span] = []
     places: list[Span] = []
     words: set[str] = set()
-    names = CodeNames((), frozenset(), {}, {}, {}, {})
+    names = CodeNames((), frozenset(), {}, {}, {})
     inner: set[int] = set()
-    plain_counts = Counter[str]()
     for block in model.document_blocks(document):
         if isinstance(block, model.FeatureBlock):
             inner |= {id(part) for part in model.walk_blocks(block.child_blocks())}
@@ -186,14 +143,13 @@ def document_names(document: model.Document) -> DocumentNames | None:
             _read_script(block, names)
         link_parts: set[int] = set()
         for inline in model.walk_inlines(model.block_inlines(block)):
+            script = ""
             if isinstance(inline, model.Link):
                 link_parts |= {id(child) for child in model.walk_inlines(inline.children)}
-            elif isinstance(inline, model.CodeSpan) and not inline.literal:
-                for claim, place in claims_of(inline):
-                    if claim.kind == "plain":
-                        plain_counts[claim.name] += 1
-                        if plain_counts[claim.name] > _MOST_PLAIN:
-                            continue
+                if isinstance(inline.target, model.ExampleTarget) and len(inline.children) == 1:
+                    script, inline = inline.target.path, inline.children[0]
+            if isinstance(inline, model.CodeSpan) and not inline.literal:
+                for claim, place in claims_of(inline, script):
                     claims.append(
                         replace(
                             claim, linked=may_link and claim.linked and id(inline) not in link_parts
@@ -209,70 +165,62 @@ def document_names(document: model.Document) -> DocumentNames | None:
 
 
 def _read_script(script: model.Script, names: CodeNames) -> None:
-    members: dict[str, set[str]] = {}
-    for node in python_nodes(script.code.text.rstrip("\n")):
+    nodes = tuple(python_nodes(script.code.text.rstrip("\n")))
+    for node in nodes:
+        if type(node) is ast.Import:
+            for alias in node.names:
+                name = alias.asname or alias.name.partition(".")[0]
+                names.imports[name] = alias.name if alias.asname else name
+        elif type(node) is ast.ImportFrom and node.module and not node.level:
+            for alias in node.names:
+                names.imports[alias.asname or alias.name] = f"{node.module}.{alias.name}"
+    structures: dict[int, str] = {}
+    for node in nodes:
         definition = ""
-        if type(node) is ast.Name:
-            definition = node.id if type(node.ctx) is ast.Store else ""
-        elif type(node) is ast.Attribute:
-            if type(node.value) is ast.Name:
-                members.setdefault(node.value.id, set()).add(node.attr)
+        if type(node) is ast.Assign and len(node.targets) == 1:
+            structures[id(node.targets[0])] = _find_structure(node.value, names.imports)
         elif type(node) is ast.arg:
             definition = node.arg
         elif isinstance(node, _DEFINITIONS):
             definition = node.name
-        elif type(node) is ast.Import:
-            for alias in node.names:
-                name = alias.asname or alias.name.partition(".")[0]
-                names.imports[name] = alias.name if alias.asname else name
-        elif type(node) is ast.ImportFrom:
-            if node.module and not node.level:
-                for alias in node.names:
-                    names.imports[alias.asname or alias.name] = f"{node.module}.{alias.name}"
-        elif type(node) is ast.Assign and type(node.value) is ast.Call:
-            target, class_name = node.targets[0], _find_structure(node.value.func)
-            if class_name and type(target) is ast.Name and len(node.targets) == 1:
-                names.variables[target.id] = class_name
+        elif type(node) is ast.Name and type(node.ctx) is ast.Store:
+            definition = node.id
         if definition:
             line = getattr(node, "lineno", 1)
             names.definitions.setdefault(definition, (script.path, line))
-    for name, attributes in members.items():
-        names.members[name] = names.members.get(name, frozenset()) | attributes
+    for node in nodes:
+        if type(node) is ast.Name and type(node.ctx) is ast.Store:
+            class_name = structures.get(id(node), "")
+            if names.variables.setdefault(node.id, class_name) != class_name:
+                names.variables[node.id] = ""
 
 
-def _find_structure(function: ast.expr) -> str:
-    """Return the structure of MuJoCo in a function's name, as in `mujoco.MjData`; else nothing."""
-    node: ast.AST | None = function
-    while node is not None:
-        name: str = getattr(node, "attr", getattr(node, "id", ""))
-        if name in _STRUCTURES:
-            return name
-        node = getattr(node, "func", getattr(node, "value", None))
-    return ""
+def _find_structure(value: ast.expr, imports: Mapping[str, str]) -> str:
+    """The class of MuJoCo that makes a value, as in `mujoco.MjModel.from_xml_path(…)`."""
+    if not isinstance(value, ast.Call):
+        return ""
+    path = (_path(value.func, set()) or "").split(".")
+    parts = [*imports.get(path[0], "").split("."), *path[1:]]
+    is_made = len(parts) == 2 or (len(parts) == 3 and parts[2].startswith("from_"))
+    return parts[1] if is_made and parts[0] == "mujoco" and parts[1] in _STRUCTURES else ""
 
 
-def claims_of(code: model.CodeSpan) -> Iterator[tuple[Claim, Span]]:
-    """Yield the claims of a piece of inline code, each with its place."""
+def claims_of(code: model.CodeSpan, script: str = "") -> Iterator[tuple[Claim, Span]]:
+    """Yield the claims of a piece of inline code, each with its place; it may link to a script."""
     text = code.text.strip()
     finds: list[tuple[Kind, str, str]] = []
-    if _SHAPE.search(text) or ENGINE_WORD.fullmatch(text):
-        finds += _find(text)
-    used_words = {word for _, name, part in finds for word in re.findall(r"\w+", f"{name} {part}")}
-    tail, last = _TAIL.match(code.span.source.text, code.span.end), re.search(r"\w+\Z", text)
-    if tail is not None and last is not None:
-        finds.append(("torn", f"{last[0]} {tail[0]}", last[0]))
-    is_markup = "`" in text  # it shows how inline code is written
-    plain = (w for w in _PLAIN.findall(text) if w not in used_words and not is_markup)
-    finds += (("plain", word, word) for word in dict.fromkeys(plain))
-    finds += (("token", token, token) for token in _TOKEN.findall(text))
+    if script and (called := _CALLED.fullmatch(text)):
+        finds = [("defined", f"{script} {called[1]}", called[1])]
+    elif _SHAPE.search(text) or ENGINE_WORD.fullmatch(text):
+        finds = list(_find(text, code.span.source.text))
     for number, (kind, name, part) in enumerate(finds):
         start = code.span.start + code.span.text.find(part)
         has_part = start >= code.span.start
         span = code.span.source.span(start, start + len(part)) if has_part else code.span
-        yield Claim(kind, name, not number and kind not in GUESSES), span
+        yield Claim(kind, name, not number), span
 
 
-def _find(text: str) -> Iterator[tuple[Kind, str, str]]:
+def _find(text: str, page: str) -> Iterator[tuple[Kind, str, str]]:
     """Yield the kind of each claim, its name, and the part of the text that is reported."""
     words = text.split()
     if words[0] == "coursebuild" or text.startswith("--"):
@@ -284,21 +232,18 @@ def _find(text: str) -> Iterator[tuple[Kind, str, str]]:
             option = re.match(r"--[a-z][a-z-]*", word)
             if option is not None:
                 yield "option", f"{command} {option[0]}", option[0]
-    elif table := _TABLE.fullmatch(text):
+    elif "course.toml" in page and (table := _TABLE.fullmatch(text)):
         yield "table", f"{table[1]}{table[2]} {table[3] or ''}", table[3] or table[2]
-    elif _HALF.fullmatch(text):
-        yield "half", text, text
     elif text.startswith("<"):
+        is_mjcf = re.match(r"<mujoco[\s>]", text) is not None
         for tag in _TAG.finditer(text):
-            yield "element", tag[2], tag[2]
+            yield "mjcf" if is_mjcf else "element", tag[2], tag[2]
             for attribute in _ATTRIBUTES.findall(tag[3]):
-                yield "attribute", f"{tag[2]} {attribute}", attribute
-        yield from (("value", value, value) for value in _VALUES.findall(text))
+                yield "mjcf" if is_mjcf else "attribute", f"{tag[2]} {attribute}", attribute
     elif re.fullmatch(rf"(?:{_ATTRIBUTES.pattern})+", text):
         for attribute in _ATTRIBUTES.findall(text):
             yield "attribute", f" {attribute}", attribute
-        yield from (("value", value, value) for value in _VALUES.findall(text))
-    elif _FILE.fullmatch(text) or _NEAR_FILE.fullmatch(text):
+    elif _FILE.fullmatch(text):
         yield "file", text, text
     elif not re.search(r"\.(?:py|xml|toml|md|json|js|svg|csv|txt|ya?ml|html|rst|css)\b", text):
         yield from _find_python(text)
@@ -324,7 +269,7 @@ def _find_python(text: str) -> Iterator[tuple[Kind, str, str]]:
                 yield "path", path, re.split(r"[.(\[]", path)[0]
             elif path is not None and not path.startswith("_"):
                 name = path.removesuffix("()")
-                yield ("word" if _is_telling(name) else "call"), name, name
+                yield ("word" if name == path else "call"), name, name
         elif isinstance(node, ast.Name) and node.id not in targets and _is_telling(node.id):
             yield "word", node.id, node.id
 

@@ -1,15 +1,11 @@
-"""The child process that lists the names of MuJoCo, of MJCF and of the modules that scripts import.
+"""The child process that lists the names of MuJoCo and of MJCF.
 
 Entry point: run as a file by `known_names`, in the environment of the scripts. It says `ready`;
-then each line is a list of modules, and the answer is a `known_names.EngineNames`.
-
-Only MuJoCo and what it imports itself are imported. Other modules are read, and not run: the names
-that their file defines or imports; `*` stands for those that only running it would tell.
+then each line asks for the names, and the answer is a `known_names.EngineNames`.
 """
 
 from __future__ import annotations
 
-import ast
 import inspect
 import json
 import os
@@ -30,11 +26,11 @@ def main() -> None:
     import mujoco
 
     print("ready", file=replies, flush=True)
-    for line in sys.stdin:
+    for _ in sys.stdin:
         names = {
             **_engine(mujoco),
             "schema": mujoco.mj_printSchema(False, False),
-            "modules": {name: sorted(set(_module(name))) for name in json.loads(line)},
+            "declared": sorted(set(_headers(Path(mujoco.__file__).parent / "include"))),
         }
         print(json.dumps(names), file=replies, flush=True)
 
@@ -99,43 +95,10 @@ def _members(cls: type, fields: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         yield name, {**description, "type": types[-1] if types else ""}
 
 
-def _module(name: str) -> Iterator[str]:
-    """The names of a module; `*` where there may be more."""
-    module = sys.modules.get(name)
-    if module is not None and name.split(".")[0] in ("mujoco", "numpy") and module.__file__:
-        yield from dir(module)
-        yield from _submodules(Path(module.__file__))
-        return
-    if name in sys.builtin_module_names or (module and name in sys.stdlib_module_names):
-        yield from dir(sys.modules.get(name) or __import__(name))
-        return
-    path = name.replace(".", "/")
-    files = (Path(folder, path + end) for folder in sys.path for end in ("/__init__.py", ".py"))
-    file = next((file for file in files if file.is_file()), None)
-    if file is None:
-        yield "*"
-        return
-    yield from _submodules(file)
-    try:
-        tree = ast.parse(file.read_bytes())
-    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):  # of another Python
-        yield "*"
-        return
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            yield "*" if node.name == "__getattr__" else node.name
-        elif isinstance(node, ast.Import | ast.ImportFrom):
-            for alias in node.names:
-                yield alias.asname or alias.name.split(".")[0]  # `*` is itself
-        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            yield node.id
-        elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("globals", "setattr"):
-            yield "*"
-
-
-def _submodules(file: Path) -> Iterator[str]:
-    if file.name.startswith("__init__."):
-        yield from (path.name.partition(".")[0] for path in file.parent.iterdir())
+def _headers(folder: Path) -> Iterator[str]:
+    """The names of functions and macros in MuJoCo's headers, some of which Python has not."""
+    for header in sorted(folder.glob("**/*.h")):
+        yield from re.findall(r"\bmj[a-z]?_\w+", header.read_text("utf-8", "replace"))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""The names that can be known: of MuJoCo, MJCF, imported modules, and of coursebuild itself.
+"""The names that can be known: of MuJoCo, of MJCF, and of coursebuild itself.
 
 Entry points: `EngineNames`; `engine_names`, the table, which one child process makes for each
-version of MuJoCo and set of modules; `list_names` for another interpreter; `find_engine_name`,
+version of MuJoCo; `list_names` for another interpreter; `find_engine_name`,
 `element_href`, what a name means and where MuJoCo's manual has it.
 
 Of coursebuild, `options_by_command`; `tables_of` a kind of file, as the course map; `known_keys`;
@@ -24,13 +24,12 @@ from msgspec import Struct
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
-from coursebuild.core.model.course import MJCF_KEYWORDS
 from coursebuild.core.registry import CORE_COMMANDS, features
 from coursebuild.core.run import mjcf
 from coursebuild.core.run.child import JsonChild
 from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
 from coursebuild.core.syntax.course_schema import CourseFile, schema_roots
-from coursebuild.core.text.diagnostics import did_you_mean, misspelt, nearest, propose
+from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.core.text.source import key_of
 from coursebuild.features.names import introspect
 
@@ -68,8 +67,8 @@ class EngineNames(Struct, frozen=True, dict=True):
     classes: dict[str, dict[str, EngineName]]
     elements: dict[str, dict[str, tuple[str, ...]]]
     """The elements of MJCF: by the elements that they stand in, their attributes there."""
-    modules: dict[str, frozenset[str]]
-    """`*` is among the names of a module that may have more."""
+    declared: frozenset[str]
+    """The words of MuJoCo's headers that begin as its functions and macros do."""
 
     @functools.cached_property
     def enum_of(self) -> dict[str, str]:
@@ -90,13 +89,6 @@ class EngineNames(Struct, frozen=True, dict=True):
         """The attributes of all elements of MJCF."""
         places = (attributes for e in self.elements.values() for attributes in e.values())
         return frozenset(attribute for attributes in places for attribute in attributes)
-
-    @functools.cached_property
-    def keywords(self) -> frozenset[str]:
-        """What an attribute may say: the ends of names of enumerations, in any case, and others."""
-        ends = {member.partition("_")[2] for member in self.enum_of} - {""}
-        forms = (form for end in ends for form in (end.lower(), end.capitalize(), end))
-        return frozenset((*forms, *MJCF_KEYWORDS))
 
     @functools.cached_property
     def words(self) -> frozenset[str]:
@@ -133,10 +125,8 @@ def _decode(data: bytes) -> EngineNames:
     return msgspec.json.decode(data, type=EngineNames)
 
 
-def engine_names(
-    store: Store, interpreter: Interpreter | None, modules: Iterable[str]
-) -> EngineTable:
-    """The names of the MuJoCo that the scripts use, and of modules that they import.
+def engine_names(store: Store, interpreter: Interpreter | None) -> EngineTable:
+    """The names of the MuJoCo that the scripts use.
 
     Raises:
         EffectError: MuJoCo cannot be loaded.
@@ -147,10 +137,10 @@ def engine_names(
     folders = sys.path if interpreter is None else interpreter.packages
     packages = [Path(folder) for folder in folders if folder.endswith("-packages")]
     states = [str(folder.stat().st_mtime_ns) for folder in packages if folder.is_dir()]
-    key = key_of(engine, version, python, *sorted(modules), "", *states, _code())
+    key = key_of(engine, version, python, *states, _code())
     data = _in_memory.get(key) or store.get(_KIND, key, bytes)
     if data is None:
-        data = msgspec.json.encode(list_names(python, tuple(sorted(modules))))
+        data = msgspec.json.encode(list_names(python))
         store.put(_KIND, key, data)
     _in_memory[key] = data
     return EngineTable(data)
@@ -165,14 +155,14 @@ def _code() -> str:
 _in_memory: dict[str, bytes] = {}
 
 
-def list_names(python: str, modules: Iterable[str] = ()) -> EngineNames:
-    """List the names of the MuJoCo of an interpreter, and of modules, in a child process.
+def list_names(python: str) -> EngineNames:
+    """List the names of the MuJoCo of an interpreter in a child process.
 
     Raises:
         EffectError: MuJoCo cannot be loaded.
     """
     with JsonChild(introspect.__file__, _SECONDS, python) as child:
-        answer = child.ask(sorted(modules))
+        answer = child.ask(None)
         if answer is None:
             raise EffectError(f"listing the names of MuJoCo {child.death()}")
     elements = mjcf.read_schema(answer.pop("schema"))
@@ -328,10 +318,10 @@ def resolve_option(manual: str, command: str, name: str) -> Answer:
         options = frozenset(option for options in commands.values() for option in options)
     if name in options:
         return KnownName(manual)
-    if not command and nearest(name, options, cutoff=0.85) is None:
-        return None  # of another program
-    subject = f"`coursebuild {command}`" if command else "coursebuild"
-    return Unknown(f"{subject} has no option `{name}`", did_you_mean(name, options), name)
+    if not command:
+        return None  # it may be of another program
+    message = f"`coursebuild {command}` has no option `{name}`"
+    return Unknown(message, did_you_mean(name, options), name)
 
 
 def resolve_table(manual: str, table: str, key: str) -> Answer:
@@ -339,11 +329,7 @@ def resolve_table(manual: str, table: str, key: str) -> Answer:
     name = table.lstrip("[")
     tables = tables_of(CourseFile)
     if name not in tables:
-        likely = misspelt(name, tables) if len(name) > 3 else None
-        if likely is None:
-            return None
-        fix = propose(name, likely)
-        return Unknown(f"the course map has no table `{name}`", fix, name)
+        return None  # it may be of another file
     if key and tables[name] and key not in tables[name]:
         help = did_you_mean(key, tables[name])
         return Unknown(f"the table `{name}` of the course map has no key `{key}`", help, key)

@@ -1,7 +1,9 @@
-"""Resolves the names in inline code: what each one means, or why there is nothing of that name.
+"""What a name in inline code means, and where it certainly means nothing.
 
-Entry point: `resolver_of` a course. Its answer `None` means that nobody can say: the name belongs
-to something that is read nowhere, such as another program.
+A name is a claim where all names are known that could stand in its place: after a variable that the
+scripts of its page make a structure of MuJoCo, as a function of MuJoCo with brackets, in MJCF that
+begins with its root, behind `coursebuild`, in a link to a script. Any other name may be of a file
+or a library that nobody here knows.
 """
 
 from __future__ import annotations
@@ -9,21 +11,14 @@ from __future__ import annotations
 import builtins
 import functools
 import re
-from collections.abc import Iterable
 
 from coursebuild import MANUAL
-from coursebuild.core.model import Course, document_scripts
+from coursebuild.core.model import Course, Script, document_scripts
 from coursebuild.core.model.addresses import line_anchor
-from coursebuild.core.syntax.html import ELEMENTS
-from coursebuild.core.text.diagnostics import (
-    did_you_mean,
-    misspelt,
-    nearest,
-    propose,
-)
-from coursebuild.features.names import claims, known_names
+from coursebuild.core.text.diagnostics import did_you_mean, propose
+from coursebuild.core.text.near import nearest
+from coursebuild.features.names import known_names
 from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, course_names
-from coursebuild.features.names.guesses import Guesses
 from coursebuild.features.names.known_names import (
     ITEM_CLASSES,
     Answer,
@@ -35,17 +30,15 @@ from coursebuild.features.names.known_names import (
     class_href,
     element_href,
     find_engine_name,
-    known_keys,
 )
 
 _MANUAL_ID = "coursebuild-manual"
 """The id of the manual, in docs/content/course.toml."""
 _ROOTS = {"model": "MjModel", "data": "MjData", "opt": "MjOption", "spec": "MjSpec"}
-"""The classes of variables by their usual names."""
-_HTML = ELEMENTS | frozenset(
-    "body button canvas form head html iframe input label legend link main meta object optgroup "
-    "option output script select style template textarea".split()
-)
+"""The classes of variables by their usual names, for links."""
+_FUNCTION = re.compile(r"mj[ud]?_[A-Za-z]\w*(?<!_)")
+"""How the names of functions begin that only MuJoCo has."""
+_BRACKETS = re.compile(r"[()\[\]]+")
 _resolvers: list[Resolver] = []
 """The one that was asked last."""
 
@@ -57,13 +50,6 @@ def resolver_of(course: Course) -> Resolver:
     return _resolvers[0]
 
 
-def _propose(name: str, names: Iterable[str]) -> str:
-    """Propose the nearest name, if one is near; only those of about its length are compared."""
-    similar = {candidate for candidate in names if abs(len(candidate) - len(name)) <= 2}
-    likely = nearest(name, similar, cutoff=0.8)
-    return propose(name, likely) if likely else ""
-
-
 class Resolver:
     """Resolves the names of a course."""
 
@@ -73,44 +59,8 @@ class Resolver:
         self.engine = table.names if not engine and isinstance(table, EngineTable) else engine
 
     @functools.cached_property
-    def guesses(self) -> Guesses:
-        """What words mean that have not the shape of a name."""
-        return Guesses(
-            self.course,
-            self.engine,
-            self.words,
-            self.imports,
-            self.files,
-            self._is_known_path,
-            has_engine=self.has_engine,
-        )
-
-    def _is_known_path(self, path: str, names: CodeNames) -> bool:
-        is_path = all(part.isidentifier() for part in path.split("."))
-        return is_path and isinstance(self._path(path, names), KnownName)
-
-    @functools.cached_property
-    def words(self) -> frozenset[str]:
-        """The words of all code of the course."""
-        course = self.course
-        words = {model.name for model in course.models} | {p.path for p in course.packages}
-        return frozenset(words).union(
-            *(claims.words_of(model.source.text) for model in course.models),
-            *(names.words | names.definitions.keys() for names in course_names(course)),
-        )
-
-    @functools.cached_property
-    def imports(self) -> dict[str, str]:
-        """What scripts import, by the names that they agree on; a text may use these anywhere."""
-        imports: dict[str, str] = {"mujoco": "mujoco", "np": "numpy"}
-        for names in course_names(self.course):
-            for name, module in names.imports.items():
-                imports[name] = module if imports.get(name, module) == module else ""
-        return imports
-
-    @functools.cached_property
     def has_engine(self) -> bool:
-        """Whether the course is about MuJoCo, so that `model` and `data` are its structures."""
+        """Whether the course is about MuJoCo, so that `model` and `data` may be its structures."""
         if self.course.models or self.course.engine:
             return True
         documents = course_names(self.course)
@@ -120,17 +70,28 @@ class Resolver:
             ENGINE_WORD.fullmatch(claim.name) for claim in uses
         )
 
+    @functools.cached_property
+    def scripts(self) -> dict[str, Script]:
+        """The scripts of the course, by their paths."""
+        documents = self.course.documents
+        return {s.path: s for document in documents for s in document_scripts(document)}
+
     def resolve(self, claim: Claim, names: CodeNames) -> Answer:
         """What a name in a document means."""
         match claim.kind:
-            case "word" | "call":
-                return self._word(claim, names)
+            case "word":
+                return self._word(claim.name, names)
+            case "call":
+                return self._word(claim.name, names) or self._function(claim.name, names)
             case "path":
-                return self._path(claim.name, names)
-            case "element":
-                return self._element(claim.name)
-            case "attribute":
-                return self._attribute(*claim.name.split(" "))
+                return self._path(claim.name.split("."), names)
+            case "defined":
+                return self._linked_name(*claim.name.split(" "))
+            case "element" | "attribute":
+                answer = self._mjcf(*claim.name.split(" "))
+                return answer if isinstance(answer, KnownName) and self.has_engine else None
+            case "mjcf":
+                return self._mjcf(*claim.name.split(" "))
             case "command":
                 return known_names.resolve_command(self._manual("commands"), claim.name)
             case "option":
@@ -138,92 +99,57 @@ class Resolver:
             case "table":
                 return known_names.resolve_table(self._manual("course-map"), *claim.name.split(" "))
             case "file":
-                return self._file(claim.name)
-            case "value":
-                return self.guesses.value(claim.name)
-            case "plain":
-                return self.guesses.plain(claim.name, names)
-            case "token":
-                return self.guesses.token(claim.name, names)
-            case "half":
-                return self.guesses.half(claim.name)
-            case "torn":
-                return self.guesses.torn(claim.name, names)
+                path = claim.name
+                is_script = path in self.scripts and path.startswith("examples/")
+                sources = self.course.sources
+                has_file = is_script or any(source.path == path for source in sources)
+                return KnownName(f"#{path}" if is_script else "") if has_file else None
 
     # --- Python
 
-    def _word(self, claim: Claim, names: CodeNames) -> Answer:
-        name, engine = claim.name, self.engine
+    def _word(self, name: str, names: CodeNames) -> Answer:
         if name in names.definitions:
             return KnownName(f"#{line_anchor(*names.definitions[name])}", name)
         if name in names.imports or hasattr(builtins, name):
             return KnownName()
-        meaning = None if engine is None else find_engine_name(engine, name)
-        if meaning is not None:
-            return meaning
-        if engine is not None and name in engine.words:
-            return KnownName()
-        if engine is not None and ENGINE_WORD.fullmatch(name):
-            engine_words = {*engine.functions, *engine.constants, *engine.enums, *engine.enum_of}
-            engine_words |= {*engine.classes}
-            message = f"MuJoCo {engine.version} has no `{name}`"
-            return Unknown(message, did_you_mean(name, engine_words), name)
-        if name in self.words or name in known_keys():
-            return KnownName()
-        is_vague = claim.kind == "call" or name.isupper()  # prose, or an environment variable
-        if is_vague and (len(name) < 4 or misspelt(name, names.definitions) is None):
-            return None
-        candidates = {*self.words, *known_keys(), *(() if engine is None else engine.words)}
-        message = f"nothing that the course knows is called `{name}`"
-        return Unknown(message, _propose(name, candidates), name)
+        return None if self.engine is None else find_engine_name(self.engine, name)
 
-    def _path(self, path: str, names: CodeNames) -> Answer:
-        parts = [re.sub(r"[()\[\]]+", "", part) for part in path.split(".")]
-        root, engine = parts[0], self.engine
+    def _function(self, name: str, names: CodeNames) -> Answer:
+        """That there is no function of MuJoCo with this name, if it has the form of one."""
+        engine = self.engine
+        if engine is None or not _FUNCTION.fullmatch(name):
+            return None
+        if name in engine.declared or name in engine.functions or name in names.words:
+            return None
+        help = did_you_mean(name, (*engine.functions, *engine.declared))
+        return Unknown(f"MuJoCo {engine.version} has no function `{name}`", help, name)
+
+    def _path(self, parts: list[str], names: CodeNames) -> Answer:
+        engine, root = self.engine, _BRACKETS.sub("", parts[0])
         if engine is None:
             return None
-        class_name = self._class_of(root, names)
-        if class_name:
-            return self._member(class_name, path.split(".")[1:])
-        module = names.imports.get(root) or self.imports.get(root, "")
-        if module:
-            return self._module_member(module, path.split(".")[1:], names)
+        if class_name := names.variables.get(root, ""):
+            return self._member(class_name, parts[1:])
+        if root == "mujoco" or names.imports.get(root) == "mujoco":
+            return self._module_member(parts[1:], names)
+        if root in engine.enums and parts[1] in engine.enums[root]:
+            return find_engine_name(engine, parts[1])
         class_name = f"M{root[1:]}" if root.startswith("mj") else root
-        if class_name in engine.classes:
-            return self._member(class_name, path.split(".")[1:])
-        if root in engine.enums:
-            if parts[1] in engine.enums[root]:
-                return find_engine_name(engine, parts[1])
-            help = did_you_mean(parts[1], engine.enums[root])
-            return Unknown(f"`{root}` has no member `{parts[1]}`", help, parts[1])
-        if root in names.definitions or root in names.words:
-            return None
-        likely = misspelt(root, (*_ROOTS, "mujoco")) if self.has_engine else None
-        if likely is not None and isinstance(
-            self._path(path.replace(root, likely, 1), names), KnownName
-        ):
-            message = f"nothing that the course knows is called `{root}`"
-            return Unknown(message, propose(root, likely), root)
-        if ENGINE_WORD.fullmatch(root):
-            message = f"MuJoCo {engine.version} has no `{root}`"
-            return Unknown(message, did_you_mean(root, engine.classes), root)
-        head, _, tail = path.partition(".")
-        for candidate in (f"{head[:-1]}.{head[-1]}{tail}", f"{head}{tail[0]}.{tail[1:]}"):
-            is_likely = candidate.partition(".")[0] in _ROOTS
-            if is_likely and isinstance(self._path(candidate, names), KnownName):
-                message = f"nothing that the course knows is called `{root}`"
-                return Unknown(message, f"did you mean `{candidate}`?", root)
-        return None
+        if self.has_engine and root not in names.variables and root not in names.imports:
+            class_name = _ROOTS.get(root, class_name)
+        answer = self._member(class_name, parts[1:])
+        return answer if isinstance(answer, KnownName) else None
 
-    def _class_of(self, root: str, names: CodeNames) -> str:
-        """The class of MuJoCo of which a variable is; empty if it is of none."""
-        if root in names.variables:
-            return names.variables[root]
-        class_name = _ROOTS.get(root, "") if self.has_engine else ""
-        if not class_name or self.engine is None or root in names.imports:
-            return ""
-        attributes = names.members.get(root, frozenset())
-        return class_name if attributes <= self.engine.classes.get(class_name, {}).keys() else ""
+    def _module_member(self, parts: list[str], names: CodeNames) -> Answer:
+        """What a path means that begins at the module of MuJoCo."""
+        assert self.engine is not None
+        name = _BRACKETS.sub("", parts[0])
+        if parts[1:] and name in self.engine.enums:
+            return self._path(parts, names)
+        answer = self._member(name, parts[1:]) or find_engine_name(self.engine, name)
+        if answer is None and parts[0].startswith(f"{name}()"):
+            return self._function(name, names)
+        return answer if isinstance(answer, KnownName) else None
 
     def _member(self, class_name: str, parts: list[str]) -> Answer:
         """What a path means that begins at an object of a class of MuJoCo."""
@@ -232,7 +158,7 @@ class Resolver:
         first_class = class_name
         for part in parts:
             members = self.engine.classes.get(class_name)
-            name = re.sub(r"[()\[\]]+", "", part)
+            name = _BRACKETS.sub("", part)
             if not members:
                 break
             member = members.get(name)
@@ -247,65 +173,41 @@ class Resolver:
         href = class_href(self.engine, first_class)
         return KnownName(href, member.text, member.doc, member.extent, engine=True)
 
-    def _module_member(self, module: str, parts: list[str], names: CodeNames) -> Answer:
-        engine = self.engine
-        assert engine is not None
-        for number, part in enumerate(parts):
-            name = re.sub(r"[()\[\]]+", "", part)
-            if module == "mujoco":
-                if name in engine.classes:
-                    rest = parts[number + 1 :]
-                    href = class_href(engine, name)
-                    return self._member(name, rest) if rest else KnownName(href, name, engine=True)
-                if name in engine.enums and parts[number + 1 :]:
-                    return self._path(".".join(parts[number:]), names)
-                meaning = find_engine_name(engine, name)
-                if meaning is not None:
-                    return meaning
-            module_names = engine.modules.get(module)
-            if module_names is None or (name not in module_names and "*" in module_names):
-                return None
-            if name not in module_names:
-                is_engine = module == "mujoco"
-                label = f"MuJoCo {engine.version}" if is_engine else f"the module `{module}`"
-                return Unknown(f"{label} has no `{name}`", did_you_mean(name, module_names), name)
-            module = f"{module}.{name}"
-        return KnownName()
+    def _linked_name(self, path: str, name: str) -> Answer:
+        """Whether the script to which the name is linked has it."""
+        script = self.scripts.get(path)
+        if script is None:
+            return None
+        words = frozenset(re.findall(r"\w+", script.code.text))
+        if name in words:
+            return KnownName()
+        likely = nearest(name, words)
+        help = propose(name, likely) if likely else ""
+        return Unknown(f"`{path}` has no `{name}`", help, name)
 
     # --- MJCF
 
-    def _element(self, name: str) -> Answer:
+    def _mjcf(self, element: str, attribute: str = "") -> Answer:
+        """What an element or an attribute means; an attribute alone has an empty element."""
         engine = self.engine
-        if engine is None or not self.has_engine:
+        if engine is None:
             return None
-        if name in engine.elements:
-            return KnownName(element_href(engine, name), f"<{name}>", engine=True)
-        if name in _HTML or name in self.words:
+        if not element:
+            is_known = attribute in engine.attributes
+            return KnownName(engine=True, text=attribute) if is_known else None
+        if element not in engine.elements and attribute:
             return None
-        message = f"MJCF of MuJoCo {engine.version} has no element `<{name}>`"
-        return Unknown(message, did_you_mean(name, engine.elements), name)
+        if element not in engine.elements:
+            message = f"MJCF of MuJoCo {engine.version} has no element `<{element}>`"
+            return Unknown(message, did_you_mean(element, engine.elements), element)
+        names = {name for places in engine.elements[element].values() for name in places}
+        if not attribute or attribute in names:
+            text = attribute or f"<{element}>"
+            return KnownName(element_href(engine, element, attribute), text, engine=True)
+        message = f"`<{element}>` of MuJoCo {engine.version} has no attribute `{attribute}`"
+        return Unknown(message, did_you_mean(attribute, names), attribute)
 
-    def _attribute(self, element: str, name: str) -> Answer:
-        engine = self.engine
-        if engine is None or not self.has_engine or (element and element not in engine.elements):
-            return None
-        if element:
-            attributes = {name for places in engine.elements[element].values() for name in places}
-            if name in attributes:
-                return KnownName(element_href(engine, element, name), name, engine=True)
-            if element in _HTML:
-                return None
-            message = f"`<{element}>` of MuJoCo {engine.version} has no attribute `{name}`"
-            return Unknown(message, did_you_mean(name, attributes), name)
-        if name in engine.attributes:
-            return KnownName(engine=True, text=name)
-        likely = nearest(name, engine.attributes, cutoff=0.75)
-        if name in self.words or likely is None or name in known_keys():
-            return None
-        message = f"no element of MuJoCo {engine.version} has an attribute `{name}`"
-        return Unknown(message, propose(name, likely), name)
-
-    # --- coursebuild and the course
+    # --- the manual
 
     def _manual(self, page: str) -> str:
         """A page of the manual: in the manual's own course its file, else its address if known."""
@@ -313,20 +215,3 @@ class Resolver:
         if self.course.id == _MANUAL_ID and any(p.path == path for p in self.course.pages):
             return path
         return MANUAL and f"{MANUAL}{page}.html"
-
-    def _file(self, path: str) -> Answer:
-        if path in self.files:
-            return KnownName(f"#{path}" if path.startswith("examples/") else "")
-        is_of_course = re.match("(?:content|examples|models)/", path)
-        if is_of_course is None and misspelt(path, self.files) is None:
-            return None
-        help = _propose(path, self.files) or "write it, or say `{code}` after the name"
-        return Unknown(f"the course has no file `{path}`", help, path)
-
-    @functools.cached_property
-    def files(self) -> frozenset[str]:
-        """The files that the course has."""
-        course = self.course
-        scripts = (s.path for document in course.documents for s in document_scripts(document))
-        sources = (source.path for source in course.sources)
-        return frozenset((*course.files, *scripts, *sources, *(p.path for p in course.lessons)))

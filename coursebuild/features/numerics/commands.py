@@ -24,7 +24,7 @@ from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import require
 from coursebuild.core.pages import urls
 from coursebuild.core.run.script_environment import engine_version, machine, one_processor
-from coursebuild.core.text.diagnostics import nearest
+from coursebuild.core.text.near import nearest
 from coursebuild.core.values import decode, encode
 from coursebuild.features.bench.commands import bench
 from coursebuild.features.bench.commands.measurement import (

@@ -20,7 +20,6 @@ from coursebuild.core.model import (
     block_inlines,
     document_scripts,
     find_blocks,
-    plain_text,
     walk_blocks,
     walk_inlines,
 )
@@ -29,12 +28,10 @@ from coursebuild.core.scripts.lines import LineMatcher, MappedText, apply_filter
 from coursebuild.core.syntax.json_text import parse_json
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    Fix,
     Note,
     Parsed,
     diagnose,
     did_you_mean,
-    is_one_edit,
 )
 from coursebuild.core.text.numbers import Number, scan_prose
 from coursebuild.core.text.source import Excerpt
@@ -90,14 +87,6 @@ def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | Non
         blocks = rest[:end]
         stops = [Note("what can be hidden ends here", b.span.first_line()) for b in rest[end:][:1]]
         labs = [block for block in blocks if isinstance(block, Lab)]
-        above = [b for b in document.blocks[: at or 0] if isinstance(b, Heading)][-1:]
-        for title in (plain_text(heading.children) for heading in above):
-            if quiz.title and quiz.title != title and is_one_edit(quiz.title, title):
-                start = quiz.span.start + max(quiz.span.text.find(quiz.title), 0)
-                place = quiz.span.source.span(start, start + len(quiz.title))
-                message = f"the title `{quiz.title}` is almost that of the heading above"
-                fix = Fix(f"did you mean `{title}`?", title)
-                diagnostics.append(diagnose("field-value", place, message, help=fix))
         for question in quiz.questions:
             if isinstance(question, NumericQuestion):
                 diagnostics += _check_answer(question)

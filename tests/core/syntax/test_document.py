@@ -24,7 +24,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.features.quiz.model import Quiz
-from support.fixture_cases import Case, check_cases, read_cases
+from support.fixture_cases import Case, check_cases
 from support.plain_html import plain_html
 from support.random_lessons import KINDS, markdown
 from support.tree_dump import dump
@@ -313,48 +313,3 @@ def check_marks(inline: model.Inline) -> None:
             assert text == f"[^{inline.label}]"
         case _:
             pass
-
-
-ROOT = Path(__file__).parents[3]
-MARKUP_FOLDER = ROOT / "tests/fixtures/markup"
-MARKUP = {"markup-unread", "markup-foreign", "math-unread", "control-character", "merge-conflict"}
-
-
-def mistakes(path: str, text: str) -> list[str]:
-    source = Source(path, text)
-    document = parse_document(source, frozenset(CALLOUTS), lesson="lessons" in path)
-    return [
-        f"{d.rule} {d.span.line}:{d.span.column} {d.span.first_line().text!r}"
-        for d in document.diagnostics
-    ]
-
-
-def test_mistakes_are_reported_at_their_places(rewriting: bool) -> None:
-    def render(case: Case) -> str:
-        lines = mistakes("content/lessons/1.1-x.md", case.input)
-        assert lines, f"{case.title} is silent"
-        return "".join(f"{line}\n" for line in lines)
-
-    check_cases(MARKUP_FOLDER / "mistakes.md", render, rewriting=rewriting)
-
-
-def test_ordinary_prose_and_escaped_markup_are_no_mistakes() -> None:
-    cases = read_cases(MARKUP_FOLDER / "innocent.md")
-    failures = {
-        f"{case.line}: {case.title}": rules
-        for case in cases
-        if (rules := mistakes("content/lessons/1.1-x.md", case.input))
-    }
-    assert len(cases) >= 90
-    assert failures == {}
-
-
-@pytest.mark.parametrize("folder", ["content", "docs"])
-def test_what_this_repository_publishes_has_no_unread_markup(folder: str) -> None:
-    failures = {}
-    for path in sorted((ROOT / folder).rglob("*.md")):
-        name = path.relative_to(ROOT).as_posix()
-        rules = [m for m in mistakes(name, path.read_text("utf-8")) if m.split()[0] in MARKUP]
-        if rules:
-            failures[name] = rules
-    assert failures == {}

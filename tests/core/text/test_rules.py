@@ -33,6 +33,7 @@ from coursebuild.pipeline.outputs import update
 from coursebuild.pipeline.publication import build, export
 from coursebuild.report import Style, diagnostic_text
 from coursebuild.report.text import visible
+from coursebuild.report.values import with_hints
 from support.fixture_cases import Case, read_cases, rewrite
 from support.rule_cases import Layout, Workshop
 from support.rule_cases import workshop as workshop
@@ -43,16 +44,18 @@ _OTHER_GROUP = "Sources, names, numbers and time"
 
 def catalogue_page() -> str:
     """`docs/reference/rules.md`."""
-    errors = sum(rule.severity == "error" for rule in RULES.values())
+    counts = Counter(rule.severity for rule in RULES.values())
     names = {name for group in GROUPS.values() for name in group}
     groups = {**GROUPS, _OTHER_GROUP: [name for name in RULES if name not in names]}
     head = f"""\
 # Rules
 
-{errors} rules are errors, which keep the site from being published; {len(RULES) - errors} are
-warnings, which can be [silenced](course-map.md#silence). `coursebuild explain RULE` prints an
-entry; with `--format json`, it also says why nothing can be proposed. Where `--fix` stands over a
-message, [that option](commands.md#fix) mends it; where `--propose` does, a human decides.
+Errors ({counts["error"]} rules) keep the site from being published; warnings
+({counts["warning"]}) can be [silenced](course-map.md#silence);
+[hints](../explanation/mistakes.md#hints) ({counts["hint"]}) change nothing. `coursebuild explain
+RULE` prints an entry; with `--format json`, it also says why nothing can be proposed. Where `--fix`
+stands over a message, [that option](commands.md#fix) mends it; where `--propose` does, a human
+decides.
 """
     return head + "".join(
         f"\n## {title}\n" + "".join(_entry(RULES[name]) for name in group)
@@ -102,7 +105,7 @@ PAGE = ROOT / "docs/reference/rules.md"
 FILES = {path.stem: path for path in sorted(FIXTURES.glob("*.md"))}
 CASES = {name: read_cases(path) for name, path in FILES.items()}
 SENTENCE = re.compile(r"(?!MuJoCo|JavaScript|Markdown|Python)[A-Z][a-z]")
-MESSAGE = re.compile(r"^(error|warning)\[([a-z-]+)\]: ", re.MULTILINE)
+MESSAGE = re.compile(r"^(error|warning|hint)\[([a-z-]+)\]: ", re.MULTILINE)
 RUN = re.compile(r"file=examples/|models/|```mjcf|```lab")
 """Marks of a course with something to run or compile."""
 
@@ -187,6 +190,8 @@ def run_case(
     match command_of(case):
         case "check":
             return check(options).diagnostics
+        case "check --hints":
+            return with_hints(check(options))
         case "check --strict":
             return check(replace(options, strict=True)).diagnostics
         case "check --sensitivity":
@@ -272,7 +277,7 @@ def test_messages_keep_the_style_of_the_house() -> None:
     failures = []
     for name, cases in CASES.items():
         for line in "".join(case.expected for case in cases).splitlines():
-            text = re.match(r"(?:(?:error|warning)\[[a-z-]+\]| *= help): (.*)", line)
+            text = re.match(r"(?:(?:error|warning|hint)\[[a-z-]+\]| *= help): (.*)", line)
             if text and (SENTENCE.match(text[1]) or re.search(r"(?<!\.)\.$", text[1])):
                 failures.append(f"{name}: {line}")
     assert failures == []

@@ -65,6 +65,12 @@ def test_mistakes_are_reported_while_typing_and_nothing_is_saved(editor: Editor)
     assert editor.folder.text(SECOND_LESSON) == LINKS
 
 
+def test_hints_are_published_with_the_severity_of_hints(editor: Editor) -> None:
+    editor.write(SECOND_LESSON, f"{LINKS}\nIt **falls.\n")
+    (hint,) = editor.until(SECOND_LESSON, "shown-as-written")
+    assert hint.severity == types.DiagnosticSeverity.Hint
+
+
 def test_a_mistake_has_related_places(editor: Editor) -> None:
     editor.write(SECOND_LESSON, LINKS + "\nA [moment of inertia]{term} again.\n")
     (diagnostic,) = editor.until(SECOND_LESSON, "term-repeated")
@@ -319,14 +325,14 @@ def test_a_proposal_of_a_diagnostic_is_a_quick_fix(editor: Editor) -> None:
 
 def test_all_mistakes_of_a_file_are_fixed_together(editor: Editor) -> None:
     """On request, from anywhere in the file, and only what can be meant."""
-    text = FALL.replace("## ", "[a](lesson:fall) [b](term:zzzz)\n\n> [!nte] A\n>\n> B.\n\n## ", 1)
+    text = FALL.replace("## ", "[a](lesson:fall) [b](term:zzzz)\n\n> [!note]+ A\n>\n> B.\n\n## ", 1)
     editor.write(FIRST_LESSON, text)
     editor.until(FIRST_LESSON, "link-lesson", "link-term", "callout-unknown")
     kind = types.CodeActionKind.SourceFixAll
     (fix_all,) = editor.actions(FIRST_LESSON, "> |B.", only=[kind]).values()
     assert (fix_all.title, fix_all.kind) == ("Fix all in this file (1)", kind)
     new = editor.apply_edits(fix_all.edit.changes)[FIRST_LESSON]
-    assert new == text.replace("!nte", "!note")
+    assert new == text.replace("]+", "]")
     assert not editor.actions(FIRST_LESSON, "> |B.", only=[types.CodeActionKind.Refactor])
 
 

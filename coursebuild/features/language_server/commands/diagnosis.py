@@ -20,13 +20,14 @@ from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.findings import output_findings
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
 from coursebuild.core.text.numbers import scan_prose
-from coursebuild.core.text.rules import rule_address
+from coursebuild.core.text.rules import Severity, rule_address
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.language_server.commands.texts import OpenTexts, Places
 from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.fix import choose_fixes
 from coursebuild.preview.messages import new_output
 from coursebuild.preview.session import Session
+from coursebuild.report.values import with_hints
 
 _COMPARISON_RULES = (
     *("output-drift", "script-silent"),
@@ -77,7 +78,7 @@ def _diagnose(session: Session, version: int) -> tuple[Diagnostic, ...]:
             )
             edits = diagnostic.edits if span is diagnostic.span else ()
             diagnostics += (replace(diagnostic, span=span, notes=notes, edits=edits),)
-    return judge(course, diagnostics).diagnostics
+    return with_hints(judge(course, diagnostics))
 
 
 # --- diagnostics of a text as it was
@@ -111,16 +112,22 @@ def _line_shifts(old: Source, new: Source) -> dict[int, int]:
 # --- for a client
 
 
+_SEVERITIES: dict[Severity, types.DiagnosticSeverity] = {
+    "error": types.DiagnosticSeverity.Error,
+    "warning": types.DiagnosticSeverity.Warning,
+    "hint": types.DiagnosticSeverity.Hint,
+}
+
+
 def to_lsp(diagnostic: Diagnostic, places: Places) -> types.Diagnostic:
     """Return a diagnostic as the client reads it, with its notes and a link to its rule."""
-    is_error = diagnostic.is_error
     lines = [diagnostic.message, diagnostic.label, diagnostic.help and f"help: {diagnostic.help}"]
     lines += [f"note: {note.message}" for note in diagnostic.notes if note.span is None]
     address = rule_address(diagnostic.rule)
     return types.Diagnostic(
         places.range(diagnostic.span),
         "\n".join(filter(None, lines)),
-        severity=types.DiagnosticSeverity.Error if is_error else types.DiagnosticSeverity.Warning,
+        severity=_SEVERITIES[diagnostic.severity],
         code=diagnostic.rule,
         code_description=types.CodeDescription(address) if address else None,
         source="coursebuild",

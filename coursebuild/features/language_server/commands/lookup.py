@@ -360,7 +360,7 @@ def members(texts: OpenTexts, path: tuple[str, ...], code: str) -> Mapping[str, 
     """
     engine = resolver_of(texts.library.course).engine
     if engine is None:  # no text names anything of it
-        engine = engine_names(texts.session.options.store, None, ()).names
+        engine = engine_names(texts.session.options.store, None).names
     if path == ("mujoco",):
         return engine.functions
     roots = {"data": "MjData", "model": "MjModel"} | dict(_ASSIGNMENT.findall(code))

@@ -97,8 +97,8 @@ def completions(
                 for name, field in missing.items()
             }
         case "rule":
-            warnings = (rule for rule in RULES.values() if rule.severity == "warning")
-            names = {f'"{rule.name}"': rule.summary for rule in warnings}
+            rules = (rule for rule in RULES.values() if rule.severity != "error")
+            names = {f'"{rule.name}"': rule.summary for rule in rules}
         case "prerequisites":
             lessons = texts.library.lessons.values()
             names = {f'"{lesson.id}"': lesson.title for lesson in lessons}
