@@ -40,4 +40,4 @@ def _try(grounds: Grounds, command: tuple[str, ...], place: str) -> str:
     done = gate.finish(tool(*option, *command), environment, folder=stand)
     text = (done.output + done.errors).decode("utf-8", "replace")
     violation = grounds.find_violation(done.status, text)
-    return f"it ran {', '.join(traps.ran())}" if traps.ran() else violation
+    return f"it ran {', '.join(traps.marks())}" if traps.marks() else violation

@@ -145,6 +145,6 @@ def environment(places: Places) -> dict[str, str]:
 
 def read_version(command: Sequence[str]) -> str | None:
     """The first number with dots in the output of a version command."""
-    asked = gate.finish(command, {**os.environ, "PYTHONPATH": str(ROOT)}, seconds=60.0)
-    match = re.search(r"\d+\.\d[\w.]*", (asked.output + asked.errors).decode(errors="replace"))
-    return match[0] if match and asked.status == 0 else None
+    answer = gate.finish(command, {**os.environ, "PYTHONPATH": str(ROOT)}, seconds=60.0)
+    match = re.search(r"\d+\.\d[\w.]*", (answer.output + answer.errors).decode(errors="replace"))
+    return match[0] if match and answer.status == 0 else None

@@ -14,13 +14,13 @@ from coursebuild.core.files.locks import temporary_folder
 
 def main() -> None:
     """Run the command that the arguments are."""
-    here = os.open(".", os.O_RDONLY)
+    folder_of_user = os.open(".", os.O_RDONLY)
     with temporary_folder() as folder:
         os.chdir(folder)
         import mujoco  # noqa: F401  # what the command imports later is then there
 
-        os.fchdir(here)
-    os.close(here)
+        os.fchdir(folder_of_user)
+    os.close(folder_of_user)
     from coursebuild.cli import main as run
 
     sys.exit(run())

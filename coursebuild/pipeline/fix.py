@@ -40,8 +40,8 @@ _DOUBTFUL = ("file-encoding", "merge-conflict")
 """Rules of files whose text is not what they hold, or not one text."""
 _HIDING = frozenset(
     """
-    map-syntax json-syntax toml-syntax fence-unclosed fence-info fence-kind-near fence-key-unknown
-    callout-unknown recording-misspelt markup-foreign markup-unread binding-attribute
+    map-syntax json-syntax toml-syntax fence-unclosed fence-info fence-key-unknown
+    callout-unknown markup-foreign binding-attribute
     """.split()
 )
 """Rules of mistakes that keep what they stand in from being checked: without one, more errors may

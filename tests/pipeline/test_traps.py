@@ -29,11 +29,13 @@ def traps(tmp_path: Path, stores: Path) -> TrapFolder:
     return traps
 
 
-def run(traps: TrapFolder, *command: str, **others: str) -> subprocess.CompletedProcess[str]:
+def run(
+    traps: TrapFolder, *command: str, **more_variables: str
+) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         tool(*command),
         cwd=traps.folder.root,
-        env=traps.folder.environment(variables(**others)),
+        env=traps.folder.environment(variables(**more_variables)),
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
@@ -48,21 +50,23 @@ def test_every_command_is_tried() -> None:
 @pytest.mark.parametrize("command", EACH)
 def test_no_trap_runs(traps: TrapFolder, command: tuple[str, ...]) -> None:
     result = run(traps, *command)
-    assert (traps.ran(), "Traceback" in result.stderr) == ([], False), result.stderr
+    assert (traps.marks(), "Traceback" in result.stderr) == ([], False), result.stderr
     if command[0] in ("build", "check") and "--against" not in command:
         assert result.stdout.endswith("everything holds\n")  # all that a course needs was started
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("more", [(), ("--sandbox",)], ids=["plain", "sandbox"])
+@pytest.mark.parametrize("options", [(), ("--sandbox",)], ids=["plain", "sandbox"])
 def test_no_trap_runs_on_a_cluster(
-    traps: TrapFolder, tmp_path: Path, more: tuple[str, ...]
+    traps: TrapFolder, tmp_path: Path, options: tuple[str, ...]
 ) -> None:
     (tmp_path / "packages").mkdir()
     path = install_plugin(tmp_path / "packages")
-    command = ("check", "--cluster", "local", *more)
+    command = ("check", "--cluster", "local", *options)
     result = run(traps, *command, PYTHONPATH=path, PYTHONWARNINGS="ignore")
-    assert (traps.ran(), result.stdout.endswith("everything holds\n")) == ([], True), result.stderr
+    assert (traps.marks(), result.stdout.endswith("everything holds\n")) == ([], True), (
+        result.stderr
+    )
 
 
 @pytest.mark.site
@@ -78,13 +82,13 @@ def test_no_trap_runs_while_a_course_is_served(traps: TrapFolder) -> None:
     )
     with kill_at_end(process):  # type: ignore[arg-type]
         assert process.stderr is not None
-        said = ""
-        while "everything holds" not in said and process.poll() is None:
-            said += process.stderr.readline()
+        output = ""
+        while "everything holds" not in output and process.poll() is None:
+            output += process.stderr.readline()
         process.send_signal(signal.SIGINT)
-        said += process.stderr.read()
+        output += process.stderr.read()
         process.wait()
-    assert (traps.ran(), "everything holds" in said) == ([], True), said
+    assert (traps.marks(), "everything holds" in output) == ([], True), output
 
 
 @pytest.mark.site
@@ -98,7 +102,7 @@ def test_no_trap_runs_in_an_editor(traps: TrapFolder) -> None:
         editor.hover_text(folder.lesson(), "`mujoco.mj_st|ep`")
     finally:
         editor.close()
-    assert traps.ran() == []
+    assert traps.marks() == []
 
 
 @pytest.mark.site
@@ -114,7 +118,7 @@ def test_no_trap_runs_in_a_run_of_pytest(traps: TrapFolder) -> None:
         capture_output=True,
         text=True,
     )
-    assert traps.ran() == [], result.stdout
+    assert traps.marks() == [], result.stdout
     assert "passed" in result.stdout, result.stdout + result.stderr
 
 
@@ -122,5 +126,5 @@ def test_traps_work(traps: TrapFolder) -> None:
     """Whoever starts Python in the folder, as the tool must not, runs one."""
     command = [sys.executable, "-c", "import colorsys"]
     subprocess.run(command, cwd=traps.folder.root, check=False, capture_output=True)
-    assert "module colorsys" in traps.ran()
+    assert "module colorsys" in traps.marks()
     assert processes(traps.folder) == []

@@ -45,7 +45,8 @@ COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "fmt": (("fmt",), ("fmt", "--check")),
     "help": (("help",), ("help", "bench"), ("--version",)),
     "import": tuple(
-        ("import", "content/lessons", "--out", "../new", *more) for more in ((), ("--sandbox",))
+        ("import", "content/lessons", "--out", "../new", *options)
+        for options in ((), ("--sandbox",))
     ),
     "init": (("init", "new"),),
     "new": (("new", "lesson", "1.2", "B"), ("new", "feature", "x"), ("new", "model", "y")),
@@ -98,7 +99,7 @@ class TrapFolder:
 
     def __init__(self, folder: Folder) -> None:
         self.folder = folder
-        self._marks = folder.root.with_name("marks")
+        self._file_of_marks = folder.root.with_name("marks")
         folder.write("content/course.toml", course_map(1))
         folder.write(folder.lesson(), LESSON)
         folder.write("models/box.xml", BOX)
@@ -112,13 +113,17 @@ class TrapFolder:
         self._set_program_traps()
         self._set_settings()
 
-    def ran(self) -> list[str]:
+    def marks(self) -> list[str]:
         """The names of the traps that have run."""
-        return sorted({*self._marks.read_text().splitlines()}) if self._marks.exists() else []
+        return (
+            sorted({*self._file_of_marks.read_text().splitlines()})
+            if self._file_of_marks.exists()
+            else []
+        )
 
     def _code(self, name: str) -> str:
         """Code that needs no module, each of which may be a trap."""
-        return f"open({str(self._marks)!r}, 'a').write({name!r} + '\\n')\n"
+        return f"open({str(self._file_of_marks)!r}, 'a').write({name!r} + '\\n')\n"
 
     def _set_module_traps(self) -> None:
         for name in {*sys.stdlib_module_names, *packages_distributions(), "usercustomize"}:
@@ -135,7 +140,9 @@ class TrapFolder:
             self._set_program(program)
 
     def _set_program(self, name: str) -> None:
-        self.folder.write(name, f"#!/bin/sh\necho 'program {name}' >> '{self._marks}'\nexit 1\n")
+        self.folder.write(
+            name, f"#!/bin/sh\necho 'program {name}' >> '{self._file_of_marks}'\nexit 1\n"
+        )
         (self.folder.root / name).chmod(0o755)
 
     def _set_settings(self) -> None:
@@ -173,9 +180,14 @@ class TrapFolder:
         write(".git/config", f"{config}[core]\n\thooksPath = .\n")
 
 
-def variables(**others: str) -> dict[str, str]:
+def variables(**more_variables: str) -> dict[str, str]:
     """Of a user whose PATH begins with the working folder, and who reaches no package index."""
-    return {"PATH": f".::{os.environ['PATH']}", "PIP_NO_INDEX": "1", "PYTHONPATH": "", **others}
+    return {
+        "PATH": f".::{os.environ['PATH']}",
+        "PIP_NO_INDEX": "1",
+        "PYTHONPATH": "",
+        **more_variables,
+    }
 
 
 def tool(*arguments: str) -> list[str]:

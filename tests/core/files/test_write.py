@@ -368,9 +368,9 @@ def test_without_a_state_folder_all_are_changed_or_none(
     with pytest.raises(EffectError):
         change_files(root, (*GOOD[:2], FileChange("a.md/d.md", None, b"x")))
     assert files(root) == {"a.md": b"a\r\n", "b.md": b"b"}
-    said: list[str] = []
-    change_files(root, GOOD, said.append)
-    assert said == [
+    lines: list[str] = []
+    change_files(root, GOOD, lines.append)
+    assert lines == [
         "there is no place for a journal: if this command is killed, it stays half done "
         "(set HOME or XDG_STATE_HOME to a folder outside the course)"
     ]
@@ -386,7 +386,7 @@ def test_what_is_saved_in_place_at_the_last_moment_is_kept(root: Path) -> None:
             file.write_bytes(saves.pop())
 
     sys.addaudithook(save)
-    seen = file.read_bytes()
+    text = file.read_bytes()
     with pytest.raises(FileChangedError):
-        change_files(root, [FileChange("new.md", None, seen), FileChange("a.md", seen, None)])
+        change_files(root, [FileChange("new.md", None, text), FileChange("a.md", text, None)])
     assert (saves, files(root)) == ([], {"a.md": b"saved\n", "b.md": b"b"})
