@@ -63,5 +63,5 @@ def test_a_kind_of_hint_can_be_silenced(course: Folder) -> None:
 
 def test_fixes_leave_hints_alone(course: Folder) -> None:
     text = course.text(course.lesson())
-    assert course.main("check", "--fix", "--unsafe").status == 0
+    assert course.main("check", "--fix").status == 0
     assert course.text(course.lesson()) == text
