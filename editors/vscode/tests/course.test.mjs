@@ -28,6 +28,12 @@ test('the command is that of the setting, of .venv, of the path', () => {
   assert.equal(commandOf('', 'C:\\c', windows), 'C:\\c\\.venv\\Scripts\\coursebuild.exe');
 });
 
+test('no place on the path is meant from the working folder', () => {
+  const exists = among('coursebuild', './coursebuild', 'bin/coursebuild', '/opt/bin/coursebuild');
+  const env = { PATH: '.:bin::/opt/bin' };
+  assert.equal(commandOf('', '/c', { env, platform: 'linux', exists }), '/opt/bin/coursebuild');
+});
+
 test('a file has the page that the map says', () => {
   const map = `[course]\ntitle = "T"\n\n[[page]] # first\nid = "home"\nfile = "content/pages/home.md"\n
 [[page]]\nfile = 'docs/a/text.md'\nid = "text"\n[[level]]\nid = "1"\n`;
