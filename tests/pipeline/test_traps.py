@@ -122,6 +122,32 @@ def test_no_trap_runs_in_a_run_of_pytest(traps: TrapFolder) -> None:
     assert "passed" in result.stdout, result.stdout + result.stderr
 
 
+WITHOUT_MUJOCO = """
+import os, sys
+sys.modules["mujoco"] = sys.modules["glfw"] = None  # importing them fails
+from coursebuild.cli import main
+status = main(sys.argv[1:])
+places = [os.path.realpath(place) for place in sys.path]
+sys.exit(status or os.path.realpath(".") in places)
+"""
+
+
+@pytest.mark.site
+@pytest.mark.parametrize("command", ["check", "build"])
+def test_the_tool_imports_no_mujoco_and_has_no_course_on_its_path(
+    traps: TrapFolder, command: str
+) -> None:
+    result = subprocess.run(
+        [sys.executable, "-P", "-c", WITHOUT_MUJOCO, command, "--no-cache"],
+        cwd=traps.folder.root,
+        env=traps.folder.environment(variables()),
+        capture_output=True,
+        text=True,
+    )
+    assert (result.returncode, traps.marks()) == (0, []), result.stdout + result.stderr
+    assert "1 lab tried" in result.stdout
+
+
 def test_traps_work(traps: TrapFolder) -> None:
     """Whoever starts Python in the folder, as the tool must not, runs one."""
     command = [sys.executable, "-c", "import colorsys"]
