@@ -134,6 +134,11 @@ class Site:
             self._store.put_value(_INDEX, index, all_pages)
         reader.stop_workers()
 
+    @property
+    def keys(self) -> dict[str, str]:
+        """The keys of all pages, by site path."""
+        return {path: entry.key for path, entry in self._pages.items()}
+
     # --- pages
 
     def _draw_changed(

@@ -336,6 +336,7 @@ def open_in_editor(session: Session, place: str) -> str:
     if not words:
         return "no editor that opens a window was found: set VISUAL to one, such as `code`"
     file = session.root / span.path
+    program = Path(words[0]).name
     arguments = [
         part.format(file=file, line=span.line, column=span.column)
         for part in _EDITORS[_name(words[0])].split()
@@ -344,10 +345,10 @@ def open_in_editor(session: Session, place: str) -> str:
     try:
         status = gate.start([*words, *arguments], variables, bound=False).wait(_PATIENCE)
     except OSError as error:
-        return f"{words[0]} cannot be started: {reason(error)}"
+        return f"{program} cannot be started: {reason(error)}"
     except gate.StillRunningError:  # it is open
         return ""
-    return f"{words[0]} ended with status {status}" if status else ""
+    return f"{program} ended with status {status}" if status else ""
 
 
 def _find_editor() -> list[str]:

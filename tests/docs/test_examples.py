@@ -153,7 +153,7 @@ def prepare(folder: Folder, words: list[str]) -> None:
         shutil.rmtree(folder.root)
         folder.root.mkdir()
     elif words[0] == "undo":
-        folder.write("content/lessons/1.2-lab.md", "## A word\n\nSee [it](model:pendulim).\n")
+        folder.write("content/lessons/1.2-lab.md", "## A word {#word\n\nText.\n")
         assert "fixed 1 mistake" in folder.main("check", "--fix").out
     elif words[0] == "import":
         cell = {"cell_type": "markdown", "metadata": {}, "source": "# Old\n\nText.\n"}

@@ -24,7 +24,7 @@ SLIPS = GOOD.replace("text\n", "text rtol = 1e-6\n") + QUIZ.replace('"}', '",}')
 )
 MENDED = GOOD.replace("text\n", "text rtol=1e-6\n") + QUIZ
 MISSPELT = (
-    "See [friction](term:frict) and [the other](lesson:tow).\n\nThe [friction]{term} slows.\n"
+    "See [friction](term:fricton) and [the other](lesson:tow).\n\nThe [friction]{term} slows.\n"
 )
 """Names that are near others: what was meant, a human has to say."""
 
@@ -120,7 +120,7 @@ def test_fix_changes_none_of_2000_right_names_and_numbers(make: Make) -> None:
         texts.append("\n".join(parts))
     folder = make(*texts)
     result = folder.main("check", "--fix")
-    assert int(re.findall(r"fixed (\d+) mistakes", result.out)[0]) >= 150, "there was much to mend"
+    assert int(re.findall(r"fixed (\d+) mistakes", result.out)[0]) >= 100, "there was much to mend"
     mended = [folder.text(folder.lesson(n)) for n in range(1, 9)]
     for before, after in zip(texts, mended, strict=True):
         words = [

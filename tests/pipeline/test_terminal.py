@@ -139,7 +139,7 @@ def test_a_terminal_shows_what_runs_and_then_only_the_results(make: Make) -> Non
 def test_proposals_are_accepted_one_by_one(make: Make) -> None:
     """Each with its diff; what is declined stays, and `undo` takes all back."""
     text = (
-        "See [a](term:frict), [b](term:frictio) and [c](term:fricton).\n\nThe [friction]{term}.\n"
+        "See [a](term:fricion), [b](term:frictio) and [c](term:fricton).\n\nThe [friction]{term}.\n"
     )
     folder = make(text)
     with terminal(folder, "check", "--propose") as window:

@@ -270,8 +270,15 @@ def without_seconds(text: str) -> str:
     return re.sub(r"\d+\.\d\d s", "# s", text)
 
 
-WAIT_FOR_GO = "import pathlib, time\nwhile not pathlib.Path('go').exists(): time.sleep(0.01)\n"
-"""The beginning of a script that goes on when there is a file `go`."""
+WAIT_FOR_GO = """import posix, time
+while True:
+    try:
+        posix.stat("go")
+        break
+    except OSError:
+        time.sleep(0.01)
+"""
+"""The beginning of a script that goes on when there is a file `go`, which the tool does not see."""
 FIRST = "## One\n\n" + block("one.py", "print(1)", "1")
 SECOND = "## Two\n\n" + block("two.py", "print(2)", "2")
 DRIFTED_LESSON = "## One\n\n" + block("one.py", "print('value', 1.25)", "value 1.35", "digits")

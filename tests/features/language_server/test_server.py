@@ -316,11 +316,10 @@ def test_a_proposal_of_a_diagnostic_is_a_quick_fix(editor: Editor) -> None:
     text = FALL.replace("at `1.000`{out} m", "at `1.200 m`{out}")
     editor.write(FIRST_LESSON, text)
     editor.until(FIRST_LESSON, "binding-mismatch")
-    fix, fix_all = editor.actions(FIRST_LESSON, "`1.2|00 m`").values()
+    (fix,) = editor.actions(FIRST_LESSON, "`1.2|00 m`").values()
     assert (fix.title, fix.kind) == ("Write `1.000 m`", types.CodeActionKind.QuickFix)
-    assert fix.is_preferred
+    assert not fix.is_preferred  # a number is for a human to decide
     assert editor.apply_edits(fix.edit.changes)[FIRST_LESSON] == text.replace("1.200", "1.000")
-    assert fix_all.title == "Fix all in this file (1)"
 
 
 def test_all_mistakes_of_a_file_are_fixed_together(editor: Editor) -> None:
