@@ -270,7 +270,7 @@ def without_seconds(text: str) -> str:
     return re.sub(r"\d+\.\d\d s", "# s", text)
 
 
-WAIT_FOR_GO = """import posix, time
+WAIT_FOR_GO = """import pathlib, posix, time
 while True:
     try:
         posix.stat("go")
