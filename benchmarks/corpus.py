@@ -12,10 +12,12 @@ run this again. Letters are kept in `corpus_judged.txt`, with a hash of rule and
 
 - r: right, the text has this mistake;
 - f: fair, no mistake, but advice that makes the text better;
-- o: syntax of another tool, or what the package does not hold; the text is right there;
+- o: right in its own tool, and never in a lesson: another tool's syntax, a file that the package
+  does not hold, a picture elsewhere, `<script>`, a title in the text;
 - w: wrong, the text is right here too.
 
-The share of `w` among the lines judged of a rule and body is taken for all of them.
+The share of a letter among the lines judged of a rule and body is taken for all of them. Rates are
+of `w`, and of all hints but `o`.
 """
 
 from __future__ import annotations
@@ -78,15 +80,14 @@ class Row(Struct, frozen=True):
     words: int
     counts: dict[str, int]
     """Messages by severity."""
-    false: dict[str, float]
-    """Those that are wrong, by severity, as far as they were judged."""
+    refused: dict[str, float]
+    """Those that are wrong, as far as they were judged; of hints, all but those of other tools."""
     unjudged: int
     """Messages of rules of which no line was judged."""
 
     def rate(self, severity: str) -> float:
-        """Wrong messages per 10,000 words; of hints, all."""
-        count = self.counts[severity] if severity == "hint" else self.false[severity]
-        return count * SHARE / max(self.words, 1)
+        """What `refused` counts, per 10,000 words."""
+        return self.refused[severity] * SHARE / max(self.words, 1)
 
 
 def line_of(diagnostic: Diagnostic) -> str:
@@ -141,16 +142,18 @@ def sample(body: str, diagnostics: Iterable[Diagnostic], judgements: Judgements)
 
 def evaluate(body: str, way: str, seen: Examination, judgements: Judgements) -> Row:
     """Count what is said, and what of it is wrong."""
-    counts, false, unjudged = Counter[str](), dict.fromkeys(SEVERITIES, 0.0), 0
+    counts, refused, unjudged = Counter[str](), dict.fromkeys(SEVERITIES, 0.0), 0
     for groups in by_rule(seen.diagnostics).values():
         severity = next(iter(groups.values()))[0].severity
         count = sum(map(len, groups.values()))
         letters = [judgements[key] for key in groups if key in judgements]
         counts[severity] += count
-        false[severity] += count * letters.count("w") / max(len(letters), 1)
+        bad = "rfw" if severity == "hint" else "w"
+        share = sum(letter in bad for letter in letters) / max(len(letters), 1)
+        refused[severity] += count * share
         unjudged += 0 if letters else count
     filled = {severity: counts[severity] for severity in SEVERITIES}
-    return Row(body, way, seen.files, seen.words, filled, false, unjudged)
+    return Row(body, way, seen.files, seen.words, filled, refused, unjudged)
 
 
 # --- the run

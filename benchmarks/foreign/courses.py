@@ -46,13 +46,16 @@ def import_course(texts: Path, root: Path) -> None:
 
 def write_plain_course(texts: Path, root: Path) -> bool:
     """Write the Markdown files as lessons, without front matter and title; whether there are any."""
-    paths = sorted(texts.rglob("*.md"))
     entries = ['[course]\ntitle = "Texts"\n\n[[level]]\nid = "1"\ntitle = "Texts"\n']
     lessons = root / "content" / "lessons"
     lessons.mkdir(parents=True)
-    for number, path in enumerate(paths, 1):
+    number = 0
+    for path in sorted(texts.rglob("*.md")):
         text = path.read_text("utf-8", errors="replace")
         text = _TITLE.sub("", _FRONT.sub("", text), count=1)
+        if not text.strip():
+            continue
+        number += 1
         id, slug = f"1.{number}", f"text-{number}"
         title = json.dumps(path.relative_to(texts).as_posix(), ensure_ascii=False)
         (lessons / f"{id}-{slug}.md").write_text(text, encoding="utf-8")
@@ -60,7 +63,7 @@ def write_plain_course(texts: Path, root: Path) -> bool:
             f'[[level.lesson]]\nid = "{id}"\nslug = "{slug}"\ntitle = {title}\nstatus = "draft"\n'
         )
     (root / "content" / "course.toml").write_text("\n".join(entries), encoding="utf-8")
-    return bool(paths)
+    return number > 0
 
 
 def examine(root: Path) -> Examination:
