@@ -45,7 +45,7 @@ def import_course(texts: Path, root: Path) -> None:
 
 
 def write_plain_course(texts: Path, root: Path) -> bool:
-    """Write the Markdown files as lessons, without front matter and title; whether there are any."""
+    """Write the Markdown files as lessons, without front matter and title, if there are any."""
     entries = ['[course]\ntitle = "Texts"\n\n[[level]]\nid = "1"\ntitle = "Texts"\n']
     lessons = root / "content" / "lessons"
     lessons.mkdir(parents=True)
