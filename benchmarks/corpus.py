@@ -134,10 +134,10 @@ def sample(body: str, diagnostics: Iterable[Diagnostic], judgements: Judgements)
     for rule, groups in sorted(by_rule(diagnostics).items()):
         wanted = SAMPLE - sum(key in judgements for key in groups)
         for key in sorted(groups.keys() - judgements.keys())[: max(wanted, 0)]:
-            one = groups[key][0]
-            marked = one.span.first_line().text[:80] if one.span.start < one.span.end else ""
-            yield f"? {key} {body} | {one.severity} {rule}: {one.message}"
-            yield f"      {one.span.path}:{one.span.line}: {marked!r} in {line_of(one)[:300]!r}"
+            first = groups[key][0]
+            text = first.span.first_line().text[:80] if first.span.start < first.span.end else ""
+            yield f"? {key} {body} | {first.severity} {rule}: {first.message}"
+            yield f"      {first.span.path}:{first.span.line}: {text!r} in {line_of(first)[:300]!r}"
 
 
 def evaluate(body: str, way: str, seen: Examination, judgements: Judgements) -> Row:
@@ -183,12 +183,12 @@ def examine_body(body: Body, cache: Path) -> Iterator[tuple[str, Examination]]:
 def table_of_rules(seen: Examination, judgements: Judgements) -> Iterator[str]:
     """A line for each rule that fired."""
     for rule, groups in sorted(by_rule(seen.diagnostics).items()):
-        one = next(iter(groups.values()))[0]
+        first = next(iter(groups.values()))[0]
         count = sum(map(len, groups.values()))
         letters = Counter(judgements[key] for key in groups if key in judgements)
         verdicts = ", ".join(f"{letters[letter]} {letter}" for letter in LETTERS if letters[letter])
         rate = count * SHARE / max(seen.words, 1)
-        yield f"  {one.severity:<8}{rule:<24}{count:>6}{rate:>9.1f}   {verdicts}"
+        yield f"  {first.severity:<8}{rule:<24}{count:>6}{rate:>9.1f}   {verdicts}"
 
 
 def table(rows: Sequence[Row]) -> Iterator[str]:

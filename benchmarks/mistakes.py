@@ -137,13 +137,13 @@ class Checker:
             if diagnostics:
                 return _judge_place(change, old, new, diagnostics)
             verdict = self._compare(change)
-            told = self._tell(change) if verdict == "other" else None
+            verdict_of_remarks = self._tell(change) if verdict == "other" else None
         finally:
             self.session.open_texts = {}
             if self.session.edit([change.path], is_saved=False) is None:
                 self.session.read(is_saved=False)
             self.session.take_results(self._course, self.verification)
-        return told or Outcome(change, "silent" if verdict == "other" else verdict)
+        return verdict_of_remarks or Outcome(change, "silent" if verdict == "other" else verdict)
 
     def _tell(self, change: Change) -> Outcome | None:
         """What is said of a change that is no mistake, if anything is."""

@@ -70,8 +70,8 @@ def examine(root: Path) -> Examination:
     """Read, typeset and look up all that a course holds, and compile its models."""
     options = Options(root, 1, open_store(root, None, None))
     with Reader(options) as reader:
-        parsed = load(root, reader, code="refuse")
-    course, diagnostics = parsed.value, [*parsed.diagnostics]
+        loaded_course = load(root, reader, code="refuse")
+    course, diagnostics = loaded_course.value, [*loaded_course.diagnostics]
     if course is not None:
         diagnostics += extract_scripts(course, options).diagnostics
         diagnostics += compile_models(course, options)[1]

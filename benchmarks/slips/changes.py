@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 
 from msgspec import Struct
 
-from benchmarks.slips.keyboards import LAYOUTS, beside
+from benchmarks.slips.keyboards import LAYOUTS, neighbours
 
 _FENCE = re.compile(r"^(?P<indent>[ >]*)(?P<mark>`{3,}|~{3,})(?P<info>.*)$")
 _BLOCKS = {
@@ -184,10 +184,10 @@ def _slip(text: str, start: int, end: int, chance: random.Random) -> tuple[str, 
         changed = piece[:at] + rest[:1] + letter + rest[1:]
         return (slip, changed) if changed != piece and rest[:1].strip() else None
     layout = chance.choice(list(LAYOUTS))
-    neighbours = beside(layout, letter)
-    if not neighbours:
+    signs = neighbours(layout, letter)
+    if not signs:
         return None
-    return f"{slip} ({layout})", piece[:at] + chance.choice(neighbours) + rest
+    return f"{slip} ({layout})", piece[:at] + chance.choice(signs) + rest
 
 
 def _lines(text: str, chance: random.Random) -> tuple[int, int]:

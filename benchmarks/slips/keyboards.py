@@ -1,6 +1,6 @@
 """What lies beside a key: on keyboards of several countries, and on telephones.
 
-Entry points: `beside`, and `LAYOUTS`.
+Entry points: `neighbours`, and `LAYOUTS`.
 """
 
 from __future__ import annotations
@@ -43,18 +43,18 @@ LAYOUTS: dict[str, tuple[tuple[str, str], ...]] = {
 letters and two of signs."""
 
 
-def beside(layout: str, letter: str) -> list[str]:
+def neighbours(layout: str, letter: str) -> list[str]:
     """The signs of the keys left, right, above and below, sorted; none if the layout lacks it."""
     rows = LAYOUTS[layout]
-    found: set[str] = set()
+    signs: set[str] = set()
     for number, (plain, shifted) in enumerate(rows):
-        for row, other in ((plain, shifted), (shifted, plain)):
+        for row, twin in ((plain, shifted), (shifted, plain)):
             at = row.find(letter)
             if at < 0:
                 continue
-            found |= {*row[max(at - 1, 0) : at + 2]}
+            signs |= {*row[max(at - 1, 0) : at + 2]}
             sheet = 0 if row is plain else 1
-            for neighbour in rows[max(number - 1, 0) : number + 2]:
-                found |= {*neighbour[sheet][at : at + 1]}
-            found |= {*other[at : at + 1]} if layout != "telephone" else set()
-    return sorted(found - {letter})
+            for row_nearby in rows[max(number - 1, 0) : number + 2]:
+                signs |= {*row_nearby[sheet][at : at + 1]}
+            signs |= {*twin[at : at + 1]} if layout != "telephone" else set()
+    return sorted(signs - {letter})

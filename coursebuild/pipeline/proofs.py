@@ -195,7 +195,7 @@ def _places(source: Source, text: str) -> Iterator[Span]:
     at = source.text.find(text)
     while at >= 0:
         end = at + len(text)
-        beside = source.text[at - 1 : at], source.text[end : end + 1]
-        if not any(sign.isalnum() for sign in beside):
+        signs = source.text[at - 1 : at], source.text[end : end + 1]
+        if not any(sign.isalnum() for sign in signs):
             yield source.span(at, end)
         at = source.text.find(text, end)
