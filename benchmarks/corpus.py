@@ -132,18 +132,18 @@ def by_rule(diagnostics: Iterable[Diagnostic]) -> dict[str, dict[str, list[Diagn
 def sample(body: str, diagnostics: Iterable[Diagnostic], judgements: Judgements) -> Iterator[str]:
     """Lines to be judged, as they stand in the file of the sample."""
     for rule, groups in sorted(by_rule(diagnostics).items()):
-        wanted = SAMPLE - sum(key in judgements for key in groups)
-        for key in sorted(groups.keys() - judgements.keys())[: max(wanted, 0)]:
+        room = SAMPLE - sum(key in judgements for key in groups)
+        for key in sorted(groups.keys() - judgements.keys())[: max(room, 0)]:
             first = groups[key][0]
             text = first.span.first_line().text[:80] if first.span.start < first.span.end else ""
             yield f"? {key} {body} | {first.severity} {rule}: {first.message}"
             yield f"      {first.span.path}:{first.span.line}: {text!r} in {line_of(first)[:300]!r}"
 
 
-def evaluate(body: str, way: str, seen: Examination, judgements: Judgements) -> Row:
+def evaluate(body: str, way: str, examination: Examination, judgements: Judgements) -> Row:
     """Count what is said, and what of it is wrong."""
     counts, refused, unjudged = Counter[str](), dict.fromkeys(SEVERITIES, 0.0), 0
-    for groups in by_rule(seen.diagnostics).values():
+    for groups in by_rule(examination.diagnostics).values():
         severity = next(iter(groups.values()))[0].severity
         count = sum(map(len, groups.values()))
         letters = [judgements[key] for key in groups if key in judgements]
@@ -153,7 +153,7 @@ def evaluate(body: str, way: str, seen: Examination, judgements: Judgements) -> 
         refused[severity] += count * share
         unjudged += 0 if letters else count
     filled = {severity: counts[severity] for severity in SEVERITIES}
-    return Row(body, way, seen.files, seen.words, filled, refused, unjudged)
+    return Row(body, way, examination.files, examination.words, filled, refused, unjudged)
 
 
 # --- the run
@@ -180,14 +180,14 @@ def examine_body(body: Body, cache: Path) -> Iterator[tuple[str, Examination]]:
             yield "as it is", examine(top / "plain")
 
 
-def table_of_rules(seen: Examination, judgements: Judgements) -> Iterator[str]:
+def table_of_rules(examination: Examination, judgements: Judgements) -> Iterator[str]:
     """A line for each rule that fired."""
-    for rule, groups in sorted(by_rule(seen.diagnostics).items()):
+    for rule, groups in sorted(by_rule(examination.diagnostics).items()):
         first = next(iter(groups.values()))[0]
         count = sum(map(len, groups.values()))
         letters = Counter(judgements[key] for key in groups if key in judgements)
         verdicts = ", ".join(f"{letters[letter]} {letter}" for letter in LETTERS if letters[letter])
-        rate = count * SHARE / max(seen.words, 1)
+        rate = count * SHARE / max(examination.words, 1)
         yield f"  {first.severity:<8}{rule:<24}{count:>6}{rate:>9.1f}   {verdicts}"
 
 
@@ -224,12 +224,12 @@ def main() -> int:
     keep_judgements(judgements)
     rows, questions = [], []
     for body in read_bodies(arguments.bodies):
-        for way, seen in examine_body(body, cache):
-            row = evaluate(body.name, way, seen, judgements)
+        for way, examination in examine_body(body, cache):
+            row = evaluate(body.name, way, examination, judgements)
             rows.append(row)
-            questions += sample(f"{body.name}, {way}", seen.diagnostics, judgements)
+            questions += sample(f"{body.name}, {way}", examination.diagnostics, judgements)
             print(f"\n{body.name}, {way}: {row.files} files, {row.words} words")
-            print(*table_of_rules(seen, judgements), sep="\n", flush=True)
+            print(*table_of_rules(examination, judgements), sep="\n", flush=True)
     print("", *table(rows), sep="\n")
     (cache / "sample.txt").write_text("\n".join([*questions, ""]), encoding="utf-8")
     if questions:

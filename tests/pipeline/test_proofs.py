@@ -49,15 +49,15 @@ def test_an_output_that_became_an_illustration_is_told_once(make: Make) -> None:
     lesson = "## Fall\n\n" + block("fall.py", "print('time', 0.357, 's')", "time 0.357 s")
     folder = make(lesson)
     assert folder.main("check").status == 0
-    shown = lesson.replace("Output:\n\n```text", "```text illustration")
-    told = (
+    illustration = lesson.replace("Output:\n\n```text", "```text illustration")
+    remark = (
         "1.1: the output of `examples/fall.py` in line 8 was proved before and is not now "
         "(proved: nothing)"
     )
-    for text, is_told in ((shown, True), (f"{shown}\nIt fell.\n", False)):
+    for text, is_told in ((illustration, True), (f"{illustration}\nIt fell.\n", False)):
         folder.write(folder.lesson(1), text)
         result = folder.main("check")
-        assert (result.status, told in result.out) == (0, is_told), result.out
+        assert (result.status, remark in result.out) == (0, is_told), result.out
 
 
 def test_what_was_proved_is_kept_while_there_are_errors(make: Make) -> None:
