@@ -52,7 +52,8 @@ class Proof(Struct, frozen=True):
                 return f"the figure `{self.text}`"
             case "lab":
                 return "the lab"
-        return f"the {self.kind} of `{self.script}`"
+            case "output" | "table":
+                return f"the {self.kind} of `{self.script}`"
 
 
 class Loss(Struct, frozen=True):
