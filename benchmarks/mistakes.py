@@ -10,26 +10,29 @@ changed. A change ends in one of these ways:
 - at its place: a message names a changed line, or the one before or after it;
 - in its result: what runs was changed, and a message names what came of it, such as the output;
 - elsewhere: a message names another line;
+- hinted: only a hint says what is likely;
+- unproved: `check` says what was proved of the course as it was, and is proved no longer;
 - same: the pages say the same;
 - prose: only words have changed, which nothing can know to be wrong;
-- reason: nothing can know that it is wrong, or another command lists it (`slips/reasons.py`);
 - silent: all others. They are listed.
+
+Nothing excuses a silence: which slips could not be known either, a reader of the list decides.
+Beside the silence stand the false alarms that it was bought with: those of `corpus.py --record`.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import multiprocessing
 import random
-import re
 import shutil
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any
 
@@ -41,22 +44,31 @@ sys.path[:0] = [str(ROOT)]
 
 from benchmarks.slips.changes import KINDS, Change, make_change  # noqa: E402
 from benchmarks.slips.pages import compare_pages  # noqa: E402
-from benchmarks.slips.reasons import REASONS  # noqa: E402
 from coursebuild.core.files.trust import FOLDER  # noqa: E402
 from coursebuild.core.model import Course  # noqa: E402
 from coursebuild.core.model.results import ScriptJob, ScriptRun  # noqa: E402
 from coursebuild.core.pages import urls  # noqa: E402
 from coursebuild.core.pages.page_list import page_list  # noqa: E402
-from coursebuild.core.registry import unproven  # noqa: E402
 from coursebuild.core.run.script_server import ScriptServer  # noqa: E402
 from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
 from coursebuild.pipeline.check import judge  # noqa: E402
 from coursebuild.pipeline.options import Options, open_store  # noqa: E402
+from coursebuild.pipeline.proofs import find_losses, find_proofs  # noqa: E402
 from coursebuild.pipeline.verify import verify  # noqa: E402
 from coursebuild.preview.run_history import script_keys  # noqa: E402
 from coursebuild.preview.session import Session  # noqa: E402
 
-ENDS = ("at its place", "in its result", "elsewhere", "same", "prose", "reason", "silent")
+ENDS = "at its place|in its result|elsewhere|hinted|unproved|same|prose|silent".split("|")
+CLAIMS = frozenset(
+    (
+        *("bound and given numbers", "attributes", "links", "formulas", "captions", "fences"),
+        *("scripts", "recorded outputs", "quizzes", "labs", "other blocks", "course map"),
+        *("declarations of models", "fence not closed", "key renamed", "merge conflict"),
+    )
+)
+"""Kinds of changes of what the course claims; all others are of prose and its marks."""
+RESULT = Path(__file__).parent / "corpus_result.json"
+"""What `corpus.py --record` writes."""
 WIDTH = 300
 """Characters of a change that are listed."""
 SECONDS = 20.0
@@ -70,7 +82,7 @@ class Outcome(Struct, frozen=True):
     change: Change
     end: str
     note: str = ""
-    """The message, or why there can be none."""
+    """The message."""
 
 
 class Checker:
@@ -84,7 +96,9 @@ class Checker:
         course = self._course
         self.verification = verify(course, self.options)
         self.session.take_results(course, self.verification)
-        findings = judge(course, self.session.diagnostics()).diagnostics
+        report = judge(course, self.session.diagnostics())
+        findings = report.diagnostics
+        self.hints = Counter(map(_identity, report.hints))
         if any(diagnostic.is_error for diagnostic in findings):
             raise SystemExit(f"the course has mistakes of its own: {_describe(findings[0])}")
         self.findings = Counter(map(_identity, findings))
@@ -94,7 +108,7 @@ class Checker:
             path.relative_to(root).as_posix(): path.read_text("utf-8")
             for path in sorted(root.glob("models/*.toml"))
         }
-        self.words = {word for text in self.texts.values() for word in re.findall(r"\w+", text)}
+        self.proofs = find_proofs(course)
         self.runs = {run.path: run for run in self.verification.results.runs}
         self.keys = script_keys(course)
         self.pages: dict[str, bytes] = {}
@@ -123,17 +137,23 @@ class Checker:
             if diagnostics:
                 return _judge_place(change, old, new, diagnostics)
             verdict = self._compare(change)
-            inventory = unproven(self._course, self.session.library.results.runs)  # type: ignore[union-attr]
-            claims = [claim for claim in inventory if isinstance(claim, Diagnostic)]
+            verdict_of_remarks = self._tell(change) if verdict == "other" else None
         finally:
             self.session.open_texts = {}
             if self.session.edit([change.path], is_saved=False) is None:
                 self.session.read(is_saved=False)
             self.session.take_results(self._course, self.verification)
-        if verdict != "other":
-            return Outcome(change, verdict)
-        reason = find_reason(change, old, claims, self.words)
-        return Outcome(change, "reason" if reason else "silent", reason)
+        return verdict_of_remarks or Outcome(change, "silent" if verdict == "other" else verdict)
+
+    def _tell(self, change: Change) -> Outcome | None:
+        """What is said of a change that is no mistake, if anything is."""
+        course = self._course
+        for loss in find_losses(course, change.path, self.proofs.get(change.path, ())):
+            return Outcome(change, "unproved", loss.proof.describe())
+        for hint in judge(course, self.session.diagnostics()).hints:
+            if _identity(hint) not in self.hints:
+                return Outcome(change, "hinted", _describe(hint))
+        return None
 
     def _diagnose(self, path: str, new: str) -> list[Diagnostic]:
         """What is reported of a course with this text, and not of the course as it was."""
@@ -212,75 +232,6 @@ def _describe(diagnostic: Diagnostic) -> str:
     return f"{span.path}:{span.line}: {diagnostic.rule}: {diagnostic.message}"
 
 
-_QUOTED = frozenset("bash console html ini json markdown md sh text toml xml yaml".split())
-"""Kinds of blocks that show what nothing runs."""
-
-
-def find_reason(
-    change: Change, old: str, claims: Iterable[Diagnostic], known_names: Collection[str]
-) -> str:
-    """Why a change is no mistake that can be known; empty where it should be.
-
-    `known_names`: the words of the course.
-    """
-    new, start = change.apply(old), change.start
-    end = max(start + len(change.text), start + 1)
-    steps = SequenceMatcher(None, old[start : change.end], change.text, False).get_opcodes()
-    letters = "".join(
-        old[start + a : start + b] + change.text[c:d]
-        for step, a, b, c, d in steps
-        if step != "equal"
-    )
-    is_number = re.fullmatch(r"[\d.,\u2212-]+", letters)
-    for claim in claims if is_number or "out" in letters or "given" in letters else ():
-        span = claim.span
-        if span.path == change.path and span.start <= end and start <= span.end:
-            return "listed by `check --truth`"
-    if is_number and re.fullmatch(r"(?s).*Lessons? (?:[\d.]+ and )?\d+\.\d+", new[:end].rstrip()):
-        return "another lesson of the map"
-    line_start = new.rfind("\n", 0, start) + 1
-    line = new[line_start : new.find("\n", end) % (len(new) + 1)]
-    is_word = change.place in ("code", "list", "words") and re.fullmatch("[A-Za-z_]+", letters)
-    if is_word and (reason := _judge_code(old, new, known_names)):
-        return reason
-    if change.place == "other block":
-        kind = re.findall(r"^[ >]*`{3,} *([^\s`]*)", old[:start], re.MULTILINE)[-1]
-        if kind in _QUOTED:
-            return f"what a block of kind `{kind}` quotes: nothing runs it"
-        is_value = kind == "mjcf" and re.fullmatch(r"[\w.]*", letters)
-        return "another model that compiles" if is_value else ""
-    for reason in REASONS:
-        pairs = (
-            (reason.place, change.place),
-            (reason.letters, letters),
-            (reason.line, line),
-            (reason.slip, change.slip),
-        )
-        if all(re.fullmatch(pattern, text) for pattern, text in pairs):
-            return reason.text
-    return ""
-
-
-def _judge_code(old: str, new: str, known_names: Collection[str]) -> str:
-    """Why a word of inline code that has changed is no mistake that can be known."""
-    at = next(n for n, pair in enumerate(zip(old, new, strict=False)) if pair[0] != pair[1])
-    words = []
-    for text in (old, new):
-        start = text.rfind("\n\n", 0, at) + 1
-        is_code = text.count("`", start, at) % 2
-        words += [m[0] for m in re.finditer(r"\w+", text) if m.start() <= at <= m.end() and is_code]
-    if len(words) != 2 or not words[1][0].isalpha():
-        return ""
-    if words[1] in known_names:
-        return "another name that there is"
-    if len(words[1]) < 4:
-        return "a name of three letters in code"
-    is_alone = (
-        len(re.findall(rf"\b{re.escape(words[0])}\b", old)) == 1 and words[0] not in known_names
-    )
-    return "a name that nothing else has" if is_alone else ""
-
-
 # --- the run
 
 _checker: Checker | None = None
@@ -334,27 +285,31 @@ def run(
 
 def table(outcomes: Sequence[Outcome]) -> list[str]:
     """The counts by kind, and what they come to."""
-    lines = [f"| kind of change | tried | {' | '.join(ENDS)} |", "| --- |" + " ---: |" * 8]
-    for kind in [*KINDS, ""]:
-        ends = Counter(o.end for o in outcomes if not kind or o.change.kind == kind)
-        if ends:
-            cells = (str(ends[end] or "") for end in ENDS)
-            lines.append(f"| {kind or '**all**'} | {ends.total()} | {' | '.join(cells)} |")
-    rest = [o for o in outcomes if o.change.kind not in ("numbers in prose", "inline code")]
-    for title, part in (
-        ("changes to anything but words of prose", outcomes),
-        ("those outside of inline code and of numbers in prose", rest),
-    ):
-        ends = Counter(o.end for o in part if o.end != "prose")
-        total = max(ends.total(), 1)
-        silent, elsewhere = (100 * ends[end] / total for end in ("silent", "elsewhere"))
-        lines += [
-            "",
-            f"Of {total} {title}, {silent:.1f} % were silent, {elsewhere:.1f} % elsewhere.",
-        ]
-    reasons = Counter(o.note for o in outcomes if o.end == "reason")
-    lines += ["", "| reason | changes |", "| --- | ---: |"] if reasons else []
-    return lines + [f"| {reason} | {count} |" for reason, count in reasons.most_common()]
+    head = f"| kind of change | tried | {' | '.join(ENDS)} | silent, % |"
+    lines = [head, "| --- |" + " ---: |" * (len(ENDS) + 2)]
+    claims = [outcome for outcome in outcomes if outcome.change.kind in CLAIMS]
+    prose = [outcome for outcome in outcomes if outcome.change.kind not in CLAIMS]
+    groups = [(k, [o for o in outcomes if o.change.kind == k]) for k in KINDS]
+    groups += [("**claims**", claims), ("**prose**", prose), ("**all**", list(outcomes))]
+    for name, group in groups:
+        if group:
+            ends = Counter(outcome.end for outcome in group)
+            cells = " | ".join(str(ends[end] or "") for end in ENDS)
+            share = 100 * ends["silent"] / len(group)
+            lines.append(f"| {name} | {len(group)} | {cells} | {share:.1f} |")
+    return lines
+
+
+def alarms() -> str:
+    """The false alarms of the last recorded run of `corpus.py`, in a sentence."""
+    if not RESULT.is_file():
+        return "No run of `corpus.py` is recorded, so nobody knows the false alarms."
+    result = json.loads(RESULT.read_text("utf-8"))
+    return (
+        f"Of 10,000 words of public texts, {result['error']:.2f} false errors, "
+        f"{result['warning']:.2f} false warnings and {result['hint']:.1f} hints "
+        f"({result['words']:,} words, as `corpus.py` has recorded)."
+    )
 
 
 def describe(outcome: Outcome, old: str) -> Iterator[str]:
@@ -391,8 +346,7 @@ def main() -> int:
             print(*describe(outcome, old), sep="\n", flush=True)
         if time.monotonic() - began > arguments.minutes * 60:
             break
-    lines = table(outcomes)
-    print("", *lines, sep="\n")
+    print("", *table(outcomes), "", alarms(), sep="\n")
     return 0
 
 

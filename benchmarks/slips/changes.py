@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator
 
 from msgspec import Struct
 
-_ROWS = ("`1234567890-=", "qwertyuiop[]\\", "asdfghjkl;'", "zxcvbnm,./")
-_SHIFTED = ("~!@#$%^&*()_+", "QWERTYUIOP{}|", 'ASDFGHJKL:"', "ZXCVBNM<>?")
+from benchmarks.slips.keyboards import LAYOUTS, neighbours
+
 _FENCE = re.compile(r"^(?P<indent>[ >]*)(?P<mark>`{3,}|~{3,})(?P<info>.*)$")
 _BLOCKS = {
     "python": "script",
@@ -183,11 +183,11 @@ def _slip(text: str, start: int, end: int, chance: random.Random) -> tuple[str, 
     if slip == "swapped":
         changed = piece[:at] + rest[:1] + letter + rest[1:]
         return (slip, changed) if changed != piece and rest[:1].strip() else None
-    for row in (*_ROWS, *_SHIFTED):
-        if letter and letter in row:
-            near = row.index(letter) + chance.choice((-1, 1))
-            return slip, piece[:at] + row[near % len(row)] + rest
-    return None
+    layout = chance.choice(list(LAYOUTS))
+    signs = neighbours(layout, letter)
+    if not signs:
+        return None
+    return f"{slip} ({layout})", piece[:at] + chance.choice(signs) + rest
 
 
 def _lines(text: str, chance: random.Random) -> tuple[int, int]:

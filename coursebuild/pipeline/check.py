@@ -24,6 +24,7 @@ from coursebuild.core.scripts.extract import extract
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
+from coursebuild.pipeline.proofs import remarks_on_proofs
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.scenes import shown_reports
 from coursebuild.pipeline.scripts import measure_sensitivity
@@ -83,6 +84,14 @@ def check(
             remarks.append(f"this was part {shard} of the work: {scripts} and {labs}")
         inventory = [claim for claim in claims if isinstance(claim, Diagnostic)]
         report = checked_course.report(diagnostics, inventory)
+        if shard is None:
+            remarks += remarks_on_proofs(
+                course,
+                options.store,
+                {run.path for run in verification.results.runs if run.did_run},
+                checked_course.documents,
+                is_green=not report.summary.errors,
+            )
         return replace(report, remarks=tuple(remarks), sensitivity=sensitivities)
 
 

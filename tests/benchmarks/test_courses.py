@@ -139,7 +139,7 @@ def test_mistakes_of_each_kind_end_as_they_did(rewriting: bool) -> None:
     outcomes = list(run(COURSE, [37], 2 * len(KINDS), KINDS, 1))
     lines = table(outcomes)
     for outcome in outcomes:
-        if outcome.end in ("silent", "elsewhere", "reason"):
+        if outcome.end in ("silent", "elsewhere", "hinted", "unproved"):
             lines += ["", *describe(outcome, (COURSE / outcome.change.path).read_text("utf-8"))]
     text = "\n".join(["# How a sample of mistakes ends", "", *lines, ""])
     if rewriting:

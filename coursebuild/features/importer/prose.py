@@ -236,7 +236,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             source = match["source"]
             if re.match("[a-z]+://|//", source):
                 context.add_leftover(f"a picture from another host, `{source}`; it is a link now")
-                return f"[{alt or source}]({source})"
+                text, end = match.string, match.end()
+                is_in_link = text[: match.start()].endswith("[") and text.startswith("](", end)
+                return (alt or source) if is_in_link else f"[{alt or source}]({source})"
             name, path = source.removeprefix("attachment:"), context.resolve_path(source)
             if name in context.pictures:
                 return f"![{alt}]({context.add_picture(name)})"

@@ -1,0 +1,244 @@
+"""Read texts that strangers wrote, and count what is said of them without reason.
+
+Run: python benchmarks/corpus.py [--bodies NAME …] [--cache DIR] [--record]
+
+The texts are those of packages (`corpus.toml`); they are fetched into `--cache`, and nothing of
+them is run. Each body is read twice: as `coursebuild import` makes it, and its Markdown files as
+lessons. Printed are errors, warnings and hints by rule.
+
+Whether a message is true, somebody has to say. Up to fifteen lines of each rule and body that
+nobody has judged are written to `sample.txt` in the cache: put a letter before each of them, and
+run this again. Letters are kept in `corpus_judged.txt`, with a hash of rule and line:
+
+- r: right, the text has this mistake;
+- f: fair, no mistake, but advice that makes the text better;
+- o: right in its own tool, and never in a lesson: another tool's syntax, a file that the package
+  does not hold, a picture elsewhere, `<script>`, a title in the text;
+- w: wrong, the text is right here too.
+
+The share of a letter among the lines judged of a rule and body is taken for all of them. Rates are
+of `w`, and of all hints but `o`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import sys
+import tempfile
+import tomllib
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+import msgspec
+from msgspec import Struct
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT)]
+
+from benchmarks.foreign.courses import (  # noqa: E402
+    Examination,
+    examine,
+    import_course,
+    write_plain_course,
+)
+from benchmarks.foreign.packages import texts_of  # noqa: E402
+from coursebuild.core.files.errors import UsageError  # noqa: E402
+from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
+
+HERE = Path(__file__).parent
+JUDGED = HERE / "corpus_judged.txt"
+RESULT = HERE / "corpus_result.json"
+SEVERITIES = ("error", "warning", "hint")
+LETTERS = "rfow"
+SAMPLE = 15
+"""Lines of a rule and body that are judged."""
+SHARE = 10_000
+"""Words to which counts are related."""
+
+Judgements: TypeAlias = dict[str, str]
+"""A letter by the hash of a rule and a line."""
+
+
+class Body(Struct, frozen=True):
+    """Texts that belong together."""
+
+    name: str
+    packages: list[str]
+    files: list[str]
+
+
+class Row(Struct, frozen=True):
+    """What is said of a body, read in one of the two ways."""
+
+    body: str
+    way: str
+    files: int
+    words: int
+    counts: dict[str, int]
+    """Messages by severity."""
+    refused: dict[str, float]
+    """Those that are wrong, as far as they were judged; of hints, all but those of other tools."""
+    unjudged: int
+    """Messages of rules of which no line was judged."""
+
+    def rate(self, severity: str) -> float:
+        """What `refused` counts, per 10,000 words."""
+        return self.refused[severity] * SHARE / max(self.words, 1)
+
+
+def line_of(diagnostic: Diagnostic) -> str:
+    """The whole line in which a diagnostic begins."""
+    text, start = diagnostic.span.source.text, diagnostic.span.start
+    return text[text.rfind("\n", 0, start) + 1 :].partition("\n")[0].strip()
+
+
+def hash_of(diagnostic: Diagnostic) -> str:
+    """What a judgement is kept by."""
+    text = f"{diagnostic.rule}\n{line_of(diagnostic)}"
+    return hashlib.sha256(text.encode(errors="replace")).hexdigest()[:16]
+
+
+# --- judgements
+
+
+def read_judgements(path: Path) -> Judgements:
+    """The judgements in a file of which each line has a letter and a hash."""
+    judgements = {}
+    for line in path.read_text("utf-8").splitlines() if path.is_file() else ():
+        letter, _, rest = line.partition(" ")
+        if letter in LETTERS and letter:
+            judgements[rest.split()[0]] = letter
+    return judgements
+
+
+def keep_judgements(judgements: Judgements) -> None:
+    """Write them where the next run reads them."""
+    lines = sorted(f"{letter} {key}\n" for key, letter in judgements.items())
+    JUDGED.write_text("".join(lines), encoding="utf-8")
+
+
+def by_rule(diagnostics: Iterable[Diagnostic]) -> dict[str, dict[str, list[Diagnostic]]]:
+    """Diagnostics by rule and hash."""
+    groups: dict[str, dict[str, list[Diagnostic]]] = defaultdict(lambda: defaultdict(list))
+    for diagnostic in diagnostics:
+        groups[diagnostic.rule][hash_of(diagnostic)].append(diagnostic)
+    return groups
+
+
+def sample(body: str, diagnostics: Iterable[Diagnostic], judgements: Judgements) -> Iterator[str]:
+    """Lines to be judged, as they stand in the file of the sample."""
+    for rule, groups in sorted(by_rule(diagnostics).items()):
+        room = SAMPLE - sum(key in judgements for key in groups)
+        for key in sorted(groups.keys() - judgements.keys())[: max(room, 0)]:
+            first = groups[key][0]
+            text = first.span.first_line().text[:80] if first.span.start < first.span.end else ""
+            yield f"? {key} {body} | {first.severity} {rule}: {first.message}"
+            yield f"      {first.span.path}:{first.span.line}: {text!r} in {line_of(first)[:300]!r}"
+
+
+def evaluate(body: str, way: str, examination: Examination, judgements: Judgements) -> Row:
+    """Count what is said, and what of it is wrong."""
+    counts, refused, unjudged = Counter[str](), dict.fromkeys(SEVERITIES, 0.0), 0
+    for groups in by_rule(examination.diagnostics).values():
+        severity = next(iter(groups.values()))[0].severity
+        count = sum(map(len, groups.values()))
+        letters = [judgements[key] for key in groups if key in judgements]
+        counts[severity] += count
+        bad = "rfw" if severity == "hint" else "w"
+        share = sum(letter in bad for letter in letters) / max(len(letters), 1)
+        refused[severity] += count * share
+        unjudged += 0 if letters else count
+    filled = {severity: counts[severity] for severity in SEVERITIES}
+    return Row(body, way, examination.files, examination.words, filled, refused, unjudged)
+
+
+# --- the run
+
+
+def read_bodies(names: Sequence[str]) -> list[Body]:
+    """The bodies with one of these words in their names; all without words."""
+    tables = tomllib.loads((HERE / "corpus.toml").read_text("utf-8"))["body"]
+    bodies = msgspec.convert(tables, list[Body])
+    return [b for b in bodies if not names or any(name in b.name for name in names)]
+
+
+def examine_body(body: Body, cache: Path) -> Iterator[tuple[str, Examination]]:
+    """What is said of a body, in the two ways."""
+    with tempfile.TemporaryDirectory(prefix="corpus-") as folder:
+        top = Path(folder)
+        texts_of(body.packages, body.files, cache / "packages", top / "texts")
+        try:
+            import_course(top / "texts", top / "imported")
+            yield "imported", examine(top / "imported")
+        except UsageError as error:
+            print(f"{body.name} cannot be imported: {error}")
+        if write_plain_course(top / "texts", top / "plain"):
+            yield "as it is", examine(top / "plain")
+
+
+def table_of_rules(examination: Examination, judgements: Judgements) -> Iterator[str]:
+    """A line for each rule that fired."""
+    for rule, groups in sorted(by_rule(examination.diagnostics).items()):
+        first = next(iter(groups.values()))[0]
+        count = sum(map(len, groups.values()))
+        letters = Counter(judgements[key] for key in groups if key in judgements)
+        verdicts = ", ".join(f"{letters[letter]} {letter}" for letter in LETTERS if letters[letter])
+        rate = count * SHARE / max(examination.words, 1)
+        yield f"  {first.severity:<8}{rule:<24}{count:>6}{rate:>9.1f}   {verdicts}"
+
+
+def table(rows: Sequence[Row]) -> Iterator[str]:
+    """Rates of each body, of the worst, and of all words."""
+    yield "| body | read | files | words | false errors | false warnings | hints | not judged |"
+    yield "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |"
+    for row in rows:
+        rates = " | ".join(f"{row.rate(severity):.2f}" for severity in SEVERITIES)
+        yield f"| {row.body} | {row.way} | {row.files} | {row.words} | {rates} | {row.unjudged} |"
+    worst = " | ".join(f"{max(row.rate(s) for row in rows):.2f}" for s in SEVERITIES)
+    yield f"| **worst** | | | | {worst} | |"
+    words = sum(row.words for row in rows)
+    whole = " | ".join(f"{overall(rows)[severity]:.2f}" for severity in SEVERITIES)
+    yield f"| **all** | | {sum(row.files for row in rows)} | {words} | {whole} | |"
+
+
+def overall(rows: Sequence[Row]) -> dict[str, float]:
+    """The rates of all words together."""
+    words = sum(row.words for row in rows)
+    return {s: sum(row.rate(s) * row.words for row in rows) / max(words, 1) for s in SEVERITIES}
+
+
+def main() -> int:
+    """Print what is said of all bodies, and write what is to be judged."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])  # type: ignore[union-attr]
+    parser.add_argument("--bodies", nargs="*", default=[], help="words of the names of bodies")
+    parser.add_argument("--cache", type=Path, default=Path.home() / ".cache/coursebuild-corpus")
+    parser.add_argument("--record", action="store_true", help=f"write {RESULT.name}")
+    arguments = parser.parse_args()
+    cache: Path = arguments.cache
+    cache.mkdir(parents=True, exist_ok=True)
+    judgements = read_judgements(JUDGED) | read_judgements(cache / "sample.txt")
+    keep_judgements(judgements)
+    rows, questions = [], []
+    for body in read_bodies(arguments.bodies):
+        for way, examination in examine_body(body, cache):
+            row = evaluate(body.name, way, examination, judgements)
+            rows.append(row)
+            questions += sample(f"{body.name}, {way}", examination.diagnostics, judgements)
+            print(f"\n{body.name}, {way}: {row.files} files, {row.words} words")
+            print(*table_of_rules(examination, judgements), sep="\n", flush=True)
+    print("", *table(rows), sep="\n")
+    (cache / "sample.txt").write_text("\n".join([*questions, ""]), encoding="utf-8")
+    if questions:
+        print(f"\n{len(questions) // 2} lines are to be judged: {cache / 'sample.txt'}")
+    if arguments.record:
+        result = {"words": sum(row.words for row in rows), **overall(rows)}
+        RESULT.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Texts that strangers wrote: how they are got, and how they are made courses."""

@@ -1,0 +1,86 @@
+"""What was proved, still stands in a lesson, and is proved no longer."""
+
+from __future__ import annotations
+
+import pytest
+
+from support.scratch_course import Make, block
+
+pytestmark = pytest.mark.site
+
+OUTPUT = "time 0.357 s\nspeed 3.5 m/s"
+LESSON = (
+    "## Fall\n\n"
+    + block("fall.py", "print('time 0.357 s')\nprint('speed 3.5 m/s')", OUTPUT)
+    + "It takes `0.357 s`{out}, and ends with `3.5 m/s`{out}.\n"
+)
+"""An output and two values."""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "remark"),
+    [
+        (
+            "`0.357 s`{out}",
+            "`0.357 s`",
+            "1.1: `0.357 s` in line 15 was proved before and is not now "
+            "(proved: 1 output, 1 value)",
+        ),
+        ("`0.357 s`{out}", "0.357 s", "`0.357 s` in line 15 was proved before"),
+        ("`0.357 s`{out}", "a third of a second", ""),
+        (" `3.5 m/s`{out}.", " speed.", ""),
+        ("`3.5 m/s`{out}", "`3.5 m/s`{out=examples/fall.py}", ""),
+        ("It takes", "It took", ""),
+    ],
+)
+def test_a_value_that_is_bound_no_longer_is_told(
+    make: Make, old: str, new: str, remark: str
+) -> None:
+    folder = make(LESSON)
+    assert "is not now" not in folder.main("check").out
+    folder.write(folder.lesson(1), LESSON.replace(old, new))
+    result = folder.main("check")
+    assert result.status == 0, result.out
+    assert remark in result.out
+    assert ("is not now" in result.out) is bool(remark)
+
+
+def test_an_output_that_became_an_illustration_is_told_once(make: Make) -> None:
+    lesson = "## Fall\n\n" + block("fall.py", "print('time', 0.357, 's')", "time 0.357 s")
+    folder = make(lesson)
+    assert folder.main("check").status == 0
+    illustration = lesson.replace("Output:\n\n```text", "```text illustration")
+    remark = (
+        "1.1: the output of `examples/fall.py` in line 8 was proved before and is not now "
+        "(proved: nothing)"
+    )
+    for text, is_told in ((illustration, True), (f"{illustration}\nIt fell.\n", False)):
+        folder.write(folder.lesson(1), text)
+        result = folder.main("check")
+        assert (result.status, remark in result.out) == (0, is_told), result.out
+
+
+def test_what_was_proved_is_kept_while_there_are_errors(make: Make) -> None:
+    folder = make(LESSON)
+    folder.main("check")
+    changed = LESSON.replace("`0.357 s`{out}", "`0.357 s`")
+    for text in (changed + "\n[a](lesson:9.9)\n", changed):
+        folder.write(folder.lesson(1), text)
+        assert "`0.357 s` in line 15 was proved before" in folder.main("check").out
+
+
+def test_another_lesson_with_the_same_text_is_not_meant(make: Make) -> None:
+    folder = make(LESSON, "## Two\n\nIt takes `0.357 s`.\n")
+    folder.main("check")
+    folder.write(folder.lesson(2), "## Two\n\nIt takes 0.357 s.\n")
+    assert "is not now" not in folder.main("check").out
+
+
+def test_a_table_without_its_caption_is_told(make: Make) -> None:
+    rows = "| t | x |\n| --- | --- |\n| 1 | 22.5 |\n"
+    code = "```python file=examples/t.py\nprint('t x')\nprint('1 22.5')\n```\n\n"
+    lesson = f"## T\n\n{code}Output:\n\n{rows}"
+    folder = make(lesson)
+    assert folder.main("check").status == 0, folder.main("check").out
+    folder.write(folder.lesson(1), lesson.replace("Output:", "Table: Data"))
+    assert "the table of `examples/t.py` in line 11 was proved" in folder.main("check").out
