@@ -210,7 +210,7 @@ def test_preview_tells_noise_and_what_varies_when_idle(make: Make) -> None:
     folder.write("runs/log", "")
     folder.main("update", "-q")
     with serve_preview(folder) as preview, preview.events() as events:
-        events.wait_until_settled("output-unstable", "output-noise")
+        events.wait_until_settled("output-noise", "output-unstable")  # its own first
 
         def noisy_line(page: Events) -> str:
             places = (p["place"] for p in page.news["problems"] if p["rule"] == "output-noise")
