@@ -13,7 +13,6 @@ from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.fence import (
     INDENTED_FENCE,
     Fence,
-    check_foreign_key,
     kind_of,
     outdent,
     split_words,
@@ -95,7 +94,6 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
         message = f"nothing that is installed reads a block of kind `{fence.kind}`"
         yield diagnose("feature-missing", fence.head, message, help=f"install {package}")
     words = split_words(fence.info).value
-    yield from (diagnostic for word in words if (diagnostic := check_foreign_key(kind.text, word)))
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"
         help = "a script is a block of kind `python`"
