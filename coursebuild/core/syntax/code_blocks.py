@@ -300,9 +300,6 @@ def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
 
 def _read_unclosed(fence: Fence, state: ParsingState) -> CodeBlock:
     """Report a fence without end, and show it as code; its content is not checked."""
-    if state.closes_indented and not fence.info.text:
-        state.closes_indented = False
-        return fence.code()
     marks = fence.head.text[: len(fence.head.text) - len(fence.head.text.lstrip("`~"))]
     name = "backticks" if marks[0] == "`" else "tildes"
     help = f"close it with a line of {len(marks)} {name} in the same quote or list item"

@@ -155,21 +155,6 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
     return Parsed(tuple(words), tuple(diagnostics))
 
 
-INDENTED_FENCE = re.compile(r"\s*(`{3,}|~{3,})[ \t]*([\w+-]*)[^`\n]*")
-"""The first line of an indented block that was surely meant to be a fence."""
-
-
-def outdent(code: Excerpt) -> tuple[Edit, ...]:
-    """The edits that take the white space away by which a block is indented code."""
-    edits = []
-    for line in code.lines():
-        start = line.span().start
-        white = re.search(r"(?:    |\t)$", code.source.text[:start][-4:])
-        if line.text.strip() and white is not None:
-            edits.append(Edit(code.source.span(start - len(white[0]), start), ""))
-    return tuple(edits)
-
-
 class Fence(Struct, frozen=True):
     """A fenced code block."""
 

@@ -103,7 +103,6 @@ GROUPS: dict[str, dict[str, str]] = {
     },
     "Code blocks": {
         "fence-unclosed": "A code block is not closed, or not before the next one.",
-        "fence-indented": "An indented fence is shown as text.",
         "fence-info": "The first line of a fence cannot be read.",
         "fence-key-unknown": "This kind of block has no such key.",
         "fence-key-repeated": "A fence has the same key twice.",
