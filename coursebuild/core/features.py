@@ -145,8 +145,6 @@ class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):
     """Adds what the search can find of the block."""
     scopes: Callable[[B], tuple[Span, ...]] = lambda block: (block.span,)
     """Parts that stand for themselves, as questions do: what one assumes holds in it alone."""
-    tasks: Callable[[B], int] = lambda block: 0
-    """How many tasks it gives a reader."""
 
 
 class PageKind(Struct, frozen=True, kw_only=True):

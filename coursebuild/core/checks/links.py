@@ -14,7 +14,6 @@ from coursebuild.core import model
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    Edit,
     Fix,
     Note,
     diagnose,
@@ -25,10 +24,6 @@ from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Span
 
 _HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
-_LESSON_NAME = re.compile(r"(?:.*/)?([\w.]+?)(?:-.*)?(?:\.\w+)?")
-"""A file name or an address that begins with the id of a lesson, as in `4.2-inertia.md`."""
-_ROUTE = re.compile(r"!?/?(lesson|level|page)s?[/:]([^/]+)/?")
-"""The fragment by which a site of a single page names a lesson, as in `#/lesson/4.2`."""
 
 
 class LinkTargets(Struct, frozen=True):
@@ -144,13 +139,9 @@ class _Checker(Struct, frozen=True):
                 assert_never(target)
         if name not in names:
             if isinstance(target, model.LessonTarget) and name in targets.levels:
-                help = f"{name} is a level: {_link_help('level', name)}"
-                help = Fix(help, edits=_rename_kind(span, "Lesson", "Level"))
+                help = f"{name} is a level: write `Level {name}`, which becomes a link"
             elif isinstance(target, model.LevelTarget) and name in targets.lessons:
-                help = f"{name} is a lesson: {_link_help('lesson', name)}"
-                help = Fix(help, edits=_rename_kind(span, "Level", "Lesson"))
-            elif isinstance(target, model.LessonTarget):
-                help = self.suggest_lesson(name) or did_you_mean(name, names)
+                help = f"{name} is a lesson: write `Lesson {name}`, or link to `lesson:{name}`"
             else:
                 help = did_you_mean(name, names)
             yield diagnose(rule, span, missing, help=help)
@@ -169,21 +160,6 @@ class _Checker(Struct, frozen=True):
             page = targets.pages[name]
             yield from _check_document_anchor(span, target.anchor, page, f"page `{name}`")
 
-    def suggest_lesson(self, name: str) -> str:
-        """A help: the lesson whose file or slug a link names, or those of its level."""
-        lessons = self.targets.lessons
-        match = _LESSON_NAME.fullmatch(name)
-        paths = ((id, d.source.path) for id, d in lessons.items() if d is not None)
-        ids = [id for id, path in paths if path.endswith(f"-{name}.md")]
-        if match and match[1] in lessons:
-            ids = [match[1]]
-        if len(ids) == 1:
-            return Fix(f"did you mean `lesson:{ids[0]}`?", ids[0], name, safe=True)
-        level = name.rpartition(".")[0]
-        ids_of_level = [id for id in lessons if level and id.rpartition(".")[0] == level]
-        names = ", ".join(f"`{id}`" for id in ids_of_level)
-        return f"level {level} has {names}" if names else ""
-
     def check_url(self, span: Span, url: str) -> Iterator[Diagnostic]:
         parts = urlsplit_or_none(url)
         if parts is None:
@@ -191,18 +167,7 @@ class _Checker(Struct, frozen=True):
         elif parts.path and not (parts.scheme or parts.netloc):
             yield from self.check_file(url, span)
         elif not (parts.scheme or parts.netloc):
-            route = _ROUTE.fullmatch(unquote(parts.fragment))
-            targets = self.targets
-            ids = {"lesson": targets.lessons, "level": targets.levels, "page": targets.pages}
-            if route is None or route[2] not in ids[route[1]]:
-                fragment, document = parts.fragment, self.document
-                yield from _check_document_anchor(span, fragment, document, "this page")
-                return
-            message = f"`{url}` is an address of another tool"
-            help = _link_help(route[1], route[2])
-            if route[1] != "level":
-                help = Fix(help, f"{route[1]}:{route[2]}", safe=True)
-            yield diagnose("link-anchor", span, message, help=help)
+            yield from _check_document_anchor(span, parts.fragment, self.document, "this page")
 
     def check_file(self, url: str, span: Span) -> Iterator[Diagnostic]:
         path = model.local_file(url, self.document.source.path)
@@ -212,15 +177,8 @@ class _Checker(Struct, frozen=True):
 
     def suggest_file(self, path: str, address: str) -> str:
         targets, name = self.targets, posixpath.basename(path)
-        match = _LESSON_NAME.fullmatch(name)
-        if name.endswith((".md", ".html")) and match and match[1] in targets.lessons:
-            new = f"lesson:{match[1]}"
-            return Fix(f"link to the lesson by its id: `{new}`", new, address, safe=True)
         if name.endswith(".md"):
             return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
-        if name.endswith(".xml") and name[:-4] in targets.models:
-            new = f"model:{name[:-4]}"
-            return Fix(f"link to a model by its name: `{new}`", new, address, safe=True)
         files = {posixpath.basename(f): f for f in targets.files if not f.endswith(".md")}
         likely = nearest(name, files)
         if likely is None:
@@ -237,21 +195,6 @@ class _Checker(Struct, frozen=True):
             yield diagnose("image-remote", span, message, help=help)
         else:
             yield from self.check_file(url, span)
-
-
-def _link_help(kind: str, id: str) -> str:
-    if kind == "level":
-        return f"write `Level {id}` in the text, which becomes a link"
-    if kind == "lesson":
-        return f"write `Lesson {id}` in the text, or link to `lesson:{id}`"
-    return f"link to `{kind}:{id}`"
-
-
-def _rename_kind(span: Span, old: str, new: str) -> tuple[Edit, ...]:
-    """The edit of the word before the number in a mention."""
-    start = span.start - len(old) - 1
-    place = span.source.span(start, start + len(old)) if start >= 0 else span
-    return (Edit(place, new),) if place.text == old else ()
 
 
 def _check_document_anchor(

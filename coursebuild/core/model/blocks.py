@@ -361,8 +361,8 @@ class Document(Struct, frozen=True, dict=True):
     footnotes: tuple[Footnote, ...]
     title_anchor: str = ""
     """The anchor of the title that a page opens with; empty where a heading has the same."""
-    unclaimed: tuple[CodeBlock | Table, ...] = ()
-    """Texts and tables below a script that may show its output, and that are not marked as such."""
+    unclaimed: tuple[CodeBlock, ...] = ()
+    """Texts below a script that may show its output, and that are not marked as such."""
     numbered_items: tuple[NumberedItem, ...] = ()
     """Set in a summary only, which lacks formulas and tables themselves."""
     summaries: Mapping[str, Struct] | None = None

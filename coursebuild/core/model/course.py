@@ -229,14 +229,6 @@ class CalloutKind(Struct, frozen=True):
     promise: str = ""
 
 
-class Pace(Struct, frozen=True, forbid_unknown_fields=True):
-    """How fast a learner works; the minutes of lessons are checked against it."""
-
-    words: Annotated[float, describe("words of text in a minute", gt=0)]
-    lines: Annotated[float, describe("lines of code or output in a minute", gt=0)]
-    task: Annotated[float, describe("minutes for a question, or to try a lab", ge=0)]
-
-
 class Silence(Struct, frozen=True, forbid_unknown_fields=True):
     """A warning that is not shown."""
 
@@ -342,7 +334,6 @@ class Course(Struct, frozen=True):
     """
     id: str = ""
     """A name for the course that stays when its title changes; see `key`."""
-    pace: Pace | None = None
     width: int = 0
     """The columns to which `fmt` wraps text; 0 leaves the author's lines."""
     html: Literal["none", "safe", "trusted"] = "safe"

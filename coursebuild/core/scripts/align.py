@@ -84,14 +84,6 @@ def same_lines(recorded: Side, printed: Side, comparison: Comparison) -> bool:
     return True
 
 
-def count_alike(text: Side, printed: Side, matcher: LineMatcher) -> int:
-    """How many lines of a text have a printed one, in order, with half of their words or more.
-
-    Numbers count as alike, whatever their values.
-    """
-    return len(_line_pairs(text, range(len(text.lines)), printed, matcher))
-
-
 def align(recorded: Side, printed: Side, matcher: LineMatcher) -> tuple[Step, ...]:
     """The steps that lead through both sides, in order."""
     literal = [i for i, line in enumerate(recorded.lines) if not matcher.elides_lines(line)]

@@ -9,7 +9,6 @@ from decimal import Decimal
 from msgspec.structs import replace
 
 from coursebuild.core.model import (
-    CodeBlock,
     Course,
     Document,
     Filter,
@@ -21,13 +20,12 @@ from coursebuild.core.model import (
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts import bindings, failures
-from coursebuild.core.scripts.align import count_alike
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
 from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
-from coursebuild.core.scripts.lines import ELLIPSIS, LineMatcher, Side
-from coursebuild.core.scripts.tables import HEADER_HELP, TableMatcher, table_rows
+from coursebuild.core.scripts.lines import ELLIPSIS, Side
+from coursebuild.core.scripts.tables import HEADER_HELP, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.numbers import Number, only_number, scan, within_tolerance
 from coursebuild.core.text.source import Excerpt
@@ -142,60 +140,26 @@ def _find_loose(verdict: Verdict) -> Iterator[Diagnostic]:
             yield diagnose("recording-loose", place, message, help=help)
 
 
-_ALIKE = 0.5
-"""The share of its telling lines or rows by which a block resembles an output. The 353 texts and
-tables of the course and of this tool's documentation, each compared with each of 107 outputs, share
-a third at most; a copied output of which some lines were cut, and others changed, shares more."""
-_TELLING = re.compile(r"[^\W\d_]{2}|\d[.,]?\d[.,]?\d")
-"""A word or a number of three digits: a line without either is like too many others."""
-
-
 def _find_unmarked(
     course: Course, document: Document, runs: Mapping[str, ScriptRun]
 ) -> Iterator[Diagnostic]:
-    """Report the texts and tables of a document that resemble what a script above them printed."""
+    """Report the texts of a document that are what a script above them printed."""
+    comparison = replace(course.comparison, course_filters=course.filters)
     for block in document.unclaimed:
-        scripts = [s for s in document_scripts(document) if s.span.start < block.span.start]
-        for script in reversed(scripts):
+        text = Side.of(block.code.text, comparison.filters)
+        for script in document_scripts(document):
             run = runs.get(script.path)
-            if run is None or run.outcome is not Outcome.OK or not run.stdout.strip():
+            if script.span.start > block.span.start or run is None or run.outcome is not Outcome.OK:
                 continue
-            if _share_alike(block, run.stdout, course) < _ALIKE:
+            is_printed = text.lines == Side.of(run.stdout, comparison.filters).lines
+            if not is_printed or len(block.code.text.strip()) <= 3:
                 continue
-            message = f"this resembles what `{script.path}` printed, and nothing compares the two"
+            message = f"this is what `{script.path}` printed, and nothing compares the two"
             help = "an output is of kind `output`; if it is none, write `text illustration`"
-            if isinstance(block, Table):
-                help = f"write a paragraph `{course.words.output[0]}:` above it; or bind its "
-                help += "numbers, or mark them as given"
-            elif (head := _FENCE_HEAD.match(block.span.text)) is not None:
+            if (head := _FENCE_HEAD.match(block.span.text)) is not None:
                 help = Fix(help, f"{head[1]}output", head[0])
             yield diagnose("output-unmarked", block.span.first_line(), message, help=help)
             break
-
-
-def _share_alike(block: CodeBlock | Table, stdout: str, course: Course) -> float:
-    """The share of the telling lines or rows of a block that a script printed, but for numbers.
-
-    A row of numbers alone would stand in most lines, so its numbers must have been printed.
-    """
-    comparison = replace(course.comparison, course_filters=course.filters)
-    printed = Side.of(stdout, comparison.filters)
-    if isinstance(block, Table):
-        rows = table_rows(block, comparison.filters)
-        texts = [" ".join(cell.mapped.text for cell in row) for row in rows]
-        matches = TableMatcher(rows, printed, comparison).match()
-        telling = [pair for pair in zip(matches, texts, strict=True) if _TELLING.search(pair[1])]
-        count = sum(
-            match.line >= 0 and (not match.pairs or any(map(str.isalpha, text)))
-            for match, text in telling
-        )
-        return count / max(len(telling), 1)
-    whole = Side.of(block.code.text, comparison.filters)
-    if whole.lines == printed.lines and len(block.code.text.strip()) > 3:
-        return 1.0
-    lines = list(filter(_TELLING.search, whole.lines))
-    matcher = LineMatcher(comparison)
-    return count_alike(Side.of("\n".join(lines)), printed, matcher) / max(len(lines), 1)
 
 
 _FENCE_HEAD = re.compile(r"(`{3,}|~{3,})[ \t]*[^\s`]*")

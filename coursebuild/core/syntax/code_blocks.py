@@ -20,15 +20,13 @@ from coursebuild.core.syntax.fence import (
     FenceKeys,
     TextParser,
     Word,
-    find_likely_end,
-    find_likely_start,
     split_words,
 )
 from coursebuild.core.syntax.other_tools import check_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.python_syntax import check_syntax, find_windows
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, Parsed, diagnose, write
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose, write
 from coursebuild.core.text.source import Excerpt
 
 DEFAULT_TIMEOUT, MAX_TIMEOUT = 60.0, 86400.0
@@ -302,9 +300,6 @@ def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
 
 def _read_unclosed(fence: Fence, state: ParsingState) -> CodeBlock:
     """Report a fence without end, and show it as code; its content is not checked."""
-    if state.closes_indented and not fence.info.text:
-        state.closes_indented = False
-        return fence.code()
     marks = fence.head.text[: len(fence.head.text) - len(fence.head.text.lstrip("`~"))]
     name = "backticks" if marks[0] == "`" else "tildes"
     help = f"close it with a line of {len(marks)} {name} in the same quote or list item"
@@ -312,17 +307,6 @@ def _read_unclosed(fence: Fence, state: ParsingState) -> CodeBlock:
     if fence.inner is not None:
         message = "this code fence is not closed before another one begins"
         notes = [Note("this line is read as text of the fence above it", fence.inner)]
-    likely_end = find_likely_end(fence)
-    likely_start = None if fence.info.text else find_likely_start(fence.head)
-    if likely_end is not None:
-        notes.append(Note("its block seems to end here", likely_end))
-        source, end = likely_end.source, likely_end.end
-        edit = Edit(source.span(end, end), f"\n{fence.prefix}{marks}")
-        if not likely_end.text.strip("`~ "):  # marks that are too few
-            edit = Edit(likely_end, marks)
-        help = Fix(help, edits=(edit,))
-    if likely_start is not None:
-        notes.append(Note("or a block that begins here has lost its first line", likely_start))
     state.report(diagnose("fence-unclosed", fence.head, message, help=help, notes=notes))
     if fence.kind == "python" or fence.inner is not None:
         state.script, state.has_invalid_script = None, True

@@ -21,7 +21,7 @@ from coursebuild.core.drawing.contrast import (
     contrast,
     legible,
 )
-from coursebuild.core.model import Filter, LessonTable, Limits, Pace, Silence
+from coursebuild.core.model import Filter, LessonTable, Limits, Silence
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
 from coursebuild.core.model.fields import (
     NotNegative,
@@ -336,7 +336,6 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
     security: SecurityTable = SecurityTable()
     limits: Limits = Limits()
     launch: Launch | None = None
-    pace: Pace | None = None
     callouts: Annotated[
         dict[str, Text | CalloutTable],
         describe("more kinds of callouts by name, with a label or a table"),

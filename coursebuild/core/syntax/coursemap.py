@@ -141,7 +141,6 @@ def _build_course(
         features=_named_paths(table, "features", settings.features),
         packages=_named_paths(table, "packages", settings.packages),
         environment=tuple(sorted(verify.env.items())),
-        pace=fields.pace,
         width=fields.format.width if fields.format is not None else 0,
         html=fields.security.html,
         limits=fields.limits,

@@ -105,29 +105,23 @@ _TEXTS = frozenset(
 
 def _unclaimed_blocks(
     document: model.Document, diagnostics: Iterable[Diagnostic]
-) -> Iterator[model.CodeBlock | model.Table]:
-    """The texts and tables below a script of which nothing says what they are.
+) -> Iterator[model.CodeBlock]:
+    """The texts below a script of which nothing says what they are.
 
-    A table is claimed if one of its numbers is bound or given. Quizzes show what is wrong as
-    well, and of a block with a mistake in its first line that is to be mended first.
+    Quizzes show what is wrong as well, and of a block with a mistake in its first line that is
+    to be mended first.
     """
     in_features = feature_block_ids(document)
     mistakes = {d.span.line for d in diagnostics if d.is_error}
-    has_script, recorded = False, None
+    has_script = False
     for block in model.document_blocks(document):
         if isinstance(block, model.Script):
             has_script = True
-        elif isinstance(block, model.Recording):
-            recorded = block.body
-        elif not has_script or id(block) in in_features or block.span.line in mistakes:
-            pass
-        elif isinstance(block, model.CodeBlock):
-            if block.language in _TEXTS and ILLUSTRATION not in block.info.split():
-                yield block
-        elif isinstance(block, model.Table) and block is not recorded:
-            inlines = model.walk_inlines(model.block_inlines(block))
-            if not any(isinstance(inline, model.NumberBinding) for inline in inlines):
-                yield block
+        if not (has_script and isinstance(block, model.CodeBlock)):
+            continue
+        is_free = id(block) not in in_features and block.span.line not in mistakes
+        if is_free and block.language in _TEXTS and ILLUSTRATION not in block.info.split():
+            yield block
 
 
 def _check_placement(document: model.Document) -> Iterator[Diagnostic]:

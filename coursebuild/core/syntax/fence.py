@@ -7,8 +7,6 @@ the rest is still read.
 
 from __future__ import annotations
 
-import ast
-import json
 import re
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
@@ -40,17 +38,6 @@ _NOT_SPACE = re.compile(r"\S")
 _REST = re.compile(r"\S*")
 _PART = re.compile(r"(?:^|(?<=,))[^,]*")
 _ESCAPE = re.compile(r"""\\(["\\])""")
-
-
-_NO_TITLE = "a block has no title: write it into the text above"
-_NO_NUMBERS = "the lines of a block are not numbered: leave it out"
-_NO_MARKS = "lines are not highlighted: leave it out, and say in the text which ones matter"
-_FOREIGN_KEYS = {
-    **dict.fromkeys(("caption", "filename", "title"), _NO_TITLE),
-    **dict.fromkeys(("linenos", "linenostart", "linenums", "startline"), _NO_NUMBERS),
-    **dict.fromkeys(("emphasize-lines", "highlight", "hl_lines"), _NO_MARKS),
-}
-"""Keys of MkDocs and others, with what to do instead."""
 
 
 class Word(Struct, frozen=True):
@@ -115,18 +102,6 @@ def kind_of(info: Excerpt) -> Excerpt:
     return info.slice(*match.span(1)) if match else info
 
 
-def check_foreign_key(kind: str, word: Word) -> Diagnostic | None:
-    """The diagnostic of a key that only other tools read."""
-    help = _FOREIGN_KEYS.get(word.key.lower())
-    if help is None or word.value is None:
-        return None
-    if kind == "python" and help == _NO_TITLE:
-        help += "; a script has `file=examples/….py`, which is shown above it"
-    message = f"`{kind}` has no key `{word.key}`"
-    fix = Fix(help, edits=word.removal, safe=not help.startswith(_NO_TITLE))
-    return diagnose("fence-key-unknown", word.key_span, message, help=fix)
-
-
 def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
     """The words after the kind, whatever their keys."""
     words: list[Word] = []
@@ -180,21 +155,6 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
     return Parsed(tuple(words), tuple(diagnostics))
 
 
-INDENTED_FENCE = re.compile(r"\s*(`{3,}|~{3,})[ \t]*([\w+-]*)[^`\n]*")
-"""The first line of an indented block that was surely meant to be a fence."""
-
-
-def outdent(code: Excerpt) -> tuple[Edit, ...]:
-    """The edits that take the white space away by which a block is indented code."""
-    edits = []
-    for line in code.lines():
-        start = line.span().start
-        white = re.search(r"(?:    |\t)$", code.source.text[:start][-4:])
-        if line.text.strip() and white is not None:
-            edits.append(Edit(code.source.span(start - len(white[0]), start), ""))
-    return tuple(edits)
-
-
 class Fence(Struct, frozen=True):
     """A fenced code block."""
 
@@ -235,9 +195,7 @@ class Fence(Struct, frozen=True):
         words_by_key: dict[str, Word] = {}
         for word in words:
             key = word.key
-            if key not in keys and (foreign := check_foreign_key(kind, word)) is not None:
-                diagnostics.append(foreign)
-            elif key not in keys:
+            if key not in keys:
                 message = f"`{kind}` has no key `{key}`" if keys else f"`{kind}` takes no keys"
                 help = did_you_mean(key, keys)
                 diagnostics.append(diagnose("fence-key-unknown", word.key_span, message, help=help))
@@ -291,62 +249,6 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
         if (match := re.search(opening, body.text, re.MULTILINE)) is not None:
             inner = body.span(*match.span(1))
     return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner, label)
-
-
-_MOST_LINES = 300
-"""Lines above a fence among which the first one of its block is looked for."""
-_TEXT_AGAIN = re.compile(r"\n[ \t]*\n(?=[A-Z#>$*`|\[]|\d+\. |- )")
-"""An empty line, and what begins like a paragraph or another block."""
-
-
-def find_likely_end(fence: Fence) -> Span | None:
-    """The last line that fits to the kind of a fence without end, if more follows it."""
-    text = fence.body.text
-    if text.lstrip().startswith("{"):
-        try:
-            end = json.JSONDecoder().raw_decode(text, len(text) - len(text.lstrip()))[1]
-        except ValueError:
-            return None
-    elif fence.kind == "python":
-        error = _parse_error(text)
-        if error is None:
-            return None
-        line = error.lineno or 0 if isinstance(error, SyntaxError) else 0
-        end = len("".join(text.splitlines(keepends=True)[: max(line - 1, 0)]).rstrip())
-    else:
-        match = _TEXT_AGAIN.search(text)
-        end = 0 if match is None else match.start()
-    start = text.rfind("\n", 0, end) + 1
-    return fence.body.span(start, end) if text[start:end].strip() else None
-
-
-def find_likely_start(head: Span) -> Span | None:
-    """The first line of the block that ends with a fence without a kind, if it has lost its own.
-
-    It is the farthest one above from which on all is Python or JSON, else that of the paragraph.
-    """
-    source, line = head.source, head.line
-    start = None
-    while line > 1 and head.line - line < _MOST_LINES:
-        line -= 1
-        if source.line_text(line).startswith(("```", "~~~", "#")):
-            break
-        if source.line_text(line).strip(" \t>") and not source.line_text(line - 1).strip(" \t>"):
-            text = source.text[source.line_start(line) : source.line_start(head.line)]
-            if start is None or _parse_error(text) is None or text.startswith("{"):
-                start = source.line_start(line)
-    if start is None:
-        return None
-    end = source.text.find("\n", start)
-    return source.span(start, end)
-
-
-def _parse_error(text: str) -> Exception | None:
-    try:
-        ast.parse(text)
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        return error
-    return None
 
 
 def line_prefix(place: Span) -> str:

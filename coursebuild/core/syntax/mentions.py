@@ -30,8 +30,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.course import Words
 from coursebuild.core.model.inlines import LABEL_KINDS
 from coursebuild.core.syntax.attributes import term_id
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, propose
-from coursebuild.core.text.near import nearest
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
@@ -41,8 +40,6 @@ _BLANK = "".join(map(chr, range(33)))
 _IGNORED_CHARACTER = re.compile("[\t\n\r]")
 """Characters that browsers ignore in an address, as they do those of `_BLANK` at its ends."""
 _COURSE_SCHEMES = ("lesson", "model", "page", "term")
-_OTHER_SCHEMES = frozenset("http https mailto ftp ftps git ssh tel".split())
-"""Schemes that are no misspelt ones."""
 
 
 def classify(url: str) -> Target:
@@ -78,11 +75,7 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
     if scheme in LABEL_KINDS:
         help = Fix(f"did you mean `#{url}`?", f"#{url}")
         return diagnose("link-scheme", span, f"no link scheme `{match[1]}:`", help=help)
-    likely = nearest(match[1], (*_COURSE_SCHEMES, "https", "mailto"))
-    if likely is None or scheme in _OTHER_SCHEMES:
-        return None
-    fix = propose(f"{match[1]}:", f"{likely}:")
-    return diagnose("link-scheme", span, f"no link scheme `{match[1]}:`", help=fix)
+    return None
 
 
 def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
@@ -96,12 +89,8 @@ def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
     return check_scheme(url, span, image=True)
 
 
-_NUMBERED = re.compile(r"(?:[^\W\d_]+ )?(\d+(?:\.\d+)+)")
-"""A text that is the number of a lesson, as "Lesson 4.2"."""
-
-
 def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> Diagnostic | None:
-    """The diagnostic of a text or address that is missing, or a text that names another lesson."""
+    """The diagnostic of a text or an address that is missing."""
     if target == UrlTarget(""):
         message, help = "this link has no address", "write one in the brackets behind its text"
         return diagnose("link-text", span, message, help=help)
@@ -111,13 +100,7 @@ def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> D
             return None
         message, help = "this link has no text, so no reader sees it", "write one in the brackets"
         return diagnose("link-text", span, message, help=help)
-    first = children[0]
-    number = _NUMBERED.fullmatch(first.text) if isinstance(first, Text) else None
-    if number is None or len(children) > 1 or not isinstance(target, LessonTarget):
-        return None
-    message = f"the text of this link says `{number[1]}`, and it leads to `{target.id}`"
-    help = "name the same lesson in both"
-    return diagnose("link-text", span, message, help=help) if number[1] != target.id else None
+    return None
 
 
 _LESSON = r"[0-9]+(?:\.[0-9]+)+(?!\w)"

@@ -1,7 +1,7 @@
 """Blocks of other tools, which readers would see as they are written.
 
 Entry points: `check_marks`, for the lines of a paragraph; `check_kind`, for a fence that is shown
-as code; `check_indented_fence`.
+as code.
 """
 
 from __future__ import annotations
@@ -11,15 +11,11 @@ from collections.abc import Iterator
 
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.fence import (
-    INDENTED_FENCE,
     Fence,
-    check_foreign_key,
     kind_of,
-    outdent,
     split_words,
 )
 from coursebuild.core.syntax.nodes import shorten
-from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.source import Excerpt
 
@@ -73,21 +69,6 @@ def is_known_kind(kind: str) -> bool:
     return kind in CORE_FENCES or kind in fence_names()
 
 
-def check_indented_fence(code: Excerpt, state: ParsingState) -> None:
-    """Report a fence that is shown as text because it is indented."""
-    opening = INDENTED_FENCE.match(code.text)
-    if opening is None:
-        return
-    is_closed = re.search(rf"^{opening[1]}\s*\Z", code.text.rstrip(), re.MULTILINE) is not None
-    if is_closed and not is_known_kind(opening[2]):
-        return
-    message = "this fence is indented by a tab or four blanks, so its block is shown as text"
-    help = Fix("remove the white space before it", edits=outdent(code), safe=True)
-    place = code.span(opening.start(1), opening.end())
-    state.report(diagnose("fence-indented", place, message, help=help))
-    state.closes_indented = not is_closed
-
-
 def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     """Report what is wrong with the first line of a block that is shown as code."""
     package, kind = missing_package(fence.kind), kind_of(fence.info)
@@ -95,7 +76,6 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
         message = f"nothing that is installed reads a block of kind `{fence.kind}`"
         yield diagnose("feature-missing", fence.head, message, help=f"install {package}")
     words = split_words(fence.info).value
-    yield from (diagnostic for word in words if (diagnostic := check_foreign_key(kind.text, word)))
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"
         help = "a script is a block of kind `python`"

@@ -37,8 +37,6 @@ class ParsingState:
         """Names of figures of scripts above that no paragraph has shown yet."""
         self.has_invalid_script = False
         """Whether the nearest script above was read as code, because of a mistake."""
-        self.closes_indented = False
-        """Whether a fence above was indented, so that its closing line seems to open a fence."""
         self.level = 1
         self.notes = FootnoteList(self.report)
         self.anchors = Anchors(self.report)

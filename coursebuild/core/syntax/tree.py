@@ -18,7 +18,6 @@ from coursebuild.core.syntax.containers import (
 from coursebuild.core.syntax.fence import read_fence
 from coursebuild.core.syntax.html import Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_tree import read_inlines
-from coursebuild.core.syntax.other_tools import check_indented_fence
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
     FIGURE,
@@ -188,7 +187,6 @@ class TextReader:
 
     def _read_code(self, token: PositionedToken) -> model.CodeBlock:
         code = token.text
-        check_indented_fence(code, self.state)
         return model.CodeBlock(
             self.span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
         )

@@ -23,8 +23,6 @@ class Rule(Struct, frozen=True):
     name: str
     severity: Severity
     summary: str
-    no_fix: str = ""
-    """Why no diagnostic of it has an edit, in one clause; empty where one may have."""
 
 
 def rule_address(name: str) -> str:
@@ -105,7 +103,6 @@ GROUPS: dict[str, dict[str, str]] = {
     },
     "Code blocks": {
         "fence-unclosed": "A code block is not closed, or not before the next one.",
-        "fence-indented": "An indented fence is shown as text.",
         "fence-info": "The first line of a fence cannot be read.",
         "fence-key-unknown": "This kind of block has no such key.",
         "fence-key-repeated": "A fence has the same key twice.",
@@ -138,7 +135,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "link-lesson": "A link or mention names a lesson that is not in the map.",
         "link-level": "A mention names a level that is not in the map.",
         "link-page": "A link names a page that is not in the map.",
-        "link-text": "A link has no text or no address, or its text names another lesson or model.",
+        "link-text": "A link has no text or no address.",
         "link-term": "A link names a term that no lesson defines.",
         "link-model": "A link names a model that is not in `models/`.",
         "link-example": "A link names a script that is in no lesson.",
@@ -184,7 +181,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "recording-loose": "With this `atol`, 0 would do for each number of an output.",
         "recorded-run": "The run of a script with `record=once` is missing or out of date.",
         "output-drift": "A recorded output differs from what the script prints.",
-        "output-unmarked": "A text or table resembles what a script printed, but is not compared.",
+        "output-unmarked": "A text is what a script printed, but is not compared.",
         "output-noise": "Digits of an output change if initial states are moved by 1e-12.",
         "output-unstable": "Two runs of a script print different lines.",
         "output-unrepeated": "An output was recorded from the only run of its script.",
@@ -221,7 +218,6 @@ GROUPS: dict[str, dict[str, str]] = {
         "lab-parity": "A lab runs differently in the browser than in native MuJoCo or SciPy.",
         "lab-endless": "Equations take too many steps, or an event has no end or never happens.",
         "lab-points": "Printed numbers do not lie on the curve of a lab.",
-        "lab-far": "What moves is small in the picture of a lab.",
         "lab-reset": "A reset does not restore the initial state of a lab.",
         "lab-shared": "A lab changes objects that all labs of the page share.",
         "lab-timeout": "Trying a lab takes too much time or memory.",
@@ -242,51 +238,12 @@ _WARNINGS = frozenset(
     draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
     markup-foreign math-command symbol-repeated footnote-unused image-alt recording-loose
     script-unrepeatable script-penetration script-writes script-connects
-    output-noise report-stale bench-unrecorded lab-penetration lab-far lab-reset package-reduced
+    output-noise report-stale bench-unrecorded lab-penetration lab-reset package-reduced
     """.split()
 )
 
-_NO_FIX = {
-    "only you know what was meant": """
-    bench-text binding-attribute binding-volatile draft-empty field-missing field-repeated
-    figure-unshown footnote-repeated footnote-unused heading-empty html-unbalanced image-alt
-    io-order io-repeated io-stray lesson-planned-file link-text math-brackets math-unclosed
-    markup-foreign merge-conflict nesting-deep number-form output-not-updatable prerequisite-cycle
-    quiz-answer quiz-gate recording-body recording-orphan symbol-formula symbol-repeated table-cells
-    term-attribute term-place
-    """,
-    "links may lead to either": """
-    anchor-repeated id-repeated question-id-repeated quiz-id-repeated script-repeated
-    term-repeated
-    """,
-    "a similar id is another lesson": "prerequisite-unknown",
-    "a file has to be added, moved or replaced": """
-    feature-broken figure-unreadable file-encoding file-unlisted file-unreadable image-forbidden
-    image-remote lesson-missing lesson-unlisted link-broken map-missing no-lessons page-missing
-    page-unlisted template-broken template-outdated template-unknown text-long theme-file
-    """,
-    "`coursebuild update` accepts what a script prints": """
-    figure-drift output-drift recorded-run
-    """,
-    "choose between the file and the lesson": "example-edited",
-    "your code or model has to change": """
-    figure-missing figure-window lab-diverged lab-endless lab-engine lab-expect lab-far lab-goal
-    lab-parity lab-penetration lab-reset lab-shared lab-timeout lab-value lab-warning
-    mjcf-compiles mjcf-message model-timeout output-noise recording-loose script-connects
-    script-diverged script-encoding script-killed script-output-limit script-penetration
-    script-silent script-timeout script-unrepeatable script-writes
-    """,
-    "something has to be installed or run": """
-    bench-unrecorded engine-version feature-missing no-scripts output-unrepeated report-stale
-    script-python script-unproven
-    """,
-    "leave it out, or allow it in the map": "html-forbidden",
-    "leave it out, or silence the warning": "package-reduced",
-}
-_REASONS = {name: reason for reason, names in _NO_FIX.items() for name in names.split()}
-
 RULES: dict[str, Rule] = {
-    name: Rule(name, "warning" if name in _WARNINGS else "error", summary, _REASONS.get(name, ""))
+    name: Rule(name, "warning" if name in _WARNINGS else "error", summary)
     for group in GROUPS.values()
     for name, summary in group.items()
 }

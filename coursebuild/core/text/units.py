@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any, TypeAlias
 
@@ -169,17 +169,6 @@ def units_at(line: str, start: int = 0) -> frozenset[Unit | str]:
         if bare != word:
             break
     return frozenset(units)
-
-
-def conversions(units: Collection[Unit | str], targets: Collection[Unit | str]) -> set[float]:
-    """By what a number may be multiplied if one of `targets` replaces its unit; 1 without units."""
-    if not units and not targets:
-        return {1.0}
-    ratios = {1.0} if {*units} & {*targets} else set[float]()
-    for a in (unit for unit in units if isinstance(unit, Unit)):
-        sizes = (b.size for b in targets if isinstance(b, Unit) and a.dimension == b.dimension)
-        ratios |= {float(a.size / size) for size in sizes}
-    return ratios
 
 
 def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:

@@ -132,19 +132,10 @@ FEATURE = Feature(
             "formula-identity",
             "error",
             "A formula marked `check` does not hold, or cannot be checked.",
-            "either side may be wrong",
         ),
         Rule(
-            "symbol-value",
-            "error",
-            "A symbol has two values in a section, or cannot have a value.",
-            "only you know which value holds",
+            "symbol-value", "error", "A symbol has two values in a section, or cannot have a value."
         ),
-        Rule(
-            "formula-unread",
-            "warning",
-            "The arithmetic in a formula cannot be computed.",
-            "nothing need be wrong with it",
-        ),
+        Rule("formula-unread", "warning", "The arithmetic in a formula cannot be computed."),
     ),
 )

@@ -211,7 +211,6 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
     yield from odd_angles(course, documents)
 
 
-_NO_FIX = "a hint is only likely"
 FEATURE = Feature(
     name="hints",
     needs=("names",),
@@ -220,13 +219,8 @@ FEATURE = Feature(
     ),
     check=check,
     rules=(
-        Rule("shown-as-written", "hint", "A character of Markdown would be shown.", _NO_FIX),
-        Rule("name-near", "hint", "A name that is used once is one letter from another.", _NO_FIX),
-        Rule(
-            "angle-unit",
-            "hint",
-            "An angle has the look of degrees where radians are read.",
-            _NO_FIX,
-        ),
+        Rule("shown-as-written", "hint", "A character of Markdown would be shown."),
+        Rule("name-near", "hint", "A name that is used once is one letter from another."),
+        Rule("angle-unit", "hint", "An angle has the look of degrees where radians are read."),
     ),
 )

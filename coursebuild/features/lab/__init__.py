@@ -53,7 +53,6 @@ FEATURE = Feature(
             index=page.index_lab,
             picture=page.lab_picture,
             docked=lambda lab: lab.fields.dock,
-            tasks=lambda lab: 1,
         ),
     ),
     model_part=ModelPart(

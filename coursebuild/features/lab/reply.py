@@ -124,7 +124,6 @@ class MainRun(TypedDict):
     arrows: dict[str, Number | str] | None
     fallen: NotRequired[list[Fallen]]
     fill: Number | None
-    mostFill: Number | None
     parity: Parity | None
     recorded: NotRequired[MainRecord | None]
     resetDiffers: ResetDifference | None

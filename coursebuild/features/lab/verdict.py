@@ -160,15 +160,6 @@ def remark_diagnostics(lab: Lab, trial: TrialReply) -> Iterator[Diagnostic]:
                     "puts it back"
                 )
         yield diagnose("lab-reset", lab.place(entry), message, help=help)
-    # Report a camera of the lab's own that shows what moves too small
-    if (fill := main["fill"]) is None or (most := main["mostFill"]) is None:
-        return
-    if fill < _SMALL and fill < most / 2:
-        message = (
-            f"motion fills {100 * fill:.2g} % of the picture and could fill {100 * most:.2g} %"
-        )
-        help = "without `distance` and `target` the camera fits the motion"
-        yield diagnose("lab-far", lab.place(("camera",)), message, help=help)
 
 
 def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
@@ -184,9 +175,6 @@ def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:
             return from_start or any(label in claim.controls for claim in claims)
         case _:
             return from_start
-
-
-_SMALL = 0.1
 
 
 def _make_diagnostic(lab: Lab, failure: TrialFailure) -> Diagnostic:

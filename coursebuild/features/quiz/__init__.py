@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
@@ -13,15 +12,11 @@ from coursebuild.core.model import (
     Course,
     Document,
     Heading,
-    Math,
     Mode,
     Recording,
     ThematicBreak,
-    block_inlines,
     document_scripts,
     find_blocks,
-    walk_blocks,
-    walk_inlines,
 )
 from coursebuild.core.model.results import Mathml, Outcome, ScriptRun
 from coursebuild.core.scripts.lines import LineMatcher, MappedText, apply_filters
@@ -33,12 +28,10 @@ from coursebuild.core.text.diagnostics import (
     diagnose,
     did_you_mean,
 )
-from coursebuild.core.text.numbers import Number, scan_prose
 from coursebuild.core.text.source import Excerpt
-from coursebuild.core.text.units import conversions, units_at
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.relations import check_steps
-from coursebuild.features.quiz.model import ChoiceQuestion, NumericQuestion, Quiz
+from coursebuild.features.quiz.model import ChoiceQuestion, Quiz
 from coursebuild.features.quiz.page import draw_quiz, index_quiz, quiz_markdown
 from coursebuild.features.quiz.parse import parse_fence
 from coursebuild.features.quiz.schema import QuizFile
@@ -88,8 +81,6 @@ def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | Non
         stops = [Note("what can be hidden ends here", b.span.first_line()) for b in rest[end:][:1]]
         labs = [block for block in blocks if isinstance(block, Lab)]
         for question in quiz.questions:
-            if isinstance(question, NumericQuestion):
-                diagnostics += _check_answer(question)
             if not isinstance(question, ChoiceQuestion):
                 continue
             if question.gate and blocks in ((), tuple(labs[:1])):
@@ -114,43 +105,6 @@ def check_predictions(document: Document, mathml: Mathml) -> Parsed[Struct | Non
                     diagnose("quiz-gate", run.span(), message, help=help, notes=notes)
                 )
     return Parsed(None, tuple(diagnostics))
-
-
-_RESULT = re.compile(r"\d[^=≈$]*[=≈]\s*\Z")
-"""Before a number that a formula computes from others."""
-
-
-def _check_answer(question: NumericQuestion) -> Iterator[Diagnostic]:
-    """Report an answer to which its explanation does not come, or with two digits swapped."""
-    text = " ".join(
-        f"${inline.tex.text}$" if isinstance(inline, Math) else getattr(inline, "text", "")
-        for block in walk_blocks(question.explain)
-        for inline in walk_inlines(block_inlines(block))
-    )
-    text = re.sub(r"\\(?:mathrm|text)\s*\{?([^{}$]*)\}?", r"\1", text.replace("\\approx", "≈"))
-    text = re.sub(r"\\[ ,;:]|~", " ", text.replace("\\cdot", "·"))
-    numbers = [n for n in scan_prose(text) if n.is_finite]
-    if any(abs(float(n.value) - question.answer) <= question.tolerance for n in numbers):
-        return
-    answer_units, results = units_at(question.unit), list[Number]()
-    for number in numbers:
-        sizes = conversions(units_at(text[number.end :].replace("$", " ")), answer_units)
-        values = [float(number.value) * size for size in sizes]
-        if any(abs(value - question.answer) <= question.tolerance for value in values):
-            return
-        results += [number] if values and _RESULT.search(text[: number.start]) else []
-    answer = question.answer_text
-    swaps = {
-        answer[:n] + answer[n + 1] + answer[n] + answer[n + 2 :]
-        for n in range(len(answer) - 1)
-        if answer[n : n + 2].isdigit() and sum(map(str.isdigit, answer)) > 2
-    }
-    for number in numbers:
-        if number in results or number.text in swaps - {answer}:
-            message = f"the explanation says {number.text}, and not {answer}"
-            help = "if both are right, write the answer in the explanation as well"
-            yield diagnose("quiz-answer", question.answer_span, message, help=help)
-            return
 
 
 def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
@@ -205,7 +159,6 @@ FEATURE = Feature(
             index=index_quiz,
             wide=False,
             scopes=lambda quiz: tuple(question.span for question in quiz.questions),
-            tasks=lambda quiz: len(quiz.keys),
         ),
     ),
     summary=check_predictions,

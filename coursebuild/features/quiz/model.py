@@ -60,7 +60,6 @@ class NumericQuestion(Question, frozen=True):
     answer: float
     answer_text: str
     """As the author wrote it."""
-    answer_span: Span
     tolerance: float
     unit: str
 

@@ -174,9 +174,8 @@ def _question(
             answer: Node | None = node.get("answer")
             answer_text = answer.raw if answer is not None else ""
             tolerance = TOLERANCE * abs(fields.answer) if fields.tol is None else fields.tol
-            place = node.place("answer")
             return model.NumericQuestion(
-                *common, fields.answer, answer_text, place, tolerance, fields.unit
+                *common, fields.answer, answer_text, tolerance, fields.unit
             )
         case schema.Open():
             return model.OpenQuestion(*common, prose.blocks(node.get("reference")))

@@ -204,29 +204,9 @@ FEATURE = Feature(
     ),
     rules=(
         Rule("source-unknown", "error", "A text cites a source that is not in the list."),
-        Rule(
-            "source-malformed",
-            "error",
-            "An entry of the list of sources cannot be read.",
-            "only you know what was meant",
-        ),
-        Rule(
-            "source-style",
-            "error",
-            "The course's style for citations cannot be used.",
-            "a file has to be added, moved or replaced",
-        ),
-        Rule(
-            "source-unused",
-            "warning",
-            "No text cites this source.",
-            "only you know what was meant",
-        ),
-        Rule(
-            "source-identifier",
-            "warning",
-            "A source has no valid DOI or ISBN.",
-            "the number is in the work, or in a catalogue",
-        ),
+        Rule("source-malformed", "error", "An entry of the list of sources cannot be read."),
+        Rule("source-style", "error", "The course's style for citations cannot be used."),
+        Rule("source-unused", "warning", "No text cites this source."),
+        Rule("source-identifier", "warning", "A source has no valid DOI or ISBN."),
     ),
 )

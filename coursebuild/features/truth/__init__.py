@@ -191,19 +191,9 @@ FEATURE = Feature(
     unproven=unproven,
     texts={"en": _TEXTS},
     rules=(
-        Rule(
-            "number-unproven",
-            "warning",
-            "Nothing in the course proves this number.",
-            "only you know where the number is from",
-        ),
+        Rule("number-unproven", "warning", "Nothing in the course proves this number."),
         Rule("given-source", "error", "A number is not in the file named as its source."),
-        Rule(
-            "truth-share",
-            "error",
-            "Fewer numbers are proven than the map demands.",
-            "only you know where the numbers are from",
-        ),
+        Rule("truth-share", "error", "Fewer numbers are proven than the map demands."),
         Rule("truth-text", "error", "A `truth` fence is not empty."),
     ),
 )

@@ -247,17 +247,6 @@ def test_every_rule_has_its_fixture_and_every_fixture_its_rule() -> None:
     assert set(FILES) == set(RULES)
 
 
-def test_a_rule_without_edits_says_why() -> None:
-    with_edits = {
-        name
-        for name, cases in CASES.items()
-        if any(re.search("^--(fix|propose) writes", c.expected, re.MULTILINE) for c in cases)
-    }
-    without_edits = {name for name, rule in RULES.items() if rule.no_fix}
-    assert sorted(RULES.keys() - with_edits - without_edits) == [], "neither edit nor reason"
-    assert sorted(with_edits & without_edits) == [], "edit and reason"
-
-
 def test_each_case_of_a_fixture_shows_its_rule() -> None:
     names = {name for name, cases in CASES.items() if any(case.expected.strip() for case in cases)}
     assert sorted(CASES.keys() - names) == [], "they show nothing"

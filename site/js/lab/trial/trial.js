@@ -34,8 +34,7 @@
  *     plots                      `{times, plots: [[values of each trace]]}`, at most 1000 times; a gap is `null`
  *     pictures                   `{time, frame, readouts}` at the start and at the end
  *     scene                      as the page gets it, with textures of at most 256 × 256 and faces of cubes of 64 × 64
- *     fill, mostFill             the part of the picture that what moves fills, in the mean of the run: with the lab's camera, and with
- *                                the fitting one
+ *     fill                       the part of the picture that what moves fills, in the mean of the run
  *     fallen                     `[{name, height, time}]`: bodies that have fallen out of the scene, and where they are at the end
  *     arrows                     metres for each unit of momentum, angular momentum and force: the middle arrow seen is 0.3 of the
  *                                picture's height
@@ -144,7 +143,6 @@ class Trial {
     if (this.config.camera?.distance == null && this.config.camera?.target == null) Object.assign(camera, fitting)
     main.scene.floor = this.framing.floor()
     main.fill = this.framing.fill(camera)
-    main.mostFill = this.framing.fill(fitting)
     main.arrows = this.arrowScales.fit(2 * camera.distance * Math.tan((camera.fovy * Math.PI) / 360))
     const hasArrows = this.config.overlays.some((name) => name in main.arrows)
     if (hasArrows) main.pictures[0] = packed(this.fresh({ ...this.config, arrows: main.arrows }, picture))
@@ -358,7 +356,6 @@ class Trial {
         time: lab.time,
       })),
       fill: null, // see `frame`
-      mostFill: null,
       arrows: null,
       resetDiffers: resetDiffers(lab, atStart),
     }
