@@ -33,13 +33,14 @@ from coursebuild.core.features import Trial, TrialContext, TrialOutcome, Trials
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import write_atomic
-from coursebuild.core.model import Course, FeatureBlock, find_blocks
+from coursebuild.core.model import Course, Document, FeatureBlock, Owner, find_blocks
 from coursebuild.core.model.results import (
     CompileResult,
     Outcome,
     Results,
     ScriptRun,
     TrialLine,
+    TrialResult,
     Verdict,
 )
 from coursebuild.core.registry import check_runs, feature_trials
@@ -71,13 +72,18 @@ class Verification(Struct, frozen=True):
     """The results of a verification."""
 
     results: Results
-    diagnostics: tuple[Diagnostic, ...]
+    course_diagnostics: tuple[Diagnostic, ...]
+    """Those of the whole course, whatever was chosen."""
+    run_diagnostics: tuple[Diagnostic, ...]
+    """Those of the scripts and labs that were chosen, in any file."""
     scripts: tuple[ScriptLine, ...]
+    """A line for each script that was chosen, also for one that was left out."""
+    labs: tuple[TrialLine, ...]
+    """Likewise."""
 
     @property
-    def labs(self) -> tuple[TrialLine, ...]:
-        """The lines of a report about trials."""
-        return tuple(trial.line for trial in self.results.trials)
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        return (*self.course_diagnostics, *self.run_diagnostics)
 
 
 def verify(
@@ -105,7 +111,7 @@ def verify(
     # A preview holds the lock for no longer, so that other commands need not wait for its scripts.
     with project_lock(options.root) if is_preview else contextlib.nullcontext():
         extracted_scripts = extract_scripts(course, options)
-    scripts, trials = _select(course, extracted_scripts.runnable, documents, shard)
+    scripts, trials = _select(course, extracted_scripts.extractions, documents, shard)
     models, model_diagnostics = compile_models(course, options)
     say, trial_store = options.progress.say, RunStore(options.root, options.store)
     context = TrialContext(
@@ -130,21 +136,52 @@ def verify(
         if again:
             runs = tuple({run.path: run for run in (*runs, *again)}.values())
             verdicts, figure_diagnostics, lines = runner.judge(runs)
-    diagnostics = (
+    course_diagnostics = (
         *extracted_scripts.diagnostics,
         *model_diagnostics,
-        *trial_diagnostics,
-        *runner.find_mistakes(runs, verdicts, evidence, other_runs, models),
         *check_runs(course, runs),
         *_diagnose_nothing(course, () if shard is not None else runs),
-        *figure_diagnostics,
         *check_drawings(course, options),
+    )
+    broken_paths = [d.span.path for d in model_diagnostics if d.is_error]
+    chosen_places = {e.script.path_span for e in scripts}
+    owned_documents = course.owned_documents
+    if documents is not None:  # some may quote scripts of other lessons
+        chosen_paths = documents | {e.document for e in scripts}
+        owned_documents = tuple(
+            (owner, document)
+            for owner, document in owned_documents
+            if document.source.path in chosen_paths
+        )
+    run_diagnostics = (
+        *(d for d in extracted_scripts.diagnostics if d.span in chosen_places),
+        *trial_diagnostics,
+        *runner.find_mistakes(owned_documents, runs, verdicts, evidence, other_runs, broken_paths),
+        *figure_diagnostics,
     )
     interpreter = options.interpreter
     python = python_version() if interpreter is None else interpreter.version
     engine = engine_version() if interpreter is None else interpreter.engine
     results = Results(runs, verdicts, (), models, python, engine, trial_results)
-    return Verification(results, diagnostics, lines)
+    labs = _lab_lines(course, trials, trial_results)
+    return Verification(results, course_diagnostics, run_diagnostics, lines, labs)
+
+
+def _lab_lines(
+    course: Course, trials: Iterable[tuple[Trials, Trial]], results: Iterable[TrialResult]
+) -> tuple[TrialLine, ...]:
+    """A line for each trial; one that came to no result was not tried.
+
+    Outside of lessons and pages, such as in the list of models, labs claim nothing.
+    """
+    lines = {result.line.name: result.line for result in results}
+    paths = {document.source.path for document in course.documents}
+    for _, trial in trials:
+        if trial.name not in lines and trial.block.span.path in paths:
+            lines[trial.name] = TrialLine(
+                trial.name, "", trial.owner, "untried", untried="other mistakes"
+            )
+    return tuple(lines[trial.name] for _, trial in trials if trial.name in lines)
 
 
 class _ScriptRunner:
@@ -158,7 +195,9 @@ class _ScriptRunner:
         scripts: Sequence[Extraction],
         known_runs: Mapping[str, ScriptRun] | None,
     ) -> None:
-        self.course, self.options, self.scripts = course, options, scripts
+        self.course, self.options = course, options
+        self.scripts = [e for e in scripts if e in extracted_scripts.runnable]
+        self.left_out = [e for e in scripts if e not in extracted_scripts.runnable]
         self.extracted_scripts, self.known_runs = extracted_scripts, known_runs
         self.store = options.run_store()
 
@@ -203,27 +242,31 @@ class _ScriptRunner:
         read = functools.partial(read_recorded, self.options.root)
         figure_diagnostics = list(figure_findings(self.course, runs, read))
         drifted_figures = [diagnostic.span for diagnostic in figure_diagnostics]
-        lines = script_lines(self.scripts, runs, verdicts, self.course, drifted_figures)
+        lines = script_lines(
+            self.scripts, runs, verdicts, self.course, drifted_figures, self.left_out
+        )
         return verdicts, figure_diagnostics, lines
 
     def find_mistakes(
         self,
+        documents: Iterable[tuple[Owner, Document]],
         runs: Sequence[ScriptRun],
         verdicts: Sequence[Verdict],
         evidence: BindingEvidence | None,
         other_runs: Mapping[str, ScriptRun] | None,
-        models: Iterable[tuple[str, CompileResult]],
+        broken_paths: Collection[str],
     ) -> Iterator[Diagnostic]:
         yield from check_recorded_runs(self.scripts, self.options)
         yield from script_findings(
             self.course,
+            documents,
             self.scripts,
             runs,
             verdicts,
             evidence,
             self.extracted_scripts.extractions,
             other_runs,
-            [f"models/{name}.xml" for name, model in models if model.error],
+            broken_paths,
             functools.partial(find_module, self.options.root),
         )
         yield from repeat_findings(self.course, self.scripts, self.store.differing_runs)
@@ -275,11 +318,11 @@ def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Dia
 
 def _select(
     course: Course,
-    runnable: Sequence[Extraction],
+    extractions: Sequence[Extraction],
     documents: Collection[str] | None,
     shard: Shard | None,
 ) -> tuple[Sequence[Extraction], tuple[tuple[Trials, Trial], ...]]:
-    extractions, trials = runnable, feature_trials(course)
+    trials = feature_trials(course)
     if documents is not None:
         quoted_scripts: set[str] = set()
         for document in course.documents:
