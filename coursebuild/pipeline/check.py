@@ -30,7 +30,8 @@ from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.scenes import shown_reports
 from coursebuild.pipeline.scripts import measure_sensitivity
-from coursebuild.pipeline.verify import Shard, Verification, verify, write_timings
+from coursebuild.pipeline.shards import Shard, write_timings
+from coursebuild.pipeline.verify import Verification, verify
 from coursebuild.report import Report, ScriptLine
 from coursebuild.report.values import unproven_things
 

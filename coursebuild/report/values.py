@@ -132,25 +132,25 @@ class Report(Struct, frozen=True):
     def summary(self) -> Summary:
         """What its diagnostics, scripts and labs come to."""
         severities = Counter(d.severity for d in self.diagnostics)
-        ran = [line for line in self.scripts if line.did_run]
+        run_lines = [line for line in self.scripts if line.did_run]
         unrun = [line for line in self.scripts if not line.did_run]
-        tried = [line for line in self.labs if not line.untried]
-        statuses = [*(line.status for line in ran), *(line.status for line in tried)]
+        trial_lines = [line for line in self.labs if not line.untried]
+        statuses = [*(line.status for line in run_lines), *(line.status for line in trial_lines)]
         untried = [line.untried for line in self.labs if line.untried]
         reasons = [*(reason for line in unrun for reason in line.reasons), *untried]
         return Summary(
             lessons=self.lessons,
             scripts=len(self.scripts),
-            ran=len(ran),
+            ran=len(run_lines),
             failed=sum(status != "ok" for status in statuses),
             skipped=sum(line.status == "skipped" for line in unrun),
-            tried=len(tried),
+            tried=len(trial_lines),
             untried=len(untried),
             errors=severities["error"],
             warnings=severities["warning"],
             silenced=self.silenced,
             seconds=self.seconds,
-            cached=sum(line.cached for line in ran),
+            cached=sum(line.cached for line in run_lines),
             unproven=len(unrun),
             reasons=tuple(dict.fromkeys(reasons)),
             unrepeated=sum(line.unrepeated for line in self.scripts),

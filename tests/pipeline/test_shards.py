@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.pipeline.options import UsageError
-from coursebuild.pipeline.verify import read_shard, read_timings, split, write_timings
+from coursebuild.pipeline.shards import read_shard, read_timings, split, write_timings
 from support.scratch_course import Make, block
 
 names = st.lists(st.text(max_size=6), max_size=30)

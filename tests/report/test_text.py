@@ -204,10 +204,10 @@ def test_everything_holds_only_where_all_was_run_and_nothing_failed(form: str) -
             line = replace(line, reasons=("norun",))
         scripts, labs = ((line,), ()) if isinstance(line, ScriptLine) else ((), (line,))
         report = Report(diagnostics, scripts, labs, lessons=1)
-        failed = line.status not in {"ok", *unrun}
-        assert report.ok is not (failed or diagnostics == (ERROR,)), line
-        everything = "everything holds" in report.summary.verdict()
-        assert everything is (line.status == "ok" and not diagnostics), line
+        is_failure = line.status not in {"ok", *unrun}
+        assert report.ok is not (is_failure or diagnostics == (ERROR,)), line
+        is_whole = "everything holds" in report.summary.verdict()
+        assert is_whole is (line.status == "ok" and not diagnostics), line
         assert "holds" not in report.summary.verdict() or report.ok, line
         text = render_report(report, form, Style())
         if form == "text":

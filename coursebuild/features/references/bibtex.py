@@ -165,8 +165,8 @@ def _find_swallowed(value: str) -> tuple[int, str, str] | None:
         end = _end_of_piece(value, joint.end())
     if rest := value[end:].strip():
         start = value.index(rest, end)
-        shown = " ".join(rest.split())[:40]
-        return start, f"ends before `{shown}`", "put a comma between the two"
+        excerpt = " ".join(rest.split())[:40]
+        return start, f"ends before `{excerpt}`", "put a comma between the two"
     if (inner := _INNER_FIELD.search(value)) is not None:
         message = f"takes in the field `{inner[1]}`"
         return inner.start(1), message, "close the value before the comma"
