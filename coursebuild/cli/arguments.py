@@ -140,15 +140,11 @@ def print_report(report: Report, form: str, options: Options) -> int:
 
 def report_text(report: Report, form: str, options: Options) -> str:
     """Return the report as it is printed; as text and if quiet, only what is wrong."""
-    if options.progress.quiet and form == "text":
-        if not report.diagnostics:
-            return ""
-        report = replace(report, scripts=(), labs=(), remarks=(), sensitivity=None)
     # A workflow names its checkout, of which the course may be a folder.
     place = os.path.relpath(options.root, os.environ.get("GITHUB_WORKSPACE") or options.root)
     if place != os.curdir and not place.startswith(os.pardir):
         report = replace(report, folder=f"{Path(place).as_posix()}/")
-    return render_report(report, form, style_of(sys.stdout))
+    return render_report(report, form, style_of(sys.stdout), brief=options.progress.quiet)
 
 
 def style_of(stream: TextIO | None) -> Style:

@@ -16,7 +16,7 @@ from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.check import check
 from coursebuild.pipeline.fix import Answer, fix, propose
 from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.verify import read_shard
+from coursebuild.pipeline.shards import read_shard
 from coursebuild.report import Report
 from coursebuild.report.text import diagnostic_text, visible_lines
 from coursebuild.report.values import plural, with_hints

@@ -5,17 +5,20 @@ In a report, silenced warnings are left out, the rest is sorted and counted.
 
 from __future__ import annotations
 
+import posixpath
+import re
 import time
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
-from coursebuild.core.model import Course, Script, document_scripts
+from coursebuild.core.model import Citation, Course, Script, document_scripts, find_inlines
 from coursebuild.core.model.results import Reports, Results, TrialLine
+from coursebuild.core.pages.library import named_models
 from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.run.dependencies import sought_files
 from coursebuild.core.run.script_environment import Interpreter
@@ -28,9 +31,10 @@ from coursebuild.pipeline.proofs import remarks_on_proofs
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.scenes import shown_reports
 from coursebuild.pipeline.scripts import measure_sensitivity
-from coursebuild.pipeline.verify import Shard, Verification, verify, write_timings
-from coursebuild.report import Report, ScriptLine, Summary
-from coursebuild.report.values import plural, unproven_things
+from coursebuild.pipeline.shards import Shard, write_timings
+from coursebuild.pipeline.verify import Verification, verify
+from coursebuild.report import Report, ScriptLine
+from coursebuild.report.values import unproven_things
 
 if TYPE_CHECKING:
     from coursebuild.core.scripts.sensitivity import Sensitivity
@@ -77,11 +81,6 @@ def check(
                 course, checked_course.options, runs, selected, halve=True
             )
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
-        if shard is not None:
-            scripts = plural(len(verification.scripts), "script")
-            labs = plural(len(verification.labs), "lab")
-            # Else a reader of the report could take this for the whole.
-            remarks.append(f"this was part {shard} of the work: {scripts} and {labs}")
         inventory = [claim for claim in claims if isinstance(claim, Diagnostic)]
         report = checked_course.report(diagnostics, inventory)
         if shard is None:
@@ -90,9 +89,10 @@ def check(
                 options.store,
                 {run.path for run in verification.results.runs if run.did_run},
                 checked_course.documents,
-                is_green=not report.summary.errors,
+                is_green=report.summary.ok,
             )
-        return replace(report, remarks=tuple(remarks), sensitivity=sensitivities)
+        part = "" if shard is None else str(shard)
+        return replace(report, remarks=tuple(remarks), sensitivity=sensitivities, part=part)
 
 
 class CheckedCourse(Struct, frozen=True):
@@ -109,18 +109,23 @@ class CheckedCourse(Struct, frozen=True):
     reports: Reports
     """Those that pages may show."""
     diagnostics: tuple[Diagnostic, ...]
+    """Those of the whole course; those of what was run are in the verification."""
 
     def report(
         self, further: Iterable[Diagnostic] = (), inventory: Sequence[Diagnostic] = ()
     ) -> Report:
         """The report; `further` are diagnostics found since, for `inventory` see `judge`."""
-        verification = self.verification
+        verification, documents = self.verification, self.documents
+        diagnostics = self.diagnostics
+        if documents is not None:
+            used_paths = _used_files(self.course, documents, verification.results)
+            diagnostics = _select_diagnostics(self.course, documents, diagnostics, used_paths)
         report = judge(
             self.course,
-            (*self.diagnostics, *further),
+            (*diagnostics, *verification.run_diagnostics, *further),
             self.began,
             scripts=verification.scripts,
-            documents=self.documents,
+            documents=documents,
             labs=verification.labs,
             strict=self.options.strict or self.course.strict,
             inventory=inventory,
@@ -157,26 +162,54 @@ def read_and_verify(
     options = options.for_course(course)
     verification = verify(course, options, selected, static=static, shard=shard, repeat=repeat)
     reports = shown_reports(options.root, course)
-    diagnostics = (*parsed_course.diagnostics, *verification.diagnostics, *reports.diagnostics)
+    diagnostics = (
+        *parsed_course.diagnostics,
+        *verification.course_diagnostics,
+        *reports.diagnostics,
+    )
     return CheckedCourse(began, course, options, selected, verification, reports.value, diagnostics)
 
 
 # --- from diagnostics to a report
 
-_RULES_OF_RUNS = (
-    "script-failed",
-    "script-timeout",
-    "script-killed",
-    "script-output-limit",
-    "script-encoding",
-    "script-silent",
-    "script-diverged",
-    "script-penetration",
-    "script-writes",
-    "script-connects",
-    "script-unproven",
-)
-"""Rules broken only by scripts that were to run; the line may be in another lesson."""
+
+def _used_files(course: Course, documents: Collection[str], results: Results) -> set[str]:
+    """The files that some lessons and pages use: models, what scripts read, the list of sources."""
+    paths = {file for run in results.runs if run.trace is not None for file in run.trace.files}
+    for document in course.documents:
+        if document.source.path in documents:
+            paths |= {f"models/{name}.xml" for name in named_models(document)}
+            if course.bibliography is not None and any(find_inlines(document, Citation)):
+                paths.add(course.bibliography.path)
+    models = {model.source.path: model.source.text for model in course.models}
+    new_paths = paths & {*models}
+    while new_paths:
+        included = {
+            f"{posixpath.dirname(path)}/{name}"
+            for path in new_paths
+            for name in _INCLUDE.findall(models[path])
+        }
+        new_paths = {posixpath.normpath(path) for path in included} & {*models} - paths
+        paths |= new_paths
+    return paths | {f"{path.removesuffix('.xml')}.toml" for path in paths & {*models}}
+
+
+_INCLUDE = re.compile(r"""<include\s[^<>]*?\bfile\s*=\s*["']([^"'<>]+)""")
+
+
+def _select_diagnostics(
+    course: Course,
+    documents: Collection[str],
+    diagnostics: Iterable[Diagnostic],
+    used_paths: Collection[str],
+) -> tuple[Diagnostic, ...]:
+    """What is wrong in these documents and the map, and the errors in files that they use."""
+    own_paths = {*documents, course.map.path}
+    return tuple(
+        d
+        for d in diagnostics
+        if d.span.path in own_paths or (d.is_error and d.span.path in used_paths)
+    )
 
 
 def judge(
@@ -193,15 +226,14 @@ def judge(
 ) -> Report:
     """Make the report of a command that began at this moment of `time.monotonic`.
 
-    `documents` limits it to these lessons and pages, by path: to mistakes in them and in the map,
-    and those of the scripts that ran. `strict`: warnings count as errors, and so does a script that
-    was not run, unless the map lets it pass, or was recorded from its only run. `inventory`:
-    warnings that somebody asked for, such as a list of numbers; they stay warnings.
+    `documents`: the lessons and pages that it is about, by path. `strict`: warnings count as
+    errors, and so does a script that was not run, unless the map lets it pass, or was recorded from
+    its only run. `inventory`: warnings that somebody asked for, such as a list of numbers; they
+    stay warnings.
     """
-    unrun = () if course is None else tuple(_unrun_scripts(course, scripts))
     if strict and course is not None:
         unrepeated = _refuse_unrepeated(course, scripts)
-        diagnostics = (*diagnostics, *_refuse_unproven(course, unrun), *unrepeated)
+        diagnostics = (*diagnostics, *_refuse_unproven(course, scripts), *unrepeated)
     if course is None:
         lesson_count = 0
     elif documents is None:
@@ -209,9 +241,6 @@ def judge(
     else:
         lesson_count = sum(lesson.path in documents for lesson in course.lessons)
     relevant = sort_diagnostics(_without_consequences([*diagnostics, *inventory]))
-    if documents is not None and course is not None:
-        paths = {*documents, course.map.path}
-        relevant = tuple(d for d in relevant if d.span.path in paths or d.rule in _RULES_OF_RUNS)
     silences = course.silences if course is not None else ()
     mild = {d.rule for d in inventory}
 
@@ -227,46 +256,29 @@ def judge(
     reported = tuple(
         replace(d, strict=strict and d.rule not in mild) for d in unsilenced if d.severity != "hint"
     )
-    errors = sum(d.is_error for d in reported)
-    summary = Summary(
+    return Report(
+        diagnostics=reported,
+        scripts=tuple(scripts),
+        labs=labs,
         lessons=lesson_count,
-        scripts=len(scripts),
-        ran=sum(line.did_run for line in scripts),
-        skipped=sum(line.status == "skipped" for line in scripts),
-        errors=errors,
-        warnings=len(reported) - errors,
-        hints=len(hints),
         silenced=len(relevant) - len(unsilenced),
         seconds=0.0 if began is None else time.monotonic() - began,
-        cached=sum(line.cached for line in scripts),
-        unproven=len(unrun),
-        reasons=tuple(dict.fromkeys(name for _, _, names in unrun for name in names)),
-        unrepeated=sum(line.unrepeated for line in scripts),
+        remarks=remarks,
+        hints=hints,
     )
-    return Report(reported, tuple(scripts), summary, remarks, labs, hints=hints)
 
 
-_Unrun: TypeAlias = tuple[Script, ScriptLine, tuple[str, ...]]
-"""A script that was not run, and why: missing modules, or a key of its fence."""
-
-
-def _unrun_scripts(course: Course, lines: Iterable[ScriptLine]) -> Iterator[_Unrun]:
-    by_path = {s.path: s for document in course.documents for s in document_scripts(document)}
-    for line in lines:
-        if not line.did_run and line.path in by_path:
-            script = by_path[line.path]
-            reason = "record=once" if script.once else "norun"
-            reason = "nothing recorded" if line.status == "unrecorded" else reason
-            yield script, line, line.missing or (reason,)
-
-
-def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diagnostic]:
+def _refuse_unproven(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Diagnostic]:
+    by_path = _scripts_by_path(course)
     allowed_paths = {entry.path for entry in course.unproven}
-    for script, line, reasons in scripts:
-        if line.path in allowed_paths or not (line.missing or script.norun):
-            continue  # another mistake says that nothing is recorded
-        names = " and ".join(f"`{name}`" for name in reasons)
-        are = "are" if len(reasons) > 1 else "is"
+    for line in lines:
+        if line.did_run or line.path in allowed_paths:
+            continue
+        script = by_path[line.path]
+        if not (line.missing or script.norun):
+            continue  # another mistake says why
+        names = " and ".join(f"`{name}`" for name in line.missing)
+        are = "are" if len(line.missing) > 1 else "is"
         reason = f"{names} {are} not installed" if line.missing else "its fence says `norun`"
         cure = f"install {names}" if line.missing else "remove `norun`"
         unproven = unproven_things(line) or "that it runs"
@@ -278,8 +290,12 @@ def _refuse_unproven(course: Course, scripts: Iterable[_Unrun]) -> Iterator[Diag
         )
 
 
+def _scripts_by_path(course: Course) -> dict[str, Script]:
+    return {s.path: s for document in course.documents for s in document_scripts(document)}
+
+
 def _refuse_unrepeated(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Diagnostic]:
-    by_path = {s.path: s for document in course.documents for s in document_scripts(document)}
+    by_path = _scripts_by_path(course)
     for line in lines:
         if line.unrepeated and line.path in by_path:
             yield diagnose(

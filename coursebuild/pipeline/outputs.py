@@ -198,6 +198,7 @@ class _Updater:
         diagnostics = [
             *script_findings(
                 new_course,
+                new_course.owned_documents,
                 extractions,
                 runs,
                 verdicts(new_course),

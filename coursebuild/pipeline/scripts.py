@@ -294,8 +294,13 @@ def script_lines(
     verdicts: Sequence[Verdict],
     course: Course,
     drifted_figures: Collection[Span] = (),
+    left_out: Iterable[Extraction] = (),
 ) -> tuple[ScriptLine, ...]:
-    """Make the lines of a report about scripts; some figures are not as they are recorded."""
+    """Make the lines of a report about scripts.
+
+    Some figures are not as they are recorded. Scripts that are `left_out` could not be extracted,
+    or have no interpreter.
+    """
     unproven = count_unproven(course, runs, verdicts)
     drifted_paths = {v.recording.script for v in verdicts if v.status == "drift"}
     recorded_paths = {v.recording.script for v in verdicts if v.status == "verified"}
@@ -317,9 +322,21 @@ def script_lines(
                 script_run.missing,
                 *unproven.get(script_run.path, (0, 0)),
                 script_run.unrepeated and script_run.path in recorded_paths,
+                ()
+                if script_run.did_run
+                else script_run.missing or (_unrun_reason(extraction, status),),
             )
         )
+    lines += [
+        ScriptLine(e.path, e.owner, "blocked", 0.0, False, reasons=("blocked",)) for e in left_out
+    ]
     return tuple(lines)
+
+
+def _unrun_reason(extraction: Extraction, status: str) -> str:
+    if status == Outcome.UNRECORDED.value:
+        return "nothing recorded"
+    return "record=once" if extraction.script.once else "norun"
 
 
 def measure_sensitivity(

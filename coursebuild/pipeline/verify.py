@@ -2,44 +2,30 @@
 
 Models and MJCF blocks are compiled in a child process, and features' trials, such as those of labs,
 are run while the scripts run. Documents may be summaries. Formulas are checked by the reader.
-
-`check --shard 2/8` divides the scripts and labs of a course among several machines. Every machine
-computes the whole split by itself, so it must follow from what all machines have: the names of the
-scripts and labs, and times from files that are given to all. Stores and shared caches differ from
-machine to machine: by their times, a script could fall between two shards.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
-import heapq
-import json
-import os
-import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
 from operator import itemgetter
-from pathlib import Path
-from typing import Annotated
 
-import msgspec
-from msgspec import Meta, Struct
+from msgspec import Struct
 
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.features import Trial, TrialContext, TrialOutcome, Trials
-from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import project_lock
-from coursebuild.core.files.write import write_atomic
-from coursebuild.core.model import Course, FeatureBlock, find_blocks
+from coursebuild.core.model import Course, Document, FeatureBlock, Owner, find_blocks
 from coursebuild.core.model.results import (
     CompileResult,
     Outcome,
     Results,
     ScriptRun,
     TrialLine,
+    TrialResult,
     Verdict,
 )
 from coursebuild.core.registry import check_runs, feature_trials
@@ -52,7 +38,7 @@ from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.pipeline.options import Options, Progress, UsageError
+from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
@@ -61,6 +47,7 @@ from coursebuild.pipeline.scripts import (
     run,
     script_lines,
 )
+from coursebuild.pipeline.shards import Shard
 from coursebuild.report import ScriptLine
 
 _QUICK = 20.0
@@ -71,13 +58,18 @@ class Verification(Struct, frozen=True):
     """The results of a verification."""
 
     results: Results
-    diagnostics: tuple[Diagnostic, ...]
+    course_diagnostics: tuple[Diagnostic, ...]
+    """Those of the whole course, whatever was chosen."""
+    run_diagnostics: tuple[Diagnostic, ...]
+    """Those of the scripts and labs that were chosen, in any file."""
     scripts: tuple[ScriptLine, ...]
+    """A line for each script that was chosen, also for one that was left out."""
+    labs: tuple[TrialLine, ...]
+    """Likewise."""
 
     @property
-    def labs(self) -> tuple[TrialLine, ...]:
-        """The lines of a report about trials."""
-        return tuple(trial.line for trial in self.results.trials)
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        return (*self.course_diagnostics, *self.run_diagnostics)
 
 
 def verify(
@@ -105,7 +97,7 @@ def verify(
     # A preview holds the lock for no longer, so that other commands need not wait for its scripts.
     with project_lock(options.root) if is_preview else contextlib.nullcontext():
         extracted_scripts = extract_scripts(course, options)
-    scripts, trials = _select(course, extracted_scripts.runnable, documents, shard)
+    scripts, trials = _select(course, extracted_scripts.extractions, documents, shard)
     models, model_diagnostics = compile_models(course, options)
     say, trial_store = options.progress.say, RunStore(options.root, options.store)
     context = TrialContext(
@@ -130,21 +122,52 @@ def verify(
         if again:
             runs = tuple({run.path: run for run in (*runs, *again)}.values())
             verdicts, figure_diagnostics, lines = runner.judge(runs)
-    diagnostics = (
+    course_diagnostics = (
         *extracted_scripts.diagnostics,
         *model_diagnostics,
-        *trial_diagnostics,
-        *runner.find_mistakes(runs, verdicts, evidence, other_runs, models),
         *check_runs(course, runs),
         *_diagnose_nothing(course, () if shard is not None else runs),
-        *figure_diagnostics,
         *check_drawings(course, options),
+    )
+    broken_paths = [d.span.path for d in model_diagnostics if d.is_error]
+    chosen_places = {e.script.path_span for e in scripts}
+    owned_documents = course.owned_documents
+    if documents is not None:  # some may quote scripts of other lessons
+        chosen_paths = documents | {e.document for e in scripts}
+        owned_documents = tuple(
+            (owner, document)
+            for owner, document in owned_documents
+            if document.source.path in chosen_paths
+        )
+    run_diagnostics = (
+        *(d for d in extracted_scripts.diagnostics if d.span in chosen_places),
+        *trial_diagnostics,
+        *runner.find_mistakes(owned_documents, runs, verdicts, evidence, other_runs, broken_paths),
+        *figure_diagnostics,
     )
     interpreter = options.interpreter
     python = python_version() if interpreter is None else interpreter.version
     engine = engine_version() if interpreter is None else interpreter.engine
     results = Results(runs, verdicts, (), models, python, engine, trial_results)
-    return Verification(results, diagnostics, lines)
+    labs = _lab_lines(course, trials, trial_results)
+    return Verification(results, course_diagnostics, run_diagnostics, lines, labs)
+
+
+def _lab_lines(
+    course: Course, trials: Iterable[tuple[Trials, Trial]], results: Iterable[TrialResult]
+) -> tuple[TrialLine, ...]:
+    """A line for each trial; one that came to no result was not tried.
+
+    Outside of lessons and pages, such as in the list of models, labs claim nothing.
+    """
+    lines = {result.line.name: result.line for result in results}
+    paths = {document.source.path for document in course.documents}
+    for _, trial in trials:
+        if trial.name not in lines and trial.block.span.path in paths:
+            lines[trial.name] = TrialLine(
+                trial.name, "", trial.owner, "untried", untried="other mistakes"
+            )
+    return tuple(lines[trial.name] for _, trial in trials if trial.name in lines)
 
 
 class _ScriptRunner:
@@ -158,7 +181,9 @@ class _ScriptRunner:
         scripts: Sequence[Extraction],
         known_runs: Mapping[str, ScriptRun] | None,
     ) -> None:
-        self.course, self.options, self.scripts = course, options, scripts
+        self.course, self.options = course, options
+        self.scripts = [e for e in scripts if e in extracted_scripts.runnable]
+        self.left_out = [e for e in scripts if e not in extracted_scripts.runnable]
         self.extracted_scripts, self.known_runs = extracted_scripts, known_runs
         self.store = options.run_store()
 
@@ -203,27 +228,31 @@ class _ScriptRunner:
         read = functools.partial(read_recorded, self.options.root)
         figure_diagnostics = list(figure_findings(self.course, runs, read))
         drifted_figures = [diagnostic.span for diagnostic in figure_diagnostics]
-        lines = script_lines(self.scripts, runs, verdicts, self.course, drifted_figures)
+        lines = script_lines(
+            self.scripts, runs, verdicts, self.course, drifted_figures, self.left_out
+        )
         return verdicts, figure_diagnostics, lines
 
     def find_mistakes(
         self,
+        documents: Iterable[tuple[Owner, Document]],
         runs: Sequence[ScriptRun],
         verdicts: Sequence[Verdict],
         evidence: BindingEvidence | None,
         other_runs: Mapping[str, ScriptRun] | None,
-        models: Iterable[tuple[str, CompileResult]],
+        broken_paths: Collection[str],
     ) -> Iterator[Diagnostic]:
         yield from check_recorded_runs(self.scripts, self.options)
         yield from script_findings(
             self.course,
+            documents,
             self.scripts,
             runs,
             verdicts,
             evidence,
             self.extracted_scripts.extractions,
             other_runs,
-            [f"models/{name}.xml" for name, model in models if model.error],
+            broken_paths,
             functools.partial(find_module, self.options.root),
         )
         yield from repeat_findings(self.course, self.scripts, self.store.differing_runs)
@@ -275,11 +304,11 @@ def _diagnose_nothing(course: Course, runs: Sequence[ScriptRun]) -> Iterator[Dia
 
 def _select(
     course: Course,
-    runnable: Sequence[Extraction],
+    extractions: Sequence[Extraction],
     documents: Collection[str] | None,
     shard: Shard | None,
 ) -> tuple[Sequence[Extraction], tuple[tuple[Trials, Trial], ...]]:
-    extractions, trials = runnable, feature_trials(course)
+    trials = feature_trials(course)
     if documents is not None:
         quoted_scripts: set[str] = set()
         for document in course.documents:
@@ -323,113 +352,3 @@ def compile_models(
     compiled_blocks = tuple(zip(texts, results[len(models) :], strict=True))
     diagnostics = check_compiled(course, dict(models), compiled_blocks, mjcf.readable_error)
     return models, diagnostics
-
-
-# --- a part of the work
-
-_LARGEST_COUNT = 10_000
-
-
-class Shard(Struct, frozen=True):
-    """One part of the work, from 1 to `count`."""
-
-    index: int
-    count: int
-    seconds: tuple[tuple[str, float], ...] = ()
-    """How long scripts (by path) and labs (by name) take, where that is known."""
-
-    def __str__(self) -> str:
-        return f"{self.index}/{self.count}"
-
-    def takes(self, names: Iterable[str]) -> frozenset[str]:
-        """Return those of the names that belong to this part."""
-        parts = split(names, self.count, dict(self.seconds))
-        return frozenset(name for name, part in parts.items() if part == self.index)
-
-
-class _Timings(Struct):
-    """What a file of timings holds."""
-
-    seconds: dict[str, Annotated[float, Meta(ge=0, lt=1e9)]]
-
-
-def split(names: Iterable[str], count: int, seconds: Mapping[str, float]) -> dict[str, int]:
-    """Assign each name to a part, from 1.
-
-    With times: the longest first, each to the part that has least to do (within 4/3 of the best
-    possible: Graham, SIAM J. Appl. Math. 17, 1969, p. 416). An unknown time counts as the median.
-    Without times all names count the same, in the order of their hashes: neighbours in a lesson,
-    which are often alike, go to different parts.
-    """
-    sorted_names = sorted(set(names), key=lambda name: hashlib.sha256(os.fsencode(name)).digest())
-    known_times = sorted(seconds[name] for name in sorted_names if name in seconds)
-    median = known_times[len(known_times) // 2] if known_times else 1.0
-    loads = [(0.0, 0, part) for part in range(1, count + 1)]
-    parts: dict[str, int] = {}
-    for name in sorted(sorted_names, key=lambda name: -seconds.get(name, median)):
-        load, number, part = heapq.heappop(loads)
-        parts[name] = part
-        heapq.heappush(loads, (load + seconds.get(name, median), number + 1, part))
-    return parts
-
-
-def read_shard(text: str | None, timings: Sequence[str]) -> Shard | None:
-    """Parse `--shard` and `--timings`; `None` where the work is not divided.
-
-    Raises:
-        UsageError: they cannot be understood, or a file cannot be read.
-    """
-    if text is None:
-        if timings:
-            raise UsageError("--timings says how `--shard` divides the work: it needs `--shard`")
-        return None
-    match = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
-    if match is None:
-        raise UsageError(
-            f"--shard: {text!r} is not a part of the work; write 2/8 for the second of 8"
-        )
-    index, count = int(match[1]), int(match[2])
-    if not 1 <= index <= count <= _LARGEST_COUNT:
-        raise UsageError(f"--shard: part {index} of {count} does not exist")
-    seconds: dict[str, float] = {}
-    for file in timings:
-        for name, value in read_timings(file).items():
-            seconds[name] = max(value, seconds.get(name, 0.0))
-    return Shard(index, count, tuple(sorted(seconds.items())))
-
-
-def read_timings(file: str) -> dict[str, float]:
-    """Read the times, in seconds, from a file that `--write-timings` wrote.
-
-    Raises:
-        UsageError: it has none.
-    """
-    try:
-        return msgspec.json.decode(Path(file).read_bytes(), type=_Timings).seconds
-    except OSError as error:
-        raise UsageError(f"--timings: {file} cannot be read: {reason(error)}") from None
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        message = f"--timings: {file} holds no times; `--write-timings` writes such a file"
-        raise UsageError(message) from None
-
-
-def write_timings(file: str, seconds: Mapping[str, float], names: Iterable[str]) -> None:
-    """Write how long scripts and labs took; other times of the course that are in the file stay.
-
-    Raises:
-        UsageError: it cannot be written, or something else is in it.
-    """
-    path = Path(file).absolute()
-    before = read_timings(file) if path.exists() else {}
-    course_names = frozenset(names)
-    times = {name: time for name, time in before.items() if name in course_names}
-    times |= {name: round(time, 3) for name, time in seconds.items()}
-    value = {"seconds": {name: times[name] for name in sorted(times)}}
-    data = json.dumps(value, indent=2, ensure_ascii=True).encode() + b"\n"
-    try:
-        expected = path.read_bytes() if path.exists() else None
-        write_atomic(path.parent, path.name, data, expected=expected, durable=False)
-    except EffectError as error:
-        raise UsageError(f"--write-timings: {error.message}") from None
-    except OSError as error:
-        raise UsageError(f"--write-timings: {file} cannot be written: {reason(error)}") from None

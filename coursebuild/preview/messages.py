@@ -74,7 +74,13 @@ class Offer(Struct, frozen=True):
 
 def report_now(session: Session) -> Report:
     """Return everything that is wrong, as a report."""
-    return judge(session.course, session.diagnostics(), scripts=session.runs.script_lines)
+    history = session.runs
+    return judge(
+        session.course,
+        session.diagnostics(),
+        scripts=history.script_lines,
+        labs=history.trial_lines,
+    )
 
 
 def page_news(session: Session, path: str) -> str:

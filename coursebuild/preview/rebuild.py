@@ -35,7 +35,7 @@ from coursebuild.pipeline.verify import verify
 from coursebuild.preview.messages import report_now
 from coursebuild.preview.run_history import script_keys
 from coursebuild.preview.session import Session
-from coursebuild.report import Report, Style, summary_line
+from coursebuild.report import Report, Style
 from coursebuild.report.text import diagnostic_paragraphs, location
 
 QUIET = 0.15
@@ -175,7 +175,7 @@ class BackgroundRebuild:
             self._progress.say(f"gone: {location(diagnostic.span)}: {diagnostic.message}")
         counts = [f"{len(new)} new"] if new else []
         counts += [f"{len(resolved)} gone"] if resolved else []
-        verdict = summary_line(report).rpartition(": ")[2]
+        verdict = report.summary.verdict()
         if now and before is not None:
             verdict = f"{verdict} ({', '.join(counts)})" if counts else f"still {verdict}"
         self._progress.say(f"checked: {verdict}")

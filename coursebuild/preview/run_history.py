@@ -12,7 +12,13 @@ from typing import TypeAlias
 from msgspec.structs import replace
 
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import PublishedTrials, Results, ScriptJob, ScriptRun
+from coursebuild.core.model.results import (
+    PublishedTrials,
+    Results,
+    ScriptJob,
+    ScriptRun,
+    TrialLine,
+)
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import extract, jobs
@@ -32,6 +38,7 @@ class RunHistory:
         """The course that was run last."""
         self.diagnostics: tuple[Diagnostic, ...] = ()
         self.script_lines: tuple[ScriptLine, ...] = ()
+        self.trial_lines: tuple[TrialLine, ...] = ()
         self.is_all_due = True
         """Whether any script may print something new, since other files have changed."""
         self.trials = PublishedTrials()
@@ -56,7 +63,7 @@ class RunHistory:
     def take(self, course: Course, verification: Verification, trials: PublishedTrials) -> None:
         """Take the results of verifying a course."""
         self.course, self.diagnostics = course, verification.diagnostics
-        self.script_lines = verification.scripts
+        self.script_lines, self.trial_lines = verification.scripts, verification.labs
         self.last_results, self.trials = verification.results, trials
         keys = script_keys(course)
         self._runs = {run.path: (keys[run.path], run) for run in self.last_results.runs}

@@ -15,15 +15,16 @@ from coursebuild.report.text import diagnostic_text as diagnostic_text
 from coursebuild.report.text import location, to_text
 from coursebuild.report.values import Report as Report
 from coursebuild.report.values import ScriptLine as ScriptLine
-from coursebuild.report.values import Summary as Summary
-from coursebuild.report.values import json_text, plain
-from coursebuild.report.values import summary_line as summary_line
+from coursebuild.report.values import json_text, plain, unrun_reason
 from coursebuild.report.values import unchanged_report as unchanged_report
 
 
-def render_report(report: Report, form: str, style: Style) -> str:
-    """Return the report as `text` or in a format of `FORMATS`; ends in a newline, or is empty."""
-    return to_text(report, style) if form == "text" else FORMATS[form](report)
+def render_report(report: Report, form: str, style: Style, *, brief: bool = False) -> str:
+    """Return the report as `text` or in a format of `FORMATS`; ends in a newline, or is empty.
+
+    As text, and if `brief`, only what is wrong.
+    """
+    return to_text(report, style, brief=brief) if form == "text" else FORMATS[form](report)
 
 
 def to_json(report: Report) -> str:
@@ -32,7 +33,7 @@ def to_json(report: Report) -> str:
     In the summary, `ran` counts the scripts run just now, `cached` those with a remembered result.
     """
     s = report.summary
-    summary = {"ok": report.ok, **plain(s), "ran": s.ran - s.cached, "seconds": round(s.seconds, 3)}
+    summary = {"ok": s.ok, **plain(s), "ran": s.ran - s.cached, "seconds": round(s.seconds, 3)}
     value: dict[str, Any] = {
         "diagnostics": report.diagnostics,
         "scripts": [_line_value(line) for line in report.scripts],
@@ -67,13 +68,14 @@ def to_junit(report: Report) -> str:
     for script in report.scripts:
         case = _add_case(suite, f"lesson {script.lesson}", script.path, script.seconds)
         if not script.did_run:
-            reason = f"needs {', '.join(script.missing)}" if script.missing else "not run"
-            SubElement(case, "skipped", message=reason)
+            SubElement(case, "skipped", message=unrun_reason(script))
         elif script.status != "ok":
             SubElement(case, "failure", type=script.status, message=script.status)
     for lab in report.labs:
         case = _add_case(suite, f"lesson {lab.lesson}", lab.name, lab.seconds)
-        if lab.status != "ok":
+        if lab.untried:
+            SubElement(case, "skipped", message=lab.untried)
+        elif lab.status != "ok":
             SubElement(case, "failure", type=lab.status, message=lab.status)
     for path in dict.fromkeys(d.span.path for d in report.diagnostics):
         case = _add_case(suite, "course", path, 0.0)
@@ -91,7 +93,7 @@ def to_junit(report: Report) -> str:
         "failures": str(sum(case.find("failure") is not None for case in suite)),
         "errors": "0",
         "skipped": str(sum(case.find("skipped") is not None for case in suite)),
-        "time": f"{report.summary.seconds:.3f}",
+        "time": f"{report.seconds:.3f}",
     }
     indent(suites)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(suites, encoding="unicode")}\n'

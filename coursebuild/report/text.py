@@ -26,6 +26,7 @@ from coursebuild.report.values import (
     plural,
     summary_line,
     unproven_things,
+    unrun_reason,
 )
 
 BOLD, FAINT, GREEN, RED, YELLOW, BLUE = "1", "2", "32", "1;31", "1;33", "1;34"
@@ -139,16 +140,18 @@ def _is_filled(column: Column) -> bool:
 _MOST_OF_A_RULE = 20
 
 
-def to_text(report: Report, style: Style) -> str:
-    """The report as text: diagnostics, the scripts, and a summary line."""
+def to_text(report: Report, style: Style, *, brief: bool = False) -> str:
+    """The report as text: diagnostics, the scripts, and a summary line; if `brief`, no scripts."""
+    if brief and report.ok and not report.diagnostics:
+        return ""
     parts = list(diagnostic_paragraphs(report.diagnostics, style))
     lines = [script_line(line, style) for line in report.scripts]
     lines += [lab_line(line, style) for line in report.labs]
-    if lines:
+    if lines and not brief:
         parts.append("".join(line + "\n" for line in lines))
-    if report.sensitivity:
+    if report.sensitivity and not brief:
         parts.append(sensitivity_text(report.sensitivity, style))
-    if report.remarks:
+    if report.remarks and not brief:
         parts.append("".join(visible_lines(remark) + "\n" for remark in report.remarks))
     parts.append(style.paint(summary_line(report), GREEN if report.ok else RED) + "\n")
     return "\n".join(parts)
@@ -177,10 +180,8 @@ def script_line(line: ScriptLine, style: Style) -> str:
     good = line.status == "ok" or not line.did_run
     verdict = style.paint(f"{line.status:<8}", GREEN if good else RED)
     if not line.did_run:
-        reason = f"needs {', '.join(line.missing)}" if line.missing else "not run"
-        reason = "nothing to compare with" if line.status == "unrecorded" else reason
         unproven = f"; unproven: {things}" if (things := unproven_things(line)) else ""
-        return f"{verdict} {line.path}  ({reason}{unproven})"
+        return f"{verdict} {line.path}  ({unrun_reason(line)}{unproven})"
     took = "cached" if line.cached else f"{line.seconds:.2f} s"
     took += ", not yet repeated" if line.unrepeated else ""
     return f"{verdict} {line.path}  {style.paint(took, FAINT)}"
@@ -188,10 +189,10 @@ def script_line(line: ScriptLine, style: Style) -> str:
 
 def lab_line(line: TrialLine, style: Style) -> str:
     """One lab: verdict, name, how fast it ran, what was tried, how it compares."""
-    verdict = style.paint(f"{line.status:<8}", GREEN if line.status == "ok" else RED)
+    verdict = style.paint(f"{line.status:<8}", RED if line.status == "failed" else GREEN)
+    if line.untried:
+        return f"{verdict} {line.name}  ({line.untried})"
     parts = [] if line.steps_per_second is None else [f"{line.steps_per_second:,} steps/s"]
-    if line.status == "ok" and line.tried == 0:
-        return f"{verdict} {line.name}  {style.paint('not tried: a custom kind of lab', FAINT)}"
     parts += [plural(line.tried, "thing") + " tried"] + ([line.parity] if line.parity else [])
     parts += [f"motion fills {100 * line.fill:.1f} %"] if line.fill is not None else []
     parts += [f"falls out of the scene: {body}" for body in line.fallen]

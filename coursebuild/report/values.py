@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Mapping
 from enum import Enum
 from typing import Any
@@ -33,34 +34,74 @@ class ScriptLine(Struct, frozen=True):
     unproven_numbers: int = 0
     unrepeated: bool = False
     """Whether what is recorded of it was recorded from its only run."""
+    reasons: tuple[str, ...] = ()
+    """What kept it from running: missing modules, `norun`."""
 
     @property
     def did_run(self) -> bool:
         """Whether it was run, now or before."""
-        return self.status not in ("skipped", "norun", "unrecorded")
+        return not self.reasons
 
 
 class Summary(Struct, frozen=True):
-    """The totals."""
+    """What a report comes to. Exit status and last line are both read from it."""
 
     lessons: int
     scripts: int
     ran: int
     """Scripts with a result, new or remembered."""
+    failed: int
+    """Scripts and labs that did not do what they should."""
     skipped: int
+    tried: int
+    """Labs that were tried."""
+    untried: int
     errors: int
     warnings: int
     silenced: int
     seconds: float
-    cached: int = 0
+    cached: int
     """Those of `ran` whose result is remembered, so that they were not run again."""
-    unproven: int = 0
+    unproven: int
     """Scripts that were not run, so that they prove nothing."""
-    reasons: tuple[str, ...] = ()
-    """What kept them from it: missing modules, `norun`."""
-    unrepeated: int = 0
+    reasons: tuple[str, ...]
+    """What kept scripts and labs from it: missing modules, `norun`."""
+    unrepeated: int
     """Scripts that were recorded from their only run."""
-    hints: int = 0
+    hints: int
+    part: str
+    """The part of the work that was done, as `2/8`; empty for all of it."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing is wrong, so that the command succeeds."""
+        return not (self.errors or self.failed)
+
+    def verdict(self) -> str:
+        """What was found, in words: all holds only where all was run and nothing is wrong."""
+        counts = [plural(self.errors, "error")] if self.errors else []
+        if self.failed and not self.errors:
+            counts.append(f"{self.failed} failed")
+        counts += [plural(self.warnings, "warning")] if self.warnings else []
+        left_out = [_were_not(self.unproven, "script", "run")] if self.unproven else []
+        left_out += [_were_not(self.untried, "lab", "tried")] if self.untried else []
+        exceptions = f"{' and '.join(left_out)} ({', '.join(self.reasons)})" if left_out else ""
+        part = f"part {self.part} of the work" if self.part else ""
+        if counts:
+            text = ", ".join(counts) + (f" in {part}" if part else "")
+            text += f", and {exceptions}" if exceptions else ""
+        elif exceptions:
+            text = f"{part} holds, but for {exceptions}".lstrip()
+        else:
+            assert self.ok, self
+            text = f"{part or 'everything'} holds"
+        if self.unrepeated:
+            text += f"; {plural(self.unrepeated, 'script')} recorded, not yet repeated"
+        return text + (f" ({self.silenced} silenced)" if self.silenced else "")
+
+
+def _were_not(count: int, noun: str, done: str) -> str:
+    return f"{plural(count, noun)} that {'was' if count == 1 else 'were'} not {done}"
 
 
 class Report(Struct, frozen=True):
@@ -68,9 +109,15 @@ class Report(Struct, frozen=True):
 
     diagnostics: tuple[Diagnostic, ...]
     scripts: tuple[ScriptLine, ...]
-    summary: Summary
-    remarks: tuple[str, ...] = ()
     labs: tuple[TrialLine, ...] = ()
+    lessons: int = 0
+    """How many it is about."""
+    silenced: int = 0
+    """How many warnings the map silences."""
+    seconds: float = 0.0
+    remarks: tuple[str, ...] = ()
+    part: str = ""
+    """The part of the work that was done, as `2/8`; empty for all of it."""
     depends: tuple[str, ...] | None = None
     """Files outside the course's own folders that the report depends on, absolute or relative to
     its root; `None` where they are not known."""
@@ -82,9 +129,39 @@ class Report(Struct, frozen=True):
     """Where the course lies in the repository, for services that know only this: `lectures/`."""
 
     @property
+    def summary(self) -> Summary:
+        """What its diagnostics, scripts and labs come to."""
+        severities = Counter(d.severity for d in self.diagnostics)
+        run_lines = [line for line in self.scripts if line.did_run]
+        unrun = [line for line in self.scripts if not line.did_run]
+        trial_lines = [line for line in self.labs if not line.untried]
+        statuses = [*(line.status for line in run_lines), *(line.status for line in trial_lines)]
+        untried = [line.untried for line in self.labs if line.untried]
+        reasons = [*(reason for line in unrun for reason in line.reasons), *untried]
+        return Summary(
+            lessons=self.lessons,
+            scripts=len(self.scripts),
+            ran=len(run_lines),
+            failed=sum(status != "ok" for status in statuses),
+            skipped=sum(line.status == "skipped" for line in unrun),
+            tried=len(trial_lines),
+            untried=len(untried),
+            errors=severities["error"],
+            warnings=severities["warning"],
+            silenced=self.silenced,
+            seconds=self.seconds,
+            cached=sum(line.cached for line in run_lines),
+            unproven=len(unrun),
+            reasons=tuple(dict.fromkeys(reasons)),
+            unrepeated=sum(line.unrepeated for line in self.scripts),
+            hints=len(self.hints),
+            part=self.part,
+        )
+
+    @property
     def ok(self) -> bool:
-        """Whether there are no errors."""
-        return all(not d.is_error for d in self.diagnostics)
+        """Whether nothing is wrong."""
+        return self.summary.ok
 
 
 def with_hints(report: Report) -> tuple[Diagnostic, ...]:
@@ -98,7 +175,6 @@ def unchanged_report(report: Report, remark: str) -> Report:
         report,
         scripts=tuple(replace(line, cached=True) for line in report.scripts),
         labs=tuple(replace(line, cached=True) for line in report.labs),
-        summary=replace(report.summary, cached=report.summary.ran),
         remarks=(remark,),
     )
 
@@ -114,25 +190,20 @@ def unproven_things(line: ScriptLine) -> str:
     return " and ".join(plural(count, noun) for count, noun in counts if count)
 
 
+def unrun_reason(line: ScriptLine) -> str:
+    """Why a script was not run: `needs torch`, or what its fence or the course says."""
+    return f"needs {', '.join(line.missing)}" if line.missing else ", ".join(line.reasons)
+
+
 def summary_line(report: Report) -> str:
     """One line that says what was checked and what was found."""
     s = report.summary
     parts = [plural(s.lessons, "lesson"), f"{plural(s.ran - s.cached, 'script')} run"]
     if s.cached:
         parts.append(f"{s.cached} cached")
-    if report.labs:
-        parts.append(f"{plural(len(report.labs), 'lab')} tried")
-    counts = [plural(s.errors, "error")] if s.errors else []
-    counts += [plural(s.warnings, "warning")] if s.warnings else []
-    verdict = ", ".join(counts) if counts else "everything holds"
-    if s.unproven:
-        was = "was" if s.unproven == 1 else "were"
-        unrun = f"{plural(s.unproven, 'script')} that {was} not run ({', '.join(s.reasons)})"
-        verdict = f"{verdict}, and {unrun}" if counts else f"holds, but for {unrun}"
-    if s.unrepeated:
-        verdict += f"; {plural(s.unrepeated, 'script')} recorded, not yet repeated"
-    silenced = f" ({s.silenced} silenced)" if s.silenced else ""
-    return f"{', '.join(parts)}: {verdict}{silenced}"
+    if s.tried:
+        parts.append(f"{plural(s.tried, 'lab')} tried")
+    return f"{', '.join(parts)}: {s.verdict()}"
 
 
 # --- JSON

@@ -52,7 +52,7 @@ def test_a_new_script_runs_once_until_it_is_measured(course: Folder) -> None:
     result = course.main("check")
     assert (result.status, count(course)) == (1, 0)
     assert "error[output-drift]: no output of `examples/a.py` is recorded yet" in result.out
-    assert "unrecorded examples/a.py  (nothing to compare with" in result.out
+    assert "unrecorded examples/a.py  (nothing recorded" in result.out
     assert "and 1 script that was not run (nothing recorded)" in result.out
 
     result = course.main("update")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import xml.etree.ElementTree as ElementTree
+from itertools import product
 from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
 
 from coursebuild import MANUAL
-from coursebuild.core.model.results import TrialLine
+from coursebuild.core.model.results import Outcome, TrialLine
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.report import (
@@ -18,7 +19,6 @@ from coursebuild.report import (
     Report,
     ScriptLine,
     Style,
-    Summary,
     diagnostic_text,
     render_report,
 )
@@ -120,18 +120,19 @@ def test_report_lists_scripts_and_ends_with_a_summary() -> None:
     scripts = (
         ScriptLine("examples/a.py", "1.1", "ok", 0.25, False),
         ScriptLine("examples/b.py", "1.1", "drift", 1.0, True),
-        ScriptLine("examples/c.py", "1.2", "skipped", 0.0, False, ("torch",), 1, 2),
-        ScriptLine("examples/d.py", "1.2", "norun", 0.0, False),
+        ScriptLine(
+            "examples/c.py", "1.2", "skipped", 0.0, False, ("torch",), 1, 2, reasons=("torch",)
+        ),
+        ScriptLine("examples/d.py", "1.2", "norun", 0.0, False, reasons=("norun",)),
     )
-    counts = Summary(2, 4, 2, 1, 0, 0, 1, 1.5, cached=1, unproven=2, reasons=("torch", "norun"))
-    report = Report((), scripts, counts)
+    report = Report((), scripts, lessons=2, silenced=1)
     assert render_report(report, "text", Style()) == (
         "ok       examples/a.py  0.25 s\n"
         "drift    examples/b.py  cached\n"
         "skipped  examples/c.py  (needs torch; unproven: 1 output and 2 bound numbers)\n"
-        "norun    examples/d.py  (not run)\n"
+        "norun    examples/d.py  (norun)\n"
         "\n"
-        "2 lessons, 1 script run, 1 cached: holds, but for 2 scripts that were not run"
+        "2 lessons, 1 script run, 1 cached: 1 failed, and 2 scripts that were not run"
         " (torch, norun) (1 silenced)\n"
     )
 
@@ -142,7 +143,7 @@ def test_many_diagnostics_of_a_rule_in_a_file_are_counted() -> None:
     diagnostics = tuple(
         diagnose(rule, source.span(4 * n, 4 * n + 3), "m") for n, rule in enumerate(rules)
     )
-    report = Report(diagnostics, (), Summary(1, 0, 0, 0, 1501, 0, 0, 1.0))
+    report = Report(diagnostics, (), lessons=1)
     text = render_report(report, "text", Style())
     assert text.count("[html-unbalanced]: m\n") == 20
     assert text.count("[math-syntax]: m\n") == 1
@@ -169,17 +170,66 @@ def test_labs_are_listed_like_scripts() -> None:
         TrialLine("1.1-lab-1", "A", "1.1", "ok", 1.239, 64206, 13, "bit-identical", False),
         TrialLine("1.1-lab-2", "", "1.1", "ok", 0.1, 1000, 1, "", True, "a `switch`"),
         TrialLine("1.1-lab-3", "", "1.1", "failed", 0.5, None, 0, "", False),
-        TrialLine("1.1-lab-4", "", "1.1", "ok", 0.0, None, 0, "", False),
+        TrialLine("1.1-lab-4", "", "1.1", "untried", untried="a kind of the course's"),
     )
-    report = Report((), (), Summary(1, 0, 0, 0, 0, 0, 0, 2.0), labs=labs)
+    report = Report((), (), labs, lessons=1)
     assert render_report(report, "text", Style()) == (
         "ok       1.1-lab-1  64,206 steps/s, 13 things tried, bit-identical, 1.24 s\n"
         "ok       1.1-lab-2  1,000 steps/s, 1 thing tried, no Python export: a `switch`, cached\n"
         "failed   1.1-lab-3  0 things tried, 0.50 s\n"
-        "ok       1.1-lab-4  not tried: a custom kind of lab\n"
+        "untried  1.1-lab-4  (a kind of the course's)\n"
         "\n"
-        "1 lesson, 0 scripts run, 4 labs tried: everything holds\n"
+        "1 lesson, 0 scripts run, 3 labs tried: 1 failed, and 1 lab that was not tried"
+        " (a kind of the course's)\n"
     )
+
+
+LINES: tuple[ScriptLine | TrialLine, ...] = (
+    *(ScriptLine("a.py", "1.1", outcome.value, 1.0, False) for outcome in Outcome),
+    ScriptLine("a.py", "1.1", "drift", 1.0, False),
+    ScriptLine("a.py", "1.1", "diverged", 1.0, False),
+    ScriptLine("a.py", "1.1", "blocked", 0.0, False, reasons=("blocked",)),
+    TrialLine("l", "", "1.1", "ok", tried=1),
+    TrialLine("l", "", "1.1", "failed"),
+    TrialLine("l", "", "1.1", "untried", untried="other mistakes"),
+)
+
+
+@pytest.mark.parametrize("form", ("text", *FORMATS))
+def test_everything_holds_only_where_all_was_run_and_nothing_failed(form: str) -> None:
+    """Of every way in which a script or a lab can end, with no mistake, a warning, or an error."""
+    unrun = {"skipped", "norun", "unrecorded", "blocked", "untried"}
+    for line, diagnostics in product(LINES, ((), (WARNING,), (ERROR,))):
+        if isinstance(line, ScriptLine) and line.status in unrun:
+            line = replace(line, reasons=("norun",))
+        scripts, labs = ((line,), ()) if isinstance(line, ScriptLine) else ((), (line,))
+        report = Report(diagnostics, scripts, labs, lessons=1)
+        is_failure = line.status not in {"ok", *unrun}
+        assert report.ok is not (is_failure or diagnostics == (ERROR,)), line
+        is_whole = "everything holds" in report.summary.verdict()
+        assert is_whole is (line.status == "ok" and not diagnostics), line
+        assert "holds" not in report.summary.verdict() or report.ok, line
+        text = render_report(report, form, Style())
+        if form == "text":
+            assert text.endswith(f": {report.summary.verdict()}\n")
+        elif form == "json":
+            assert json.loads(text)["summary"]["ok"] is report.ok
+        elif form == "junit":
+            suite = ElementTree.fromstring(text.encode()).find("testsuite")
+            assert suite is not None
+            assert (suite.get("failures") == "0") is report.ok, line
+            assert (suite.get("skipped") == "1") is (line.status in unrun), line
+
+
+def test_a_part_of_the_work_is_not_everything() -> None:
+    verdicts = [
+        Report(diagnostics, (), part="2/8").summary.verdict()
+        for diagnostics in ((), (WARNING, ERROR))
+    ]
+    assert verdicts == [
+        "part 2/8 of the work holds",
+        "1 error, 1 warning in part 2/8 of the work",
+    ]
 
 
 ROOT = Path(__file__).parents[2]
@@ -196,14 +246,14 @@ WARNING = diagnose("image-alt", SOURCE.span(0, 5), "no text")
 SCRIPTS = (
     ScriptLine("examples/a.py", "1.1", "ok", 0.25, False),
     ScriptLine("examples/b.py", "1.1", "timeout", 60.0, False),
-    ScriptLine("examples/c.py", "1.1", "skipped", 0.0, False, ("torch",)),
-    ScriptLine("examples/d.py", "1.1", "norun", 0.0, False),
+    ScriptLine("examples/c.py", "1.1", "skipped", 0.0, False, ("torch",), reasons=("torch",)),
+    ScriptLine("examples/d.py", "1.1", "norun", 0.0, False, reasons=("norun",)),
 )
 LABS = (
     TrialLine("1.1-lab-1", "A & B", "1.1", "ok", 1.23456, 64206, 13, "bit-identical", True),
     TrialLine("1.1-lab-2", "", "1.1", "failed", 0.5, None, 0, "", False),
 )
-REPORT = Report((WARNING, ERROR), SCRIPTS, Summary(1, 4, 2, 1, 1, 1, 0, 60.25), labs=LABS)
+REPORT = Report((WARNING, ERROR), SCRIPTS, LABS, lessons=1, seconds=60.25)
 
 
 @pytest.mark.parametrize("form", FORMATS)

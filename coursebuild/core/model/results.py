@@ -293,7 +293,7 @@ class TrialLine(Struct, frozen=True):
     lesson: str
     """Id of its lesson or page."""
     status: str
-    """`ok` or `failed`."""
+    """`ok`, `failed` or `untried`."""
     seconds: float = 0.0
     """Wall time."""
     steps_per_second: int | None = None
@@ -308,6 +308,8 @@ class TrialLine(Struct, frozen=True):
     """The mean share of its picture that moving things fill; `None` where nothing moves."""
     fallen: tuple[str, ...] = ()
     """What has fallen out of the scene, and to where."""
+    untried: str = ""
+    """Why it was not tried; empty if it was."""
 
 
 class TrialResult(Struct, frozen=True):

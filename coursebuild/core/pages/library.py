@@ -129,7 +129,7 @@ class Library(Struct, frozen=True, dict=True):
         return _group(
             (name, ModelUse(owner, tuple(way for way in WAYS if way in ways)))
             for owner, document in (self.course.owned_documents if names else ())
-            for name, ways in _named_models(document).items()
+            for name, ways in named_models(document).items()
             if name in names
         )
 
@@ -246,7 +246,7 @@ def models_named(script: model.Script) -> frozenset[str]:
     return frozenset(name.removesuffix(".xml").removeprefix("models/") for name in names)
 
 
-def _named_models(document: model.Document) -> Mapping[str, tuple[str, ...]]:
+def named_models(document: model.Document) -> Mapping[str, tuple[str, ...]]:
     """The names in a document that may be models, with the ways in which it uses them."""
 
     def uses() -> Iterator[tuple[str, str]]:

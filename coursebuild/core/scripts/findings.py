@@ -36,6 +36,7 @@ _WIDTH = 60
 
 def script_findings(
     course: Course,
+    documents: Iterable[tuple[Owner, Document]],
     extractions: Sequence[Extraction],
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
@@ -49,6 +50,7 @@ def script_findings(
 
     Args:
         course: the course.
+        documents: those whose outputs and bound numbers are looked at.
         extractions: the scripts that were run, perhaps not all of the course.
         runs: what they did.
         verdicts: their output compared with the recorded one.
@@ -71,7 +73,7 @@ def script_findings(
     outputs = bindings.PrintedOutputs(verdicts, runs, scripts)
     return (
         *diagnostics,
-        *output_findings(course, course.owned_documents, outputs, evidence, other_runs),
+        *output_findings(course, documents, outputs, evidence, other_runs),
     )
 
 

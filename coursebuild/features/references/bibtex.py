@@ -82,8 +82,9 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
         *("pylatexenc.latexwalker", "pylatexenc.latex2text"),
     ):
         logging.getLogger(name).disabled = True
+    list_text = source.text.replace("\r\n", "\n").replace("\r", "\n")
     library = parse_string(
-        source.text.replace("\r\n", "\n").replace("\r", "\n"),
+        list_text,
         append_middleware=[
             middlewares.NormalizeFieldKeys(),
             middlewares.SeparateCoAuthors(),
@@ -117,6 +118,17 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
         for match in _ENTRY.finditer(comment.comment or ""):
             line = (comment.start_line or 0) + comment.comment[: match.start()].count("\n")
             report(line, "no entry begins here", "an entry is `@article{key, title = {…}, …}`")
+    for entry in parse_string(list_text, parse_stack=()).entries:  # values as they are written
+        for field in entry.fields:
+            if (swallowed := _find_swallowed(field.value)) is not None:
+                start, message, help = swallowed
+                before = "\n".join(list_text.split("\n")[: field.start_line])
+                start += list_text.index(field.value, len(before))
+                report(
+                    list_text.count("\n", 0, start),
+                    f"in `{entry.key}`, the value of `{field.key}` {message}",
+                    help,
+                )
     works: list[Work] = []
     for entry in library.entries:
         fields: list[tuple[str, str]] = []
@@ -129,6 +141,50 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
         kind, span = entry.entry_type.lower(), _line(source, entry.start_line or 0)
         works.append(Work(entry.key, kind, tuple(fields), tuple(people), span))
     return Parsed(tuple(works), tuple(diagnostics))
+
+
+_PIECE = re.compile(r"""[^\s"#%'(),={}]+""")
+"""A number, or a name of `@string`."""
+_FIELDS = """
+    abstract address annote author booktitle chapter crossref date doi edition editor howpublished
+    institution isbn issn journal key keywords month note number organization pages publisher school
+    series title translator type url volume year
+""".split()
+"""Those of BibTeX and of the styles of today."""
+_INNER_FIELD = re.compile(rf",\s*\n\s*({'|'.join(_FIELDS)})\s*=\s*[{{\"\d]", re.IGNORECASE)
+
+
+def _find_swallowed(value: str) -> tuple[int, str, str] | None:
+    """Where a value goes on with what is not its own, in words, and a help.
+
+    A value is one piece, or several with `#` between them: texts in braces or quotes, numbers and
+    names.
+    """
+    end = _end_of_piece(value, 0)
+    while (joint := re.compile(r"\s*#\s*").match(value, end)) is not None:
+        end = _end_of_piece(value, joint.end())
+    if rest := value[end:].strip():
+        start = value.index(rest, end)
+        excerpt = " ".join(rest.split())[:40]
+        return start, f"ends before `{excerpt}`", "put a comma between the two"
+    if (inner := _INNER_FIELD.search(value)) is not None:
+        message = f"takes in the field `{inner[1]}`"
+        return inner.start(1), message, "close the value before the comma"
+    return None
+
+
+def _end_of_piece(value: str, start: int) -> int:
+    """The end of a text, number or name; of a text that nothing closes, the end of all."""
+    opening = value[start : start + 1]
+    if opening not in ("{", '"'):
+        piece = _PIECE.match(value, start)
+        return start if piece is None else piece.end()
+    depth = 0
+    for mark in re.compile(r'\\.|[{}"]', re.DOTALL).finditer(value, start + (opening == '"')):
+        depth += {"{": 1, "}": -1}.get(mark[0], 0)
+        if depth == 0 and mark[0] == ("}" if opening == "{" else '"'):
+            return mark.end()
+    return len(value)
 
 
 def _line(source: Source, index: int) -> Span:

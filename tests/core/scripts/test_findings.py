@@ -77,10 +77,18 @@ def test_tracebacks_lead_into_scripts_that_did_not_run() -> None:
     lessons = course(document(LESSON))
     scripts = extract(lessons).value[:1]
     runs = [make_run(outcome=Outcome.FAILED, status=1, stderr=stderr)]
-    (diagnostic,) = script_findings(lessons, scripts, runs, verify(lessons, runs))
+    (diagnostic,) = script_findings(
+        lessons, lessons.owned_documents, scripts, runs, verify(lessons, runs)
+    )
     assert describe(diagnostic).startswith("script-failed at 15:1 `1/0`")
     assert (
-        script_findings(lessons, scripts, [make_run("E 1.5")], verify(lessons, [make_run("E 1.5")]))
+        script_findings(
+            lessons,
+            lessons.owned_documents,
+            scripts,
+            [make_run("E 1.5")],
+            verify(lessons, [make_run("E 1.5")]),
+        )
         == ()
     )
 
@@ -94,10 +102,14 @@ def test_a_text_that_is_an_output_is_marked_by_its_edit() -> None:
         lessons = course(document("```python file=examples/a.py\n1\n```\n\nSee this.\n\n" + block))
         runs = [make_run("E 1.52 of 3")]
         scripts = extract(lessons).value
-        (diagnostic,) = script_findings(lessons, scripts, runs, verify(lessons, runs))
+        (diagnostic,) = script_findings(
+            lessons, lessons.owned_documents, scripts, runs, verify(lessons, runs)
+        )
         assert diagnostic.rule == "output-unmarked"
         lessons = course(document(apply_edits(lessons.documents[0].source.text, diagnostic.edits)))
-        assert script_findings(lessons, scripts, runs, verify(lessons, runs)) == ()
+        verdict = verify(lessons, runs)
+        documents = lessons.owned_documents
+        assert script_findings(lessons, documents, scripts, runs, verdict) == ()
 
 
 def test_every_recording_gets_a_verdict() -> None:
