@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.run import gate
+from support.waiting import wait_until
 
 ROOT = Path(__file__).parents[3]
 MODULES = "subprocess multiprocessing concurrent.futures.process pty webbrowser asyncio.subprocess"
@@ -157,8 +158,12 @@ def test_a_process_that_takes_too_long_is_ended_with_its_children(tmp_path: Path
     command = ["/bin/sh", "-c", f"sleep 600 & echo $! > '{mark}'; wait"]
     with pytest.raises(TimeoutError, match="longer than 4 s"):
         gate.finish(command, gate.environment(), seconds=4.0)
-    state = Path(f"/proc/{mark.read_text().strip()}/stat")
-    assert not state.exists() or state.read_text().rpartition(")")[2].split()[0] == "Z"
+    child = Path(f"/proc/{mark.read_text().strip()}/stat")
+    wait_until(lambda: not child.exists() or is_zombie(child), "the end of the child")
+
+
+def is_zombie(stat: Path) -> bool:
+    return stat.read_text().rpartition(")")[2].split()[0] == "Z"
 
 
 def test_modules_are_run_from_where_this_process_has_them(tmp_path: Path) -> None:
