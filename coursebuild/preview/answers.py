@@ -122,6 +122,16 @@ _TYPES = MimeTypes().types_map[True] | {
 }
 """Python's own table, and what it lacks in some version or has otherwise."""
 _WORKER = "/service-worker.js"
+
+
+def is_worker(address: str) -> bool:
+    """Whether an address is of the script that takes the place of a published site's worker.
+
+    It is for everybody: until it has come, the browser shows that site, and no link gets through.
+    """
+    return address.partition("?")[0].endswith(_WORKER)
+
+
 _NEXT_PAGE = '<!DOCTYPE html><title>…</title><meta http-equiv="refresh" content="0; url={}">'
 _MESSAGE_PAGE = "<!DOCTYPE html><html lang={}><title>{}</title><body><p>{}</p></body></html>"
 

@@ -40,7 +40,7 @@ import msgspec
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.trust import store_key
 from coursebuild.core.run import gate
-from coursebuild.preview.answers import HTML, PREFIX, TEXT, Access, Answers, digest
+from coursebuild.preview.answers import HTML, PREFIX, TEXT, Access, Answers, digest, is_worker
 from coursebuild.preview.messages import accept, page_news
 from coursebuild.preview.session import Session
 from coursebuild.report.text import location
@@ -234,7 +234,7 @@ class _Handler(BaseHTTPRequestHandler):
             cookie, page = exchange
             self._send(HTTPStatus.OK, HTML, page, {"Set-Cookie": cookie})
             return False
-        if not refusal and access.has_token(self.headers):
+        if not refusal and (access.has_token(self.headers) or is_worker(self.path)):
             return True
         message = refusal or "open the address that the terminal shows, which lets this browser in"
         self._send(HTTPStatus.FORBIDDEN, TEXT, f"{message}\n".encode())

@@ -348,7 +348,8 @@ def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
     preview.answers = OneScript(session, script)
     preview.start()
     try:
-        page.goto(host.url + FIRST)
+        page.goto(f"{host.url}{FIRST}?token={preview.access.token}")
+        page.wait_for_url(host.url + FIRST)  # the link let the browser in
         left = "navigator.serviceWorker.getRegistrations().then(all => all.length === 0)"
         until(page, left)
         if script == "worker.js":
