@@ -198,7 +198,7 @@ lost       content/lessons/1.1-one.md:3:11  MuJoCo {NEW_VERSION} discourages `mj
 This is deprecated, take another.
 lost       content/lessons/1.1-one.md:3:42  MuJoCo {NEW_VERSION} has no `mj_step`
 lost       content/lessons/1.1-one.md:3:53  MuJoCo {NEW_VERSION} has no `data.qpos`
-lost       content/lessons/1.1-one.md:3:69  MJCF of MuJoCo {NEW_VERSION} has no element `<geom>`
+lost       content/lessons/1.1-one.md:3:69  MuJoCo {NEW_VERSION} has no `geom`
 
 {SUM} 0 scripts: nothing to compare
 """
