@@ -82,7 +82,7 @@ def describe(*diagnostics: Diagnostic) -> None:
 
 def _fixture_cases() -> Iterator[Case]:
     for path in sorted(FIXTURES.rglob("*.md")):
-        if path.parent.name != "documents":
+        if path.parent.name not in ("documents", "right_texts"):  # whole texts, and not cases
             yield from read_cases(path)
 
 
@@ -92,7 +92,8 @@ def lessons() -> Iterator[bytes]:
         for part in re.split("^(?=## )", path.read_text("utf-8"), flags=re.MULTILINE):
             yield part[:3000].encode()
     yield from (case.input.encode() for case in _fixture_cases())
-    yield from (path.read_bytes() for path in sorted(FIXTURES.glob("documents/*.md")))
+    for folder in ("documents", "right_texts"):
+        yield from (path.read_bytes() for path in sorted(FIXTURES.glob(f"{folder}/*.md")))
 
 
 def info_string(text: str) -> None:
