@@ -15,6 +15,7 @@ import argparse
 import contextlib
 import gc
 import importlib
+import os
 import re
 import resource
 import signal
@@ -177,7 +178,10 @@ def leave_to_apart(command: Command) -> None:
     if command.computes and "mujoco" not in sys.modules:
         from coursebuild.core.run import gate
 
-        process = gate.module_command("coursebuild.cli.apart", *sys.argv[1:])
+        python_path = os.environ.get("PYTHONPATH", "")  # where the user has further packages
+        process = gate.module_command(
+            "coursebuild.cli.apart", *sys.argv[1:], python_path=python_path
+        )
         gate.become(process, gate.environment(*gate.TOOL, *gate.COMPUTING))
 
 

@@ -129,11 +129,15 @@ def python_command(*arguments: str, program: str = sys.executable) -> list[str]:
     return [program, "-E", "-P", *arguments]
 
 
-def module_command(module: str, *arguments: str) -> list[str]:
-    """The command that runs a module of a package, found where this process has it from."""
+def module_command(module: str, *arguments: str, python_path: str = "") -> list[str]:
+    """The command that runs a module of a package, found where this process has it from.
+
+    What the absolute places of `python_path` hold is found as well.
+    """
     packages = ("coursebuild", module.partition(".")[0])
     files = (importlib.util.find_spec(package) for package in packages)
     places = {str(Path(spec.origin).parents[1]) for spec in files if spec and spec.origin}
+    places |= {*filter(os.path.isabs, python_path.split(os.pathsep))}
     return python_command("-c", _RUN_MODULE, os.pathsep.join(sorted(places)), module, *arguments)
 
 
