@@ -195,10 +195,15 @@ class _Updater:
         evidence = None
         if new_course is not self.course:
             evidence = collect_evidence(self.course, runs, verdicts(self.course))
+        chosen_documents = [
+            (owner, document)
+            for owner, document in new_course.owned_documents
+            if self.documents is None or document.source.path in self.documents
+        ]
         diagnostics = [
             *script_findings(
                 new_course,
-                new_course.owned_documents,
+                chosen_documents,
                 extractions,
                 runs,
                 verdicts(new_course),

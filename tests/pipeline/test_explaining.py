@@ -66,7 +66,7 @@ def test_an_edit_runs_again_what_depends_on_it(course: Folder) -> None:
     assert run_paths(course) == ["hello", "reads", "helper", "helped"]
     assert run_paths(course) == []
     result = course.main("check", "--shard", "1/1")
-    assert "2 lessons, 0 scripts run, 4 cached: everything holds" in result.out
+    assert "2 lessons, 0 scripts run, 4 cached: part 1/1 of the work holds" in result.out
     assert result.out.count("  cached\n") == 4
     assert "running scripts" not in result.err
     for path, old, new, again in EDITS:
