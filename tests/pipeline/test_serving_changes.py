@@ -252,7 +252,7 @@ def test_course_that_is_wrong_from_the_beginning(make: Make) -> None:
         assert b"Scratch" in preview.get("/")[2]
         folder.write(folder.lesson(), GOOD)
         events.wait_until_settled()
-        assert b"gone" not in preview.get(page)[2]
+        assert b"hello 3.14159" in preview.get(page)[2]
     assert not (folder.root / "public").exists()
 
 
