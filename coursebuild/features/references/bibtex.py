@@ -145,13 +145,6 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
 
 _PIECE = re.compile(r"""[^\s"#%'(),={}]+""")
 """A number, or a name of `@string`."""
-_FIELDS = """
-    abstract address annote author booktitle chapter crossref date doi edition editor howpublished
-    institution isbn issn journal key keywords month note number organization pages publisher school
-    series title translator type url volume year
-""".split()
-"""Those of BibTeX and of the styles of today."""
-_INNER_FIELD = re.compile(rf",\s*\n\s*({'|'.join(_FIELDS)})\s*=\s*[{{\"\d]", re.IGNORECASE)
 
 
 def _find_swallowed(value: str) -> tuple[int, str, str] | None:
@@ -167,9 +160,6 @@ def _find_swallowed(value: str) -> tuple[int, str, str] | None:
         start = value.index(rest, end)
         excerpt = " ".join(rest.split())[:40]
         return start, f"ends before `{excerpt}`", "put a comma between the two"
-    if (inner := _INNER_FIELD.search(value)) is not None:
-        message = f"takes in the field `{inner[1]}`"
-        return inner.start(1), message, "close the value before the comma"
     return None
 
 
