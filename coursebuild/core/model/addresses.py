@@ -96,15 +96,16 @@ def document_anchors(document: blocks.Document) -> Iterator[tuple[str, AnchorOwn
         elif isinstance(block, blocks.Recording) and block.script is not None:
             yield output_anchor(block.script, numbers[block.span.start]), block, block.span
         elif isinstance(block, blocks.HtmlBlock):
-            yield from ((id, block, block.span) for id in _html_ids(block.html))
+            yield from ((id, block, block.span) for id in html_ids(block.html))
         for inline in walk.walk_inlines(walk.block_inlines(block)):
             if isinstance(inline, RawInline):
-                yield from ((id, inline, inline.span) for id in _html_ids(inline.html))
+                yield from ((id, inline, inline.span) for id in html_ids(inline.html))
             elif isinstance(inline, Term):
                 yield inline.anchor, inline, inline.span
 
 
-def _html_ids(html: str) -> list[str]:
+def html_ids(html: str) -> list[str]:
+    """The ids that tags of some HTML have."""
     return _HTML_ID.findall(_NO_MARKUP.sub(r"\1", html))
 
 

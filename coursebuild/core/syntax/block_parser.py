@@ -35,7 +35,8 @@ _TEX = re.compile(r"(?>(?:[^\\`$]++|\\[\s\S])*)")
 _BLOCK_TEX = re.compile(r"(?>(?:[^\\$]++|\\[\s\S]|\$(?!\$))*)")
 BACKTICKS = re.compile(r"`+")
 _DOLLARS = re.compile(r"\$+")
-_LABEL = re.compile(r"\{#[^{}$]*\}?")
+_AFTER_MATH = re.compile(r"[.,;:]?[ \t]*(?:\{#[^{}$]*\}?)?")
+"""What may stand behind a formula of its own: a mark of the sentence that it ends, and a label."""
 _SPACE = " \t\n"
 _DIGITS = ("0", "1", "2", "3", "4", "5", "6", "7", "8", "9")
 
@@ -107,7 +108,7 @@ def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) 
             closing = _BLOCK_TEX.match(state.src, start, end).end()  # type: ignore[union-attr]  # it matches nothing too
         if closing >= 0 and state.src.startswith("$$", closing, end):
             rest = state.src[closing + 2 : end].strip(" \t")
-            if rest and not _LABEL.fullmatch(rest):
+            if not _AFTER_MATH.fullmatch(rest):
                 return False
             is_closed = True
             line += 1

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import partial
 
 from msgspec.structs import replace
 
 from coursebuild.core import model
+from coursebuild.core.model.addresses import html_ids
 from coursebuild.core.syntax.attributes import LABEL, check_heading, read_attributes, split_label
 from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.code_blocks import read_block
@@ -176,6 +178,9 @@ class TextReader:
             state.level = level
         classes, id = attributes.value.classes, attributes.value.id
         if id is None:
+            for inline in model.walk_inlines(children):  # links mean the id that its author wrote
+                for name in html_ids(inline.html) if isinstance(inline, model.RawInline) else ():
+                    state.anchors.reserve(name)
             anchor = state.anchors.make(model.plain_text(children))
             return model.Heading(span, level, children, anchor, False, classes)
         state.anchors.take(id.text[1:], id.span())
@@ -217,7 +222,11 @@ class TextReader:
             self.state.report(diagnose("math-unclosed", place, message, help=help))
         elif not tex.text:
             self.state.report(diagnose("math-syntax", self.span(token), "the formula is empty"))
-        braces = LABEL.match(text.text, end + 2)
+        after = min(end + 2, len(text.text))
+        mark = _SENTENCE_MARK.match(text.text, after)
+        if mark is not None:  # it is shown with the formula, beside which it would stand alone
+            tex, after = Excerpt.join([tex, text.slice(*mark.span(1))]), mark.end()
+        braces = LABEL.match(text.text, after)
         label = self.state.take_label(text.slice(*braces.span(1)) if braces else None, "eq")
         return model.MathBlock(self.span(token), tex, label=label)
 
@@ -289,6 +298,7 @@ class TextReader:
         return None
 
 
+_SENTENCE_MARK = re.compile(r"[ \t]*([.,;:])")
 _READERS: dict[str, Callable[[TextReader, PositionedToken], model.Block | None]] = {
     "paragraph_open": TextReader._read_paragraph,
     "heading_open": TextReader._read_heading,
