@@ -236,8 +236,8 @@ GROUPS: dict[str, dict[str, str]] = {
 _WARNINGS = frozenset(
     """
     draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
-    markup-foreign math-command symbol-repeated footnote-unused image-alt recording-loose
-    script-unrepeatable script-penetration script-writes script-connects
+    markup-foreign math-brackets math-command symbol-repeated footnote-unused image-alt
+    recording-loose script-unrepeatable script-penetration script-writes script-connects
     output-noise report-stale bench-unrecorded lab-penetration lab-reset package-reduced
     """.split()
 )
