@@ -6,6 +6,7 @@ works where it was given.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 
@@ -14,13 +15,14 @@ from coursebuild.core.files.locks import temporary_folder
 
 def main() -> None:
     """Run the command that the arguments are."""
-    folder_of_user = os.open(".", os.O_RDONLY)
-    with temporary_folder() as folder:
-        os.chdir(folder)
-        import mujoco  # noqa: F401  # what the command imports later is then there
-
-        os.fchdir(folder_of_user)
-    os.close(folder_of_user)
+    with contextlib.ExitStack() as resources:
+        with contextlib.suppress(OSError):  # the folder of the user may be gone
+            user_folder = os.open(".", os.O_RDONLY)
+            resources.callback(os.close, user_folder)
+            resources.callback(os.fchdir, user_folder)
+        os.chdir(resources.enter_context(temporary_folder()))
+        with contextlib.suppress(ImportError):  # the command tells that
+            import mujoco  # noqa: F401  # what the command imports later is then there
     from coursebuild.cli import main as run
 
     sys.exit(run())

@@ -2,8 +2,8 @@
 
 What a formula is, its MathML says; the TeX only tells the place. What may be right is not told: an
 interval may be open, so that `[` and `]` may each begin or end one, and a set may stand in several
-formulas of its paragraph. Brackets and letters are warnings: nearly all that is told is wrong, but a
-text may be about `((x)` itself.
+formulas of its paragraph. Brackets and letters are warnings: nearly all that is told is wrong, but
+a text may be about `((x)` itself.
 """
 
 from __future__ import annotations
