@@ -31,7 +31,9 @@ export function followLesson(document, id, progress) {
     if (document.visibilityState !== 'visible') return
     const { top, height } = text.getBoundingClientRect()
     reading.look(-top / height, (innerHeight - top) / height)
-    if (reading.isRead && !progress.lessons().get(id)?.marked) progress.markLesson(id, true)
+    // The button keeps its meaning under the pointer: who goes to press "Mark as read" would else press its opposite.
+    const isAimedAt = document.querySelector('[data-progress="lesson"] button:hover') !== null
+    if (reading.isRead && !isAimedAt && !progress.lessons().get(id)?.marked) progress.markLesson(id, true)
     if (reading.seconds >= lastSave + SAVE_EVERY) save()
   }
   const timer = setInterval(look, SECOND)
