@@ -17,6 +17,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Citation, Course, Script, document_scripts, find_inlines
+from coursebuild.core.model.lesson_record import record_path
 from coursebuild.core.model.results import Reports, Results, TrialLine
 from coursebuild.core.pages.library import named_models
 from coursebuild.core.registry import feature_trials, unproven
@@ -329,7 +330,8 @@ def depends_on(
     packages = {package.path for package in course.packages}  # archives hold all of them
     if "." in packages:
         return None
-    files = {*(page.path for page in course.pages), *shown_files(course), *packages}
+    pages = [page.path for page in course.pages]
+    files = {*pages, *map(record_path, pages), *shown_files(course), *packages}
     if interpreter is not None:
         files |= {interpreter.python, f"{interpreter.prefix}/pyvenv.cfg", *interpreter.packages}
     for run in results.runs:

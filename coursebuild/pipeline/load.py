@@ -16,7 +16,7 @@ from coursebuild.core.checks.compiled import diagnose_orphan_scenarios
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.course_features import features_digest, load_course_features
 from coursebuild.core.files.errors import EffectError, UsageError
-from coursebuild.core.files.read import read_course, read_sources
+from coursebuild.core.files.read import read_course, read_records, read_sources
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import (
     Course,
@@ -38,6 +38,7 @@ from coursebuild.core.model.course import (
     Theme,
     Words,
 )
+from coursebuild.core.model.lesson_record import ENDING, record_path
 from coursebuild.core.pages.materials import words_for
 from coursebuild.core.registry import read_references
 from coursebuild.core.run.script_environment import course_environment, engine_version
@@ -158,6 +159,7 @@ class _Loader:
             course,
             models=self.files.models,
             files=self._files_to_show(course),
+            records=read_records(self.root, [d.source.path for d in course.documents]),
             declarations=declarations,
             theme=self._load_theme(course.theme),
             bibliography=self._read_list(BIBLIOGRAPHY, course.limits.text),
@@ -343,7 +345,7 @@ class _Loader:
                 if closest is not None:
                     help = f"is it `{closest}`, which the map does not name?"
                     del unlisted[closest]
-                elif misnamed := next(self.root.glob(f"{lesson.path.removesuffix('.md')}.*"), None):
+                elif misnamed := self._find_misnamed(lesson.path):
                     help = f"is it `{misnamed.name}`? the file of a lesson ends with `.md`"
                 message = f"there is no file {lesson.path}"
                 self._report("lesson-missing", lesson.span, message, help)
@@ -353,6 +355,10 @@ class _Loader:
                 help = "lessons lie in content/lessons itself: move it there, or out of content/"
             message = f"the course map does not name {source.path}"
             self._report("lesson-unlisted", source.span(0, 0), message, help)
+
+    def _find_misnamed(self, path: str) -> Path | None:
+        names = self.root.glob(f"{path.removesuffix('.md')}.*")
+        return next((name for name in names if not name.name.endswith(ENDING)), None)
 
     def _find_pages(self, course: Course) -> list[Source]:
         """Find the texts of the pages of the map, which may lie anywhere in the course's folder."""
@@ -410,10 +416,14 @@ class _Loader:
         self.diagnostics.append(diagnose(rule, span.first_line(), message, help=help))
 
     def _files_to_show(self, course: Course) -> tuple[str, ...]:
-        """The files that a page may show or link to: all but the map, the lessons and the pages."""
+        """The files that a page may show or link to.
+
+        They are all but the map, the lessons and pages with their records, and the models.
+        """
         models = (f"models/{model.name}.xml" for model in self.files.models)
-        texts = (source.path for source in (*self.files.lessons, *self.files.pages))
-        excluded = {MAP, *texts, *(page.path for page in course.pages), *models}
+        texts = [source.path for source in (*self.files.lessons, *self.files.pages)]
+        texts += (page.path for page in course.pages)
+        excluded = {MAP, *texts, *map(record_path, texts), *models}
         return tuple(path for path in self.files.files if path not in excluded)
 
 

@@ -18,7 +18,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.examples import Obstacle
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.files.write import check_writable, write_atomic
+from coursebuild.core.files.write import change_files, check_writable, write_atomic
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.compare import verify as compare_all
@@ -38,6 +38,7 @@ from coursebuild.pipeline.recordings import (
     record_runs,
     write_figures,
 )
+from coursebuild.pipeline.records import record_changes
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
     extract_scripts,
@@ -102,6 +103,8 @@ class _Updater:
             parsed_course = load(self.options.root)
             new_course = parsed_course.value or self.course
             read_diagnostics = parsed_course.diagnostics
+        if not self.dry_run:
+            remarks += self._write_records(new_course, runs)
         diagnostics = [*read_diagnostics, *self.extracted_scripts.diagnostics]
         diagnostics += [*refusals, *failures, *figure_failures]
         diagnostics += check_recorded_runs(self.scripts, self.options)
@@ -183,6 +186,20 @@ class _Updater:
         return remarks, failures
 
     # --- the lessons as they are then
+
+    def _write_records(self, new_course: Course, runs: Sequence[ScriptRun]) -> list[str]:
+        """Write what the outputs and figures were recorded with, beside the lessons."""
+        root = self.options.root
+        documents = [
+            document
+            for document in new_course.documents
+            if self.documents is None or document.source.path in self.documents
+        ]
+        read = functools.partial(read_recorded, root)
+        changes = list(record_changes(new_course, documents, runs, root, read))
+        if changes:
+            change_files(root, changes, beside_commands=True)
+        return [f"{'wrote' if change.new else 'removed'} {change.path}" for change in changes]
 
     def _diagnose_updated(self, new_course: Course, runs: Sequence[ScriptRun]) -> list[Diagnostic]:
         paths = {extraction.path for extraction in self.scripts}

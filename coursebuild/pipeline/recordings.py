@@ -27,6 +27,7 @@ from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Course
 from coursebuild.core.model.addresses import RecordedFigure, recorded_figures
+from coursebuild.core.model.lesson_record import LessonRecord, shown_versions
 from coursebuild.core.model.results import Machine, Outcome, ScriptRun
 from coursebuild.core.run.dependencies import (
     Inputs,
@@ -40,7 +41,7 @@ from coursebuild.core.run.run_record import RunRecord, record_of
 from coursebuild.core.run.run_store import States
 from coursebuild.core.run.script_environment import machine
 from coursebuild.core.scripts.extract import Extraction, jobs
-from coursebuild.core.scripts.figures import SVG_HELP, describe_difference, prepare_figure
+from coursebuild.core.scripts.figures import SVG_HELP, figure_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.numerics.reports.records import FOLDER
@@ -51,16 +52,15 @@ class RecordedRun(Struct, frozen=True):
     """A recorded run, as its file holds it."""
 
     machine: Machine
-    packages: tuple[str, ...]
-    """Versions of the installed packages that the script imported."""
     record: RunRecord
 
     def run(self) -> ScriptRun:
         """Return the run as if it had been made now."""
         date = time.strftime("%Y-%m-%d", time.gmtime(self.record.timestamp))
         host = ", ".join(filter(None, (self.machine.cpu, self.machine.system)))
-        versions = f"MuJoCo {self.machine.engine}, Python {self.machine.python}"
-        return replace(self.record.restore(()), recorded=f"{date}, {versions}, {host}")
+        run = self.record.restore(())
+        versions = shown_versions([run.provenance])
+        return replace(run, recorded=", ".join((date, *versions, host)))
 
 
 def recorded_runs(scripts: Iterable[Extraction], options: Options) -> dict[str, ScriptRun]:
@@ -126,12 +126,7 @@ def record_runs(scripts: Iterable[Extraction], runs: Sequence[ScriptRun], option
             "",
             replace(run, seconds=round(run.seconds, 1), stderr="", figures=(), unrepeated=False),
         )
-        packages = tuple(
-            dependency.state
-            for dependency in dependencies
-            if dependency.kind is Kind.MODULE and dependency.state
-        )
-        recorded_run = RecordedRun(machine(interpreter=options.interpreter), packages, record)
+        recorded_run = RecordedRun(machine(interpreter=options.interpreter), record)
         before = _read_run(extraction, options)
         if before is not None and replace(before.record, timestamp=0) == replace(
             record, timestamp=0
@@ -194,17 +189,25 @@ def write_figures(
 ) -> tuple[list[str], list[Diagnostic]]:
     """Write the drawings that differ from the recorded ones; a remark for each, and failures."""
     by_path = {run.path: run for run in runs if run.outcome is Outcome.OK}
+    owner_records = [
+        (figure, course.records.get(document.source.path, LessonRecord()))
+        for document in course.documents
+        if documents is None or document.source.path in documents
+        for figure in recorded_figures(document)
+    ]
     remarks: list[str] = []
     failures: list[Diagnostic] = []
-    for figure in find_figures(course, documents):
+    for figure, record in owner_records:
         run = by_path.get(figure.script)
         data = dict(run.figures).get(figure.name) if run is not None else None
         drawing = prepare_figure(figure.name, data) if data is not None else ""
         recorded = read_recorded(options.root, figure.path)
-        if isinstance(drawing, str) or (
-            recorded is not None and not describe_difference(figure.name, recorded, drawing)
-        ):
+        if run is None or isinstance(drawing, str):
             continue
+        if recorded is not None:
+            _, wording = figure_difference(figure, run, recorded, drawing, record)
+            if not wording:
+                continue
         try:
             if not dry_run:
                 write_atomic(options.root, figure.path, drawing, expected=recorded)

@@ -17,7 +17,8 @@ from coursebuild.core.files.errors import OutsideProjectError
 from coursebuild.core.files.examples import BlockedFile, ExamplesReport, Obstacle, write_examples
 from coursebuild.core.files.write import remove_leftovers
 from coursebuild.core.model import Course, Mode, Recording, Table, find_blocks
-from coursebuild.core.model.addresses import RecordedFigure
+from coursebuild.core.model.addresses import RecordedFigure, recorded_figures
+from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.run_store import RunStore, longest_first
@@ -37,6 +38,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Span
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.recordings import find_figures, read_recorded, recorded_runs
+from coursebuild.pipeline.records import with_provenance
 from coursebuild.report import ScriptLine
 
 
@@ -147,6 +149,7 @@ def run(
             runs |= {path: ScriptRun(path, Outcome.UNRECORDED, 0, "", "", 0.0) for path in blank}
             jobs_to_run = [job for job in jobs_to_run if job.path not in blank]
         runs |= _run(jobs_to_run, inputs, options, stage, run_store, records)
+    runs = with_provenance(runs, extractions, options)
     return tuple(runs[job.path] for job in all_jobs)
 
 
@@ -158,9 +161,11 @@ class _Records:
         self._outputs: dict[str, list[Recording]] = {}
         for recording in recorded_outputs(course):
             self._outputs.setdefault(recording.script or "", []).append(recording)
-        self._figures: dict[str, list[RecordedFigure]] = {}
-        for figure in find_figures(course, None):
-            self._figures.setdefault(figure.script, []).append(figure)
+        self._figures: dict[str, list[tuple[RecordedFigure, LessonRecord]]] = {}
+        for document in course.documents:
+            record = course.records.get(document.source.path, LessonRecord())
+            for figure in recorded_figures(document):
+                self._figures.setdefault(figure.script, []).append((figure, record))
 
     def is_blank(self, path: str) -> bool:
         """Whether there is a place for what a script gives, and nothing in any such place."""
@@ -172,7 +177,7 @@ class _Records:
                 or self._course.comparison_of(recording).mode is Mode.VOLATILE
                 for recording in outputs
             )
-            or any(self._read(figure.path) is not None for figure in figures)
+            or any(self._read(figure.path) is not None for figure, _ in figures)
         )
 
     def compare(self, script_run: ScriptRun) -> ScriptRun:
@@ -184,8 +189,8 @@ class _Records:
             for r in outputs
         ) and not any(
             finding
-            for figure in figures
-            for finding in compare_figure(figure, script_run, self._read(figure.path))
+            for figure, record in figures
+            for finding in compare_figure(figure, script_run, self._read(figure.path), record)
         )
         return replace(script_run, unrepeated=not (holds and (outputs or figures)))
 

@@ -30,7 +30,7 @@ from coursebuild.core.model.results import (
 )
 from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.run.run_store import RunStore
-from coursebuild.core.run.script_environment import engine_version, python_version
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.scripts.bindings import BindingEvidence, document_bindings
 from coursebuild.core.scripts.compare import repeat_findings
 from coursebuild.core.scripts.compare import verify as compare_all
@@ -146,9 +146,8 @@ def verify(
         *figure_diagnostics,
     )
     interpreter = options.interpreter
-    python = python_version() if interpreter is None else interpreter.version
     engine = engine_version() if interpreter is None else interpreter.engine
-    results = Results(runs, verdicts, (), models, python, engine, trial_results)
+    results = Results(runs, verdicts, (), models, engine, trial_results)
     labs = _lab_lines(course, trials, trial_results)
     return Verification(results, course_diagnostics, run_diagnostics, lines, labs)
 

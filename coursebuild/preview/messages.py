@@ -10,7 +10,7 @@ import base64
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from operator import attrgetter
 from typing import Any
 
@@ -26,18 +26,20 @@ from coursebuild.core.model import (
     output_numbers,
 )
 from coursebuild.core.model.addresses import recorded_figures
+from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.pages.library import Library
 from coursebuild.core.scripts.bindings import document_bindings
 from coursebuild.core.scripts.diff import diff_rows
 from coursebuild.core.scripts.edit import apply_edits, update_body
-from coursebuild.core.scripts.figures import describe_difference, prepare_figure
+from coursebuild.core.scripts.figures import figure_difference, prepare_figure
 from coursebuild.core.scripts.findings import find_instability
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.fix import may_edit
 from coursebuild.pipeline.recordings import read_recorded
+from coursebuild.pipeline.records import record_changes
 from coursebuild.preview.session import Session, is_marked
 from coursebuild.report import Report
 from coursebuild.report.text import location
@@ -113,11 +115,33 @@ def accept(session: Session, path: str, ids: str) -> str:
         for s, edits_there in edits.items()
     ]
     changes += [FileChange(o.path, o.old, o.new) for o in accepted_offers if not o.edits]
+    with session.condition:
+        changes += _change_records(session, changes)
     try:  # if two browsers accept the same at once, the second one meets another text
         change_files(session.root, changes, keep=True, beside_commands=True)
     except EffectError as error:
         return error.message
     return ""
+
+
+def _change_records(session: Session, changes: Sequence[FileChange]) -> Iterator[FileChange]:
+    """Change the files that say what was recorded with what, as these changes record something."""
+    library = session.library
+    new_files = {change.path: change.new for change in changes}
+    for owner, document in () if library is None else library.course.owned_documents:
+        figures = {figure.path for figure in recorded_figures(document)}
+        path = document.source.path
+        new_text = new_files.get(path)
+        if library is None or not new_files.keys() & {path, *figures}:
+            continue
+        if new_text is not None:
+            document = session.parse(owner, Source(path, new_text.decode())).value
+
+        def read(path: str) -> bytes | None:
+            return new_files[path] if path in new_files else read_recorded(session.root, path)
+
+        runs = library.results.runs
+        yield from record_changes(library.course, [document], runs, session.root, read)
 
 
 def _collect_news(session: Session, path: str) -> dict[str, Any]:
@@ -246,14 +270,14 @@ def _figures(session: Session, library: Library, document: Document) -> Iterator
         run = library.runs.get(figure.script)
         data = dict(run.figures).get(figure.name) if run is not None else None
         drawing = prepare_figure(figure.name, data) if data is not None else ""
-        if figure.span not in drifted_spans or isinstance(drawing, str):
-            continue
         old = read_recorded(session.root, figure.path)
-        differs = (
-            "nothing is recorded yet"
-            if old is None
-            else describe_difference(figure.name, old, drawing)
-        )
+        record = library.course.records.get(document.source.path, LessonRecord())
+        if run is None or figure.span not in drifted_spans or isinstance(drawing, str):
+            continue
+        differs = "nothing is recorded yet"
+        if old is not None:
+            change, differs = figure_difference(figure, run, old, drawing, record)
+            differs += f" ({change})" if change and differs else ""
         if differs:
             kind = _IMAGES.get(figure.name.rpartition(".")[2])
             image = f"data:{kind};base64,{base64.b64encode(drawing).decode()}"

@@ -19,7 +19,7 @@ from coursebuild.core.model.results import (
     ScriptRun,
     TrialLine,
 )
-from coursebuild.core.run.script_environment import engine_version, python_version
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -42,7 +42,7 @@ class RunHistory:
         self.is_all_due = True
         """Whether any script may print something new, since other files have changed."""
         self.trials = PublishedTrials()
-        self.last_results = Results((), (), (), (), python_version(), engine_version())
+        self.last_results = Results((), (), (), (), engine_version())
         self._runs: dict[str, tuple[ScriptKey, ScriptRun]] = {}
         """The last run of each script, by path, with the key of the script that ran."""
         self.repeats: dict[str, tuple[ScriptRun, ScriptRun]] = {}

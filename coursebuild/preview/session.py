@@ -30,6 +30,7 @@ from coursebuild.core.pages.renderer import TemplateFailure
 from coursebuild.core.registry import publish_trials
 from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
+from coursebuild.core.text.source import Source
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.reader import Reader
@@ -222,13 +223,19 @@ class Session:
                 return None
             (source,) = sources
             if source != owner.document.source or self._diagnostics_by_file.get(path):
-                course = self.library.course
-                (parsed_document,) = self._reader.read_documents(
-                    [(source, isinstance(owner, Lesson))], course.callout_names, course.words
-                )
+                parsed_document = self.parse(owner, source)
                 diagnostics = (*read.diagnostics, *parsed_document.diagnostics)
                 changed_owners.append((replace(owner, document=parsed_document.value), diagnostics))
         return changed_owners
+
+    def parse(self, owner: Owner, source: Source) -> Parsed[Document]:
+        """Parse a text of a lesson or page, which need not be the one that is saved."""
+        assert self.library is not None
+        course = self.library.course
+        (parsed_document,) = self._reader.read_documents(
+            [(source, isinstance(owner, Lesson))], course.callout_names, course.words
+        )
+        return parsed_document
 
     def _check(self, document: Document) -> tuple[Diagnostic, ...]:
         assert self.course is not None and self._targets is not None

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.engine.store import Store
+from coursebuild.core.model.lesson_record import Provenance
 from coursebuild.core.model.results import (
     CompileResult,
     FileFacts,
@@ -148,6 +149,10 @@ class Make(Struct, frozen=True):
         return RenderedCourse(with_documents(rendered, summarized), results, self.assets)
 
 
+PROVENANCE = Provenance("Python 3.11.7", "linux", (("mujoco", "3.14.0"),))
+"""What the scripts ran with."""
+
+
 def results_of(course: model.Course, runs: Mapping[str, ScriptRun], status: str) -> Results:
     """Scripts that are not in `runs` printed `one`, `two`; a formula is rendered as its TeX."""
     script_runs: list[ScriptRun] = []
@@ -156,7 +161,9 @@ def results_of(course: model.Course, runs: Mapping[str, ScriptRun], status: str)
     for document in course.documents:
         for block in model.document_blocks(document):
             if isinstance(block, model.Script):
-                default_run = ScriptRun(block.path, Outcome.OK, 0, "one\ntwo\n", "", 0.1)
+                default_run = ScriptRun(
+                    block.path, Outcome.OK, 0, "one\ntwo\n", "", 0.1, provenance=PROVENANCE
+                )
                 script_runs.append(runs.get(block.path, default_run))
             elif isinstance(block, model.Recording):
                 verdicts.append(Verdict(block, course.comparison_of(block), status))
@@ -173,7 +180,6 @@ def results_of(course: model.Course, runs: Mapping[str, ScriptRun], status: str)
         tuple(verdicts),
         tuple(formulas.items()),
         (("box", CompileResult("", None, facts)),),
-        "3.11.7",
         "3.14.0",
     )
 

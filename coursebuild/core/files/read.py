@@ -9,9 +9,10 @@ that is no text at all, or is in UTF-16, is nothing else: any mistake found in i
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from msgspec import Struct
@@ -19,6 +20,7 @@ from msgspec import Struct
 from coursebuild.core.files.course_root import MAP, find_course_root, is_dropping, read_regular
 from coursebuild.core.files.errors import EffectError, OutsideProjectError, UsageError, reason
 from coursebuild.core.model import MjcfModel
+from coursebuild.core.model.lesson_record import LessonRecord, record_path
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.source import Source
 
@@ -123,6 +125,16 @@ def read_folder(root: Path, folder: str) -> Parsed[tuple[Source, ...]]:
     reader = _Reader(root.resolve())
     sources = reader.sources([*reader.walk(folder)])
     return Parsed(sources, tuple(reader.diagnostics))
+
+
+def read_records(root: Path, documents: Iterable[str]) -> dict[str, LessonRecord]:
+    """The records of the lessons and pages that have one, by the paths of these."""
+    records = {}
+    for path in documents:
+        with contextlib.suppress(EffectError):
+            text = read_bytes(root, record_path(path)).decode("utf-8", "replace")
+            records[path] = LessonRecord.parse(text)
+    return records
 
 
 class _Reader:

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from coursebuild.core.model import fields
 from coursebuild.core.model.blocks import Comparison, Document, Filter, Recording
 from coursebuild.core.model.fields import Slug, WebPlace, describe, matching
+from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.text.source import Source, Span, key_of
 
@@ -317,6 +318,8 @@ class Course(Struct, frozen=True):
     to the root."""
     declarations: tuple[Declarations, ...] = ()
     """The contents of the files `models/NAME.toml`, of existing models only."""
+    records: Mapping[str, LessonRecord] = {}
+    """What lessons and pages were recorded with, by their paths."""
     features: tuple[NamedPath, ...] = ()
     packages: tuple[NamedPath, ...] = ()
     """Folders that scripts import from, after their own and before all others."""

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from msgspec import Meta, Struct, field
 
 from coursebuild.core.model import Comparison, Limits, Recording
+from coursebuild.core.model.lesson_record import Provenance
 from coursebuild.core.text.source import Span
 
 
@@ -171,6 +172,8 @@ class ScriptRun(Struct, frozen=True):
     unrepeated: bool = False
     """Whether something else was recorded when it ran, or nothing: what is recorded from it since
     then, no other run bears out."""
+    provenance: Provenance | None = None
+    """What it ran with; `None` where it did not run, and while it is stored."""
 
     @property
     def did_run(self) -> bool:
@@ -383,8 +386,6 @@ class Results(Struct, frozen=True):
     formulas: tuple[tuple[Formula, str | MathError], ...]
     """Each distinct formula of the course, with its MathML or its error."""
     models: tuple[tuple[str, CompileResult], ...]
-    python: str
-    """Version of the interpreter that ran the scripts."""
     engine: str
     """Version of MuJoCo that ran the scripts."""
     trials: tuple[TrialResult, ...] = ()

@@ -41,6 +41,8 @@ class ShownRun(Struct, frozen=True):
     """When and where a run that the course keeps was made."""
     unrepeated: bool = False
     """Whether what is recorded of it was recorded from this run."""
+    versions: tuple[str, ...] = ()
+    """What it ran with."""
 
 
 class ShownVerdict(Struct, frozen=True):
@@ -76,7 +78,6 @@ class DocumentInputs(Struct, frozen=True):
     """
 
     engine: str = ""
-    python: str = ""
     hrefs: Mapping[model.Target, str] = field(default_factory=dict)
     """Addresses of links, relative to the page."""
     names: Mapping[model.Target, str] = field(default_factory=dict)

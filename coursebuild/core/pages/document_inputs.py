@@ -9,6 +9,7 @@ from msgspec import Struct
 
 from coursebuild.core import model
 from coursebuild.core.model import Document, Lesson, Level, Owner, document_scripts
+from coursebuild.core.model.lesson_record import shown_versions
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import (
@@ -56,14 +57,16 @@ def document_inputs(
                 (n, visible(lines[n - 1].rstrip()) if 1 <= n <= len(lines) else None)
                 for n in (sorted(numbers) if run.outcome is Outcome.OK else ())
             )
-            runs[script] = ShownRun(run.outcome, run.missing, quotes, run.recorded, run.unrepeated)
+            versions = shown_versions([run.provenance])
+            runs[script] = ShownRun(
+                run.outcome, run.missing, quotes, run.recorded, run.unrepeated, versions
+            )
     names = {target: name_elsewhere(library, path, target) for target in targets}
     verdicts = ((block.span.start, library.verdict(block)) for block in recordings)
     trials = ((block.span.start, library.trial_value(block)) for block in feature_blocks)
     values = ((block, kind_of_block(block).values) for block in feature_blocks)
     return DocumentInputs(
         engine=library.results.engine,
-        python=library.results.python,
         hrefs={target: address(library, place, path, target) for target in targets},
         names={target: name for target, name in names.items() if name},
         number_prefix=number_prefix,

@@ -19,6 +19,7 @@ from msgspec import Struct
 
 from coursebuild.core.features import PageKind, PagePart
 from coursebuild.core.model import Course, Lesson
+from coursebuild.core.model.lesson_record import shown_versions
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets, Names
 from coursebuild.core.pages.context import PageHead
@@ -117,8 +118,8 @@ class FrameInputs(Struct, frozen=True):
     menu: tuple[tuple[str, str], ...]
     """Site paths and titles of the pages in the menu of every page, besides the home page."""
     added_pages: tuple[tuple[str, str], ...]
-    engine: str
-    python: str
+    versions: tuple[str, ...]
+    """What the scripts ran with."""
     templates: Texts
     version: str
     is_manual: bool
@@ -127,7 +128,7 @@ class FrameInputs(Struct, frozen=True):
     @classmethod
     def of(cls, library: Library, names: Names) -> FrameInputs:
         """What the frame shows of a course whose shared files have these names."""
-        course, results = library.course, library.results
+        course = library.course
         return cls(
             language=course.language or "en",
             title=course.title,
@@ -137,8 +138,7 @@ class FrameInputs(Struct, frozen=True):
             source=course.repository if "{path}" not in course.repository else "",
             menu=tuple((urls.page_path(page), page.title) for page in library.menu),
             added_pages=tuple((k.path, page_title(library, k)) for k in added_pages(library)),
-            engine=results.engine,
-            python=results.python,
+            versions=shown_versions(run.provenance for run in library.results.runs),
             templates=course.theme.template_texts,
             version=course.version,
             is_manual=course.is_manual,

@@ -195,21 +195,21 @@ def output_receipt(page: PageContext, block: model.Recording) -> Receipt:
     """The receipt of a recorded output."""
     words, inputs = page.words, page.inputs
     verdict, run = inputs.verdicts.get(block.span.start), inputs.runs.get(block.script or "")
-    versions = {"engine": inputs.engine, "python": inputs.python}
-    if verdict is None or verdict.status == "unchecked":
+    if verdict is None or run is None or verdict.status == "unchecked":
         return _not_run(words, run)
+    versions = words.join(run.versions)
     match verdict.status:
         case "verified":
-            text = words("receipt.verified", **versions)
-            if run is not None and run.recorded:
+            text = words("receipt.verified", versions=versions)
+            if run.recorded:
                 text = words("receipt.once", when=run.recorded)
-            if run is not None and run.unrepeated:
-                return Receipt("unverified", words("receipt.unrepeated", **versions))
+            if run.unrepeated:
+                return Receipt("unverified", words("receipt.unrepeated", versions=versions))
             return Receipt("verified", f"{text} {_describe_comparison(words, verdict.comparison)}.")
         case "volatile":
-            return Receipt("volatile", words("receipt.volatile", **versions))
+            return Receipt("volatile", words("receipt.volatile", versions=versions))
         case "drift":
-            return Receipt("unverified", words("receipt.drift", **versions))
+            return Receipt("unverified", words("receipt.drift", versions=versions))
         case _:
             assert_never(verdict.status)
 
@@ -250,8 +250,7 @@ def script_receipt(page: PageContext, block: model.Script) -> Receipt:
     if run is not None and run.recorded:
         return Receipt("verified", words("receipt.once_ran", when=run.recorded))
     if run is not None and run.outcome is Outcome.OK:
-        text = words("receipt.ran", engine=inputs.engine, python=inputs.python)
-        return Receipt("verified", text)
+        return Receipt("verified", words("receipt.ran", versions=words.join(run.versions)))
     return _not_run(words, run)
 
 

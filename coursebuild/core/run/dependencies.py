@@ -22,7 +22,7 @@ from coursebuild.core.engine.digests import ABSENT, FILE, FOLDER, SPECIAL
 from coursebuild.core.model import Limits
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 
-VERSION = "7"
+VERSION = "8"
 """Change it when scripts are run or watched in another way: older results then no longer count."""
 
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFoundError|ImportError)\b", re.MULTILINE)

@@ -25,6 +25,7 @@ from types import CodeType, ModuleType
 from typing import Any, TypedDict
 
 from coursebuild.core.run import mujoco_tracing, mujoco_watching, perturbation
+from coursebuild.core.run.matplotlib_watching import FigureWatch
 from coursebuild.core.run.tracing import Tracer
 
 _IMPORTS = {"numpy": ("numpy", "numpy.random"), "mujoco": ("numpy", "mujoco")}
@@ -270,6 +271,7 @@ def redirect_figures(job: Job, temporary: str) -> None:
     paths = {f"{root}/{name}": figure_path(temporary, name) for name in job["figures"]}
     os.mkdir(os.path.dirname(next(iter(paths.values()))))  # noqa: PTH102, PTH120 (time counts)
     real_open = builtins.open
+    sys.meta_path.insert(1, FigureWatch(paths))  # the first one notes what is imported
 
     def open_figure(file: Any, mode: str = "r", *args: Any, **kwargs: Any) -> Any:
         if isinstance(file, str | os.PathLike):

@@ -2,8 +2,12 @@
 
 A figure is judged as text of somebody else's: `core.drawing.safe_svg` says what an SVG may hold; of
 a PNG what draws is recorded, and nothing else. Dates, comments and ids, which change from run to
-run, are taken out of an SVG, so that the same drawing gives the same bytes. Numbers may differ by
-`TOLERANCE`, pixels by `PIXEL_TOLERANCE`; everything else must be the same.
+run, are taken out of an SVG, so that the same drawing gives the same bytes.
+
+Figures of Matplotlib hold what they draw (`figure_data`), which must be the same wherever a script
+runs. Their layout depends on versions and fonts: it is compared only where these are as they were.
+Of other figures the drawing itself is compared: numbers may differ by `TOLERANCE`, pixels by
+`PIXEL_TOLERANCE`; everything else must be the same.
 """
 
 from __future__ import annotations
@@ -21,12 +25,17 @@ from importlib.util import find_spec
 from coursebuild.core.drawing.safe_svg import SVG, XLINK, read_svg
 from coursebuild.core.model import Course
 from coursebuild.core.model.addresses import RecordedFigure, recorded_figures, unshown_figures
+from coursebuild.core.model.lesson_record import LessonRecord, data_digest
 from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.scripts.figure_data import (
+    TOLERANCE,
+    add_to_svg,
+    describe_data_difference,
+    png_chunk,
+    read_figure_data,
+)
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 
-TOLERANCE = 1e-3
-"""How much numbers may differ: this part of the longer side of a drawing in SVG, or of the largest
-number in a column of data."""
 PIXEL_TOLERANCE = 1.0
 """How much pixels may differ: root mean square over all channels, of 255 steps."""
 
@@ -43,6 +52,7 @@ _RULE_PART = re.compile(r"[^{};]*+[{};]?")
 _SELECTED = re.compile(r"(#)([\w:-]+)")
 _PNG_PARTS = frozenset(b"IHDR PLTE IDAT IEND tRNS bKGD cHRM cICP gAMA iCCP pHYs sBIT sRGB".split())
 """The chunks of a PNG that say what is drawn."""
+_PNG_END = b"\0\0\0\0IEND"
 
 ReadFile = Callable[[str], bytes | None]
 
@@ -64,11 +74,16 @@ def figure_findings(
         for recorded in recorded_figures(document):
             run = by_path.get(recorded.script)
             if run is not None and not run.recorded:  # a run that the course keeps drew nothing now
-                yield from compare_figure(recorded, run, read(recorded.path), owner.id)
+                record = course.records.get(document.source.path, LessonRecord())
+                yield from compare_figure(recorded, run, read(recorded.path), record, owner.id)
 
 
 def compare_figure(
-    figure: RecordedFigure, run: ScriptRun, recorded: bytes | None, owner: str = ""
+    figure: RecordedFigure,
+    run: ScriptRun,
+    recorded: bytes | None,
+    record: LessonRecord,
+    owner: str = "",
 ) -> Iterator[Diagnostic]:
     """What is wrong with a figure of a run, given the file that is recorded."""
     data = dict(run.figures).get(figure.name)
@@ -88,32 +103,60 @@ def compare_figure(
         message = f"no figure of `{run.path}` is recorded yet"
         yield diagnose("figure-drift", figure.span, message, help=f"run {update}")
         return
-    wording = describe_difference(figure.name, recorded, figure_file)
+    change, wording = figure_difference(figure, run, recorded, figure_file, record)
     if wording:
         kind = "data differ" if figure.name.endswith(".csv") else "figure differs"
         message = f"the recorded {kind} from this run: {wording}"
+        message = f"{change}: {message}" if change else message
         help = f"if the change is intended, run {update}"
         yield diagnose("figure-drift", figure.span, message, help=help)
+
+
+def figure_difference(
+    figure: RecordedFigure, run: ScriptRun, recorded: bytes, drawing: bytes, record: LessonRecord
+) -> tuple[str, str]:
+    """What is another now than when a figure was recorded, and how it differs, both in words."""
+    made_with, change = record.find(figure.script, data_digest(recorded)), ""
+    if made_with is not None and run.provenance is not None:
+        change = made_with.change(run.provenance)
+    return change, describe_difference(figure.name, recorded, drawing, is_same_place=not change)
 
 
 def prepare_figure(name: str, data: bytes) -> bytes | str:
     """The bytes to record of a figure; or why it cannot be shown, in words."""
     if name.endswith(".png"):
-        drawing = _png_drawing(data)
+        drawing, figure_data = _png_drawing(data), read_figure_data(data)
         size = _png_size(drawing)
-        return size if isinstance(size, str) else drawing
+        if isinstance(size, str):
+            return size
+        head, end, tail = drawing.rpartition(_PNG_END)
+        return drawing if figure_data is None else head + png_chunk(figure_data) + end + tail
     if name.endswith(".csv"):
         if len(data) > MAX_TABLE:
             return f"is larger than {MAX_TABLE >> 20} MiB"
         return b"\n".join(data.splitlines()) + b"\n"
     tree = _read_drawing(data)
-    return tree if isinstance(tree, str) else ET.tostring(tree, encoding="utf-8") + b"\n"
+    if isinstance(tree, str):
+        return tree
+    if (figure_data := read_figure_data(data)) is not None:
+        add_to_svg(tree, figure_data)
+    svg: bytes = ET.tostring(tree, encoding="utf-8")
+    return svg + b"\n"
 
 
-def describe_difference(name: str, old: bytes, new: bytes) -> str:
-    """How a new figure differs from the recorded one, in words; empty where it does not."""
+def describe_difference(name: str, old: bytes, new: bytes, *, is_same_place: bool = True) -> str:
+    """How a new figure differs from the recorded one, in words; empty where it does not.
+
+    `is_same_place`: as far as is known, the recorded one was drawn with the same versions, on the
+    same platform.
+    """
     if old == new:
         return ""
+    data_before, data_now = read_figure_data(old), read_figure_data(new)
+    if data_before is not None and data_now is not None:
+        wording = describe_data_difference(data_before, data_now)
+        if wording or not is_same_place or data_before.fonts != data_now.fonts:
+            return wording
     kinds = {"png": _png_difference, "csv": _csv_difference, "svg": _svg_difference}
     return kinds[name.rpartition(".")[2]](old, new)
 

@@ -18,6 +18,7 @@ from coursebuild.core.model import (
     document_scripts,
 )
 from coursebuild.core.model.addresses import recorded_figures
+from coursebuild.core.model.lesson_record import LessonRecord, describe_comparison, recording_digest
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts import bindings, failures
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
@@ -86,6 +87,7 @@ def output_findings(
 ) -> Iterator[Diagnostic]:
     """What is wrong with the recorded outputs and bound numbers of some documents."""
     for owner, document in documents:
+        record = course.records.get(document.source.path, LessonRecord())
         for verdict in outputs.of_document(document):
             recording = verdict.recording
             yield from _find_loose(verdict)
@@ -98,7 +100,8 @@ def output_findings(
                 yield unstable_output
             elif verdict.status == "drift":
                 dependents = bindings.dependent_bindings(verdict, course.documents, outputs)
-                yield drift_diagnostic(verdict, owner.id, dependents)
+                change = _environment_change(verdict, run, record)
+                yield drift_diagnostic(verdict, owner.id, dependents, change)
         yield from bindings.check_bindings(document, outputs, evidence)
         yield from _find_unmarked(course, document, outputs.runs)
 
@@ -216,10 +219,25 @@ def count_unproven(
 # --- drift
 
 
+def _environment_change(verdict: Verdict, run: ScriptRun | None, record: LessonRecord) -> str:
+    """What an output was recorded with that is another now, as a message begins with it."""
+    recording = verdict.recording
+    made_with = record.find(recording.script or "", recording_digest(recording))
+    if made_with is None or run is None or run.provenance is None:
+        return ""
+    return made_with.change(run.provenance, describe_comparison(verdict.comparison))
+
+
 def drift_diagnostic(
-    verdict: Verdict, owner: str, dependents: Sequence[bindings.DependentBinding] = ()
+    verdict: Verdict,
+    owner: str,
+    dependents: Sequence[bindings.DependentBinding] = (),
+    change: str = "",
 ) -> Diagnostic:
-    """A recorded output of a lesson or page, `owner`, that differs from this run."""
+    """A recorded output of a lesson or page, `owner`, that differs from this run.
+
+    `change`: what is another now than when it was recorded.
+    """
     recording, update = verdict.recording, f"`coursebuild update {owner}`"
     if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
         message = f"no output of `{recording.script}` is recorded yet"
@@ -243,6 +261,7 @@ def drift_diagnostic(
     ):
         help = HEADER_HELP
     message = f"recorded output differs from this run ({classes(changes)})"
+    message = f"{change}: {message}" if change else message
     return diagnose(
         "output-drift", first.span, message, label=_label(first), help=help, notes=notes
     )

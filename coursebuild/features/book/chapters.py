@@ -28,6 +28,7 @@ from msgspec import Struct
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model import Lesson, Level
+from coursebuild.core.model.lesson_record import shown_versions
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import ExportContext
@@ -148,10 +149,11 @@ _TEXT_START, _TEXT_END = '<div class="prose">\n', '\n</div>\n<div class="lesson-
 
 def summary_line(context: ExportContext) -> str:
     """Return the number of lessons, and the versions that they were verified with."""
-    words, results = context.library.words, context.library.results
-    verified = words("site.verified", engine=results.engine, python=results.python)
-    lessons = words("exports.lessons", n=len(context.course.written_lessons))
-    return f"{lessons}. {verified}."
+    words, runs = context.library.words, context.library.results.runs
+    versions = shown_versions(run.provenance for run in runs)
+    sentences = [words("exports.lessons", n=len(context.course.written_lessons))]
+    sentences += [words("site.verified", versions=words.join(versions))] if versions else []
+    return " ".join(f"{sentence}." for sentence in sentences)
 
 
 def render_lesson(

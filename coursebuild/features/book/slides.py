@@ -20,6 +20,8 @@ from collections.abc import Iterable, Iterator
 
 from markupsafe import Markup
 
+from coursebuild.core.model import document_scripts
+from coursebuild.core.model.lesson_record import shown_versions
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import ExportContext
@@ -79,7 +81,9 @@ def slides_file(context: ExportContext) -> OutputFile:
     script = context.assets.file("js/slides.js").decode().replace("</", "<\\/")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     evaluation = " 'unsafe-eval'" if any(path.endswith(".wasm") for path in files) else ""
-    language, results = course.language or "en", context.library.results
+    language, runs = course.language or "en", context.library.runs
+    scripts = document_scripts(lesson.document) if lesson.document is not None else ()
+    versions = shown_versions(runs[s.path].provenance for s in scripts if s.path in runs)
     html = context.library.render(
         "book/slides.html",
         language=language,
@@ -91,7 +95,7 @@ def slides_file(context: ExportContext) -> OutputFile:
         head_title=f"{lesson.id} {lesson.title} · {course.title}",
         course=course,
         lesson=lesson,
-        verified=words("site.verified", engine=results.engine, python=results.python),
+        verified=words("site.verified", versions=words.join(versions)) if versions else "",
         slides=[(section, Markup(to_html(part))) for section, part in _split(content)],
         words=Markup(page_words),
         quiz_script=quiz_script,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from msgspec.structs import replace
 
@@ -13,6 +14,7 @@ from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.files.write import FileChange
 from coursebuild.core.model import Lesson
+from coursebuild.core.model.lesson_record import LessonRecord, record_path
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.text.diagnostics import Edit, did_you_mean
 from coursebuild.core.text.source import Source
@@ -41,6 +43,16 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--leave", action="store_true", help="leave ambiguous mentions as they are")
 
 
+def _move_record(root: Path, old: str, new: str) -> list[FileChange]:
+    """Let the record of a lesson, if it has one, follow it from one path to another."""
+    if not (root / record_path(old)).is_file():
+        return []
+    data = read_bytes(root, record_path(old))
+    text = LessonRecord.parse(data.decode("utf-8", "replace")).text(new.rpartition("/")[2])
+    moved_file = FileChange(record_path(new), None, text.encode())
+    return [moved_file, FileChange(record_path(old), data, None)]
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Change the map, the lesson's file, and all references to it."""
     root = options_of(arguments).root
@@ -65,6 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
         changes = [change for change in changes if change is not lesson_change]
         changes.append(FileChange(replace(lesson, id=new).path, None, lesson_change.new))
         changes.append(FileChange(lesson.path, lesson_change.old, None))
+        changes += _move_record(root, lesson.path, replace(lesson, id=new).path)
     files = (path for top in (*FOLDERS, "src") for path in (root / top).rglob("*.*"))
     code = [path for path in files if path.suffix in (".py", ".js") and path.is_file()]
     sources = read_sources(root, sorted(path.relative_to(root).as_posix() for path in code)).value
