@@ -236,7 +236,9 @@ class _Loader:
             paths |= set(package_files(self.root, course))
         paths -= {source.path for source in (*sources, *self.files.lessons, *self.files.pages)}
         paths -= {document.source.path for document in ([] if course is None else course.documents)}
-        for path in sorted(path for path in paths if path.endswith(_TEXTS)):
+        # A line of a record is looked up by a hash: it holds beside the marks of a conflict, too.
+        texts = (path for path in paths if path.endswith(_TEXTS) and not path.endswith(ENDING))
+        for path in sorted(texts):
             text = self._read_text(path)
             sources += [] if text is None else [Source(path, text)]
         conflicts = (find_conflict(source) for source in sources)

@@ -31,8 +31,8 @@ ENDING = ".recorded.txt"
 FIGURE = "figure"
 """How a figure is compared."""
 _HEAD = """\
-# What the outputs and figures of {name} were recorded with. `coursebuild update` writes a line
-# where it records one; keep this file in Git, beside the lesson.
+# What the outputs and figures of {name} were recorded with.
+# `coursebuild update` writes a line where it records one. Keep this file in Git, beside the lesson.
 """
 _HEADING = re.compile(r"\[(.+)\]")
 _LINE = re.compile(r"[a-z]+ .*")

@@ -6,6 +6,8 @@ import argparse
 import os
 import re
 import shlex
+from collections.abc import Iterator
+from importlib.metadata import requires
 from pathlib import Path
 
 from coursebuild import __version__
@@ -14,6 +16,7 @@ from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.resources import locked_requirements
 from coursebuild.core.files.write import FileChange, change_files, undo_changes
 from coursebuild.core.run import gate
+from coursebuild.core.run.script_environment import package_version
 from coursebuild.core.syntax.course_schema import json_schema
 from coursebuild.pipeline.options import Progress, check_path
 from coursebuild.report.values import plural
@@ -26,6 +29,7 @@ examples:
 
 _COURSE = Path(__file__).parents[1] / "course"
 _PATHS_BY_FILE = {
+    "gitattributes": ".gitattributes",
     "gitignore": ".gitignore",
     "settings.json": ".vscode/settings.json",
     "extensions.json": ".vscode/extensions.json",
@@ -34,7 +38,7 @@ _PATHS_BY_FILE = {
     "coursebuild.txt": ".github/coursebuild.txt",
 }
 """Paths in a new course, for files that tools would read if they had these names here."""
-_KEPT = ("README.md", "requirements.txt")
+_KEPT = (".gitattributes", "README.md", "requirements.txt")
 """Files that a folder may have already; they stay as they are."""
 
 
@@ -55,15 +59,18 @@ def run(arguments: argparse.Namespace) -> int:
     root = Path(folder).resolve()
     check_path(root)
     undo_changes(root, Progress().say)
+    _, requirements = re.split("(?m)^(?=[^#])", locked_requirements(), maxsplit=1)
+    engine = re.findall(r"(?m)^mujoco==(\S+)", requirements)[0]
     files = {".vscode/course.schema.json": json_schema("course")}
     for file in sorted(_COURSE.rglob("*")):
         if file.is_file() and "__pycache__" not in file.parts:
             path = file.relative_to(_COURSE).as_posix()
             data = file.read_bytes().replace(b"VERSION", __version__.encode())
+            data = data.replace(b"ENGINE", engine.encode())
             files[_PATHS_BY_FILE.get(path, path)] = data
-    _, requirements = re.split("(?m)^(?=[^#])", locked_requirements(), maxsplit=1)
     comment = f"# What coursebuild {__version__} was tested with, as its release locks it.\n"
-    files[".github/requirements.txt"] = f"{comment}{requirements}".encode()
+    files["requirements.lock"] = f"{comment}{requirements}".encode()
+    files["requirements.txt"] += "".join(_installed_extras()).encode()
     existing = [path for path in files if (root / path).exists() or (root / path).is_symlink()]
     for path in (path for path in _KEPT if path in existing):
         existing.remove(path)
@@ -77,13 +84,29 @@ def run(arguments: argparse.Namespace) -> int:
         raise EffectError(f"{folder} cannot be created: {reason(error)}") from None
     change_files(root, [FileChange(path, None, data) for path, data in files.items()])
     repository = ", in a new Git repository" if _make_repository(root) else ""
+    installed = package_version("mujoco")
+    remark = ""
+    if installed != engine:  # then `check` would refuse what was recorded with another
+        remark = (
+            f"  MuJoCo {installed} is installed here, and the course is for {engine}, as its labs "
+            "are;\n  `pip install --require-hashes -r requirements.lock` installs that\n\n"
+        )
     option = "" if root == Path.cwd() else f" -C {shlex.quote(folder)}"
     return write(
-        f"wrote {plural(len(files), 'file')} to {folder}{repository}\n\n"
+        f"wrote {plural(len(files), 'file')} to {folder}{repository}\n\n{remark}"
         f"  coursebuild{option} serve    look at the course, and write\n"
         f"  coursebuild{option} build    verify it, and write the site to public/\n",
         CLEAN,
     )
+
+
+def _installed_extras() -> Iterator[str]:
+    """Lines that pin what draws figures, where it is installed here."""
+    for requirement in requires("coursebuild") or ():
+        if match := re.match(r"([\w.-]+)[^;]*; extra == ['\"]figures['\"]", requirement):
+            version = package_version(match[1])
+            if version != "none":
+                yield f"{match[1]}=={version}\n"
 
 
 def _make_repository(root: Path) -> bool:
