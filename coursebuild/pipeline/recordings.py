@@ -41,6 +41,7 @@ from coursebuild.core.run.run_record import RunRecord, record_of
 from coursebuild.core.run.run_store import States
 from coursebuild.core.run.script_environment import machine
 from coursebuild.core.scripts.extract import Extraction, jobs
+from coursebuild.core.scripts.figure_data import read_figure_data
 from coursebuild.core.scripts.figures import SVG_HELP, figure_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Source
@@ -206,7 +207,8 @@ def write_figures(
             continue
         if recorded is not None:
             _, wording = figure_difference(figure, run, recorded, drawing, record)
-            if not wording:
+            lacks_data = read_figure_data(recorded) is None
+            if not wording and not (lacks_data and read_figure_data(drawing) is not None):
                 continue
         try:
             if not dry_run:

@@ -13,6 +13,8 @@ from support.scratch_course import GOOD, WAIT_FOR_GO, Make, block
 
 pytestmark = pytest.mark.site
 
+RECORD = "content/lessons/1.1-one.recorded.txt"
+
 
 def test_output_is_accepted(make: Make) -> None:
     lesson = "## Random\r\n\r\n" + GOOD.replace("\n", "\r\n").replace(
@@ -68,7 +70,7 @@ def test_output_is_accepted(make: Make) -> None:
         events.wait_until_settled()
         assert events.news["outputs"][0]["state"] == "verified"
     undone = folder.main("undo")
-    assert (undone.status, undone.out) == (0, f"restored {folder.lesson()}\n")
+    assert (undone.status, undone.out) == (0, f"restored {folder.lesson()}\nrestored {RECORD}\n")
     assert folder.read(folder.lesson()) == before
 
 

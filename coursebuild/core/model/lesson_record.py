@@ -4,7 +4,7 @@ It lies beside the lesson, is kept in Git with it, and is never published. Each 
 heading and below it a line, whose first word says of what kind it is:
 
     [examples/heat.py output 1]
-    recorded 5d41402abc4b2a76: exact; Python 3.12.4; linux x86_64; numpy 2.4.6; with pillow 12.0.0
+    recorded 5d41402abc4b2a76: exact; Python 3.12.4; linux x86_64; imports scipy 1.17.1; with …
 
 A line is found by the hash of what is recorded. So one that Git has merged with another, or that
 was left by an edit by hand, says nothing of any other text; and a recording without a line is one
@@ -87,9 +87,12 @@ class Recorded(Struct, frozen=True):
         """It as a line of the file."""
         made_with = self.provenance
         parts = [self.comparison, made_with.python, made_with.platform]
-        parts.append(", ".join(f"{name} {version}" for name, version in made_with.packages))
-        requirements = ", ".join(f"{name} {version}" for name, version in made_with.requirements)
-        parts.append(f"with {requirements}" if requirements else "")
+        for word, versions in (
+            ("imports", made_with.packages),
+            ("with", made_with.requirements),
+        ):
+            if versions:
+                parts.append(f"{word} " + ", ".join(map(" ".join, versions)))
         return f"recorded {self.digest}: {'; '.join(parts)}"
 
     @classmethod
@@ -97,11 +100,13 @@ class Recorded(Struct, frozen=True):
         """What a line says; `None` where it is no such line."""
         match = _RECORDED.fullmatch(line)
         parts = match[2].split("; ") if match is not None else []
-        if match is None or len(parts) != 5:
+        if match is None or len(parts) < 3:
             return None
-        comparison, python, platform, packages, requirements = parts
+        comparison, python, platform, *lists = parts
+        words = (text.partition(" ") for text in lists)
+        versions = {word: _versions(text) for word, _, text in words}
         made_with = Provenance(
-            python, platform, _versions(packages), _versions(requirements.removeprefix("with "))
+            python, platform, versions.get("imports", ()), versions.get("with", ())
         )
         return cls(match[1], comparison, made_with)
 

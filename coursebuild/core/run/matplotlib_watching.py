@@ -28,7 +28,7 @@ from typing import Any
 _MODULE = "matplotlib.backend_bases"
 MOST_DATA = 1 << 20
 """The most bytes of data that a figure holds; one with more is compared as it is drawn."""
-_DIGITS = 5
+_DIGITS = 4
 """The decimal places that are kept of a place, as a part of its axis."""
 
 
@@ -71,7 +71,7 @@ class FigureWatch:
         canvas.print_figure = print_figure
 
     def _add_data(self, path: str, figure: Any) -> None:
-        data = json.dumps(_describe_figure(figure), separators=(",", ":"), ensure_ascii=False)
+        data = json.dumps(describe_figure(figure), separators=(",", ":"), ensure_ascii=False)
         if len(data) > MOST_DATA:
             return
         with self._open(path, "rb") as file:
@@ -92,7 +92,8 @@ class FigureWatch:
 # --- figures and axes
 
 
-def _describe_figure(figure: Any) -> dict[str, Any]:
+def describe_figure(figure: Any) -> dict[str, Any]:
+    """What a figure draws, as JSON holds it; see `core.scripts.figure_data.FigureData`."""
     from matplotlib.font_manager import findfont
     from matplotlib.text import Text
 
@@ -130,8 +131,6 @@ class _Axes:
         self._limits = [sorted(map(float, axis.get_view_interval())) for axis in self._all_axis]
         place = axes.transLimits + axes.transAxes if self._is_flat else axes.transAxes
         self._place = place.inverted()
-        self._labels: set[Any] = set()
-        """Those of contours, which Matplotlib places."""
         self._ranges = [1.0, 1.0]
         if self._is_flat:
             (left, bottom), (right, top) = self._place.transform(
@@ -170,10 +169,10 @@ class _Axes:
         frame |= {axes.title, axes._left_title, axes._right_title}
         artists = [a for a in axes.get_children() if a.get_visible() and a not in frame]
         artists.sort(key=lambda artist: float(artist.get_zorder()))  # as they are drawn
-        self._labels = {t for a in artists for t in getattr(a, "labelTexts", ())}
+        labels = {text for artist in artists for text in getattr(artist, "labelTexts", ())}
         for artist in artists:
-            if isinstance(artist, Axes | Legend):
-                continue
+            if isinstance(artist, Axes | Legend) or artist in labels:
+                continue  # how many labels contours have depends on their size
             kinds = {
                 "curve": Line2D,
                 "shape": Patch,
@@ -197,7 +196,7 @@ class _Axes:
     def _text_place(self, text: Any) -> list[Any]:
         """Where a text stands; nothing where its author has not placed it in the axes."""
         coordinates = getattr(text, "xycoords", None)
-        if coordinates not in (None, "data") or text in self._labels:
+        if coordinates not in (None, "data"):
             return []
         place = text.xy if coordinates == "data" else text.get_unitless_position()
         transform = self._axes.transData if coordinates == "data" else text.get_transform()
@@ -228,7 +227,9 @@ class _Axes:
         """The paths of an artist on the canvas."""
         if getattr(artist, "labelTexts", ()):  # contours, which make room for their labels
             contours, to_canvas = artist._contour_generator, self._axes.transData.transform
-            return [to_canvas(path) for z in artist.levels for path in contours.lines(z)]
+            paths = (contours.lines(level) for level in artist.levels)  # with or without codes
+            points = (path[0] if isinstance(path, tuple) else path for path in paths)
+            return [to_canvas(line) for lines in points for line in lines]
         renderer = _renderer(self._axes.figure.dpi)
         artist.draw(renderer)
         return list(renderer.paths)

@@ -35,7 +35,7 @@ _MOST_NAMED = 2
 Point: TypeAlias = tuple[float | None, float | None]
 
 
-class Part(Struct, frozen=True):
+class Part(Struct, frozen=True, omit_defaults=True):
     """A curve, or whatever else an axes draws."""
 
     kind: str

@@ -8,6 +8,7 @@ import re
 import subprocess
 import tomllib
 import venv
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ from coursebuild.core.run.packages import site_folders
 from support.scratch_course import ROOT, Folder
 
 REPORT = """\
-wrote 15 files to {0}, in a new Git repository
+wrote 17 files to {0}, in a new Git repository
 
   coursebuild -C {1} serve    look at the course, and write
   coursebuild -C {1} build    verify it, and write the site to public/
@@ -69,13 +70,24 @@ def test_new_course_has_what_git_and_an_editor_need(tmp_path: Path) -> None:
 def test_new_course_names_its_packages_with_hashes(tmp_path: Path) -> None:
     folder = Folder(tmp_path)
     assert folder.main("init").status == 0
-    assert f"coursebuild=={__version__} -r requirements.txt" in folder.text("README.md")
-    assert folder.text("requirements.txt").count("\n#") == 2, "nothing but a comment so far"
-    text = folder.text(".github/requirements.txt")
+    text = folder.text("requirements.lock")
     requirements = re.split(r"(?m)^(?=[\w.-]+==)", text)[1:]
     assert len(requirements) > 30
     assert [r for r in requirements if not re.search(r"--hash=sha256:[0-9a-f]{64}\b", r)] == []
     assert f"\ncoursebuild=={__version__}\n" in folder.text(".github/coursebuild.txt")
+    drawing = {f"{name}=={version(name)}" for name in ("matplotlib", "pillow")}
+    assert {*folder.text("requirements.txt").splitlines()[3:]} == drawing
+
+
+@pytest.mark.site
+def test_new_course_has_one_engine_and_one_lock_at_home_and_for_jobs(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    assert folder.main("init").status == 0
+    (engine,) = re.findall(r"(?m)^mujoco==(\S+)", folder.text("requirements.lock"))
+    assert tomllib.loads(folder.text("content/course.toml"))["course"]["engine"] == engine
+    installation = "pip install --require-hashes -r requirements.lock\n"
+    texts = ["README.md", ".github/workflows/course.yml", ".github/workflows/weekly.yml"]
+    assert [path for path in texts if installation not in folder.text(path)] == []
 
 
 @pytest.mark.site
@@ -126,7 +138,7 @@ def test_new_course_is_a_repository_unless_it_lies_in_one(
     assert "Git" not in folder.main("init", "course/part").out
     assert not (tmp_path / "course/part/.git").exists()
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert folder.main("init", "without").out.startswith("wrote 15 files to without\n")
+    assert folder.main("init", "without").out.startswith("wrote 17 files to without\n")
     assert not (tmp_path / "without/.git").exists()
 
 

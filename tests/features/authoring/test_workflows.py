@@ -176,11 +176,11 @@ def test_every_command_line_is_accepted() -> None:
 # --------------------------------------------------------------------------- run, step by step
 
 LOCKS = {
-    ".github/requirements.txt": "numpy==2.3.0 --hash=sha256:00\n",
+    "requirements.lock": "numpy==2.3.0 --hash=sha256:00\n",
     ".github/coursebuild.txt": f"coursebuild=={__version__}\n",
     "requirements.txt": "pandas==2.3.3\n",
 }
-INSTALLED = ("requirements.txt", "coursebuild.txt", "course.txt")
+INSTALLED = ("requirements.lock", "coursebuild.txt", "course.txt")
 """What a pull request finds them as."""
 
 
@@ -230,11 +230,11 @@ def propose(runner: Runner, course: Folder, lesson: str) -> list[Step]:
     return steps_by_job["check"]
 
 
-def installations(folder: str, course: str) -> list[str]:
-    """The calls of pip that install what the files of a folder name, and the course's own."""
+def installations(lock: str, tool: str, course: str) -> list[str]:
+    """The calls of pip that install what these files name."""
     return [
-        f"pip install --require-hashes -r {folder}/requirements.txt",
-        f"pip install --no-deps -r {folder}/coursebuild.txt",
+        f"pip install --require-hashes -r {lock}",
+        f"pip install --no-deps -r {tool}",
         f"pip install -r {course}",
     ]
 
@@ -275,9 +275,9 @@ def test_only_main_is_published_and_a_pull_request_gets_a_report(
     assert "\n| the whole site | " in runner.summary
     assert [*runner.caches] == caches
     assert ">12</" not in page.read_text()
-    installed = installations(".github", "requirements.txt")
-    folder = str(runner.folder / "tmp")
-    check = [*installations(folder, f"{folder}/course.txt"), *SUDO]
+    installed = installations("requirements.lock", ".github/coursebuild.txt", "requirements.txt")
+    paths = [f"{runner.folder}/tmp/{name}" for name in INSTALLED]
+    check = [*installations(*paths), *SUDO]
     assert runner.notes == [*installed, *check, *check]
 
 

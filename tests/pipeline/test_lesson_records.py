@@ -1,0 +1,279 @@
+"""What outputs and figures were recorded with: beside each lesson, in messages and on pages."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.files.resources import template_texts
+from support.preview_process import Events, serve_preview
+from support.scratch_course import GOOD, Folder, Make, block
+from support.workflows import git
+
+pytestmark = pytest.mark.site
+
+RECORD = "content/lessons/1.1-one.recorded.txt"
+NUMPY = f"numpy {version('numpy')}"
+PYTHON = f"Python {platform.python_version()}"
+
+ARRAY = "import numpy as np\nprint(np.arange(3.0).sum())"
+DRAWING = """\
+import matplotlib
+import matplotlib.pyplot as plt
+
+matplotlib.rcParams["font.size"] = {font}
+fig, ax = plt.subplots()
+ax.plot([0, 1, 2], [0, {middle}, 4], label="fall")
+ax.set_ylim(0, 5)
+fig.savefig("fall.svg")
+"""
+
+
+def numpy_lesson(output: str = "3.0") -> str:
+    return "## An array\n\n" + block("total.py", ARRAY, output)
+
+
+def drawing_lesson(middle: float = 1, font: int = 10) -> str:
+    code = DRAWING.format(middle=middle, font=font)
+    lesson = block("draw.py", code, info="figure=fall.svg")
+    return f"## A fall\n\n{lesson}Figure: ![A curve](fall.svg) It falls.\n"
+
+
+def three_scripts(numbers: str = "123") -> str:
+    return "## Three\n\n" + "".join(
+        f"{block(f'{name}.py', f'print({number})', '0')}The number {name}.\n\n"
+        for name, number in zip("abc", numbers, strict=True)
+    )
+
+
+def lines(text: str) -> list[str]:
+    return [line for line in text.splitlines() if line.startswith(("[", "recorded "))]
+
+
+def test_update_writes_what_a_recording_was_made_with(make: Make) -> None:
+    folder = make(numpy_lesson("0"))
+    update = folder.main("update")
+    assert update.status == 0, update.out
+    assert f"wrote {RECORD}" in update.out
+    heading, line = lines(folder.text(RECORD))
+    assert heading == "[examples/total.py output 1]"
+    assert line.split("; ")[0].endswith(": exact") and line.split("; ")[1] == PYTHON
+    assert f"; imports {NUMPY}" in line
+    before = folder.read(RECORD)
+    assert folder.main("update").out.startswith("ok ")
+    assert folder.read(RECORD) == before
+    assert folder.main("build").status == 0
+    assert [path for path in folder.tree("public") if "recorded" in path] == []
+    page = folder.text("public/lessons/1.1-one.html")
+    assert f"with NumPy {version('numpy')}, {PYTHON}." in page and "MuJoCo" not in page
+
+
+def test_drift_begins_with_what_changed_in_the_environment(make: Make) -> None:
+    folder = make(numpy_lesson())
+    assert folder.main("update").status == 0
+    folder.replace(RECORD, NUMPY, "numpy 1.26.4")
+    assert folder.main("check").status == 0, "another version alone is no fault"
+    recorded_elsewhere = folder.read(RECORD)
+    assert folder.main("update").status == 0
+    assert folder.read(RECORD) == recorded_elsewhere, "what holds is not recorded anew"
+    folder.replace(folder.lesson(), "arange(3.0)", "arange(4.0)")
+    lead = f"recorded with NumPy 1.26.4, this is {version('numpy')}: recorded output differs"
+    assert f"error[output-drift]: {lead}" in folder.main("check").out
+    assert folder.main("update").status == 0
+    assert NUMPY in folder.text(RECORD), "it was recorded here"
+    folder.replace(RECORD, f"exact; {PYTHON}", "digits; Python 3.9.1")
+    folder.replace(folder.lesson(), "arange(4.0)", "arange(5.0)")
+    lead = f"recorded with Python 3.9.1 and comparison `digits`, this is {PYTHON[7:]} and `exact`"
+    assert f"error[output-drift]: {lead}: " in folder.main("check").out
+
+
+def test_nothing_is_refused_without_a_record(make: Make) -> None:
+    folder = make(numpy_lesson())
+    assert folder.main("check").status == 0
+    folder.replace(folder.lesson(), "\n3.0\n", "\n2.0\n")
+    assert "error[output-drift]: recorded output differs" in folder.main("check").out
+    folder.write(RECORD, b"\xff\0[examples/total.py output 1]\nrecorded 0: what; is; this\n")
+    assert "error[output-drift]: recorded output differs" in folder.main("check").out
+    assert folder.main("update").status == 0
+    assert NUMPY in folder.text(RECORD)
+
+
+def test_record_goes_with_its_last_recording_and_keeps_other_lines(make: Make) -> None:
+    folder = make(numpy_lesson())
+    assert folder.main("update").status == 0
+    folder.replace(RECORD, "output 1]\n", "output 1]\nvalue 3.0: first number\n")
+    folder.replace(folder.lesson(), "arange(3.0)", "arange(4.0)")
+    assert folder.main("update").status == 0
+    assert lines(folder.text(RECORD))[0] == "[examples/total.py output 1]"
+    assert "\nvalue 3.0: first number\n" in folder.text(RECORD)
+    folder.write(folder.lesson(), GOOD)
+    assert folder.main("update").status == 0
+    assert [line for line in lines(folder.text(RECORD)) if "total" in line] == []
+    folder.write(folder.lesson(), "## Nothing runs\n\nHere.\n")
+    update = folder.main("update")
+    assert f"removed {RECORD}" in update.out
+    assert not (folder.root / RECORD).exists()
+
+
+def test_renamed_lesson_takes_its_record_along(make: Make) -> None:
+    folder = make(numpy_lesson())
+    assert folder.main("update").status == 0
+    before = lines(folder.text(RECORD))
+    assert folder.main("rename", "1.1", "1.7").status == 0
+    assert not (folder.root / RECORD).exists()
+    text = folder.text("content/lessons/1.7-one.recorded.txt")
+    assert (lines(text), "of 1.7-one.md " in text) == (before, True)
+
+
+# --------------------------------------------------------------------------- git
+
+
+def commit(folder: Folder, *options: str) -> None:
+    git(folder.root, "add", "-A", *options)
+    git(folder.root, "commit", "-q", "-m", "recorded")
+
+
+def record_on_branch(folder: Folder, branch: str, numbers: str) -> None:
+    """Change what one script prints on a branch of its own, and record it there."""
+    git(folder.root, "checkout", "-q", "-b", branch, "main")
+    text = folder.text(folder.lesson())
+    for name, number in zip("abc", numbers, strict=True):
+        start = text.index(f"examples/{name}.py")
+        end = text.index("```", start)
+        text = f"{text[:start]}examples/{name}.py\nprint({number})\n{text[end:]}"
+    folder.write(folder.lesson(), text)
+    update = folder.main("update")
+    assert update.status == 0, update.out
+    commit(folder)
+
+
+def make_repository(folder: Folder) -> None:
+    folder.write(".gitignore", ".coursebuild\nexamples/\npublic/\ntmp/\n")
+    git(folder.root, "init", "-q", "-b", "main")
+    commit(folder)
+
+
+def merge(folder: Folder) -> None:
+    git(folder.root, "checkout", "-q", "left")
+    git(folder.root, "merge", "-q", "-m", "merged", "right")
+    text = folder.text(RECORD)
+    check = folder.main("check")
+    assert check.status == 0, check.out
+    update = folder.main("update")
+    assert update.status == 0, update.out
+    headings = [line for line in lines(text) if line.startswith("[")]
+    assert headings == [f"[examples/{name}.py output 1]" for name in "abc"]
+
+
+def test_branches_that_record_other_outputs_merge(make: Make) -> None:
+    folder = make(three_scripts())
+    assert folder.main("update").status == 0
+    make_repository(folder)
+    record_on_branch(folder, "left", "723")
+    record_on_branch(folder, "right", "193")
+    merge(folder)
+    before = folder.read(RECORD)
+    assert folder.main("update").status == 0
+    assert folder.read(RECORD) == before, "each branch's line is the one of its recording"
+
+
+def test_branches_that_begin_a_record_merge_as_a_new_course_says(
+    make: Make, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = make(three_scripts("000"))
+    new_course = Folder(tmp_path_factory.mktemp("new"))
+    assert new_course.main("init").status == 0
+    folder.write(".gitattributes", new_course.read(".gitattributes"))
+    make_repository(folder)
+    record_on_branch(folder, "left", "700")
+    record_on_branch(folder, "right", "090")
+    git(folder.root, "checkout", "-q", "left")
+    git(folder.root, "merge", "-q", "-m", "merged", "right")
+    assert folder.main("check").status == 0
+    assert folder.main("update").status == 0
+    assert len(lines(folder.text(RECORD))) == 6, "what the merge left over is gone"
+
+
+def test_marks_of_a_conflict_in_a_record_harm_nothing(make: Make) -> None:
+    folder = make(numpy_lesson())
+    assert folder.main("update").status == 0
+    heading, line = lines(folder.text(RECORD))
+    conflict = f"<<<<<<< ours\n{line}\n=======\nrecorded 00: exact; X; Y\n>>>>>>> theirs\n"
+    folder.write(RECORD, f"{heading}\n{conflict}".replace(NUMPY, "numpy 1.26.4"))
+    assert folder.main("check").status == 0
+    folder.replace(folder.lesson(), "arange(3.0)", "arange(4.0)")
+    assert "recorded with NumPy 1.26.4, this is" in folder.main("check").out
+    assert folder.main("update").status == 0
+    assert len(lines(folder.text(RECORD))) == 2 and "<<<<" not in folder.text(RECORD)
+
+
+# --------------------------------------------------------------------------- figures
+
+
+def test_figure_of_another_version_is_compared_by_what_it_draws(make: Make) -> None:
+    folder = make(drawing_lesson())
+    assert folder.main("update").status == 0
+    here = f"matplotlib {version('matplotlib')}"
+    folder.write(folder.lesson(), drawing_lesson(font=17))
+    check = folder.main("check")
+    assert "the recorded figure differs" in check.out, "the same version draws the same"
+    folder.replace(RECORD, here, "matplotlib 3.9.0")
+    assert folder.main("check").status == 0, "the layout of another version is not this one's"
+    before = folder.read("content/lessons/fall.svg")
+    assert folder.main("update").status == 0
+    assert folder.read("content/lessons/fall.svg") == before
+    folder.write(folder.lesson(), drawing_lesson(middle=1.5, font=17))
+    check = folder.main("check")
+    assert (
+        f"error[figure-drift]: recorded with Matplotlib 3.9.0, this is {version('matplotlib')}: "
+        "the recorded figure differs from this run: "
+        "the curve “fall” has its point 2 of 3 at (1, 1.5) where (1, 1) is recorded\n"
+    ) in check.out
+    assert folder.main("update").status == 0
+    assert here in folder.text(RECORD)
+    assert folder.main("check").status == 0
+
+
+def test_figure_recorded_before_gets_its_data(make: Make) -> None:
+    folder = make(drawing_lesson())
+    assert folder.main("update").status == 0
+    with_data = folder.text("content/lessons/fall.svg")
+    bare = with_data[: with_data.index('<metadata class="drawn">')] + "</svg>\n"
+    folder.write("content/lessons/fall.svg", bare)
+    (folder.root / RECORD).unlink()
+    assert folder.main("check").status == 0
+    assert folder.main("update").status == 0
+    assert folder.text("content/lessons/fall.svg") == with_data
+    assert "fall.svg]" in folder.text(RECORD)
+
+
+# --------------------------------------------------------------------------- preview
+
+
+def test_accepted_output_is_recorded_with_what_printed_it(make: Make) -> None:
+    folder = make(numpy_lesson("2.0"))
+    with serve_preview(folder) as preview, preview.events() as events:
+
+        def offered(page: Events) -> bool:
+            return any(output.get("offer") for output in page.news["outputs"])
+
+        events.until(offered)
+        (output,) = events.news["outputs"]
+        assert preview.accept_offer(output["offer"]) == (200, {"message": ""})
+        events.wait_until_settled()
+    assert NUMPY in folder.text(RECORD)
+    assert folder.main("update").out.startswith("ok "), "there is nothing left to record"
+
+
+# --------------------------------------------------------------------------- texts
+
+
+def test_versions_stand_on_pages_of_every_language() -> None:
+    texts = [text for path, text in template_texts() if Path(path).parent.name == "strings"]
+    assert len(texts) >= 5
+    for text in texts:
+        receipt = text[text.index("[receipt]") : text.index("[mjcf]")]
+        assert receipt.count("{versions}") == 5 and "MuJoCo" not in receipt
