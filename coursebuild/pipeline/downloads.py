@@ -23,6 +23,7 @@ from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.theme import dark_colours, dark_drawing
 from coursebuild.core.run.packages import distributions, module_files
 from coursebuild.core.run.script_environment import course_environment
+from coursebuild.core.scripts.figure_data import without_data
 from coursebuild.pipeline.reader import Reader
 
 _DIGEST = hashlib.sha256().digest_size * 2
@@ -64,17 +65,24 @@ class Downloads(Struct, frozen=True):
 def _files(library: Library, assets: Assets, root: Path) -> Iterator[SiteFile]:
     """Files of the course that pages show or link to, and dark versions of its drawings."""
 
+    def read_drawing(path: str) -> bytes:
+        return without_data(read_bytes(root, path))
+
     def make_dark_drawing(read: Callable[[], bytes]) -> bytes:
         colours = dark_colours(assets.file("css/site.css").decode())
         return dark_drawing(read().decode(), colours).encode()
 
-    figures = (figure for d in library.course.documents for figure in recorded_figures(d))
+    figures = [figure for d in library.course.documents for figure in recorded_figures(d)]
+    drawings = frozenset(f.path for f in figures if not f.path.endswith(".csv"))
     dark = frozenset(figure.path for figure in figures if figure.has_dark)
     for path in library.course.files:
         digest = file_state(f"{root}/{path}")
         read = functools.partial(read_bytes, root, path)
         if len(digest) != _DIGEST:  # it is gone or cannot be read: `read` raises the right error
             digest = hashlib.sha256(read()).hexdigest()
+        if path in drawings:
+            read = functools.partial(read_drawing, path)
+            digest = step_key("drawing without data", digest)
         yield CachedFile(urls.file_path(path), digest, read)
         if path in dark:
             make = functools.partial(make_dark_drawing, read)

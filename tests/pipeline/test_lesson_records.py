@@ -241,13 +241,16 @@ def test_figure_recorded_before_gets_its_data(make: Make) -> None:
     folder = make(drawing_lesson())
     assert folder.main("update").status == 0
     with_data = folder.text("content/lessons/fall.svg")
-    bare = with_data[: with_data.index('<metadata class="drawn">')] + "</svg>\n"
+    start, end = with_data.index('<metadata class="drawn">'), with_data.index("</metadata>")
+    bare = with_data[:start] + with_data[end + len("</metadata>") :]
     folder.write("content/lessons/fall.svg", bare)
     (folder.root / RECORD).unlink()
     assert folder.main("check").status == 0
     assert folder.main("update").status == 0
     assert folder.text("content/lessons/fall.svg") == with_data
     assert "fall.svg]" in folder.text(RECORD)
+    assert folder.main("build").status == 0
+    assert folder.text("public/files/lessons/fall.svg") == bare, "readers get the drawing alone"
 
 
 # --------------------------------------------------------------------------- preview

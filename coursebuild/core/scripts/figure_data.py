@@ -28,7 +28,9 @@ SVG, or of the largest number in a column of data."""
 MOST_DATA = 1 << 20
 """The most bytes of data that a figure may hold."""
 _MARK = "drawn"
-_PNG_CHUNK = b"zTXt"
+_PNG_MARK = b"zTXt" + _MARK.encode() + b"\0\0"
+"""How the chunk with the data begins."""
+_SVG_DATA = re.compile(rb'<metadata class="%s">([^<]*+)</metadata>' % _MARK.encode())
 _MOST_NAMED = 2
 """The most differences that a message names."""
 
@@ -99,13 +101,21 @@ def add_to_svg(root: ET.Element, figure_data: FigureData) -> None:
 
 def png_chunk(figure_data: FigureData) -> bytes:
     """The chunk of a PNG that holds the data of its figure."""
-    data = _PNG_CHUNK + _MARK.encode() + b"\0\0" + zlib.compress(msgspec.json.encode(figure_data))
+    data = _PNG_MARK + zlib.compress(msgspec.json.encode(figure_data))
     return struct.pack(">I", len(data) - 4) + data + struct.pack(">I", zlib.crc32(data))
 
 
+def without_data(figure: bytes) -> bytes:
+    """A figure's file as readers get it, who see nothing of its data."""
+    if not figure.startswith(b"\x89PNG"):
+        return _SVG_DATA.sub(b"", figure)
+    at = figure.rfind(_PNG_MARK)
+    end = at + 8 + int.from_bytes(figure[at - 4 : at], "big")
+    return figure if at < 0 else figure[: at - 4] + figure[end:]
+
+
 def _read_svg(data: bytes) -> bytes:
-    pattern = rb'<metadata class="%s">([^<]*)</metadata>' % _MARK.encode()
-    match = re.search(pattern, data)
+    match = _SVG_DATA.search(data)
     if match is None or len(match[1]) > 2 * MOST_DATA:
         return b""
     text: bytes = match[1]
@@ -115,10 +125,10 @@ def _read_svg(data: bytes) -> bytes:
 
 
 def _read_png(data: bytes) -> bytes:
-    at = data.rfind(_PNG_CHUNK + _MARK.encode() + b"\0\0")
+    at = data.rfind(_PNG_MARK)
     if at < 0:
         return b""
-    start, end = at + 6 + len(_MARK), at + 4 + int.from_bytes(data[at - 4 : at], "big")
+    start, end = at + len(_PNG_MARK), at + 4 + int.from_bytes(data[at - 4 : at], "big")
     with contextlib.suppress(zlib.error):
         return zlib.decompressobj().decompress(data[start:end], MOST_DATA)
     return b""

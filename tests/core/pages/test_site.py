@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.core.model import local_file
+from coursebuild.core.model.lesson_record import Provenance
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages.references import check_links
 from coursebuild.core.pages.urls import Place, dark_path, file_path
@@ -162,7 +163,11 @@ def test_nothing_hostile_gets_through(make: Make) -> None:
         levels=levels,
         pages=tuple(replace(page, title=HOSTILE) for page in course.pages),
     )
-    results = replace(rendered.results, engine=HOSTILE, python=HOSTILE)
+    runs = tuple(
+        replace(run, provenance=Provenance(HOSTILE, HOSTILE, ((HOSTILE, HOSTILE),)))
+        for run in rendered.results.runs
+    )
+    results = replace(rendered.results, engine=HOSTILE, runs=runs)
     clean = pages(rendered.site(FILES))
     for path, page in pages(replace(rendered, course=hostile, results=results).site(FILES)).items():
         assert "\x07" not in page
