@@ -14,6 +14,7 @@ import re
 import shutil
 import zipfile
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -90,6 +91,7 @@ def replace_varying(text: str) -> str:
     """Remove what changes with a style sheet, the Python version or the machine."""
     text = re.sub(r"(assets/[\w./%-]+?)\.[0-9a-f]{8}\.", r"\1.HASH.", text)
     text = re.sub(r"; [^;]*nativem? MuJoCo[^<]*", "; PARITY", text)  # differs by processor
+    text = text.replace(f"NumPy {version('numpy')}", "NumPy NUMPY")
     return text.replace(f"Python {platform.python_version()}", "Python PYTHON")
 
 

@@ -216,11 +216,11 @@ def test_marks_of_a_conflict_in_a_record_harm_nothing(make: Make) -> None:
 def test_figure_of_another_version_is_compared_by_what_it_draws(make: Make) -> None:
     folder = make(drawing_lesson())
     assert folder.main("update").status == 0
-    here = f"matplotlib {version('matplotlib')}"
+    version_here = f"matplotlib {version('matplotlib')}"
     folder.write(folder.lesson(), drawing_lesson(font=17))
     check = folder.main("check")
     assert "the recorded figure differs" in check.out, "the same version draws the same"
-    folder.replace(RECORD, here, "matplotlib 3.9.0")
+    folder.replace(RECORD, version_here, "matplotlib 3.9.0")
     assert folder.main("check").status == 0, "the layout of another version is not this one's"
     before = folder.read("content/lessons/fall.svg")
     assert folder.main("update").status == 0
@@ -233,7 +233,7 @@ def test_figure_of_another_version_is_compared_by_what_it_draws(make: Make) -> N
         "the curve “fall” has its point 2 of 3 at (1, 1.5) where (1, 1) is recorded\n"
     ) in check.out
     assert folder.main("update").status == 0
-    assert here in folder.text(RECORD)
+    assert version_here in folder.text(RECORD)
     assert folder.main("check").status == 0
 
 
