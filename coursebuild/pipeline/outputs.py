@@ -103,14 +103,14 @@ class _Updater:
             parsed_course = load(self.options.root)
             new_course = parsed_course.value or self.course
             read_diagnostics = parsed_course.diagnostics
-        if not self.dry_run:
-            remarks += self._write_records(new_course, runs)
+        record_remarks = [] if self.dry_run else self._write_records(new_course, runs)
         diagnostics = [*read_diagnostics, *self.extracted_scripts.diagnostics]
         diagnostics += [*refusals, *failures, *figure_failures]
         diagnostics += check_recorded_runs(self.scripts, self.options)
         diagnostics += self._diagnose_updated(new_course, runs)
         if not remarks and all(not d.is_error for d in diagnostics):
             remarks = ["every recorded output is up to date"]
+        remarks += record_remarks
         return judge(
             self.course,
             diagnostics,

@@ -18,7 +18,7 @@ from coursebuild.features.lab.engines.native import LAB_ENGINE
 from support.lab_lessons import RIGHT, course, fence
 from support.lab_values import Bench, make_lab
 from support.sandboxes import require_sandbox
-from support.scratch_course import ROOT, Folder
+from support.scratch_course import ROOT, Folder, block
 
 pytestmark = pytest.mark.engine
 
@@ -35,15 +35,17 @@ PREFIX = (
 
 @pytest.fixture
 def folder(tmp_path: Path, stores: Path) -> Folder:
-    return course(tmp_path / "course", stores, "## Lab\n\n" + fence(RIGHT) + fence(PLAIN))
+    script = block("engine.py", "import mujoco\nprint(mujoco.mjPI > 3)", "True")
+    return course(tmp_path / "course", stores, f"## Lab\n\n{script}{fence(RIGHT)}{fence(PLAIN)}")
 
 
 @pytest.fixture
 def variables(tmp_path: Path) -> dict[str, str]:
     """Variables under which another MuJoCo is installed, and pip finds none."""
-    info = tmp_path / "packages" / f"mujoco-{OTHER}.dist-info"
+    info = tmp_path / "site-packages" / f"mujoco-{OTHER}.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: mujoco\nVersion: {OTHER}\n")
+    (info / "top_level.txt").write_text("mujoco\n")
     return {
         "PYTHONPATH": f"{info.parent}{os.pathsep}{ROOT}",
         "XDG_STATE_HOME": str(tmp_path / "state"),
@@ -104,7 +106,10 @@ def test_other_mujoco_of_scripts_leaves_labs_to_an_environment_of_their_own(
         result = folder.run("build", "--no-cache", *option, env=variables)
         assert result.status == 0, result.out + result.err
         (page,) = folder.root.glob("public/lessons/1.2-*.html")
-        assert f"Tried with MuJoCo {LAB_ENGINE} in the browser" in page.read_text()
+        text = page.read_text()
+        assert f"Tried with MuJoCo {LAB_ENGINE} in the browser" in text
+        reason = f"The scripts of this page ran with MuJoCo {OTHER}; in the browser there is only"
+        assert reason in text
         (offer,) = folder.root.glob("public/assets/labs/1.2-lab-2.*.json")
         assert "exportPython" in offer.read_text()
 
