@@ -1,0 +1,197 @@
+"""The unit of a number in a line of text: behind it, in its label or above its column.
+
+Entry points: `printed_unit(line, start, end, above)`; `unit_behind(text)`, `unit_of_header(text)`,
+for what an author writes; `are_different(left, right)`, which is certain.
+
+1. What has two readings is read in both: `m` is a metre or a minute, `C` a coulomb or a degree.
+   Units differ if no reading of one is a reading of the other.
+2. What may be no unit is none: `T` in `l 2.0 T 2.8` and `m` in `m = 2 n = 3` are names, as is `t`
+   in `x(t)`; `in` is a word before another one, and `min` beside `max` a minimum.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from msgspec import Struct
+
+from coursebuild.core.text.numbers import scan
+from coursebuild.core.text.units import NAMES, Unit, find_units, is_name
+
+_SECOND_READINGS = {
+    "m": ("min",),
+    "C": ("°C",),
+    "F": ("°F",),
+    "°": ("°C", "°F"),
+    "g": ("Gal",),
+}
+"""What text means besides: an acceleration in `2 g` is 981 Gal."""
+
+_LONGEST_PRODUCT = 4
+_CLOSING = ".,;:!?”\"'*_|>}"
+_UPRIGHT = re.compile(r"\$\s*(?:\\[,;: ])*\\(?:mathrm|text|textrm)\s*\{([^{}$]*)\}\s*\$")
+_TEX_SIGNS = (
+    (re.compile(r"\\(?:mathrm|text|textrm|operatorname)\s*(?:\{([^{}]*)\}|(\w))"), r" \1\2"),
+    (re.compile(r"\^?\{?\\(?:circ|degree)\}?"), "°"),
+    (re.compile(r"°\s+(?=[CF]\b)"), "°"),
+    (re.compile(r"\\cdot"), "·"),
+    (re.compile(r"\\mu\s*"), "µ"),
+    (re.compile(r"\\Omega"), "Ω"),
+    (re.compile(r"\\[td]?frac\{([^{}]*)\}\{([^{}]*)\}"), r"(\1)/(\2)"),
+    (re.compile(r"\\%"), "%"),
+    (re.compile(r"\\[,;:! ]|[~$]"), " "),
+)
+_BRACKET = re.compile(r"(?P<before>.?)[(\[](?P<unit>(?:[^()\[\]]|\([^()]*\))*)[)\]]\s*\Z")
+_SOLIDUS = re.compile(r"\s*/\s*(?P<unit>[^/=:]+)\Z|\bin\s+(?P<word>\S+)\Z")
+_TO_NUMBER = re.compile(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")
+"""From the end of a label to a number, perhaps past other numbers."""
+_CELLS = (
+    re.compile(r"[^\s|;,](?:(?!\s\s|\s*[\t|;,]).)*"),
+    re.compile(r"[^\s|;,]+(?: ?[(\[][^()\[\]]*[)\]])?"),
+)
+"""Cells of a row, with wide gaps or signs between them, and with single spaces."""
+_RULE = re.compile(r"[\s\-=+|:─━═┼]*")
+
+
+class UnitText(Struct, frozen=True):
+    """A unit as it is written, and what it may be; false for none."""
+
+    text: str = ""
+    readings: tuple[Unit, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.readings)
+
+
+NO_UNIT = UnitText()
+
+
+def read_unit(text: str) -> UnitText:
+    """The unit that a whole text is, with all its readings."""
+    text = plain_unit(text)
+    readings = [*find_units(text)] if text else []
+    for reading in _SECOND_READINGS.get(NAMES.get(text, text), ()):
+        readings += find_units(reading)
+    return UnitText(text, tuple(readings))
+
+
+def plain_unit(tex: str) -> str:
+    r"""The text of a unit that may be written in TeX: `\mathrm{m\,s^{-1}}` is `m s^{-1}`."""
+    for sign, replacement in _TEX_SIGNS:
+        tex = sign.sub(replacement, tex)
+    return " ".join(tex.split())
+
+
+def are_different(left: UnitText, right: UnitText) -> bool:
+    """Whether both are units, and certainly not the same one."""
+    return (
+        bool(left)
+        and bool(right)
+        and not any(a.is_same(b) for a in left.readings for b in right.readings)
+    )
+
+
+def printed_unit(line: str, start: int, end: int, above: Sequence[str] = ()) -> UnitText:
+    """The unit of the number at `line[start:end]`, where a program printed one.
+
+    `above`: the lines above it, the last of which stands right above.
+    """
+    return (
+        unit_behind(line, end, has_names=line[:1].isalpha())
+        or _unit_of_label(line[:start])
+        or _unit_of_column(line, start, above)
+    )
+
+
+def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
+    """The unit that stands behind a number, at a place of a text: as many words as are a product.
+
+    `has_names`: names may stand before the numbers of the text, as in `l 2.0 T 2.8`.
+    """
+    rest = _UPRIGHT.sub(lambda match: plain_unit(match[1]), text[at : at + 80])
+    words = rest.replace("&nbsp;", " ").lstrip("*_").split()[: _LONGEST_PRODUCT + 1]
+    name_sign = re.compile(r"[=:\d.+−-]" if has_names else "[=:]")
+    unit = NO_UNIT
+    for count in range(1, min(len(words), _LONGEST_PRODUCT) + 1):
+        product, word = " ".join(words[:count]), words[count - 1]
+        bare = _without_closing(product)
+        longer = read_unit(bare)
+        is_open = bare.count("(") > bare.count(")") or word in ("/", "·", "⋅", "*", "per")
+        follows = words[count] if count < len(words) and bare == product else ""
+        may_be_name = name_sign.match(follows) is not None
+        if not (longer or is_open) or (may_be_name and not unit):
+            break
+        if longer and unit and (may_be_name or is_name(word.rstrip(_CLOSING))):
+            unit = UnitText(unit.text, unit.readings + longer.readings)  # `kW h` or `m in`
+        elif longer:
+            unit = longer
+        if (
+            longer
+            and count == 1
+            and is_name(bare)
+            and (follows[:1].isalnum() or _has_maximum(text))
+        ):
+            return NO_UNIT
+        if bare != product or may_be_name:
+            break
+    is_attached = at > 0 and not text[at - 1 : at + 1].endswith(" ") and text[at : at + 1].isalpha()
+    if is_attached and (len(unit.text) == 1 or is_name(unit.text)):
+        return NO_UNIT if "." not in text[:at].split()[-1] else unit  # `4A` and `2d`
+    return unit
+
+
+def _has_maximum(text: str) -> bool:
+    """Whether `min` is a minimum."""
+    return "max" in text.casefold()
+
+
+def _without_closing(text: str) -> str:
+    """A text without the marks of the sentence, and the brackets, that end behind it."""
+    bare = text.rstrip(_CLOSING)
+    while any(bare.count(end) > bare.count(begin) for begin, end in ("()", "[]")):
+        bare = bare[:-1].rstrip(_CLOSING)
+    return bare
+
+
+def unit_of_header(text: str) -> UnitText:
+    """The unit in a label or the header of a column: `τ (min)`, `v [m/s]`, `t / s`, `time in s`."""
+    text = plain_unit(text)
+    bracket = _BRACKET.search(text)
+    if bracket is not None:
+        unit = read_unit(bracket["unit"])
+        is_letter = len(unit.text) == 1
+        is_index = bracket["before"].strip() != "" and is_letter
+        is_round = text.rstrip().endswith(")")
+        if is_index or (is_letter and is_round and is_name(unit.text)):
+            return NO_UNIT  # `x(t)`, `y[m]` and `error (h)`
+        return NO_UNIT if unit.text == "min" and _has_maximum(text) else unit
+    quotient = _SOLIDUS.search(text)
+    if quotient is None or find_units(text):
+        return NO_UNIT
+    unit = read_unit(quotient["unit"] or quotient["word"])
+    return NO_UNIT if is_name(unit.text) or unit.text in _SECOND_READINGS else unit
+
+
+def _unit_of_label(before: str) -> UnitText:
+    """The unit in the label that ends right before a number, or the list that it stands in."""
+    gap = _TO_NUMBER.search(before)
+    return NO_UNIT if gap is None else unit_of_header(before[: gap.start()])
+
+
+def _unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
+    """The unit in the header above a number of a row; none if it is uncertain which is its own."""
+    for header in reversed(above):
+        if not header.strip():
+            return NO_UNIT
+        cells = [cell[0] for cell in _CELLS[0].finditer(header)]
+        cells = [cell for cell in cells if not unit_of_header(cell)]
+        if _RULE.fullmatch(header) or any(scan(cell) for cell in cells):
+            continue
+        for pattern in _CELLS:
+            row, columns = [*pattern.finditer(line)], pattern.findall(header)
+            if 1 < len(row) == len(columns):
+                at = next((i for i, cell in enumerate(row) if cell.end() > start), -1)
+                return unit_of_header(columns[at])
+        return NO_UNIT
+    return NO_UNIT
