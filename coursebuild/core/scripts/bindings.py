@@ -219,8 +219,8 @@ def _check(
         is_run = run is None or run.outcome is not Outcome.NORUN
         return () if is_run else _orphan_diagnostic(binding, path, outputs)
     steady = [v for v in verdicts if v.comparison.mode is not model.Mode.VOLATILE]
-    bound_text = BoundText.of(binding.text, binding.comma)
     lines = [line for verdict in steady for line in outputs.lines(verdict)]
+    bound_text = _read_text(binding, lines)
     if _holds(bound_text, lines):
         mismatch = _wrong_unit(binding, bound_text, path, lines)
         return lines if mismatch is None else mismatch
@@ -259,11 +259,11 @@ def _wrong_unit(
 
 def unprinted_unit(binding: model.NumberBinding, outputs: PrintedOutputs) -> str:
     """The unit of a bound number that is printed with none; empty if there is no such."""
-    bound_text = BoundText.of(binding.text, binding.comma)
     source, end = binding.span.source, binding.span.end
-    shown_units = bound_text.units(binding.unit or source.text[end : end + 40])
     verdicts = outputs.of_binding(binding)
     lines = [line for verdict in verdicts for line in outputs.lines(verdict)]
+    bound_text = _read_text(binding, lines)
+    shown_units = bound_text.units(binding.unit or source.text[end : end + 40])
     path = binding.script or (verdicts[0].recording.script if verdicts else None)
     run = outputs.runs.get(path or "")
     if not any(shown_units) or not bound_text.numbers:
@@ -275,6 +275,13 @@ def unprinted_unit(binding: model.NumberBinding, outputs: PrintedOutputs) -> str
         if unit and printed_units and not any(units[at] for units in printed_units):
             return unit.text
     return ""
+
+
+def _read_text(binding: model.NumberBinding, lines: Sequence[PrintedLine]) -> BoundText:
+    """The text of a binding; a comma in it may stand before decimals, or part numbers."""
+    bound_text, as_printed = BoundText.of(binding.text, binding.comma), BoundText.of(binding.text)
+    is_list = bound_text.comma and not _holds(bound_text, lines) and _holds(as_printed, lines)
+    return as_printed if is_list else bound_text
 
 
 def _holds(bound_text: BoundText, lines: Sequence[PrintedLine]) -> bool:

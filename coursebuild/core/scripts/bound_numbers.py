@@ -23,7 +23,13 @@ from coursebuild.core.text.numbers import (
     within_half_unit,
     write_comma,
 )
-from coursebuild.core.text.quantities import UnitText, are_different, printed_unit, unit_behind
+from coursebuild.core.text.quantities import (
+    UnitText,
+    are_different,
+    numbers_of_quantities,
+    printed_unit,
+    unit_behind,
+)
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 Locate = Callable[[int, int], Span]
@@ -43,7 +49,7 @@ class PrintedLine(Struct, frozen=True, dict=True):
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
         """The numbers in it; not computed until needed, as those of most lines never are."""
-        return scan(self.text, self.is_grouped)
+        return numbers_of_quantities(self.text, scan(self.text, self.is_grouped))
 
 
 def lines_of_run(stdout: str, filters: Iterable[Filter] = ()) -> list[PrintedLine]:
@@ -142,7 +148,7 @@ class BoundText(Struct, frozen=True):
         pointed = point_decimals(text) if comma else text
         if pointed != text:
             return replace(cls.of(pointed), comma=True)
-        numbers = scan_prose(text)
+        numbers = numbers_of_quantities(text, scan_prose(text))
         if not numbers:
             return cls(text, plain_text(text), (), "")
         before, after = text[: numbers[0].start], text[numbers[-1].end :]

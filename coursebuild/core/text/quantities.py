@@ -12,11 +12,11 @@ for what an author writes; `are_different(left, right)`, which is certain.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from msgspec import Struct
 
-from coursebuild.core.text.numbers import scan
+from coursebuild.core.text.numbers import Number, scan
 from coursebuild.core.text.units import NAMES, Unit, find_units, is_name
 
 _SECOND_READINGS = {
@@ -28,6 +28,8 @@ _SECOND_READINGS = {
 }
 """What text means besides: an acceleration in `2 g` is 981 Gal."""
 
+_SIGNS = frozenset(("/", "·", "⋅", "*", "per"))
+_PER_UNIT = re.compile(r"/[^\W\d_]")
 _LONGEST_PRODUCT = 4
 _CLOSING = ".,;:!?”\"'*_|>}"
 _UPRIGHT = re.compile(r"\$\s*(?:\\[,;: ])*\\(?:mathrm|text|textrm)\s*\{([^{}$]*)\}\s*\$")
@@ -113,31 +115,28 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
     words = rest.replace("&nbsp;", " ").lstrip("*_").split()[: _LONGEST_PRODUCT + 1]
     name_sign = re.compile(r"[=:\d.+−-]" if has_names else "[=:]")
     unit = NO_UNIT
-    for count in range(1, min(len(words), _LONGEST_PRODUCT) + 1):
-        product, word = " ".join(words[:count]), words[count - 1]
+    for count, word in enumerate(words[:_LONGEST_PRODUCT], 1):
+        product = " ".join(words[:count])
         bare = _without_closing(product)
+        follows = words[count] if bare == product and count < len(words) else ""
+        is_open = bare.count("(") > bare.count(")") or word in _SIGNS
         longer = read_unit(bare)
-        is_open = bare.count("(") > bare.count(")") or word in ("/", "·", "⋅", "*", "per")
-        follows = words[count] if count < len(words) and bare == product else ""
-        may_be_name = name_sign.match(follows) is not None
-        if not (longer or is_open) or (may_be_name and not unit):
-            break
-        if longer and unit and (may_be_name or is_name(word.rstrip(_CLOSING))):
+        is_certain = name_sign.match(follows) is None
+        if longer and not unit:
+            is_word = is_name(bare) and (follows[:1].isalnum() or _has_maximum(text))
+            if is_word or not is_certain:
+                return NO_UNIT
+            unit = longer
+        elif longer and (is_name(_without_closing(word)) or not is_certain):
             unit = UnitText(unit.text, unit.readings + longer.readings)  # `kW h` or `m in`
+            break
         elif longer:
             unit = longer
-        if (
-            longer
-            and count == 1
-            and is_name(bare)
-            and (follows[:1].isalnum() or _has_maximum(text))
-        ):
-            return NO_UNIT
-        if bare != product or may_be_name:
+        if bare != product or not (longer or is_open):
             break
-    is_attached = at > 0 and not text[at - 1 : at + 1].endswith(" ") and text[at : at + 1].isalpha()
+    is_attached = at > 0 and text[at : at + 1].isalpha()
     if is_attached and (len(unit.text) == 1 or is_name(unit.text)):
-        return NO_UNIT if "." not in text[:at].split()[-1] else unit  # `4A` and `2d`
+        return unit if "." in text[:at].split()[-1] else NO_UNIT  # `4A` and `2d`
     return unit
 
 
@@ -152,6 +151,16 @@ def _without_closing(text: str) -> str:
     while any(bare.count(end) > bare.count(begin) for begin, end in ("()", "[]")):
         bare = bare[:-1].rstrip(_CLOSING)
     return bare
+
+
+def numbers_of_quantities(text: str, numbers: Iterable[Number]) -> tuple[Number, ...]:
+    """The numbers of a text but for the 1 of a unit, as in `0.5 1/s`."""
+    kept: list[Number] = []
+    for number in numbers:
+        follows = bool(kept) and not text[kept[-1].end : number.start].strip()
+        if not (follows and number.text == "1" and _PER_UNIT.match(text, number.end)):
+            kept.append(number)
+    return tuple(kept)
 
 
 def unit_of_header(text: str) -> UnitText:
