@@ -45,10 +45,10 @@ from coursebuild.core.scripts.bound_numbers import (
     text_places,
 )
 from coursebuild.core.scripts.lines import canonicalize
+from coursebuild.core.scripts.tables import header_unit
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.numbers import Number, difference
-from coursebuild.core.text.quantities import unit_of_header
 from coursebuild.core.text.units import with_unit
 
 _SILENT_OUTCOMES = (
@@ -60,6 +60,9 @@ _SILENT_OUTCOMES = (
     Outcome.UNRECORDED,
 )
 """Those that are reported by themselves, so that no more is said of numbers bound to them."""
+
+
+_LINE_END = re.compile(r"(?<!\n)\n[ \t>]*(?!\n)")
 
 
 class BindingKey(Struct, frozen=True):
@@ -153,7 +156,7 @@ def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ..
     One that ends its cell in a table has the unit of the column.
     """
     units = {
-        inline.span.start: unit_of_header(model.plain_text(header.children)).text
+        inline.span.start: header_unit(header).text
         for table in model.find_blocks(document, model.Table)
         for row in table.rows
         for cell, header in zip(row, table.header, strict=False)
@@ -245,8 +248,7 @@ def _check(
 def _wrong_unit(
     binding: model.NumberBinding, bound_text: BoundText, path: str, lines: Sequence[PrintedLine]
 ) -> Diagnostic | None:
-    source, end = binding.span.source, binding.span.end
-    mismatch = bound_text.wrong_unit(lines, binding.unit or source.text[end : end + 40])
+    mismatch = bound_text.wrong_unit(lines, binding.unit or _following(binding))
     if mismatch is None:
         return None
     number, printed_text, unit_text = mismatch
@@ -259,11 +261,10 @@ def _wrong_unit(
 
 def unprinted_unit(binding: model.NumberBinding, outputs: PrintedOutputs) -> str:
     """The unit of a bound number that is printed with none; empty if there is no such."""
-    source, end = binding.span.source, binding.span.end
     verdicts = outputs.of_binding(binding)
     lines = [line for verdict in verdicts for line in outputs.lines(verdict)]
     bound_text = _read_text(binding, lines)
-    shown_units = bound_text.units(binding.unit or source.text[end : end + 40])
+    shown_units = bound_text.units(binding.unit or _following(binding))
     path = binding.script or (verdicts[0].recording.script if verdicts else None)
     run = outputs.runs.get(path or "")
     if not any(shown_units) or not bound_text.numbers:
@@ -275,6 +276,12 @@ def unprinted_unit(binding: model.NumberBinding, outputs: PrintedOutputs) -> str
         if unit and printed_units and not any(units[at] for units in printed_units):
             return unit.text
     return ""
+
+
+def _following(binding: model.NumberBinding) -> str:
+    """The text behind a binding, also on the next line of a quotation."""
+    end = binding.span.end
+    return _LINE_END.sub(" ", binding.span.source.text[end : end + 80])
 
 
 def _read_text(binding: model.NumberBinding, lines: Sequence[PrintedLine]) -> BoundText:

@@ -35,10 +35,19 @@ from coursebuild.core.scripts.lines import (
     same_number,
 )
 from coursebuild.core.text.numbers import Number, point_decimals, relative_error
-from coursebuild.core.text.quantities import UnitText, are_different, printed_unit, unit_of_header
+from coursebuild.core.text.quantities import (
+    NO_UNIT,
+    UnitText,
+    are_different,
+    printed_unit,
+    unit_of_header,
+)
 from coursebuild.core.text.source import Span
 
-HEADER_HELP = "write the unit that is printed, or put the columns in order"
+HEADER_HELP = (
+    "write the unit that is printed, or put the columns in order; where it is not meant, mark it:"
+    ' `` `s`{given="…"} ``'
+)
 _ALIKE_WEIGHT = 6
 _PLACES = 64
 
@@ -115,7 +124,7 @@ def unit_changes(
 ) -> Iterator[Change]:
     """Units in a header that are not those printed with the column's numbers."""
     headers = [_cell_text(cell, ()) for cell in table.header]
-    shown_units = [unit_of_header(header.text) for header in headers]
+    shown_units = list(map(header_unit, table.header))
     mismatches: dict[int, UnitText] = {}
     for column, printed in _column_units(table, matches, matcher):
         if are_different(shown_units[column], printed):
@@ -128,6 +137,13 @@ def unit_changes(
         yield Change(DriftKind.TEXT, span, unit.text, printed.text)
 
 
+def header_unit(header: model.Cell) -> UnitText:
+    """The unit of a column, unless its source is said, as in `` τ (`s`{given="a guess"}) ``."""
+    inlines = model.walk_inlines(header.children)
+    is_given = any(isinstance(i, model.NumberBinding) and i.source is not None for i in inlines)
+    return NO_UNIT if is_given else unit_of_header(_cell_text(header, ()).text)
+
+
 def unprinted_units(
     table: model.Table, comparison: model.Comparison, stdout: str
 ) -> Iterator[tuple[Span, str]]:
@@ -138,7 +154,7 @@ def unprinted_units(
     for column, unit in _column_units(table, matcher.match(), matcher):
         columns.setdefault(column, []).append(unit)
     for column, units in columns.items():
-        unit = unit_of_header(_cell_text(table.header[column], ()).text)
+        unit = header_unit(table.header[column])
         if unit and not any(units):
             yield table.header[column].span, unit.text
 

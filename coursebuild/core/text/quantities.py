@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 
 from msgspec import Struct
 
-from coursebuild.core.text.numbers import Number, scan
+from coursebuild.core.text.numbers import Number, only_number
 from coursebuild.core.text.units import NAMES, Unit, find_units, is_name
 
 _SECOND_READINGS = {
@@ -30,6 +30,7 @@ _SECOND_READINGS = {
 
 _SIGNS = frozenset(("/", "·", "⋅", "*", "per"))
 _PER_UNIT = re.compile(r"/[^\W\d_]")
+_REACH = 80
 _LONGEST_PRODUCT = 4
 _CLOSING = ".,;:!?”\"'*_|>}"
 _UPRIGHT = re.compile(r"\$\s*(?:\\[,;: ])*\\(?:mathrm|text|textrm)\s*\{([^{}$]*)\}\s*\$")
@@ -111,7 +112,7 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
 
     `has_names`: names may stand before the numbers of the text, as in `l 2.0 T 2.8`.
     """
-    rest = _UPRIGHT.sub(lambda match: plain_unit(match[1]), text[at : at + 80])
+    rest = _UPRIGHT.sub(lambda match: plain_unit(match[1]), text[at : at + _REACH])
     words = rest.replace("&nbsp;", " ").lstrip("*_").split()[: _LONGEST_PRODUCT + 1]
     name_sign = re.compile(r"[=:\d.+−-]" if has_names else "[=:]")
     unit = NO_UNIT
@@ -132,6 +133,8 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
             break
         elif longer:
             unit = longer
+        if not longer and not is_open and words[count - 2 : count - 1] == ["per"]:
+            return NO_UNIT  # `degrees per step`
         if bare != product or not (longer or is_open):
             break
     is_attached = at > 0 and text[at : at + 1].isalpha()
@@ -178,6 +181,9 @@ def unit_of_header(text: str) -> UnitText:
     quotient = _SOLIDUS.search(text)
     if quotient is None or find_units(text):
         return NO_UNIT
+    tail = text.split()[-1]
+    if quotient["unit"] and "/" in tail and find_units(tail):  # `at 200 rad/s`
+        return NO_UNIT
     unit = read_unit(quotient["unit"] or quotient["word"])
     return NO_UNIT if is_name(unit.text) or unit.text in _SECOND_READINGS else unit
 
@@ -190,17 +196,17 @@ def _unit_of_label(before: str) -> UnitText:
 
 def _unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
     """The unit in the header above a number of a row; none if it is uncertain which is its own."""
-    for header in reversed(above):
-        if not header.strip():
-            return NO_UNIT
-        cells = [cell[0] for cell in _CELLS[0].finditer(header)]
-        cells = [cell for cell in cells if not unit_of_header(cell)]
-        if _RULE.fullmatch(header) or any(scan(cell) for cell in cells):
+    for pattern in _CELLS:
+        row = [*pattern.finditer(line)]
+        column = next((i for i, cell in enumerate(row) if cell.end() > start), 0)
+        if len(row) < 2 or not all(only_number(cell[0]) for cell in row[1:]):
             continue
-        for pattern in _CELLS:
-            row, columns = [*pattern.finditer(line)], pattern.findall(header)
-            if 1 < len(row) == len(columns):
-                at = next((i for i, cell in enumerate(row) if cell.end() > start), -1)
-                return unit_of_header(columns[at])
-        return NO_UNIT
+        for header in reversed(above):
+            cells = pattern.findall(header)
+            if _RULE.fullmatch(header) and header.strip():
+                continue
+            if len(cells) != len(row):
+                break
+            if not any(only_number(cell) for cell in cells):
+                return unit_of_header(cells[column])
     return NO_UNIT

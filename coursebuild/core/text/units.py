@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from itertools import product
 from typing import TypeAlias
@@ -418,15 +418,21 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
 
 def _pattern_of_units() -> str:
     """The pattern of the units right behind a number in prose, up to four."""
-    symbols = {symbol: row.marks for symbol, row in _ROWS.items() if "?" not in row.marks}
-    longest_first = sorted(symbols, key=len, reverse=True)
-    prefixable = "|".join(symbol for symbol in longest_first if "*" in symbols[symbol])
-    plain_symbols = "|".join(symbol for symbol in longest_first if "*" not in symbols[symbol])
-    prefixes = "|".join(sorted(_PREFIXES, key=len, reverse=True))
+    symbols = [(symbol, row.marks) for symbol, row in _ROWS.items() if "?" not in row.marks]
+    prefix = _alternatives(_PREFIXES)
+    prefixable = _alternatives(symbol for symbol, marks in symbols if "*" in marks)
+    unprefixable = _alternatives(symbol for symbol, marks in symbols if "*" not in marks)
     power = r"(?:[²³⁻¹⁴⁶0-9]|\^-?[0-9])*"
-    unit = rf"(?:(?:{prefixes})?(?:{prefixable})|{plain_symbols}|[KMGT]iB){power}"
-    product_pattern = rf"{unit}(?:[/·⋅*]{unit})*(?![^\W_])"
-    return rf"{product_pattern}(?:[ \u00a0\u202f]{product_pattern}){{0,3}}"
+    unit = rf"(?:{prefix}?{prefixable}|{unprefixable}|[KMGT]iB){power}"
+    units = rf"{unit}(?:[/·⋅*]{unit})*(?![^\W_])"
+    return rf"{units}(?:[ \u00a0\u202f]{units}){{0,3}}"
+
+
+def _alternatives(symbols: Iterable[str]) -> str:
+    """The pattern of one of these, the longest first."""
+    by_length = sorted(symbols, key=len, reverse=True)
+    letters = "".join(symbol for symbol in by_length if len(symbol) == 1)
+    return f"(?:{'|'.join(symbol for symbol in by_length if len(symbol) > 1)}|[{letters}])"
 
 
 UNITS_SHOWN = _pattern_of_units()
