@@ -30,6 +30,7 @@ _SECOND_READINGS = {
 
 _SIGNS = frozenset(("/", "·", "⋅", "*", "per"))
 _PER_UNIT = re.compile(r"/[^\W\d_]")
+_GAP = re.compile(r"[ \t]{2,}|\t")
 _REACH = 80
 _LONGEST_PRODUCT = 4
 _CLOSING = ".,;:!?”\"'*_|>}"
@@ -46,7 +47,9 @@ _TEX_SIGNS = (
     (re.compile(r"\\[,;:! ]|[~$]"), " "),
 )
 _BRACKET = re.compile(r"(?P<before>.?)[(\[](?P<unit>(?:[^()\[\]]|\([^()]*\))*)[)\]]\s*\Z")
-_SOLIDUS = re.compile(r"\s*/\s*(?P<unit>[^/=:]+)\Z|\bin\s+(?P<word>\S+)\Z")
+_SOLIDUS = re.compile(r"\s*/\s*(?P<unit>[^/=:]+)\Z")
+_IN_WORDS = re.compile(r"(?P<symbol>\S+)\s+in\s+(?P<unit>\S+)\Z")
+_SYMBOL = re.compile(r"\w{1,2}|\\[a-z]+")
 _TO_NUMBER = re.compile(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")
 """From the end of a label to a number, perhaps past other numbers."""
 _CELLS = (
@@ -112,8 +115,11 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
 
     `has_names`: names may stand before the numbers of the text, as in `l 2.0 T 2.8`.
     """
+    if _GAP.match(text, at):
+        return NO_UNIT  # the next column
     rest = _UPRIGHT.sub(lambda match: plain_unit(match[1]), text[at : at + _REACH])
-    words = rest.replace("&nbsp;", " ").lstrip("*_").split()[: _LONGEST_PRODUCT + 1]
+    words = rest.replace("&nbsp;", " ").lstrip("*_")
+    words = _GAP.split(words.strip())[0].split()[: _LONGEST_PRODUCT + 1]
     name_sign = re.compile(r"[=:\d.+−-]" if has_names else "[=:]")
     unit = NO_UNIT
     for count, word in enumerate(words[:_LONGEST_PRODUCT], 1):
@@ -178,18 +184,22 @@ def unit_of_header(text: str) -> UnitText:
         if is_index or (is_letter and is_round and is_name(unit.text)):
             return NO_UNIT  # `x(t)`, `y[m]` and `error (h)`
         return NO_UNIT if unit.text == "min" and _has_maximum(text) else unit
-    quotient = _SOLIDUS.search(text)
-    if quotient is None or find_units(text):
+    in_words, quotient = _IN_WORDS.search(text), _SOLIDUS.search(text)
+    if in_words is not None:
+        unit = read_unit(in_words["unit"])  # `F in N`, but not `change in V`
+        is_certain = len(unit.text) > 1 or _SYMBOL.fullmatch(in_words["symbol"]) is not None
+    elif quotient is not None:
+        unit, tail = read_unit(quotient["unit"]), text.split()[-1]
+        is_unit_itself = find_units(text) or ("/" in tail and find_units(tail))  # `at 200 rad/s`
+        is_certain = not is_unit_itself and unit.text not in _SECOND_READINGS
+    else:
         return NO_UNIT
-    tail = text.split()[-1]
-    if quotient["unit"] and "/" in tail and find_units(tail):  # `at 200 rad/s`
-        return NO_UNIT
-    unit = read_unit(quotient["unit"] or quotient["word"])
-    return NO_UNIT if is_name(unit.text) or unit.text in _SECOND_READINGS else unit
+    return unit if is_certain and not is_name(unit.text) else NO_UNIT
 
 
 def _unit_of_label(before: str) -> UnitText:
     """The unit in the label that ends right before a number, or the list that it stands in."""
+    before = before[-_REACH:]
     gap = _TO_NUMBER.search(before)
     return NO_UNIT if gap is None else unit_of_header(before[: gap.start()])
 

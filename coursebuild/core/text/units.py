@@ -46,6 +46,10 @@ _PREFIXES = {
     **dict(zip("dcmµnpfazyrq", (-1, -2, *range(-3, -31, -3)), strict=True)),
     **dict.fromkeys("μu", -6),
 }
+_PREFIX_NAMES = {
+    **{"kilo": "k", "milli": "m", "micro": "µ", "mega": "M", "centi": "c", "giga": "G"},
+    **{"nano": "n", "hecto": "h", "deci": "d", "pico": "p", "mikro": "µ", "zenti": "c"},
+}
 _BINARY_PREFIXES = {f"{letter}i": 2 ** (10 * n) for n, letter in enumerate("KMGTPE", 1)}
 
 _TABLE = """
@@ -345,6 +349,9 @@ def find_symbol(word: str) -> tuple[Unit, ...]:
         return tuple(_read_size(size, row.base) for size in row.sizes if size != "?")
     if symbol in _BASES:
         return (_base_unit(symbol),)
+    for name, prefix in _PREFIX_NAMES.items():
+        if word.lower().startswith(name) and word[len(name) :] in NAMES:
+            return find_symbol(prefix + NAMES[word[len(name) :]])
     if len(word) > 2 and word[:2] in _BINARY_PREFIXES and word[2:] in ("B", "bit"):
         (unit,) = find_symbol(word[2:])
         return (replace(unit, size=unit.size * _BINARY_PREFIXES[word[:2]]),)

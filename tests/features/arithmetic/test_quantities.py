@@ -34,7 +34,7 @@ def sentences() -> list[tuple[str, str, str, str]]:
 
 def judge(printed: str, text: str, words: Words) -> str:
     """The verdict on a formula, or on a sentence or column below what a script printed."""
-    stdout = printed.replace("\\n", "\n") + "\n"
+    stdout, text = (part.replace("⏎", "\n") for part in (f"{printed}⏎", text))
     column = re.fullmatch(r"\| (.*) \| (\S*) \|", text)
     if not printed:
         lesson = text
