@@ -70,7 +70,8 @@ W* 1 J/s watt watts Watt
 C*! 1 A*s coulomb coulombs Coulomb
 V* 1 W/A volt volts Volt
 F*! 1 C/V farad farads
-Ω* 1 V/A ohm ohms Ohm
+Ω* 1 V/A ohms Ohm
+ohm* 1 V/A
 S*! 1 A/V siemens
 Wb* 1 V*s weber
 T*! 1 Wb/m^2 tesla teslas Tesla
@@ -240,7 +241,7 @@ def multiply(left: Dimension, right: Dimension, power: Fraction | int = 1) -> Di
     return tuple(sorted((name, power) for name, power in powers.items() if power))
 
 
-class _Row(Struct, frozen=True):
+class UnitRow(Struct, frozen=True):
     """A row of the table."""
 
     sizes: tuple[str, ...]
@@ -248,18 +249,18 @@ class _Row(Struct, frozen=True):
     marks: str
 
 
-def _read_table() -> tuple[dict[str, _Row], dict[str, str]]:
-    rows: dict[str, _Row] = {}
+def _read_table() -> tuple[dict[str, UnitRow], dict[str, str]]:
+    rows: dict[str, UnitRow] = {}
     names: dict[str, str] = {}
     for line in _TABLE.strip().splitlines():
         symbol, sizes, base, *other_names = line.split()
         bare = symbol.rstrip("*!?")
-        rows[bare] = _Row(tuple(sizes.split(",")), base, symbol.removeprefix(bare))
+        rows[bare] = UnitRow(tuple(sizes.split(",")), base, symbol.removeprefix(bare))
         names.update(dict.fromkeys(other_names, bare))
     return rows, names
 
 
-_ROWS, NAMES = _read_table()
+UNITS, NAMES = _read_table()
 
 
 @functools.lru_cache(maxsize=512)
@@ -344,8 +345,8 @@ def find_symbol(word: str) -> tuple[Unit, ...]:
     """The units that a word of letters may be, with or without a prefix."""
     word = re.sub(r"\s", "", word).replace("\u2126", "Ω").replace("\u212b", "Å")
     symbol = NAMES.get(word, word)
-    if symbol in _ROWS:
-        row = _ROWS[symbol]
+    if symbol in UNITS:
+        row = UNITS[symbol]
         return tuple(_read_size(size, row.base) for size in row.sizes if size != "?")
     if symbol in _BASES:
         return (_base_unit(symbol),)
@@ -357,7 +358,7 @@ def find_symbol(word: str) -> tuple[Unit, ...]:
         return (replace(unit, size=unit.size * _BINARY_PREFIXES[word[:2]]),)
     for length in (1, 2):
         prefix, rest = word[:length], word[length:]
-        if prefix in _PREFIXES and rest in _ROWS and "*" in _ROWS[rest].marks:
+        if prefix in _PREFIXES and rest in UNITS and "*" in UNITS[rest].marks:
             scale = Fraction(10) ** _PREFIXES[prefix]
             return tuple(replace(unit, size=unit.size * scale) for unit in find_symbol(rest))
     return ()
@@ -388,8 +389,8 @@ def is_name(word: str) -> bool:
     So is what has a prefix for a Latin letter, as `us` and `um`, or one that few texts use.
     """
     symbol = NAMES.get(word, word)
-    if symbol in _ROWS:
-        return word not in NAMES and _ROWS[symbol].marks.strip("*") != ""
+    if symbol in UNITS:
+        return word not in NAMES and UNITS[symbol].marks.strip("*") != ""
     return len(word) == 2 and word[0] not in "kMGcmnµμ" and bool(find_symbol(word))
 
 
@@ -408,7 +409,7 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
         return
     for match in re.finditer(_WORD, unit.text):
         word = match[0]
-        if find_symbol(word) or {word, NAMES.get(word)} & {*_ROWS, "per"}:
+        if find_symbol(word) or {word, NAMES.get(word)} & {*UNITS, "per"}:
             continue
         units = (unit for unit in COMMON if unit.casefold() == word.casefold())
         pairs = ((first, word.removeprefix(first)) for first in _PRODUCT_UNITS)
@@ -425,7 +426,7 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
 
 def _pattern_of_units() -> str:
     """The pattern of the units right behind a number in prose, up to four."""
-    symbols = [(symbol, row.marks) for symbol, row in _ROWS.items() if "?" not in row.marks]
+    symbols = [(symbol, row.marks) for symbol, row in UNITS.items() if "?" not in row.marks]
     prefix = _alternatives(_PREFIXES)
     prefixable = _alternatives(symbol for symbol, marks in symbols if "*" in marks)
     unprefixable = _alternatives(symbol for symbol, marks in symbols if "*" not in marks)
@@ -442,5 +443,5 @@ def _alternatives(symbols: Iterable[str]) -> str:
     return f"(?:{'|'.join(symbol for symbol in by_length if len(symbol) > 1)}|[{letters}])"
 
 
-UNITS_SHOWN = _pattern_of_units()
+UNIT_PATTERN = _pattern_of_units()
 """It takes more for a unit than `find_units` does with its context: typography may."""

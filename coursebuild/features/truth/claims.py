@@ -33,7 +33,7 @@ from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import Number, point_decimals, scan_prose
 from coursebuild.core.text.source import Excerpt, Span
-from coursebuild.core.text.units import UNITS_SHOWN, find_unit
+from coursebuild.core.text.units import UNIT_PATTERN, find_unit
 from coursebuild.features.arithmetic.evaluate import FormulaComparison, measure, read_numeral
 from coursebuild.features.arithmetic.expressions import Expression
 from coursebuild.features.arithmetic.statements import FormulaSide, read_statements
@@ -126,7 +126,7 @@ _NO_SOURCE = "unsourced"
 
 _COUNTS = 12
 _YEARS = range(1600, 2100)
-_UNIT = re.compile(rf"[\s\u00a0\u202f]*(?:{UNITS_SHOWN})")
+_UNIT = re.compile(rf"[\s\u00a0\u202f]*(?:{UNIT_PATTERN})")
 _DECIMAL = re.compile(r"\d\.\d")
 _MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
 """Every formula with claims matches this."""
