@@ -29,6 +29,7 @@ from coursebuild.core.text.quantities import (
     numbers_of_quantities,
     printed_unit,
     unit_behind,
+    unit_of_column,
 )
 from coursebuild.core.text.source import Excerpt, Source, Span
 
@@ -110,10 +111,16 @@ class Window(Struct, frozen=True):
 
     def units(self, lines: Sequence[PrintedLine]) -> list[UnitText]:
         """The units that are printed with them, the lines being all of their output."""
-        index = next((i for i, line in enumerate(lines) if line is self.line), 0)
-        above = [line.text for line in lines[:index]]
         text = self.line.text
-        return [printed_unit(text, number.start, number.end, above) for number in self.numbers]
+        return [
+            printed_unit(text, number.start, number.end)
+            or unit_of_column(text, number.start, self._lines_above(lines))
+            for number in self.numbers
+        ]
+
+    def _lines_above(self, lines: Sequence[PrintedLine]) -> list[str]:
+        index = next((i for i, line in enumerate(lines) if line is self.line), 0)
+        return [line.text for line in lines[:index]]
 
     @property
     def text(self) -> str:

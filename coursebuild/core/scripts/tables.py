@@ -40,6 +40,7 @@ from coursebuild.core.text.quantities import (
     UnitText,
     are_different,
     printed_unit,
+    unit_of_column,
     unit_of_header,
 )
 from coursebuild.core.text.source import Span
@@ -165,9 +166,11 @@ def _column_units(
     """The column of each number of a table, and the unit that is printed with it."""
     columns = {id(cell): at for row in table.rows for at, cell in enumerate(row)}
     for match in matches:
-        line, above = matcher.lines[match.line], matcher.lines[: max(match.line, 0)]
+        line = matcher.lines[match.line]
         for cell, _, number in matcher.pairs(match.row, match.line) if match.line >= 0 else ():
-            yield columns[id(cell.cell)], printed_unit(line, number.start, number.end, above)
+            unit = printed_unit(line, number.start, number.end)
+            unit = unit or unit_of_column(line, number.start, matcher.lines[: match.line])
+            yield columns[id(cell.cell)], unit
 
 
 def _row_text(row: Sequence[RowCell]) -> str:

@@ -1,7 +1,8 @@
 """The unit of a number in a line of text: behind it, in its label or above its column.
 
-Entry points: `printed_unit(line, start, end, above)`; `unit_behind(text)`, `unit_of_header(text)`,
-for what an author writes; `are_different(left, right)`, which is certain.
+Entry points: `printed_unit(line, start, end)`, `unit_of_column(line, start, above)`, for what a
+program printed; `unit_behind(text)`, `unit_of_header(text)`, for what an author writes;
+`are_different(left, right)`, which is certain.
 
 1. What has two readings is read in both: `m` is a metre or a minute, `C` a coulomb or a degree.
    Units differ if no reading of one is a reading of the other.
@@ -98,16 +99,9 @@ def are_different(left: UnitText, right: UnitText) -> bool:
     )
 
 
-def printed_unit(line: str, start: int, end: int, above: Sequence[str] = ()) -> UnitText:
-    """The unit of the number at `line[start:end]`, where a program printed one.
-
-    `above`: the lines above it, the last of which stands right above.
-    """
-    return (
-        unit_behind(line, end, has_names=line[:1].isalpha())
-        or _unit_of_label(line[:start])
-        or _unit_of_column(line, start, above)
-    )
+def printed_unit(line: str, start: int, end: int) -> UnitText:
+    """The unit of the number at `line[start:end]` in what a program printed, in its own line."""
+    return unit_behind(line, end, has_names=line[:1].isalpha()) or _unit_of_label(line[:start])
 
 
 def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
@@ -118,9 +112,8 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
     if _GAP.match(text, at):
         return NO_UNIT  # the next column
     rest = _UPRIGHT.sub(lambda match: plain_unit(match[1]), text[at : at + _REACH])
-    words = rest.replace("&nbsp;", " ").lstrip("*_")
-    words = _GAP.split(words.strip())[0].split()[: _LONGEST_PRODUCT + 1]
-    name_sign = re.compile(r"[=:\d.+−-]" if has_names else "[=:]")
+    phrase = _GAP.split(rest.replace("&nbsp;", " ").lstrip("*_ \n"))[0]
+    words = phrase.split()[: _LONGEST_PRODUCT + 1]
     unit = NO_UNIT
     for count, word in enumerate(words[:_LONGEST_PRODUCT], 1):
         product = " ".join(words[:count])
@@ -128,7 +121,9 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
         follows = words[count] if bare == product and count < len(words) else ""
         is_open = bare.count("(") > bare.count(")") or word in _SIGNS
         longer = read_unit(bare)
-        is_certain = name_sign.match(follows) is None
+        is_certain = re.match("[=:]", follows) is None
+        if has_names or count > 1:
+            is_certain &= re.match(r"[\d.+−-]", follows) is None
         if longer and not unit:
             is_word = is_name(bare) and (follows[:1].isalnum() or _has_maximum(text))
             if is_word or not is_certain:
@@ -164,12 +159,12 @@ def _without_closing(text: str) -> str:
 
 def numbers_of_quantities(text: str, numbers: Iterable[Number]) -> tuple[Number, ...]:
     """The numbers of a text but for the 1 of a unit, as in `0.5 1/s`."""
-    kept: list[Number] = []
+    quantities: list[Number] = []
     for number in numbers:
-        follows = bool(kept) and not text[kept[-1].end : number.start].strip()
+        follows = bool(quantities) and not text[quantities[-1].end : number.start].strip()
         if not (follows and number.text == "1" and _PER_UNIT.match(text, number.end)):
-            kept.append(number)
-    return tuple(kept)
+            quantities.append(number)
+    return tuple(quantities)
 
 
 def unit_of_header(text: str) -> UnitText:
@@ -204,8 +199,11 @@ def _unit_of_label(before: str) -> UnitText:
     return NO_UNIT if gap is None else unit_of_header(before[: gap.start()])
 
 
-def _unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
-    """The unit in the header above a number of a row; none if it is uncertain which is its own."""
+def unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
+    """The unit in the header above a number of a row; none if it is uncertain which is its own.
+
+    `above`: the lines above the row, the last of which stands right above.
+    """
     for pattern in _CELLS:
         row = [*pattern.finditer(line)]
         column = next((i for i, cell in enumerate(row) if cell.end() > start), 0)
