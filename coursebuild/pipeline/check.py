@@ -25,6 +25,7 @@ from coursebuild.core.run.dependencies import sought_files
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.scripts.extract import extract
+from coursebuild.core.scripts.findings import unproven_units
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
@@ -83,6 +84,9 @@ def check(
             )
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
         inventory = [claim for claim in claims if isinstance(claim, Diagnostic)]
+        if truth:
+            results = verification.results
+            inventory += unproven_units(course, results.runs, results.verdicts)
         report = checked_course.report(diagnostics, inventory)
         if shard is None:
             remarks += remarks_on_proofs(

@@ -5,6 +5,7 @@ between `<!-- generated: WORDS -->` and `<!-- end -->`. The words are those of `
 
 - `fields lab SimLab`: the fields of a structure in the schema `lab`; `beyond` or `within` and the
   name of another one, of this schema or of `lab`, leave out those that it has, or has not;
+- `units`: those that there are;
 - `commands`, and `command check`: all of them, and what one takes; `options`: those of several.
 """
 
@@ -13,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import textwrap
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 from typing import Any
@@ -21,6 +23,7 @@ import pytest
 
 from coursebuild.cli.commands import known_commands, parser_of
 from coursebuild.core.syntax.course_schema import json_schema
+from coursebuild.core.text.units import UNITS
 from support.markdown_files import PAGES
 
 _PART = re.compile(r"(<!-- generated: ([^>\n]+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -188,11 +191,20 @@ def _kinds(action: Any) -> Iterator[list[tuple[str, str]]]:
         yield [(f"`{name}` {argument}", meaning) for argument, meaning in rows]
 
 
+def _units(text: str) -> str:
+    parts = []
+    for marks, lead in (("*", "With prefixes, as in `mm` and `MPa`"), ("", "Without")):
+        symbols = [f"`{name}`" for name, row in UNITS.items() if ("*" in row.marks) is bool(marks)]
+        parts.append(f"{lead}: {', '.join(symbols)}.")
+    return "\n\n".join("\n".join(textwrap.wrap(part, 120)) for part in parts)
+
+
 _MAKERS: dict[str, Callable[..., str]] = {
     "fields": _fields,
     "commands": _commands,
     "command": _command,
     "options": _options,
+    "units": _units,
 }
 
 

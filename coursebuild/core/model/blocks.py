@@ -124,6 +124,8 @@ class Table(Labelled, frozen=True):
     rows: tuple[tuple[Cell, ...], ...]
     caption: tuple[Inline, ...] = ()
     """The rest of a paragraph `Table: …` above it."""
+    comma: bool = False
+    """Whether a comma may stand before the decimals of its numbers."""
 
 
 class FigureName(Struct, frozen=True):
@@ -365,5 +367,7 @@ class Document(Struct, frozen=True, dict=True):
     """Texts below a script that may show its output, and that are not marked as such."""
     numbered_items: tuple[NumberedItem, ...] = ()
     """Set in a summary only, which lacks formulas and tables themselves."""
+    comma: bool = False
+    """Whether a comma may stand before the decimals of its numbers, as in its language."""
     summaries: Mapping[str, Struct] | None = None
     """Set in a summary only: those that features made of the text, by their names."""

@@ -38,6 +38,8 @@ class Words(Struct, frozen=True):
     levels: tuple[str, ...] = ("Levels",)
     conjunctions: tuple[str, ...] = ("and", "or", "to")
     """Between the numbers of lessons or levels."""
+    decimal: tuple[str, ...] = (".",)
+    """The signs before the decimals of a number."""
 
 
 ENGLISH = Words()

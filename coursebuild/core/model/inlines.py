@@ -67,6 +67,8 @@ class NumberBinding(Located, frozen=True):
     """Its source from `{given="…"}`, perhaps empty; `None` where a script has printed it."""
     unit: str = ""
     """That of a symbol whose value it is."""
+    comma: bool = False
+    """Whether a comma may stand before its decimals, as in the language of the text."""
 
 
 LABEL_KINDS = {

@@ -30,7 +30,7 @@ from typing import Literal
 
 from markupsafe import Markup
 
-from coursebuild.core.text.units import UNITS_SHOWN
+from coursebuild.core.text.units import UNIT_PATTERN
 
 LONG = 20
 """Characters; a shorter formula is not split."""
@@ -176,10 +176,10 @@ _NUMBER = (
     r"(?:\^[-−]?[0-9]+|[⁻¹²³⁰⁴-⁹]+)?)?"
 )
 
-_WITH_UNITS = re.compile(rf"(?<=[0-9]) {UNITS_SHOWN}")
+_WITH_UNITS = re.compile(rf"(?<=[0-9]) {UNIT_PATTERN}")
 _TITLE = re.compile(r"[0-9]+\.[0-9]+(?= [A-Z] [a-z])")
 """The number of a lesson before a title such as `A pendulum`: no amperes."""
-_UNITS_FIRST = rf"{_SPACE}?{UNITS_SHOWN}"
+_UNITS_FIRST = rf"{_SPACE}?{UNIT_PATTERN}"
 _QUANTITY = rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_UNITS_FIRST})?|{_NUMBER}{_UNITS_FIRST})"
 """Compiled when it is needed, as few pages do: it takes longer than all others together."""
 _LATIN_BEFORE = re.compile("[A-Za-z]\\s*(?:=\\s*)?$")

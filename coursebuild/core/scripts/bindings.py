@@ -45,9 +45,11 @@ from coursebuild.core.scripts.bound_numbers import (
     text_places,
 )
 from coursebuild.core.scripts.lines import canonicalize
+from coursebuild.core.scripts.tables import header_unit
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.numbers import Number, difference
+from coursebuild.core.text.units import with_unit
 
 _SILENT_OUTCOMES = (
     Outcome.FAILED,
@@ -58,6 +60,9 @@ _SILENT_OUTCOMES = (
     Outcome.UNRECORDED,
 )
 """Those that are reported by themselves, so that no more is said of numbers bound to them."""
+
+
+_LINE_END = re.compile(r"(?<!\n)\n[ \t>]*(?!\n)")
 
 
 class BindingKey(Struct, frozen=True):
@@ -146,8 +151,19 @@ def _recording_key(verdict: Verdict) -> tuple[str, int]:
 
 
 def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ...]:
-    """The bound numbers of a document, in order: also in footnotes, tables and quizzes."""
-    return tuple(b for b in model.find_inlines(document, model.NumberBinding) if b.source is None)
+    """The bound numbers of a document, in order: also in footnotes, tables and quizzes.
+
+    One that ends its cell in a table has the unit of the column.
+    """
+    units = {
+        inline.span.start: header_unit(header).text
+        for table in model.find_blocks(document, model.Table)
+        for row in table.rows
+        for cell, header in zip(row, table.header, strict=False)
+        for inline in cell.children[-1:]
+    }
+    bindings = (b for b in model.find_inlines(document, model.NumberBinding) if b.source is None)
+    return tuple(replace(b, unit=b.unit or units.get(b.span.start, "")) for b in bindings)
 
 
 def check_bindings(
@@ -206,8 +222,8 @@ def _check(
         is_run = run is None or run.outcome is not Outcome.NORUN
         return () if is_run else _orphan_diagnostic(binding, path, outputs)
     steady = [v for v in verdicts if v.comparison.mode is not model.Mode.VOLATILE]
-    bound_text = BoundText.of(binding.text)
     lines = [line for verdict in steady for line in outputs.lines(verdict)]
+    bound_text = _read_text(binding, lines)
     if _holds(bound_text, lines):
         mismatch = _wrong_unit(binding, bound_text, path, lines)
         return lines if mismatch is None else mismatch
@@ -232,13 +248,47 @@ def _check(
 def _wrong_unit(
     binding: model.NumberBinding, bound_text: BoundText, path: str, lines: Sequence[PrintedLine]
 ) -> Diagnostic | None:
-    source, end = binding.span.source, binding.span.end
-    units = bound_text.wrong_unit(lines, binding.unit or source.text[end : end + 40])
-    if units is None:
+    mismatch = bound_text.wrong_unit(lines, binding.unit or _following(binding))
+    if mismatch is None:
         return None
-    message = f"`{path}` printed `{units[0]}`, and here it is followed by `{units[1]}`"
-    help = "write the unit that is printed, or let the script convert the number"
+    number, printed_text, unit_text = mismatch
+    quantity = with_unit(number.text, printed_text)
+    message = f"`{path}` printed `{quantity}`, and the unit here is `{unit_text}`"
+    help = "write the unit that is printed, or let the script convert the number; where it is not"
+    help += ' meant, write `{given="…"}` in place of `{out}`'
     return diagnose("binding-mismatch", binding.text_span, message, help=help)
+
+
+def unprinted_unit(binding: model.NumberBinding, outputs: PrintedOutputs) -> str:
+    """The unit of a bound number that is printed with none; empty if there is no such."""
+    verdicts = outputs.of_binding(binding)
+    lines = [line for verdict in verdicts for line in outputs.lines(verdict)]
+    bound_text = _read_text(binding, lines)
+    shown_units = bound_text.units(binding.unit or _following(binding))
+    path = binding.script or (verdicts[0].recording.script if verdicts else None)
+    run = outputs.runs.get(path or "")
+    if not any(shown_units) or not bound_text.numbers:
+        return ""
+    if not bound_text.is_in(lines) and run is not None:
+        lines = lines_of_run(run.stdout)
+    printed_units = [w.units(lines) for w in bound_text.windows(lines) if bound_text.shows(w)]
+    for at, unit in enumerate(shown_units):
+        if unit and printed_units and not any(units[at] for units in printed_units):
+            return unit.text
+    return ""
+
+
+def _following(binding: model.NumberBinding) -> str:
+    """The text behind a binding, also on the next line of a quotation."""
+    end = binding.span.end
+    return _LINE_END.sub(" ", binding.span.source.text[end : end + 80])
+
+
+def _read_text(binding: model.NumberBinding, lines: Sequence[PrintedLine]) -> BoundText:
+    """The text of a binding; a comma in it may stand before decimals, or part numbers."""
+    bound_text, as_printed = BoundText.of(binding.text, binding.comma), BoundText.of(binding.text)
+    is_list = bound_text.comma and not _holds(bound_text, lines) and _holds(as_printed, lines)
+    return as_printed if is_list else bound_text
 
 
 def _holds(bound_text: BoundText, lines: Sequence[PrintedLine]) -> bool:
@@ -275,7 +325,7 @@ def dependent_bindings(
     dependents: list[DependentBinding] = []
     for binding in (b for document in documents for b in document_bindings(document)):
         if any(_recording_key(candidate) == key for candidate in outputs.of_binding(binding)):
-            bound_text = BoundText.of(binding.text)
+            bound_text = BoundText.of(binding.text, binding.comma)
             places = text_places(bound_text.before, lines)
             if bound_text.numbers:
                 windows = filter(bound_text.shows, bound_text.windows(lines))
@@ -295,7 +345,7 @@ def _mismatch(
     binding: model.NumberBinding, path: str, lines: Sequence[PrintedLine], before: Sequence[str]
 ) -> Diagnostic:
     """The diagnostic of a binding that none of these lines bears out; `before` as in `_check`."""
-    bound_text = BoundText.of(binding.text)
+    bound_text = BoundText.of(binding.text, binding.comma)
     stray, label = bound_text.stray, ""
     pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", binding.text)
     with_point = BoundText.of(pointed)
@@ -341,8 +391,8 @@ def _propose(
         doubt = f"it is not certain what is printed in place of {text_before} now"
         return f"{doubt}; {nearest_text}", ""
     better = rewritings.pop()
-    if better and not BoundText.of(better).is_in(lines):  # other numbers have its words or unit
-        better = ""
+    if better and not BoundText.of(better, bound_text.comma).is_in(lines):
+        better = ""  # other numbers have its words or unit
     are, were = ("are", "were") if several else ("is", "was")
     return f"{now[0].text} {are} printed where {text_before} {were}", better
 

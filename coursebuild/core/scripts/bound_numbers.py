@@ -8,6 +8,7 @@ from decimal import Decimal
 from functools import cached_property
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.scripts.lines import MappedText, Side, plain_text, replace_ranges
@@ -15,13 +16,22 @@ from coursebuild.core.scripts.tables import RowCell, table_rows
 from coursebuild.core.text.numbers import (
     Number,
     has_groups,
+    point_decimals,
     round_like,
     scan,
     scan_prose,
     within_half_unit,
+    write_comma,
+)
+from coursebuild.core.text.quantities import (
+    UnitText,
+    are_different,
+    numbers_of_quantities,
+    printed_unit,
+    unit_behind,
+    unit_of_column,
 )
 from coursebuild.core.text.source import Excerpt, Source, Span
-from coursebuild.core.text.units import units_at
 
 Locate = Callable[[int, int], Span]
 _STRAY = re.compile(r"[-+*/.,:;=_]+|-?[eE][-+]+\d*|[-+][eE]\d*")
@@ -40,7 +50,7 @@ class PrintedLine(Struct, frozen=True, dict=True):
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
         """The numbers in it; not computed until needed, as those of most lines never are."""
-        return scan(self.text, self.is_grouped)
+        return numbers_of_quantities(self.text, scan(self.text, self.is_grouped))
 
 
 def lines_of_run(stdout: str, filters: Iterable[Filter] = ()) -> list[PrintedLine]:
@@ -54,10 +64,12 @@ def printed_lines(recording: Recording, filters: Iterable[Filter] = ()) -> tuple
     """The lines of a recorded output; without filters, as the author sees them."""
     if isinstance(recording.body, Table):
         rows = [_join_cells(row) for row in table_rows(recording.body)]
-        is_grouped = has_groups("\n".join(row.text for row in rows))
+        texts = [point_decimals(r.text) if recording.body.comma else r.text for r in rows]
+        is_grouped = has_groups("\n".join(texts))
         source = recording.body.span.source
         return tuple(
-            PrintedLine(row.text, _locator_in_row(row, source), is_grouped) for row in rows
+            PrintedLine(text, _locator_in_row(row, source), is_grouped)
+            for text, row in zip(texts, rows, strict=True)
         )
     side = Side.of(recording.body.text, filters)
     is_grouped = has_groups("\n".join(side.lines))
@@ -97,6 +109,19 @@ class Window(Struct, frozen=True):
     line: PrintedLine
     numbers: tuple[Number, ...]
 
+    def units(self, lines: Sequence[PrintedLine]) -> list[UnitText]:
+        """The units that are printed with them, the lines being all of their output."""
+        text = self.line.text
+        return [
+            printed_unit(text, number.start, number.end)
+            or unit_of_column(text, number.start, self._lines_above(lines))
+            for number in self.numbers
+        ]
+
+    def _lines_above(self, lines: Sequence[PrintedLine]) -> list[str]:
+        index = next((i for i, line in enumerate(lines) if line is self.line), 0)
+        return [line.text for line in lines[:index]]
+
     @property
     def text(self) -> str:
         """The numbers as printed."""
@@ -121,10 +146,16 @@ class BoundText(Struct, frozen=True):
     numbers: tuple[Number, ...]
     after: str
 
+    comma: bool = False
+    """Whether its numbers were written with a comma before the decimals; here it is a point."""
+
     @classmethod
-    def of(cls, text: str) -> BoundText:
-        """The numbers and the plain text of a binding."""
-        numbers = scan_prose(text)
+    def of(cls, text: str, comma: bool = False) -> BoundText:
+        """The numbers and the plain text of a binding, in a language that may have the comma."""
+        pointed = point_decimals(text) if comma else text
+        if pointed != text:
+            return replace(cls.of(pointed), comma=True)
+        numbers = numbers_of_quantities(text, scan_prose(text))
         if not numbers:
             return cls(text, plain_text(text), (), "")
         before, after = text[: numbers[0].start], text[numbers[-1].end :]
@@ -146,6 +177,7 @@ class BoundText(Struct, frozen=True):
                 printed.value and not Decimal(plain_text(rounded).replace(",", ""))
             ):
                 return ""
+            rounded = write_comma(rounded) if self.comma else rounded
             places.append((number.start, number.end, rounded))
         return replace_ranges(self.text, places)
 
@@ -159,29 +191,30 @@ class BoundText(Struct, frozen=True):
             return True
         return not self.stray and any(map(self.shows, self.windows(lines)))
 
-    def wrong_unit(self, lines: Sequence[PrintedLine], following: str) -> tuple[str, str] | None:
-        """A printed number with its unit, and the text beside it here, if that is another unit.
+    def wrong_unit(
+        self, lines: Sequence[PrintedLine], following: str
+    ) -> tuple[Number, str, str] | None:
+        """A printed number with its unit, and the unit that it has here, if that is another.
 
         `following` is what stands behind the binding.
         """
-        if not self.numbers:
-            return None
-        ends = [*(number.start for number in self.numbers[1:]), len(self.text)]
-        texts = [self.text[n.end : end] for n, end in zip(self.numbers, ends, strict=True)]
-        texts[-1] = texts[-1] if texts[-1].strip() else following
-        shown_units = list(map(units_at, texts))
-        difference: tuple[str, str] | None = None
+        shown_units = self.units(following)
+        difference: tuple[Number, str, str] | None = None
         for window in filter(self.shows, self.windows(lines) if any(shown_units) else ()):
-            line = window.line.text
-            printed_units = [units_at(line, number.end) for number in window.numbers]
-            pairs = zip(shown_units, printed_units, strict=True)
-            at = [i for i, (a, b) in enumerate(pairs) if a and b and a.isdisjoint(b)]
-            if not at:
+            pairs = zip(window.numbers, shown_units, window.units(lines), strict=True)
+            mismatches = ((n, p.text, s.text) for n, s, p in pairs if are_different(s, p))
+            difference = next(mismatches, None)
+            if difference is None:
                 return None
-            number = window.numbers[at[0]]
-            unit_text = line[number.end :].split()[0].rstrip(".,;:)]")
-            difference = f"{number.text} {unit_text}", texts[at[0]].split()[0].rstrip(".,;:!?)")
         return difference
+
+    def units(self, following: str) -> list[UnitText]:
+        """The units of its numbers, the last of which may have its own in what follows."""
+        ends = [*(number.start for number in self.numbers), len(self.text)][1:]
+        texts = [self.text[n.end : end] for n, end in zip(self.numbers, ends, strict=False)]
+        if texts and not texts[-1].strip():
+            texts[-1] = following
+        return list(map(unit_behind, texts))
 
     @property
     def stray(self) -> str:

@@ -33,7 +33,6 @@ from coursebuild.core.scripts.lines import (
     ELLIPSIS,
     LineMatcher,
     Side,
-    canonicalize,
     replace_ranges,
     same_number,
 )
@@ -41,11 +40,12 @@ from coursebuild.core.scripts.tables import (
     HEADER_HELP,
     RowCell,
     TableMatcher,
+    read_cell,
     table_rows,
     unit_changes,
 )
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
-from coursebuild.core.text.numbers import round_like
+from coursebuild.core.text.numbers import point_decimals, round_like, write_comma
 from coursebuild.core.text.source import Excerpt, Span
 
 _FENCE = re.compile(r"`{3,}|~{3,}")
@@ -257,11 +257,14 @@ def _update_table(
             if same_number(old, new, comparison):
                 continue
             span, text = cell.span(old), new.text
-            if span.text.replace(MINUS, "-") != old.text:
-                reason = "a number written with an entity or an escape cannot be replaced"
+            has_comma = table.comma and point_decimals(span.text) != span.text
+            pointed_text = point_decimals(span.text) if has_comma else span.text
+            if pointed_text.replace(MINUS, "-") != old.text:
+                reason = "a number pointed_text with an entity or an escape cannot be replaced"
                 return refusal(span, reason)
             if comparison.mode is model.Mode.DIGITS and old.is_inexact and new.place < old.place:
                 text = round_like(old, new.value) or text
+            text = write_comma(text) if has_comma else text
             places[id(cell)].append((old.start, old.end, text))
             # The minus signs of the old number stay: before it, and in its exponent.
             halves = (re.split("(?=[eE])", half) for half in (span.text, text))
@@ -269,7 +272,7 @@ def _update_table(
             signed = (part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
             edits.append(Edit(span, "".join(signed)))
         texts = ((cell, replace_ranges(cell.mapped.text, places[id(cell)])) for cell in match.row)
-        rows.append(tuple(replace(cell, canonical=canonicalize(text)) for cell, text in texts))
+        rows.append(tuple(replace(cell, canonical=read_cell(table, text)) for cell, text in texts))
     if TableMatcher(rows, printed, comparison).find_matching_lines() is None:
         span = table.span if not edits else edits[0].span
         return refusal(span, "the table cannot be made to match what the script prints")

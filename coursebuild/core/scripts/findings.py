@@ -26,10 +26,10 @@ from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.lines import ELLIPSIS, Side
-from coursebuild.core.scripts.tables import HEADER_HELP, table_rows
+from coursebuild.core.scripts.tables import HEADER_HELP, table_rows, unprinted_units
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.numbers import Number, only_number, scan, within_tolerance
-from coursebuild.core.text.source import Excerpt
+from coursebuild.core.text.source import Excerpt, Span
 
 _MAX_NOTES = 3
 _WIDTH = 60
@@ -216,6 +216,28 @@ def count_unproven(
     return {path: (recorded.count(path), bound.count(path)) for path in unrun}
 
 
+def unproven_units(
+    course: Course, runs: Iterable[ScriptRun], verdicts: Iterable[Verdict]
+) -> Iterator[Diagnostic]:
+    """List the units of bound numbers and recorded columns that no script printed."""
+    outputs = bindings.PrintedOutputs(verdicts, runs)
+    for document in course.documents:
+        for verdict in outputs.of_document(document):
+            table, run = verdict.recording.body, outputs.runs.get(verdict.recording.script or "")
+            if isinstance(table, Table) and run is not None and run.did_run:
+                for span, unit in unprinted_units(table, verdict.comparison, run.stdout):
+                    yield _unproven_unit(span, unit)
+        for binding in bindings.document_bindings(document):
+            if unit := bindings.unprinted_unit(binding, outputs):
+                yield _unproven_unit(binding.text_span, unit)
+
+
+def _unproven_unit(span: Span, unit: str) -> Diagnostic:
+    message = f"no script prints the unit `{unit}` with this number"
+    help = "print it behind the number, in its label or above its column"
+    return diagnose("unit-unproven", span, message, help=help)
+
+
 # --- drift
 
 
@@ -336,11 +358,11 @@ def _describe_difference(change: Change) -> str:
 
 
 def _describe_dependence(dependent: bindings.DependentBinding) -> str:
-    change = dependent.change
-    lead = f"`{dependent.binding.text}` depends on "
+    binding, change = dependent.binding, dependent.change
+    lead = f"`{binding.text}` depends on "
     recorded, printed = _single_number(change.recorded), _single_number(change.printed)
     if recorded is None or printed is None or change.kind is DriftKind.MISSING:
         return lead + "a line that changed"
-    numbers = [n for n in BoundText.of(dependent.binding.text).numbers if shows(n, recorded)]
+    numbers = [n for n in BoundText.of(binding.text, binding.comma).numbers if shows(n, recorded)]
     holds = ", and still holds" if any(shows(n, printed) for n in numbers) else ""
     return f"{lead}{recorded.text}, which this run printed as {printed.text}{holds}"

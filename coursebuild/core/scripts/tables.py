@@ -2,7 +2,7 @@
 
 1. A body row's cells, as plain text, must stand in order in one printed line, white space folded;
    each row in a line further down than the row before. All other lines are free. A header is, too,
-   but for a unit in brackets, which is not another one than is printed behind the numbers.
+   but for its unit, which is not another one than is printed with the numbers.
 2. Cells match whole words and whole numbers only: `4` not in `14`. Numbers match by the
    comparison's mode.
 3. Where a row has no such line, rows and lines are aligned; a row that fits a line except for its
@@ -34,12 +34,21 @@ from coursebuild.core.scripts.lines import (
     plain_text,
     same_number,
 )
-from coursebuild.core.text.numbers import Number, relative_error
+from coursebuild.core.text.numbers import Number, point_decimals, relative_error
+from coursebuild.core.text.quantities import (
+    NO_UNIT,
+    UnitText,
+    are_different,
+    printed_unit,
+    unit_of_column,
+    unit_of_header,
+)
 from coursebuild.core.text.source import Span
-from coursebuild.core.text.units import units_at
 
-_HEADER_UNIT = re.compile(r"[(\[]([^()\[\]]+)[)\]]\Z")
-HEADER_HELP = "write the unit that is printed, or put the columns in order"
+HEADER_HELP = (
+    "write the unit that is printed, or put the columns in order; where it is not meant, mark it:"
+    ' `` `s`{given="…"} ``'
+)
 _ALIKE_WEIGHT = 6
 _PLACES = 64
 
@@ -76,11 +85,18 @@ def table_rows(
     texts = ([(cell, _cell_text(cell, rules)) for cell in row] for row in table.rows)
     rows = (
         tuple(
-            RowCell(cell, mapped, canonicalize(mapped.text)) for cell, mapped in row if mapped.text
+            RowCell(cell, mapped, read_cell(table, mapped.text))
+            for cell, mapped in row
+            if mapped.text
         )
         for row in texts
     )
     return tuple(row for row in rows if row)
+
+
+def read_cell(table: model.Table, text: str) -> CanonicalText:
+    """What the text of a cell says, its decimals behind a point."""
+    return canonicalize(point_decimals(text) if table.comma else text)
 
 
 def compare_table(
@@ -107,22 +123,54 @@ def compare_table(
 def unit_changes(
     table: model.Table, matches: Iterable[RowMatch], matcher: TableMatcher
 ) -> Iterator[Change]:
-    """Units in the brackets of a header that are not those printed behind the column's numbers."""
+    """Units in a header that are not those printed with the column's numbers."""
+    headers = [_cell_text(cell, ()) for cell in table.header]
+    shown_units = list(map(header_unit, table.header))
+    mismatches: dict[int, UnitText] = {}
+    for column, printed in _column_units(table, matches, matcher):
+        if are_different(shown_units[column], printed):
+            mismatches.setdefault(column, printed)
+    for column, printed in sorted(mismatches.items()):
+        header, unit = headers[column], shown_units[column]
+        at = header.text.rfind(unit.text)
+        place = (at, at + len(unit.text)) if at >= 0 else (0, len(header.text))
+        span = Span(table.span.source, *header.origin(*place))
+        yield Change(DriftKind.TEXT, span, unit.text, printed.text)
+
+
+def header_unit(header: model.Cell) -> UnitText:
+    """The unit of a column, unless its source is said, as in `` τ (`s`{given="a guess"}) ``."""
+    inlines = model.walk_inlines(header.children)
+    is_given = any(isinstance(i, model.NumberBinding) and i.source is not None for i in inlines)
+    return NO_UNIT if is_given else unit_of_header(_cell_text(header, ()).text)
+
+
+def unprinted_units(
+    table: model.Table, comparison: model.Comparison, stdout: str
+) -> Iterator[tuple[Span, str]]:
+    """The headers whose units nothing prints, and these."""
+    rows, printed = table_rows(table, comparison.filters), Side.of(stdout, comparison.filters)
+    matcher = TableMatcher(rows, printed, comparison)
+    columns: dict[int, list[UnitText]] = {}
+    for column, unit in _column_units(table, matcher.match(), matcher):
+        columns.setdefault(column, []).append(unit)
+    for column, units in columns.items():
+        unit = header_unit(table.header[column])
+        if unit and not any(units):
+            yield table.header[column].span, unit.text
+
+
+def _column_units(
+    table: model.Table, matches: Iterable[RowMatch], matcher: TableMatcher
+) -> Iterator[tuple[int, UnitText]]:
+    """The column of each number of a table, and the unit that is printed with it."""
     columns = {id(cell): at for row in table.rows for at, cell in enumerate(row)}
-    printed: dict[int, list[tuple[str, int]]] = {}
     for match in matches:
-        for cell, _, number in matcher.pairs(match.row, match.line):
-            place = matcher.lines[match.line], number.end
-            printed.setdefault(columns[id(cell.cell)], []).append(place)
-    for column, places in sorted(printed.items()):
-        header = _cell_text(table.header[column], ())
-        unit = _HEADER_UNIT.search(header.text)
-        shown_units = frozenset() if unit is None else units_at(unit[1])
-        units = [units_at(line, end) for line, end in places]
-        if unit is not None and shown_units and all(u and u.isdisjoint(shown_units) for u in units):
-            span = Span(table.span.source, *header.origin(*unit.span(1)))
-            word = places[0][0][places[0][1] :].split()[0].rstrip(".,;:)]")
-            yield Change(DriftKind.TEXT, span, unit[1], word)
+        line = matcher.lines[match.line]
+        for cell, _, number in matcher.pairs(match.row, match.line) if match.line >= 0 else ():
+            unit = printed_unit(line, number.start, number.end)
+            unit = unit or unit_of_column(line, number.start, matcher.lines[: match.line])
+            yield columns[id(cell.cell)], unit
 
 
 def _row_text(row: Sequence[RowCell]) -> str:

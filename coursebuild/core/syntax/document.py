@@ -62,7 +62,8 @@ def parse_document(
     anchor = "" if title is None else slug(title.text)
     is_free = not state.anchors.has(anchor)
     document = model.Document(source, blocks, state.notes.finish(), anchor if is_free else "")
-    document = replace(document, unclaimed=tuple(_unclaimed_blocks(document, state.diagnostics)))
+    unclaimed = tuple(_unclaimed_blocks(document, state.diagnostics))
+    document = replace(document, unclaimed=unclaimed, comma=state.has_decimal_comma)
     conflict = find_conflict(source)
     if conflict is not None:  # the rest follows from it
         return Parsed(document, (conflict,))

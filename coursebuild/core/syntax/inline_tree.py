@@ -294,16 +294,20 @@ class _TokenReader:
         if end - start == len(token.content) + 2:
             start, end = start + 1, end - 1
         place = self.content.span(start, end)
-        if token.type == "number_given":
-            if (unread := find_unread(token.content)) is not None:
-                span_of_number = self.content.span(start + unread[0], start + unread[1])
-                message = f"`{span_of_number.text}` cannot be read as a number"
-                help = "write it as `0.5`, `1e-5` or `3 × 10⁻⁵`, and a range as `3–5`"
-                self.report(diagnose("number-form", span_of_number, message, help=help))
-            return model.NumberBinding(
-                span, token.content, place, None, collapse_spaces(token.info)
-            )
-        return model.NumberBinding(span, token.content, place, token.info or None)
+        is_given = token.type == "number_given"
+        if is_given and (unread := find_unread(token.content)) is not None:
+            span_of_number = self.content.span(start + unread[0], start + unread[1])
+            message = f"`{span_of_number.text}` cannot be read as a number"
+            help = "write it as `0.5`, `1e-5` or `3 × 10⁻⁵`, and a range as `3–5`"
+            self.report(diagnose("number-form", span_of_number, message, help=help))
+        return model.NumberBinding(
+            span,
+            token.content,
+            place,
+            script=None if is_given else token.info or None,
+            source=collapse_spaces(token.info) if is_given else None,
+            comma=self.state.has_decimal_comma,
+        )
 
     def _read_html(self, token: PositionedToken, span: Span) -> model.RawInline:
         html = self.content.slice(token.start, token.end)

@@ -28,6 +28,7 @@ class ParsingState:
         self.callouts = callouts
         self.lesson = lesson
         self.words = words
+        self.has_decimal_comma = "," in words.decimal
         self.references: References = {}
         """The link definitions of the document, which its inner texts may use."""
         self.diagnostics: list[Diagnostic] = []

@@ -265,7 +265,7 @@ class TextReader:
     def _read_table(self, token: PositionedToken) -> model.Table:
         at, report = self.index - 1, self.state.report
         table, self.index = read_table(self.tokens, at, self.base, self.inlines, report)
-        return table
+        return replace(table, comma=self.state.has_decimal_comma)
 
     def _skip_footnote(self, token: PositionedToken) -> None:
         depth = 1

@@ -47,6 +47,11 @@ _GROUPS = re.compile(
     r"(?<![0-9.,])[1-9][0-9]{0,2}(?:,[0-9]{3})+(?:\.[0-9]+)?(?!,?[0-9])(?!\.[0-9])"
 )
 """Digits as Python's format `,` writes them."""
+_WITH_COMMA = re.compile(
+    r"(?<![\w.,])(?:[0-9]{1,3}(?:\.[0-9]{3})+|[0-9]+),[0-9]+(?![0-9]|[.,][0-9])"
+    r"|(?<![\w.,])[0-9]{1,3}(?:\.[0-9]{3}){2,}(?![0-9]|[.,][0-9])"
+)
+_SWAPPED = str.maketrans(",.", ".,")
 _DIGIT_COMMA = re.compile("[0-9],[0-9]")
 _NOTATION = re.compile(
     rf"(?P<sign>{_SIGN})?(?P<whole>[0-9,]*)(?:\.(?P<decimals>[0-9]*))?"
@@ -123,6 +128,19 @@ def scan(text: str, is_grouped: bool = False) -> tuple[Number, ...]:
             is_integer = value.is_finite() and not any(c in digits for c in ".eE")
             numbers.append(Number(*match.span(), digits, value, place, is_integer))
     return tuple(numbers)
+
+
+def point_decimals(text: str) -> str:
+    """A text of the same length, with points for the commas before decimals.
+
+    Points that part thousands become commas: `1.234,5` is `1,234.5`, as programs print it.
+    """
+    return _WITH_COMMA.sub(lambda match: match[0].translate(_SWAPPED), text)
+
+
+def write_comma(text: str) -> str:
+    """A number as a program prints it, with a comma before its decimals."""
+    return text.translate(_SWAPPED)
 
 
 def only_number(text: str) -> Number | None:

@@ -145,6 +145,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "link-broken": "An internal link of a built page leads nowhere.",
         "binding-orphan": "There is no recorded output to check a bound number against.",
         "binding-mismatch": "A bound number is not a printed one, rounded.",
+        "unit-unproven": "No script prints the unit of a bound number, or of a recorded column.",
         "binding-volatile": "A number is bound to an output that varies.",
         "binding-attribute": "The attribute of a bound number cannot be read.",
     },
@@ -235,7 +236,7 @@ GROUPS: dict[str, dict[str, str]] = {
 }
 _WARNINGS = frozenset(
     """
-    draft-empty file-unlisted no-scripts theme-contrast template-outdated heading-skip
+    draft-empty unit-unproven file-unlisted no-scripts theme-contrast template-outdated heading-skip
     markup-foreign math-brackets math-command symbol-repeated footnote-unused image-alt
     recording-loose script-unrepeatable script-penetration script-writes script-connects
     output-noise report-stale bench-unrecorded lab-penetration lab-reset package-reduced

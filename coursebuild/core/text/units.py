@@ -1,18 +1,23 @@
-"""Units as authors write them: `kg m²`, `N*m/rad`, `mm`.
+"""Units: one closed table, and the grammar in which they are written: `kg m²`, `N*m/rad`, `mm`.
 
-The units of mechanics are known here. Pint is asked about others only, as its import takes longer
-than the build of a page.
+The table grows by cases: with all units that there are, `link`, `hand` and `pole` would be some.
+Sizes are exact, as defined by the SI Brochure (2019), NIST SP 811 (2008) and the IAU (2012, 2015);
+that of `u` is measured, and given as CODATA published it in 2022, 2018 and 2014. A unit with
+several sizes is read as any of these: a calorie is thermochemical or of the steam tables, a
+revolution a cycle or an angle.
 """
 
 from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
-from typing import Any, TypeAlias
+from itertools import product
+from typing import TypeAlias
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.near import nearest
@@ -21,12 +26,143 @@ from coursebuild.core.text.source import Excerpt
 Dimension: TypeAlias = tuple[tuple[str, Fraction], ...]
 """Powers of base quantities, as of length and time, in the order of their names."""
 
-_PREFIXES = {"": 0, "k": 3, "M": 6, "G": 9, "c": -2, "m": -3, "µ": -6, "μ": -6, "n": -9}
-_BASES = {"m": ("length", 0), "g": ("mass", -3), "s": ("time", 0)}
-"""The quantity that each measures, and its size as a power of ten of the base unit."""
-_DERIVED_UNITS = {"N": "kg*m/s^2", "J": "N*m", "W": "J/s", "Pa": "N/m^2", "Hz": "1/s", "rad": "1"}
-_FACTOR = re.compile(r"(^|[*/])(1|[^\W\d_]+)(?:\^\(?(-?\d)\)?)?")
-_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−", "0123456789--")
+_BASES = {
+    "m": "length",
+    "kg": "mass",
+    "s": "time",
+    "A": "current",
+    "K": "temperature",
+    "mol": "substance",
+    "cd": "luminosity",
+    "bit": "information",
+    "px": "pixels",
+    "rad": "angle",
+    "cycle": "cycle",
+}
+_TURNS = ("angle", "cycle")
+"""Numbers by their dimension; they tell hertz from radians per second."""
+_PREFIXES = {
+    **dict(zip(("da", *"hkMGTPEZYRQ"), (1, 2, *range(3, 31, 3)), strict=True)),
+    **dict(zip("dcmµnpfazyrq", (-1, -2, *range(-3, -31, -3)), strict=True)),
+    **dict.fromkeys("μu", -6),
+}
+_PREFIX_NAMES = {
+    **{"kilo": "k", "milli": "m", "micro": "µ", "mega": "M", "centi": "c", "giga": "G"},
+    **{"nano": "n", "hecto": "h", "deci": "d", "pico": "p", "mikro": "µ", "zenti": "c"},
+}
+_BINARY_PREFIXES = {f"{letter}i": 2 ** (10 * n) for n, letter in enumerate("KMGTPE", 1)}
+
+_TABLE = """
+m* 1 m meter metre meters metres Meter Metern
+g* 1e-3 kg gram grams gramme grammes Gramm
+s* 1 s sec second seconds Sekunde Sekunden
+A*! 1 A ampere amperes Ampere
+K* 1 K kelvin kelvins Kelvin
+mol* 1 mol mole moles Mol
+cd* 1 cd candela candelas
+rad* 1 rad radian radians Radiant
+sr* 1 rad^2 steradian
+Hz* 1 cycle/s hertz Hertz
+N* 1 kg*m/s^2 newton newtons Newton
+Pa* 1 N/m^2 pascal pascals Pascal
+J* 1 N*m joule joules Joule
+W* 1 J/s watt watts Watt
+C*! 1 A*s coulomb coulombs Coulomb
+V* 1 W/A volt volts Volt
+F*! 1 C/V farad farads
+Ω* 1 V/A ohms Ohm
+ohm* 1 V/A
+S*! 1 A/V siemens
+Wb* 1 V*s weber
+T*! 1 Wb/m^2 tesla teslas Tesla
+H*! 1 Wb/A henry henries
+lm* 1 cd*sr lumen
+lx* 1 lm/m^2 lux
+Bq* 1 1/s becquerel
+Gy* 1 J/kg gray
+Sv* 1 J/kg sievert
+kat* 1 mol/s katal
+Nm* 1 N*m
+VA* 1 W
+Ws* 1 J
+Wh* 3600 J
+Ah* 3600 C
+min! 60 s minute minutes Minute Minuten
+h! 3600 s hour hours hr hrs Stunde Stunden
+d! 86400 s day days Tag Tage Tagen
+week? 604800 s weeks
+a*? 31557600,31536000,31556952 s
+yr 31557600,31536000,31556952 s year years Jahr Jahre Jahren
+t*! 1e3 kg tonne tonnes Tonne Tonnen
+L*! 1e-3 m^3 litre litres liter liters Liter Litern
+l*! 1e-3 m^3
+ha 1e4 m^2 hectare hectares Hektar
+au 149597870700 m AU
+ly 9460730472580800 m lightyear lightyears Lichtjahr Lichtjahre
+pc* 96939420213600000/π m parsec parsecs
+Å 1e-10 m angstrom ångström
+in? 0.0254 m inch inches
+ft 0.3048 m foot feet
+yd 0.9144 m yard yards
+mi 1609.344 m mile miles
+nmi 1852 m
+mph 1609.344 m/h
+kn 1852 m/h knot knots
+acre? 4046.8564224 m^2 acres
+gal? 3.785411784e-3,4.54609e-3 m^3 gallon gallons
+u? 1.66053906892e-27,1.66053906660e-27,1.660539040e-27 kg amu
+Da* 1.66053906892e-27,1.66053906660e-27,1.660539040e-27 kg dalton daltons
+lb 0.45359237 kg lbs pound pounds
+oz 0.028349523125,0.0311034768 kg ounce ounces
+dyn 1e-5 N
+kgf 9.80665 N kp
+lbf 4.4482216152605 N
+bar* 1e5 Pa bars
+atm 101325 Pa atmosphere atmospheres
+mmHg 133.322387415,101325/760 Pa
+Torr* 101325/760 Pa torr
+psi 4.4482216152605/0.00064516 Pa
+eV* 1.602176634e-19 J electronvolt electronvolts
+cal* 4.184,4.1868,4.1855 J calorie calories
+Cal 4184,4186.8,4185.5 J
+BTU 1055.05585262,1054.35 J Btu
+erg 1e-7 J
+hp 745.69987158227022,735.49875 W horsepower
+PS 735.49875 W
+°C 1@273.15 K degC celsius Celsius
+°F 5/9@459.67 K degF fahrenheit Fahrenheit
+° π/180 rad deg degree degrees Grad
+′ π/10800 rad arcmin
+″ π/648000 rad arcsec
+gon π/200 rad
+rev 1,2π cycle revolution revolutions Umdrehung Umdrehungen
+turn? 1,2π cycle turns
+rpm 1/60,π/30 cycle/s RPM
+G*! 1e-4 T gauss
+Gal* 1e-2 m/s^2
+P*! 0.1 Pa*s poise
+St* 1e-4 m^2/s stokes
+M*! 1e3 mol/m^3
+Ci* 3.7e10 Bq curie
+% 1e-2 1 percent Prozent
+‰ 1e-3 1
+ppm 1e-6 1
+ppb 1e-9 1
+bit* 1 bit bits
+B*! 8 bit byte bytes
+Bd* 1 1/s
+fps 1 1/s
+px 1 px pixel pixels
+pt! 0.0254/72 m
+dB ? 1 decibel
+Np ? 1
+"""
+"""Symbol, with marks; sizes in the third column's unit; names.
+
+A star: it takes prefixes. `!`: it is a name as often, as in `T = 2` and `0.2 min, 0.9 max`; `?`: a
+word as often. After an `@` stands where a scale begins: 0 °C are 273.15 of its degrees above
+absolute zero. The levels of a logarithmic scale have no size.
+"""
 
 COMMON = tuple(
     """
@@ -34,56 +170,67 @@ COMMON = tuple(
     rad mrad deg ° % Ω l L °C
     """.split()
 )
-"""Units that are valid without asking Pint; others are proposed from among these."""
-_NAMES = dict(
-    name.split("=")
-    for name in """
-    meter=m metre=m second=s sec=s gram=g kilogram=kg joule=J watt=W pascal=Pa radian=rad degree=°
-    hertz=Hz newton=N minute=min hour=h kelvin=K volt=V ampere=A percent=%
-    """.split()
-)
-_PLAIN_UNITS = frozenset(COMMON) - frozenset("min d h C F H T l L".split())
-"""Without those that behind a number may well be a name, as in `0.2 min, 0.9 max`."""
-_QUOTIENT = re.compile(r"[^\W\d_]+/[^\W\d_]+")
+"""Those that are proposed for what is no unit."""
 _PRODUCT_UNITS = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
 
-_WORD = r"(?:°C|[^\W\d_⁰¹²³⁴-⁹]+|[°%‰])"
-_POWER = r"(?:\^?(?:[-−]?\d{1,2}|\{[-−]?\d{1,2}\}|\([-−]?\d{1,2}(?:/\d)?\))|[⁻⁰¹²³⁴-⁹]+)"
-_OPERATOR = r"(?: ?[·⋅×*/.] ?| )"
-_FACTOR_TEXT = rf"(?:1|{_WORD}{_POWER}?)"
-_PRODUCT = rf"{_FACTOR_TEXT}(?:{_OPERATOR}{_FACTOR_TEXT})*"
-_GROUP = rf"(?:{_FACTOR_TEXT}|\({_PRODUCT}\){_POWER}?)"
-_UNIT = re.compile(rf"{_GROUP}(?:{_OPERATOR}{_GROUP})*")
-_UNIT_NAME = re.compile(_WORD)
-
-_SI_UNIT = (
-    "(?:[YZEPTGMkhcdm\u00b5\u03bcunpf]|da)?"
-    "(?:bar|cd|eV|Gy|Hz|kat|lm|lx|mol|Pa|rad|sr|Sv|Wb|[ACFgHJKLlmNSsTtVW\u03a9\u2126])"
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−", "0123456789--")
+_WORD = r"(?:°[ \u00a0\u202f]?[CF](?![^\W\d_])|[^\W\d_⁰¹²³⁴-⁹]+|[°%‰′″])"
+_POWER = r"(?:\^?[-−]?\d{1,2}|\^\{[-−]?\d{1,2}(?:/\d)?\}|\^\([-−]?\d{1,2}(?:/\d)?\)|[⁻⁰¹²³⁴-⁹]+)"
+_GAP = "[ \u00a0\u202f]"
+_TOKEN = re.compile(
+    rf"(?P<word>{_WORD})(?P<power>{_POWER})?|(?P<one>1)(?![\d.])|(?P<open>\()"
+    rf"|(?P<close>\))(?P<group_power>{_POWER})?|(?P<sign>{_GAP}*[·⋅*×/.]{_GAP}*|{_GAP}+)"
 )
-_SHOWN_UNIT = (
-    rf"(?:{_SI_UNIT}|min|kgf?|rpm|rev|fps|px|pt|arcmin|arcsec|[kMGT]i?B|B|bit|[hd]|°[CF]?|[%‰′″])"
-    r"(?:[²³⁻¹⁴⁶0-9]|\^-?[0-9])*"
-)
-_SHOWN_PRODUCT = rf"{_SHOWN_UNIT}(?:[/·⋅*]{_SHOWN_UNIT})*(?![^\W_])"
-UNITS_SHOWN = rf"{_SHOWN_PRODUCT}(?:[ \u00a0\u202f]{_SHOWN_PRODUCT}){{0,3}}"
-"""The pattern of the units right behind a number in prose."""
-
-
-def with_unit(number: str, unit: str) -> str:
-    """Return a number's text with its unit; only the degree stands at the digits."""
-    return f"{number}{unit}" if unit in ("", "°") else f"{number} {unit}"
+_PER = re.compile(r"\s+per\s+")
+_LONGEST = 100
 
 
 class Unit(Struct, frozen=True):
-    """The size of a unit in base units of the SI, and its dimension."""
+    """The size of a unit in base units of the SI, times a power of π, and what it measures."""
 
     size: Fraction
-    dimension: Dimension = ()
+    powers: Dimension = ()
+    """With those of angles and cycles, which `dimension` lacks."""
+    pi: int = 0
+    zero: Fraction = Fraction(0)
+    """How far above the zero of its quantity its scale begins."""
 
-    def times(self, factor: Unit, power: int) -> Unit:
-        """The product with a power of another unit."""
-        size = self.size * factor.size**power
-        return Unit(size, multiply(self.dimension, factor.dimension, power))
+    @property
+    def dimension(self) -> Dimension:
+        """The dimension, in which angles and cycles are numbers."""
+        return tuple(power for power in self.powers if power[0] not in _TURNS)
+
+    def times(self, factor: Unit, power: Fraction | int = 1) -> Unit | None:
+        """The product with a power of another unit, of differences on its scale.
+
+        `None` where the size would be no rational number.
+        """
+        exponent = Fraction(power)
+        size = _raise(factor.size, exponent)
+        pi = factor.pi * exponent
+        if size is None or pi.denominator != 1:
+            return None
+        powers = multiply(self.powers, factor.powers, exponent)
+        return Unit(self.size * size, powers, self.pi + int(pi))
+
+    def is_same(self, unit: Unit) -> bool:
+        """Whether it has the size of another unit and measures the same; angles may be left out."""
+        turns = [{name for name, _ in side.powers} & {*_TURNS} for side in (self, unit)]
+        return (
+            (self.size, self.pi, self.zero) == (unit.size, unit.pi, unit.zero)
+            and self.dimension == unit.dimension
+            and (not all(turns) or turns[0] == turns[1])
+        )
+
+
+ONE = Unit(Fraction(1))
+
+
+def _raise(size: Fraction, exponent: Fraction) -> Fraction | None:
+    if exponent.denominator == 1:
+        return size ** int(exponent)
+    root = Fraction(float(size) ** float(exponent)).limit_denominator(10**12)
+    return root if root**exponent.denominator == size**exponent.numerator else None
 
 
 def multiply(left: Dimension, right: Dimension, power: Fraction | int = 1) -> Dimension:
@@ -94,103 +241,207 @@ def multiply(left: Dimension, right: Dimension, power: Fraction | int = 1) -> Di
     return tuple(sorted((name, power) for name, power in powers.items() if power))
 
 
-@functools.lru_cache(maxsize=256)
-def find_unit(text: str) -> Unit | None:
-    """The unit of a text such as `N m/rad`; `None` if neither we nor Pint know it."""
-    unit = _parse_product(_plain(text))
-    if unit is not None:
-        return unit
-    try:
-        base = _registry()(text.replace(" ", "*").replace("·", "*")).to_base_units()
-        powers = sorted((str(n)[1:-1], Fraction(p)) for n, p in base.dimensionality.items())
-        return Unit(Fraction(repr(float(base.magnitude))), tuple(powers))
-    except Exception:  # Pint does not document what its parser raises
-        return None
+class UnitRow(Struct, frozen=True):
+    """A row of the table."""
+
+    sizes: tuple[str, ...]
+    base: str
+    marks: str
 
 
-def _plain(text: str) -> str:
-    plain = re.sub("[⁰¹²³⁴-⁹⁻]+", lambda m: "^" + m[0].translate(_SUPERSCRIPTS), text.strip())
-    return re.sub(r"\s*[ ·⋅*]\s*", "*", plain)
+def _read_table() -> tuple[dict[str, UnitRow], dict[str, str]]:
+    rows: dict[str, UnitRow] = {}
+    names: dict[str, str] = {}
+    for line in _TABLE.strip().splitlines():
+        symbol, sizes, base, *other_names = line.split()
+        bare = symbol.rstrip("*!?")
+        rows[bare] = UnitRow(tuple(sizes.split(",")), base, symbol.removeprefix(bare))
+        names.update(dict.fromkeys(other_names, bare))
+    return rows, names
 
 
-def _parse_product(text: str) -> Unit | None:
-    """The product of units of mechanics; `None` if a factor is another."""
-    unit, end = Unit(Fraction(1)), 0
-    for factor in _FACTOR.finditer(text):
-        factor_unit = _find_known_unit(factor[2])
-        if factor_unit is None or factor.start() != end:
-            return None
-        end = factor.end()
-        unit = unit.times(factor_unit, int(factor[3] or 1) * (-1 if factor[1] == "/" else 1))
-    return unit if end == len(text) and end else None
+UNITS, NAMES = _read_table()
 
 
-@functools.cache
-def _find_known_unit(name: str) -> Unit | None:
-    if name == "1":
-        return Unit(Fraction(1))
-    for prefix, power in _PREFIXES.items():
-        rest = name.removeprefix(prefix)
-        if rest in _BASES:
-            measures, shift = _BASES[rest]
-            return Unit(Fraction(10) ** (power + shift), ((measures, Fraction(1)),))
-        if rest in _DERIVED_UNITS and (unit := _parse_product(_DERIVED_UNITS[rest])):
-            return Unit(unit.size * Fraction(10) ** power, unit.dimension)
-    return None
+@functools.lru_cache(maxsize=512)
+def find_units(text: str) -> tuple[Unit, ...]:
+    """The units that a text such as `N m/rad` may be, an empty one being 1; none for another text.
 
-
-@functools.cache
-def _registry() -> Any:
-    """Pint's units; loading them takes a second."""
-    import pint
-
-    registry: Any = pint.UnitRegistry(cache_folder=None)
-    registry.define("@alias turn = rev")
-    return registry
-
-
-def units_at(line: str, start: int = 0) -> frozenset[Unit | str]:
-    """What the unit at a place of a line may be, of `N m, at rest` N or N m; nothing for others.
-
-    In `l 2.0 T 2.8` and `m = 2 n = 3` it is a name.
+    Of `J/kg K` one may divide by all that follows the solidus, or by the first factor.
     """
-    name_sign = r"[=:\d.+-]" if line[:1].isalpha() else "[=:]"
-    units: set[Unit | str] = set()
-    product = ""
-    for word in line[start:].split()[:4]:
-        bare = word.rstrip(".,;:!?)]”")
-        name = _NAMES.get(bare, bare).replace("deg", "°")
-        product = f"{product}*{name}" if product else name
-        unit = _parse_product(_plain(product)) or (name if product in _PLAIN_UNITS else None)
-        unit = unit or (find_unit(product) if _QUOTIENT.fullmatch(product) else None)
-        if unit is None:
-            return frozenset() if re.match(name_sign, word) else frozenset(units)
-        units.add(unit)
-        if bare != word:
-            break
-    return frozenset(units)
+    source = _PER.sub("/", text.strip())
+    if not source:
+        return (ONE,)
+    if len(source) > _LONGEST:
+        return ()
+    readings = _parse(source)
+    if re.search(r"/[^()/]*[ ·⋅*]", source):
+        readings += _parse(source, is_wide=True)
+    return tuple(dict.fromkeys(readings))
+
+
+def find_unit(text: str) -> Unit | None:
+    """The unit that a text is, by its first reading."""
+    return next(iter(find_units(text)), None)
+
+
+def _parse(
+    source: str,
+    *,
+    is_wide: bool = False,
+    find: Callable[[str], tuple[Unit, ...]] | None = None,
+) -> tuple[Unit, ...]:
+    """The readings of a product of units; `is_wide`: all after a solidus is divided by."""
+    stack: list[tuple[tuple[Unit, ...], int]] = []
+    units: tuple[Unit, ...] = (ONE,)
+    sign, end, expects_factor = 1, 0, True
+    for token in _TOKEN.finditer(source):
+        if token.start() != end:
+            return ()
+        end, kind = token.end(), token.lastgroup
+        if kind in ("power", "group_power"):
+            kind = "word" if token["word"] else "close"
+        if kind == "sign":
+            if expects_factor:
+                return ()
+            sign = -1 if "/" in token[0] else sign if is_wide else 1
+            expects_factor = True
+            continue
+        if kind == "open":
+            if not expects_factor:
+                return ()
+            stack.append((units, sign))
+            units, sign = (ONE,), 1
+            continue
+        if kind == "close":
+            if expects_factor or not stack:
+                return ()
+            factors, (units, sign) = units, stack.pop()
+            power = _exponent(token["group_power"])
+        else:
+            if not expects_factor:
+                return ()
+            factors = (ONE,) if token["one"] else (find or find_symbol)(token["word"])
+            power = _exponent(token["power"])
+        if power is None:
+            return ()
+        is_alone = token[0] == source and power == 1
+        if not is_alone:
+            products = (u.times(f, power * sign) for u, f in product(units, factors))
+            factors = tuple(unit for unit in products if unit is not None)
+        units, expects_factor = factors, False
+    return units if end == len(source) and not expects_factor and not stack else ()
+
+
+def _exponent(text: str | None) -> Fraction | None:
+    if not text:
+        return Fraction(1)
+    exponent = Fraction(text.translate(_SUPERSCRIPTS).strip("^{}()"))
+    return exponent if abs(exponent) <= 12 else None
+
+
+@functools.cache
+def find_symbol(word: str) -> tuple[Unit, ...]:
+    """The units that a word of letters may be, with or without a prefix."""
+    word = re.sub(r"\s", "", word).replace("\u2126", "Ω").replace("\u212b", "Å")
+    symbol = NAMES.get(word, word)
+    if symbol in UNITS:
+        row = UNITS[symbol]
+        return tuple(_read_size(size, row.base) for size in row.sizes if size != "?")
+    if symbol in _BASES:
+        return (_base_unit(symbol),)
+    for name, prefix in _PREFIX_NAMES.items():
+        if word.lower().startswith(name) and word[len(name) :] in NAMES:
+            return find_symbol(prefix + NAMES[word[len(name) :]])
+    if len(word) > 2 and word[:2] in _BINARY_PREFIXES and word[2:] in ("B", "bit"):
+        (unit,) = find_symbol(word[2:])
+        return (replace(unit, size=unit.size * _BINARY_PREFIXES[word[:2]]),)
+    for length in (1, 2):
+        prefix, rest = word[:length], word[length:]
+        if prefix in _PREFIXES and rest in UNITS and "*" in UNITS[rest].marks:
+            scale = Fraction(10) ** _PREFIXES[prefix]
+            return tuple(replace(unit, size=unit.size * scale) for unit in find_symbol(rest))
+    return ()
+
+
+def _base_unit(symbol: str) -> Unit:
+    return Unit(Fraction(1), ((_BASES[symbol], Fraction(1)),))
+
+
+def _read_size(text: str, base: str) -> Unit:
+    """A unit of the table: `1609.344`, `5/9@459.67`, `π/180`, `2π`."""
+    size, _, zero = text.partition("@")
+    unit = _base_unit(base) if base in _BASES else _parse(base)[0]
+    numerator, _, denominator = size.partition("/")
+    pi = numerator.count("π") - denominator.count("π")
+    parts = [Fraction(part.replace("π", "") or 1) for part in (numerator, denominator)]
+    powers = unit.powers
+    if "cycle" in dict(powers) and pi:  # a revolution is 2π radians, or one cycle
+        turns = dict(powers)
+        turns["angle"] = turns.pop("cycle")
+        powers = tuple(sorted(turns.items()))
+    return Unit(unit.size * parts[0] / parts[1], powers, unit.pi + pi, Fraction(zero or 0))
+
+
+def is_name(word: str) -> bool:
+    """Whether a unit is a name or a word as often, so that it is one at the end of a phrase only.
+
+    So is what has a prefix for a Latin letter, as `us` and `um`, or one that few texts use.
+    """
+    symbol = NAMES.get(word, word)
+    if symbol in UNITS:
+        return word not in NAMES and UNITS[symbol].marks.strip("*") != ""
+    return len(word) == 2 and word[0] not in "kMGcmnµμ" and bool(find_symbol(word))
+
+
+def with_unit(number: str, unit: str) -> str:
+    """Return a number's text with its unit; only the degree stands at the digits."""
+    return f"{number}{unit}" if unit in ("", "°") else f"{number} {unit}"
 
 
 def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
     """Yield what is wrong with a unit, which may be empty."""
-    text = " ".join(unit.text.split())
-    if len(text) > 100 or not _UNIT.fullmatch(text or "1"):
+    text = _PER.sub("/", " ".join(unit.text.split()))
+    if len(text) > _LONGEST or not _parse(text or "1", find=lambda word: (ONE,)):
         message = f"`{text}` cannot be read as a unit"
         help = "write it as in `kg m^2`, `m/s²` or `N m/rad`"
         yield diagnose("unit-unknown", unit.span(), message, help=help)
         return
-    for match in _UNIT_NAME.finditer(unit.text):
-        word = match[0].replace("\u2126", "Ω")
-        if word in COMMON or (word != "rads" and _registry().parse_unit_name(word)):
-            continue  # Pint takes `rads` for a dose of radiation
+    for match in re.finditer(_WORD, unit.text):
+        word = match[0]
+        if find_symbol(word) or {word, NAMES.get(word)} & {*UNITS, "per"}:
+            continue
         units = (unit for unit in COMMON if unit.casefold() == word.casefold())
         pairs = ((first, word.removeprefix(first)) for first in _PRODUCT_UNITS)
         products = (f"{a} {b}" for a, b in pairs if b != word and b in _PRODUCT_UNITS)
         likely = next(units, "") or next(products, "")
-        likely = likely or nearest(word, (*COMMON, *_NAMES)) or ""
-        likely = _NAMES.get(likely, likely)
+        likely = likely or nearest(word, (*COMMON, *NAMES)) or ""
+        likely = NAMES.get(likely, likely)
         help = "leave it out, and name in words what is counted"
         if likely:
-            help = Fix(f"did you mean `{likely}`?", likely, safe=_NAMES.get(word) == likely)
+            help = Fix(f"did you mean `{likely}`?", likely, safe=NAMES.get(word) == likely)
         message = f"there is no unit `{word}`"
         yield diagnose("unit-unknown", unit.span(*match.span()), message, help=help)
+
+
+def _pattern_of_units() -> str:
+    """The pattern of the units right behind a number in prose, up to four."""
+    symbols = [(symbol, row.marks) for symbol, row in UNITS.items() if "?" not in row.marks]
+    prefix = _alternatives(_PREFIXES)
+    prefixable = _alternatives(symbol for symbol, marks in symbols if "*" in marks)
+    unprefixable = _alternatives(symbol for symbol, marks in symbols if "*" not in marks)
+    power = r"(?:[²³⁻¹⁴⁶0-9]|\^-?[0-9])*"
+    unit = rf"(?:{prefix}?{prefixable}|{unprefixable}|[KMGT]iB){power}"
+    units = rf"{unit}(?:[/·⋅*]{unit})*(?![^\W_])"
+    return rf"{units}(?:[ \u00a0\u202f]{units}){{0,3}}"
+
+
+def _alternatives(symbols: Iterable[str]) -> str:
+    """The pattern of one of these, the longest first."""
+    by_length = sorted(symbols, key=len, reverse=True)
+    letters = "".join(symbol for symbol in by_length if len(symbol) == 1)
+    return f"(?:{'|'.join(symbol for symbol in by_length if len(symbol) > 1)}|[{letters}])"
+
+
+UNIT_PATTERN = _pattern_of_units()
+"""It takes more for a unit than `find_units` does with its context: typography may."""

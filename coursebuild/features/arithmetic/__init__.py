@@ -22,7 +22,7 @@ from coursebuild.features.arithmetic.symbol_values import check_formulas, read_s
 
 _OTHER_NUMBERS = (
     "where other numbers are meant, as in floating-point, binary or remainders, write"
-    ' `{given="floats"}` or the like after the formula'
+    ' `{%sgiven="IEEE 754"}` or the like after the formula'
 )
 
 
@@ -45,7 +45,7 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
     diagnostics = list(symbols.diagnostics)
     for _, formula in find_formulas(document):
         tex = formula.tex
-        label = formula.label
+        label, is_inline = formula.label, not formula.display
         if label is not None and label.domain is not None:
             identities.append((tex, label.conditions or "", label.domain.span()))
         for comparison in comparisons.get(tex.span().start, ()):
@@ -53,7 +53,8 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
             if comparison.kind == "wrong":
                 texts = (span.text, comparison.result)
                 are_plain = all(re.fullmatch(r"-?[\d.]+", text) for text in texts)
-                help = "; ".join(filter(None, (comparison.help, _OTHER_NUMBERS)))
+                label_text = "" if is_inline else "#eq:name "
+                help = "; ".join(filter(None, (comparison.help, _OTHER_NUMBERS % label_text)))
                 fix = Fix(help, comparison.result if are_plain else None)
                 mistake = diagnose("formula-arithmetic", span, message, help=fix)
                 diagnostics.append(mistake)

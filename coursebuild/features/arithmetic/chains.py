@@ -1,89 +1,81 @@
 r"""Checks arithmetic between numbers: compares each side of a chain of relations with the next.
 
-Entry points: `check_arithmetic(tex, symbols, unit)`; `SymbolQuantity`, what is known of a symbol.
+Entry point: `check_arithmetic(tex, symbols, unit)`.
 
 1. One of two sides is a numeral, as `3.2\cdot10^{-4}\ \mathrm m`. The other must agree with its
    digits, within half a unit of the last place. After `=` a whole number is exact; after
    `\approx` its final zeros can be the result of rounding.
 2. If some sides of a chain end in the same unit, and there is no other, it holds for all sides.
    Different units are converted.
-3. A side with symbols is computed if all of them have a value. A number that leaves out its unit
-   has that of the chain, or of the symbol alone on one side, or is in base units.
-4. Units of sides with symbols are compared if all of them have one. What can be a number whose unit
-   is left out, as in `F = 9.81 m`, is no mistake.
+   A relation holds if it does so for one meaning of each unit that has several.
+3. Sides with symbols are compared by `SymbolComparison`.
 """
 
 from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from fractions import Fraction
+from collections.abc import Iterator, Mapping
 
-from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.text.units import Dimension, Unit, find_unit
 from coursebuild.features.arithmetic.evaluate import (
     ORDERS,
     UNDECIDED,
     FormulaComparison,
-    Numeral,
-    PhysicalQuantity,
-    WrongDimensions,
+    Readings,
     agrees,
+    choose_rounded,
     describe_dimension,
     evaluate,
     format_number,
-    has_zero,
-    measure,
     read_numeral,
+    unit_readings,
 )
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
-from coursebuild.features.arithmetic.real import ONE, Real
-from coursebuild.features.arithmetic.statements import FormulaSide, Statement, read_statements
+from coursebuild.features.arithmetic.statements import (
+    FormulaSide,
+    Statement,
+    has_plain_comma,
+    point_decimals,
+    read_statements,
+)
+from coursebuild.features.arithmetic.symbol_comparison import (
+    NotJudged,
+    SymbolComparison,
+    SymbolQuantity,
+    decide,
+)
 from coursebuild.features.arithmetic.tex import CONSTANTS
 
 _RELATION = re.compile(r"[=<>≈≤≥≠]|\\(?:approx|sim|le|ge|ne|ll|gg)")
-_COMMA = re.compile(r"([0-9]+)\{,\}([0-9]+)")
-_DECIMAL_COMMA = re.compile(r"(?<![0-9.])0\{,\}[0-9]|[0-9]\{,\}(?:[0-9]{1,2}|[0-9]{4,})(?![0-9])")
-"""A comma that parts no thousands."""
-_ARABIC = {zero + n: str(n) for zero in (0x660, 0x6F0) for n in range(10)} | {0x66B: "."}
-"""Digits and the decimal sign, as they are written in Arabic and Persian."""
-
-
-def check_arithmetic(
-    tex: str, symbols: tuple[SymbolQuantity, ...] = (), unit: str = ""
-) -> tuple[FormulaComparison, ...]:
-    """Compare the numbers, and the symbols, between which a formula states a relation.
-
-    `unit`: what follows the formula in the text.
-    """
-    tex = tex.translate(_ARABIC)
-    if not _RELATION.search(tex) or not (symbols or re.search("[0-9]", tex)):
-        return ()
-    return _check_formula(tex, symbols, unit)
 
 
 @functools.lru_cache(maxsize=1024)
-def _check_formula(
-    tex: str, symbols: tuple[SymbolQuantity, ...], unit: str
+def check_arithmetic(
+    tex: str, symbols: tuple[SymbolQuantity, ...] = (), unit: str = "", comma: bool = False
 ) -> tuple[FormulaComparison, ...]:
-    decimal = _COMMA.sub(r"\1.\2  ", tex)  # as long, for the places of mistakes
-    if _DECIMAL_COMMA.search(tex):
-        return _check_statements(decimal, symbols, unit)
-    comparisons = _check_statements(tex, symbols, unit)
-    if decimal != tex and any(comparison.kind == "wrong" for comparison in comparisons):
-        as_decimals = _check_statements(decimal, symbols, unit)
+    """Compare the numbers, and the symbols, between which a formula states a relation.
+
+    `unit`: what follows the formula in the text; `comma`: it may stand before decimals.
+    """
+    if not _RELATION.search(tex) or not (symbols or re.search(r"\d", tex)):
+        return ()
+    comparisons = _check_statements(tex, symbols, unit, comma)
+    is_wrong = any(comparison.kind == "wrong" for comparison in comparisons)
+    if is_wrong and comma and has_plain_comma(tex):
+        return (FormulaComparison("unread", 0, len(tex), "a comma in it may part two numbers"),)
+    if is_wrong and not comma and point_decimals(tex, comma=True) != point_decimals(tex):
+        as_decimals = _check_statements(tex, symbols, unit, comma=True)
         if all(comparison.kind != "wrong" for comparison in as_decimals):
             return (FormulaComparison("unread", 0, len(tex), "`{,}` may be a decimal point"),)
     return comparisons
 
 
 def _check_statements(
-    tex: str, symbols: tuple[SymbolQuantity, ...], unit: str
+    tex: str, symbols: tuple[SymbolQuantity, ...], unit: str, comma: bool
 ) -> tuple[FormulaComparison, ...]:
-    statements = read_statements(tex)
+    statements = read_statements(tex, comma)
     by_name = {symbol.name: symbol for symbol in symbols}
     return tuple(
         comparison
@@ -113,7 +105,10 @@ def _check_chain(
                     mistake = FormulaComparison("unread", left.start, right.end, reason, letter)
             elif symbols and relation not in ("?", "≡"):
                 follows = unit if right is statement.sides[-1] else ""
-                mistake = SymbolComparison(statement, i, symbols, follows).find_mistake()
+                comparison = SymbolComparison(statement, i, symbols, follows)
+                mistake = comparison.find_mistake()
+                if mistake is not None and comparison.has_readings:
+                    raise right.get_expression().not_understood("a unit in it has two readings")
             else:
                 continue
         except NotJudged:
@@ -155,17 +150,40 @@ def _strip_unit(expression: Expression) -> Expression:
 def _find_mistake(left: Expression, right: Expression, relation: str) -> FormulaComparison | None:
     """Return a comparison that is wrong if a relation does not hold; `None` if it does.
 
+    It holds if it does so for any meaning of its units.
+
     Raises:
         NotUnderstood: this is not certain.
     """
     if relation in ("?", "≡"):
         raise right.not_understood("the relation says too little")
-    quantities = evaluate(left), evaluate(right)
+    mistakes: list[FormulaComparison | NotUnderstood] = []
+    for readings in unit_readings(left, right):
+        try:
+            mistake = _find_mistake_as_read(left, right, relation, readings)
+        except NotUnderstood as error:
+            mistakes.append(error)
+            continue
+        if mistake is None:
+            return None
+        mistakes.append(mistake)
+    unread = (m for m in mistakes if isinstance(m, NotUnderstood) and m.kind == "unread")
+    worst = next(unread, mistakes[0])
+    if isinstance(worst, NotUnderstood):
+        raise worst
+    return worst
+
+
+def _find_mistake_as_read(
+    left: Expression, right: Expression, relation: str, readings: Readings
+) -> FormulaComparison | None:
+    quantities = [evaluate(side, readings=readings) for side in (left, right)]
     values = [quantity.value for quantity in quantities]
     if quantities[0].dimension != quantities[1].dimension:
         message = " is held against ".join(describe_dimension(q.dimension) for q in quantities)
         return FormulaComparison("wrong", right.start, right.end, message)
-    numerals = [(i, n) for i, e in enumerate((left, right)) if (n := read_numeral(e))]
+    sides = enumerate((left, right))
+    numerals = {i: n for i, side in sides if (n := read_numeral(side, readings))}
     if relation in ORDERS or not numerals:
         if relation == "≈":
             raise right.not_understood("neither side is a number whose digits could be compared")
@@ -179,254 +197,13 @@ def _find_mistake(left: Expression, right: Expression, relation: str) -> Formula
         if relation in ORDERS:
             message = f"{numbers[0]} {relation} {numbers[1]} does not hold"
         return FormulaComparison("wrong", right.start, right.end, message)
-    # the coarser one is held against the other
-    index, numeral = max(numerals, key=lambda item: (float(item[1].step), item[0]))
-    side, value = (left, right)[index], values[1 - index]
-    if _decide(agrees(numeral, value, relation), right):
+    index = choose_rounded(numerals, relation)
+    numeral, side, value = numerals[index], (left, right)[index], values[1 - index]
+    if decide(agrees(numeral, value, relation), right):
         return None
     digits = max(numeral.digits + 2, 4)
-    result = format_number(value / numeral.unit_size, digits)
+    result = format_number(numeral.express(value), digits)
     message = f"the result is {result}, not this"
     is_rounded = numeral.is_whole and relation == "=" and agrees(numeral, value, "≈")
     help = "write `\\approx` where a whole number is rounded" if is_rounded else ""
     return FormulaComparison("wrong", side.start, side.end, message, help=help, result=result)
-
-
-def _decide(verdict: bool | None, place: Expression) -> bool:
-    if verdict is None:
-        raise place.not_understood(UNDECIDED)
-    return verdict
-
-
-_LARGEST_COEFFICIENT = 12
-"""A larger number may be a quantity whose unit is left out."""
-
-
-class SymbolQuantity(Struct, frozen=True):
-    """What a symbol stands for."""
-
-    name: str
-    unit_text: str
-    unit: Unit | None
-    """`None` if the text does not say it."""
-    value: Real | None = None
-    """In base units; `None` if it has none."""
-    step: Real | None = None
-    """One unit of the last place of its value; `None` if that is exact, as a whole number is."""
-    text: str = ""
-    """Its value as it is written."""
-
-
-class NotJudged(Exception):  # noqa: N818  # it is no mistake
-    """Nothing is known of the symbols of a relation, or it says nothing of their values."""
-
-
-class SymbolComparison:
-    """Compares two sides of a chain, at least one of which has symbols."""
-
-    def __init__(
-        self, chain: Statement, index: int, symbols: Mapping[str, SymbolQuantity], unit: str
-    ) -> None:
-        """`unit`: what follows the second side in the text."""
-        self.chain, self.symbols = chain, symbols
-        self.sides, self.relation = chain.sides[index : index + 2], chain.relations[index]
-        self.unit = find_unit(unit) if unit else None
-        is_equation = self.relation in ("=", "≈")
-        self.is_claim = is_equation and any(side.is_numeric for side in self.sides)
-
-    def find_mistake(self) -> FormulaComparison | None:
-        """Return a comparison that is wrong if the relation does not hold.
-
-        Raises:
-            NotUnderstood: it states a number of symbols with values, and cannot be computed.
-            NotJudged: there is nothing to compare but units, which fit.
-        """
-        self.is_claim &= any(symbol.value is not None for symbol in self.symbols.values())
-        try:
-            self.expressions = [side.get_expression() for side in self.sides]
-            self._find_symbols()
-            try:
-                quantities = self._evaluate()
-            except WrongDimensions:
-                self._pass_hidden_unit()
-                raise
-        except NotUnderstood as error:
-            if self.is_claim or error.kind == "wrong":
-                raise
-            raise NotJudged from None
-        has_calculus = any(e.has("derivative", "integral") for e in self.expressions)
-        bare = self._bare_side()
-        dimensions = [quantity.dimension for quantity in quantities]
-        if bare is not None:
-            base = dimensions[1 - bare]
-            is_foreign = self.unit is not None and self.unit.dimension != base
-            dimensions[bare] = self.unit.dimension if self.unit and is_foreign else base
-        if dimensions[0] != dimensions[1] and not has_zero(*quantities):
-            if bare is None:
-                self._pass_hidden_unit()
-            message = " is held against ".join(map(describe_dimension, dimensions))
-            right = self.expressions[1]
-            return FormulaComparison("wrong", right.start, right.end, message)
-        if not self.has_values or self.relation not in ("=", "≈") or has_calculus:
-            raise NotJudged
-        try:
-            return self._compare_values(
-                [quantity.value for quantity in quantities], bare, dimensions
-            )
-        except OverflowError:
-            reason = "the numbers become too large"
-            raise self.expressions[1].not_understood(reason) from None
-
-    def _pass_hidden_unit(self) -> None:
-        """Raise unless units that do not fit are a mistake for sure."""
-        hidden = next(filter(_may_hide_unit, self.expressions), None)
-        if hidden is not None:
-            if self.is_claim:
-                raise hidden.not_understood("a number in it may leave out its unit")
-            raise NotJudged
-
-    def _find_symbols(self) -> None:
-        """Collect what is known of the symbols."""
-        self.known: dict[str, SymbolQuantity] = {}
-        missing: list[Expression] = []
-        for part in (part for e in self.expressions for part in e.walk()):
-            if part.kind != "symbol" or (part.text in CONSTANTS and part.text not in self.symbols):
-                continue
-            quantity = _find_symbol(part.text, self.symbols)
-            if quantity is not None:
-                self.known[part.text] = quantity
-            if quantity is None or quantity.value is None:
-                missing.append(part)
-        self.has_values = not missing
-        self.is_claim &= any(symbol.value is not None for symbol in self.known.values())
-        if any(part.text not in self.known for part in missing) or (missing and self.is_claim):
-            raise missing[0].not_understood(f"`{missing[0].text}` has no value here")
-
-    def _evaluate(self, is_rounded: bool = False) -> list[PhysicalQuantity]:
-        """Return the quantities of both sides; without values, of any for which there are some.
-
-        `is_rounded`: of all values that are rounded to those of the symbols.
-        """
-        for attempt in range(1 if self.has_values else 4):
-            quantities = {}
-            for number, (name, symbol) in enumerate(self.known.items(), 1):
-                value = Real.of(Fraction(500 + (618 * number + 370 * attempt) % 1500, 1000))
-                if self.has_values and symbol.value is not None:
-                    value = symbol.value
-                    if is_rounded and symbol.step is not None:
-                        value = value.widen(symbol.step)
-                dimension = symbol.unit.dimension if symbol.unit is not None else ()
-                quantities[name] = PhysicalQuantity(value, dimension)
-            try:
-                return [evaluate(e, quantities, has_calculus=False) for e in self.expressions]
-            except WrongDimensions:
-                raise
-            except NotUnderstood:
-                if self.has_values:
-                    raise
-        raise NotJudged
-
-    def _bare_side(self) -> int | None:
-        """Return the index of a side of numbers alone, which may have left out its unit."""
-        pairs = zip(self.sides, self.expressions, strict=True)
-        return next(
-            (i for i, (s, e) in enumerate(pairs) if s.is_numeric and not e.has("unit")), None
-        )
-
-    def _compare_values(
-        self, values: Sequence[Real], bare: int | None, dimensions: Sequence[Dimension]
-    ) -> FormulaComparison | None:
-        sizes = [ONE]
-        if bare is not None:
-            units = [self.unit] if self.unit is not None else [*self._chain_units()]
-            sizes = [measure(u) for u in units if u.dimension == dimensions[1 - bare]]
-            sizes += [] if self.unit is not None else [ONE]
-        numerals = {i: n for i in (0, 1) if (n := self._numeral(i)) is not None}
-        if not numerals and self.relation == "≈":
-            raise NotJudged
-        mistakes: list[FormulaComparison] = []
-        for size in sizes:
-            scaled = [v * size if i == bare else v for i, v in enumerate(values)]
-            if not numerals:
-                if self._is_within_rounding(bare, size):
-                    return None
-                numbers = " and ".join(format_number(value) for value in scaled)
-                mistakes.append(self._mistake(1, f"{numbers} are not the same"))
-                continue
-            sized = {i: n.scale(size) if i == bare else n for i, n in numerals.items()}
-            index = max(sized, key=lambda i: (float(sized[i].step), i))
-            numeral, unit_size = sized[index], size if index == bare else ONE
-            value = scaled[1 - index]
-            if _decide(agrees(numeral, value, self.relation), self.expressions[1]):
-                return None
-            digits = max(numeral.digits + 2, 4)
-            result = format_number(value / (numeral.unit_size * unit_size), digits)
-            mistakes.append(self._mistake(index, f"the result is {result}", result))
-        return mistakes[0]
-
-    def _mistake(self, index: int, message: str, result: str = "") -> FormulaComparison:
-        """Return what is wrong with a side, with the values that the other side has."""
-        side, opposite = self.expressions[index], self.expressions[1 - index]
-        names = dict.fromkeys(part.text for part in opposite.walk() if part.text in self.known)
-        conditions = " and ".join(f"`{name}` is {self.known[name].text}" for name in names)
-        help = ""
-        if opposite.kind == "symbol":
-            help = "`{given}` after the formula gives the symbol another value in this section"
-        message += f" where {conditions}" if conditions else ""
-        message += ", not this" if result else ""
-        return FormulaComparison("wrong", side.start, side.end, message, help=help, result=result)
-
-    def _chain_units(self) -> Iterator[Unit]:
-        """Yield the units that the chain names."""
-        for side in self.chain.sides:
-            if not isinstance(side.expression, Expression):
-                continue
-            alone = self.symbols.get(side.expression.text) if not side.expression.parts else None
-            texts = [part.text for part in side.expression.walk() if part.kind == "unit"]
-            units = [alone.unit if alone is not None else None, *map(find_unit, texts)]
-            yield from (unit for unit in units if unit is not None)
-
-    def _numeral(self, index: int) -> Numeral | None:
-        """Return the number that a side is, or the value of the symbol that it is."""
-        expression = self.expressions[index]
-        if self.sides[index].is_numeric:
-            return read_numeral(expression)
-        symbol = self.known.get(expression.text) if expression.kind == "symbol" else None
-        if symbol is None or symbol.value is None or symbol.step is None:
-            return None
-        size = measure(symbol.unit) if symbol.unit is not None else ONE
-        return Numeral(symbol.value, symbol.step, False, 6, size)
-
-    def _is_within_rounding(self, bare: int | None, size: Real) -> bool:
-        """Whether two sides may agree where each value is rounded to half a unit of its place."""
-        sides = [quantity.value for quantity in self._evaluate(is_rounded=True)]
-        left, right = (v * size if i == bare else v for i, v in enumerate(sides))
-        sign = (left - right).sign()
-        if sign is None and all(symbol.step is None for symbol in self.known.values()):
-            raise self.expressions[1].not_understood(UNDECIDED)
-        return not sign
-
-
-def _find_symbol(name: str, symbols: Mapping[str, SymbolQuantity]) -> SymbolQuantity | None:
-    """Return what is known of a symbol; of a time derivative, its unit."""
-    symbol = symbols.get(name)
-    if symbol is not None:
-        return symbol if symbol.unit is not None else None
-    dotted = re.fullmatch(r"\\(d?)dot\{(.+?)\}(.*)", name)
-    base = symbols.get(dotted[2] + dotted[3]) if dotted is not None else None
-    if dotted is None or base is None or base.unit is None:
-        return None
-    per_time = Unit(Fraction(1), (("time", Fraction(-2 if dotted[1] else -1)),))
-    return SymbolQuantity(name, "", base.unit.times(per_time, 1))
-
-
-def _may_hide_unit(expression: Expression) -> bool:
-    """Whether a number may stand for one with a unit, as in `F = 9.81 m` or `x = 1 + v t`."""
-    parts = [*expression.walk()]
-    if any(part.kind == "unit" for part in parts):
-        return False
-    numbers = [part.text for part in parts if part.kind == "number"]
-    terms = [term for part in parts if part.kind in ("+", "-") for term in part.parts]
-    return any("." in number or int(number) > _LARGEST_COEFFICIENT for number in numbers) or any(
-        not term.has("symbol") for term in terms
-    )

@@ -10,16 +10,18 @@ functions of an argument with a dimension, are `WrongDimensions`.
 
 from __future__ import annotations
 
+import itertools
 import math
 import operator
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from typing import Literal
+from types import MappingProxyType
+from typing import Literal, TypeAlias
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.text.units import Dimension, Unit, find_unit, multiply
+from coursebuild.core.text.units import Dimension, Unit, find_units, multiply
 from coursebuild.features.arithmetic.calculus import differentiate
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 from coursebuild.features.arithmetic.real import ONE, PI, E, Real, apply, integrate
@@ -29,6 +31,11 @@ _ZERO = Real.of(0)
 ORDERS = {"<": operator.lt, ">": operator.gt, "≤": operator.le, "≥": operator.ge, "≠": operator.ne}
 """Relations between numbers that are not equations."""
 UNDECIDED = "300 digits do not tell whether it holds"
+
+
+Readings: TypeAlias = Mapping[int | str, Unit]
+"""What units mean, by their text, or by their place in the formula."""
+FIRST_READINGS: Readings = MappingProxyType({})
 
 
 class FormulaComparison(Struct, frozen=True):
@@ -56,13 +63,19 @@ class Numeral(Struct, frozen=True):
     digits: int
     unit_size: Real
     """The size of its unit in base units."""
+    zero: Real = _ZERO
+    """Where the scale of its unit begins, in this unit."""
 
     def scale(self, size: Real) -> Numeral:
         """Return the number times the size of a unit."""
         return replace(self, value=self.value * size, step=self.step * size)
 
+    def express(self, value: Real) -> Real:
+        """Return a value in its unit."""
+        return value / self.unit_size - self.zero
 
-def read_numeral(expression: Expression) -> Numeral | None:
+
+def read_numeral(expression: Expression, readings: Readings = FIRST_READINGS) -> Numeral | None:
     """Return the numeral that an expression is; `None` if it is more than that."""
     match expression:
         case Expression(kind="number", text=text):
@@ -73,22 +86,63 @@ def read_numeral(expression: Expression) -> Numeral | None:
             digits = len(text.replace(".", "").lstrip("0")) or 1
             return Numeral(Real.of(text), step, is_whole, digits, ONE)
         case Expression(kind="-", parts=(inner,)):
-            numeral = read_numeral(inner)
-            return numeral and replace(numeral, value=-numeral.value)
+            numeral = read_numeral(inner, readings)
+            if numeral is None:
+                return None
+            beginning = numeral.zero * numeral.unit_size
+            return replace(numeral, value=beginning + beginning - numeral.value)
         case Expression(kind="^", parts=(Expression(kind="number", text="10"), _)):
             size = evaluate(expression).value
             return Numeral(size, size, True, 1, ONE) if size.rational is not None else None
         case Expression(kind="*", parts=(inner, Expression(kind="unit" | "^") as factor)):
-            numeral, power = read_numeral(inner), read_numeral(factor)
-            if numeral is None or (factor.kind == "^" and (power is None or numeral.digits == 0)):
+            numeral = read_numeral(inner, readings)
+            if numeral is None:
                 return None
-            size = evaluate(factor).value
-            scaled = numeral.scale(size)
             if factor.kind == "^":
-                return replace(scaled, is_whole=False)
-            return replace(scaled, unit_size=size)
+                power = read_numeral(factor)
+                return power and replace(numeral.scale(power.value), is_whole=False)
+            unit = find_reading(factor, readings)
+            scaled, size = numeral.scale(measure(unit)), numeral.unit_size * measure(unit)
+            zero = Real.of(unit.zero)
+            return replace(scaled, value=scaled.value + zero * size, unit_size=size, zero=zero)
         case _:
             return None
+
+
+def find_reading(unit: Expression, readings: Readings) -> Unit:
+    """Return the unit that an expression is read as: as readings say, or the first that it has.
+
+    Raises:
+        NotUnderstood: it is not known.
+    """
+    for key in (unit.start, unit.text):
+        if key in readings:
+            return readings[key]
+    units = find_units(unit.text)
+    if not units:
+        raise unit.not_understood(f"`{unit.text}` is not a known unit")
+    return units[0]
+
+
+def unit_readings(*expressions: Expression) -> Iterator[Readings]:
+    """Yield all readings of the units in some expressions.
+
+    A unit with several sizes has the same one in all places; a temperature of a scale may be one,
+    or a difference, in each.
+    """
+    choices: dict[int | str, tuple[Unit, ...]] = {}
+    is_sum = any(expression.has("+", "-") for expression in expressions)
+    for part in (part for expression in expressions for part in expression.walk()):
+        units = find_units(part.text) if part.kind == "unit" else ()
+        if units and units[0].zero:
+            readings = (units[0], replace(units[0], zero=Fraction(0)))
+            choices[part.start] = readings[::-1] if is_sum else readings
+        elif len(units) > 1:
+            choices[part.text] = units
+    if len(choices) > _MAX_CHOICES:
+        raise expressions[-1].not_understood("its units have too many readings")
+    for units in itertools.product(*choices.values()):
+        yield dict(zip(choices, units, strict=True))
 
 
 def agrees(numeral: Numeral, value: Real, relation: str) -> bool | None:
@@ -101,11 +155,24 @@ def agrees(numeral: Numeral, value: Real, relation: str) -> bool | None:
     return None if excess is None else excess <= 0
 
 
+def choose_rounded(numerals: Mapping[int, Numeral], relation: str) -> int:
+    """Return which side of a relation may be rounded: that with the coarser digits.
+
+    A whole number is exact after `=`, and beside a decimal in another unit, as in `1 mi ≈ 1.6 km`.
+    """
+    rounded = {i: numeral for i, numeral in numerals.items() if not numeral.is_whole}
+    sizes = {float(numeral.unit_size) for numeral in numerals.values()}
+    if rounded and (relation == "=" or len(sizes) > 1):
+        numerals = rounded
+    return max(numerals, key=lambda i: (float(numerals[i].step), i))
+
+
 def format_number(value: Real, digits: int = 10) -> str:
     """Return a value as text."""
     return f"{value:.{digits}g}"
 
 
+_MAX_CHOICES = 5
 _MAX_DIGITS = 300
 _MAX_COUNT = 1_000
 """The limit for factorials, and for the terms of the sums in a side."""
@@ -128,16 +195,18 @@ def evaluate(
     expression: Expression,
     symbols: Mapping[str, PhysicalQuantity] = {},
     has_calculus: bool = True,
+    readings: Readings = FIRST_READINGS,
 ) -> PhysicalQuantity:
     """Return the quantity that an expression has as its value.
 
-    Without calculus derivatives and integrals have their dimensions, and any value.
+    Without calculus derivatives and integrals have their dimensions, and any value. `readings`:
+    what units mean that may mean several.
 
     Raises:
         NotUnderstood: it cannot be computed.
     """
     try:
-        quantity = _Evaluator(symbols, has_calculus).evaluate(expression)
+        quantity = _Evaluator(symbols, has_calculus, readings=readings).evaluate(expression)
     except (OverflowError, MemoryError):
         raise expression.not_understood("the numbers become too large") from None
     if not quantity.value.is_finite:
@@ -152,8 +221,10 @@ class _Evaluator:
         has_calculus: bool,
         term_numbers: Iterator[int] | None = None,
         analytic: bool = False,
+        readings: Readings = FIRST_READINGS,
     ) -> None:
         self.symbols, self.has_calculus, self.analytic = symbols, has_calculus, analytic
+        self.readings = readings
         self.term_numbers = term_numbers or iter(range(_MAX_COUNT))
         """Those that are left."""
 
@@ -163,7 +234,7 @@ class _Evaluator:
         """Return an evaluator to which a symbol is known."""
         symbols = {**self.symbols, name: quantity}
         is_analytic = self.analytic or analytic
-        return _Evaluator(symbols, self.has_calculus, self.term_numbers, is_analytic)
+        return _Evaluator(symbols, self.has_calculus, self.term_numbers, is_analytic, self.readings)
 
     def evaluate(self, expression: Expression) -> PhysicalQuantity:
         """Return the value of an expression."""
@@ -183,13 +254,15 @@ class _Evaluator:
             case "symbol":
                 return self._evaluate_symbol(expression)
             case "unit":
-                return self._evaluate_unit(expression)
+                unit = find_reading(expression, self.readings)
+                return PhysicalQuantity(measure(unit), unit.dimension)
             case "+" | "-":
                 return self._evaluate_sum(expression)
             case "*":
                 left, right = map(self.evaluate, expression.parts)
                 dimension = multiply(left.dimension, right.dimension)
-                return PhysicalQuantity(left.value * right.value, dimension)
+                value = left.value * right.value
+                return PhysicalQuantity(value + self._beginning(expression), dimension)
             case "/":
                 left, right = map(self.evaluate, expression.parts)
                 dimension = multiply(left.dimension, right.dimension, -1)
@@ -277,20 +350,18 @@ class _Evaluator:
             raise expression.not_understood(reason)
         return PhysicalQuantity(PI if expression.text == r"\pi" else E)
 
-    def _evaluate_unit(self, expression: Expression) -> PhysicalQuantity:
-        if expression.text == "%":
-            return PhysicalQuantity(Real.of(Fraction(1, 100)))
-        if expression.text == "deg":
-            return PhysicalQuantity(PI / Real.of(180))  # Pint takes a second to begin with
-        unit = find_unit(expression.text)
-        if unit is None:
-            raise expression.not_understood(f"`{expression.text}` is not a known unit")
-        return PhysicalQuantity(measure(unit), unit.dimension)
+    def _beginning(self, expression: Expression) -> Real:
+        """Return where the scale begins on which a product is a place, as 25 °C is."""
+        if expression.kind != "*" or expression.parts[1].kind != "unit":
+            return _ZERO
+        unit = find_reading(expression.parts[1], self.readings)
+        return Real.of(unit.zero) * measure(unit) if unit.zero else _ZERO
 
     def _evaluate_sum(self, expression: Expression) -> PhysicalQuantity:
         first, *rest = map(self.evaluate, expression.parts)
-        if not rest:
-            return PhysicalQuantity(-first.value, first.dimension)
+        if not rest:  # -40 °C is not the opposite of 40 °C
+            beginning = self._beginning(expression.parts[0])
+            return PhysicalQuantity(beginning + beginning - first.value, first.dimension)
         (second,) = rest
         if first.dimension != second.dimension and not has_zero(first, second):
             dimensions = [describe_dimension(term.dimension) for term in (first, second)]
@@ -343,17 +414,9 @@ class _Evaluator:
         return PhysicalQuantity(integrate(integrand, *limits), dimension)
 
 
-_DEGREE = Fraction(repr(math.radians(1)))
-_DOUBLE_DIGITS = 15
-
-
 def measure(unit: Unit) -> Real:
-    """Return the size of a unit; a ball where it is known as a floating-point number only."""
-    if unit.size == _DEGREE:
-        return PI / Real.of(180)
-    size = Real.of(unit.size)
-    digits = repr(float(unit.size)).partition("e")[0].replace(".", "").strip("0")
-    return size.widen(size * Real.of("1e-14")) if len(digits) >= _DOUBLE_DIGITS else size
+    """Return the size of a unit in base units."""
+    return Real.of(unit.size) * PI.raise_to(Real.of(unit.pi))
 
 
 def has_zero(*quantities: PhysicalQuantity) -> bool:

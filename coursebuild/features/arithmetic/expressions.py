@@ -64,3 +64,21 @@ class Expression(Struct, frozen=True):
     def not_understood(self, reason: str) -> NotUnderstood:
         """Return the exception that says that this part cannot be computed."""
         return NotUnderstood(reason, self.start, self.end)
+
+
+def join_units(product: Expression, sign: str, factor: Expression) -> Expression:
+    r"""Return a product whose unit goes on behind a sign, as in `5\,\mathrm N\cdot\mathrm m`."""
+    if product.kind != "*" or product.parts[1].kind != "unit":
+        raise factor.not_understood("it may be a symbol")
+    number, unit = product.parts
+    text = f"{unit.text}{'/' if sign == '/' else '·'}{factor.text}"
+    unit = Expression("unit", unit.start, factor.end, text=text)
+    return Expression("*", product.start, factor.end, (number, unit))
+
+
+def is_mixed(left: Expression, right: Expression) -> bool:
+    """Whether this is a mixed number: a number before a fraction of numbers."""
+    is_fraction = right.kind == "/" and all(part.kind == "number" for part in right.parts)
+    while left.kind in ("*", "-") and left.parts:
+        left = left.parts[-1]
+    return is_fraction and left.kind == "number"

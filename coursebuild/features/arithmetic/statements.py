@@ -18,6 +18,12 @@ from coursebuild.features.arithmetic.tex import CONSTANTS, GREEK, SPACE, TOKEN, 
 
 _MAX_LENGTH = 5_000
 _DIGITS = re.compile("[0-9],[0-9]")
+_COMMA = re.compile(r"([0-9]+)\{,\}([0-9]+)")
+_PLAIN_COMMA = re.compile(r"(?<=[0-9]),(?=[0-9])")
+_CERTAIN_COMMA = re.compile(r"(?<![0-9.])0\{,\}[0-9]|[0-9]\{,\}(?:[0-9]{1,2}|[0-9]{4,})(?![0-9])")
+"""A comma that parts no thousands."""
+_ARABIC = {zero + n: str(n) for zero in (0x660, 0x6F0) for n in range(10)} | {0x66B: "."}
+"""Digits and the decimal sign, as they are written in Arabic and Persian."""
 _ENVIRONMENT = re.compile(r"\\(?:begin|end)\{(?:aligned|split|align\*?|gathered|equation\*?)\}")
 _WORDS = re.compile(
     r"\\(?:mathrm|text|textrm|begin|end)\s*(?:\{[^{}]*\}|\w)"
@@ -99,11 +105,29 @@ class Statement(Struct, frozen=True):
     relations: tuple[str, ...]
 
 
+def point_decimals(tex: str, comma: bool = False) -> str:
+    """Return a formula of the same length, with points for the commas before decimals.
+
+    `comma`: such a comma is that of its language, and need not stand in braces. In other languages
+    `1{,}250` is a thousand.
+    """
+    tex = tex.translate(_ARABIC)
+    if comma:
+        return _PLAIN_COMMA.sub(".", _COMMA.sub(r"\1.\2  ", tex))
+    return _COMMA.sub(r"\1.\2  ", tex) if _CERTAIN_COMMA.search(tex) else tex
+
+
+def has_plain_comma(tex: str) -> bool:
+    """Whether a comma between digits stands in no braces, so that it may part two numbers."""
+    return _PLAIN_COMMA.search(tex) is not None
+
+
 @lru_cache(maxsize=256)
-def read_statements(tex: str) -> tuple[Statement, ...]:
+def read_statements(tex: str, comma: bool = False) -> tuple[Statement, ...]:
     """Return the statements of a formula; none if it is too long."""
     if len(tex) > _MAX_LENGTH:
         return ()
+    tex = point_decimals(tex, comma)
     tex = _ENVIRONMENT.sub(lambda match: " " * len(match[0]), tex)
     statements: list[Statement] = []
     sides: list[FormulaSide] = []

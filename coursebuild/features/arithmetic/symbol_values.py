@@ -22,12 +22,12 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.pages.typography import unit_length
 from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
+from coursebuild.core.text.quantities import unit_behind
 from coursebuild.core.text.source import Span
 from coursebuild.core.text.units import Unit, find_unit
-from coursebuild.features.arithmetic.chains import SymbolQuantity, check_arithmetic
+from coursebuild.features.arithmetic.chains import check_arithmetic
 from coursebuild.features.arithmetic.evaluate import (
     FormulaComparison,
     WrongDimensions,
@@ -39,6 +39,7 @@ from coursebuild.features.arithmetic.evaluate import (
 from coursebuild.features.arithmetic.expressions import NotUnderstood
 from coursebuild.features.arithmetic.real import ONE, Real
 from coursebuild.features.arithmetic.statements import read_statements
+from coursebuild.features.arithmetic.symbol_comparison import SymbolQuantity
 
 _Formula = model.Math | model.MathBlock
 _Level = tuple[int, ...]
@@ -52,6 +53,8 @@ class _Place(Struct, frozen=True):
     level: _Level
     unit: str
     """The unit in the text right after it."""
+    comma: bool
+    """Whether it may stand before decimals."""
 
 
 class _GivenValue(Struct, frozen=True):
@@ -120,7 +123,9 @@ def _compare_all(
         if formula.span in definitions or is_identity or _source(formula) is not None:
             continue
         tex, quantities = formula.tex, (*letters, *levels[place.level])
-        comparisons[tex.span().start] = check_arithmetic(tex.text, quantities, place.unit)
+        comparisons[tex.span().start] = check_arithmetic(
+            tex.text, quantities, place.unit, place.comma
+        )
     return comparisons
 
 
@@ -183,7 +188,7 @@ def _read_quantity(
     """
     formula, tex = place.formula, place.formula.tex.text
     number = formula.value if isinstance(formula, model.Math) else None
-    sides = [side for statement in read_statements(tex) for side in statement.sides]
+    sides = [side for statement in read_statements(tex, place.comma) for side in statement.sides]
     if number is not None and (len(sides) != 1 or sides[0].get_expression().kind != "symbol"):
         raise NotUnderstood("it is not a single symbol", 0, len(tex))
     if len(sides) > 2 or not sides or (len(sides) == 2 and not sides[1].is_numeric):
@@ -198,11 +203,12 @@ def _read_quantity(
     unit = find_unit(unit_text) if unit_text else None
     if number is not None:
         size = measure(unit) if unit is not None else ONE
+        zero = Real.of(unit.zero if unit is not None else 0)
         mantissa, _, exponent = number.text.replace("−", "-").lower().partition("e")
         decimals = len(mantissa.partition(".")[2])
         last_place = Fraction(10) ** (int(exponent or 0) - decimals)
         step = Real.of(last_place) * size if decimals else None
-        value = Real.of(Fraction(f"{mantissa}e{exponent or 0}")) * size
+        value = (Real.of(Fraction(f"{mantissa}e{exponent or 0}")) + zero) * size
         text = f"{number.text} {unit_text}".rstrip()
         return SymbolQuantity(name, unit_text, unit or Unit(Fraction(1)), value, step, text)
     if len(sides) == 1:
@@ -223,9 +229,10 @@ def _read_quantity(
     factor = ONE if units else measure(scale)
     own_unit = find_unit(unit_name) if unit_name else None
     size = measure(own_unit) if own_unit is not None else ONE
+    beginning = Real.of(own_unit.zero if own_unit is not None else 0)
     value = quantity.value * factor
     step = numeral.step * factor if numeral is not None and not numeral.is_whole else None
-    text = f"{value / size:.10g} {unit_name}".rstrip()
+    text = f"{value / size - beginning:.10g} {unit_name}".rstrip()
     return SymbolQuantity(name, unit_text or unit_name, unit, value, step, text)
 
 
@@ -252,6 +259,5 @@ def _read_places(document: model.Document) -> Iterator[_Place]:
         for formula in formulas:
             start = formula.tex.span().start
             level = bisect_right(headings, start), *(s for s, end in parts if s <= start < end)
-            after = texts.get(formula.span.end, "")
-            unit = after[: unit_length(after)].strip()
-            yield _Place(formula, level, "" if unit == "A" else unit)
+            unit = unit_behind(texts.get(formula.span.end, "")).text
+            yield _Place(formula, level, unit, document.comma)

@@ -15,7 +15,13 @@ from __future__ import annotations
 
 import re
 
-from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
+from coursebuild.core.text.quantities import plain_unit
+from coursebuild.features.arithmetic.expressions import (
+    Expression,
+    NotUnderstood,
+    is_mixed,
+    join_units,
+)
 
 CONSTANTS = frozenset((r"\pi", r"\mathrm{e}"))
 """Symbols that stand for fixed numbers."""
@@ -33,6 +39,9 @@ _NUMBER = re.compile(
 _LETTER = re.compile(r"[A-Za-z]|\\[A-Za-z]+")
 _DIFFERENTIAL = re.compile(r"\\mathrm\s*(?:\{\s*d\s*\}|d)|\\partial(?![A-Za-z])")
 _UPRIGHT = re.compile(r"\\(?:mathrm|text|textrm|operatorname|mathit)(?![A-Za-z])\s*")
+_SCALE = re.compile(r"(?:(?:\\mathrm|\\text)\s*\{\s*([CF])\s*\}|(?:\\mathrm\s*)?([CF]))(?![\w^])")
+_UPRIGHT_UNIT = r"\{\s*(\\(?:mathrm|text)\s*(?:\{[^{}]+\}|[A-Za-z])(?:\^(?:\d|\{-?\d\}))?)\s*\}"
+_UNIT_FRACTION = re.compile(rf"(?!\{{\s*\\mathrm\s*\{{?d\b)\s*{_UPRIGHT_UNIT}\s*{_UPRIGHT_UNIT}")
 _DEGREES = re.compile(r"\\circ|\{\s*\\circ\s*\}")
 _FUNCTIONS = frozenset("sin cos tan cot sec csc sinh cosh tanh arcsin arccos arctan exp ln".split())
 GREEK = frozenset(
@@ -46,6 +55,8 @@ _BRACKET = re.compile(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
 """What holds all that a function is of: brackets, perhaps in braces, as other programs write."""
 _BRACKETS = {"(": ")", "[": "]", "{": "}", "|": "|", r"\lvert": r"\rvert"}
 _QUOTIENT_SIGNS = ("/", r"\div")
+_UNIT_SIGNS = ("/", r"\cdot")
+r"""Signs between upright units, as in `\mathrm N\cdot\mathrm m`."""
 _PRODUCT_SIGNS = (r"\cdot", r"\times", "*", "⋅", "×", *_QUOTIENT_SIGNS)
 _NO_FACTOR = frozenset(")]}|+-−=<>,;:.!'_^") | {r"\rvert", *_PRODUCT_SIGNS}
 SIDE_BY_SIDE = "side by side"
@@ -90,8 +101,6 @@ class _Reader:
         """The offset of the last token that `peek` returned, and the token."""
         self.indices: frozenset[str] = frozenset()
         """The indices of the sums and products of which a term is read."""
-
-    # --- tokens
 
     def peek(self) -> str:
         """Return the next token, past spaces; empty at the end."""
@@ -147,8 +156,6 @@ class _Reader:
             self.at += len(sign)
         return re.sub(r"\s+", "", self.tex[start : self.at - 1])
 
-    # --- grammar
-
     def sum(self) -> Expression:
         """Parse terms with signs between them."""
         self.peek()
@@ -173,7 +180,11 @@ class _Reader:
             if is_quotient:
                 raise self.not_understood("what `/` divides by can be read in two ways")
             start = self.at
-            factor = self.unit() if not sign else None
+            unit = None if sign and sign not in _UNIT_SIGNS else self.unit()
+            if sign and unit is not None:
+                product = join_units(product, sign, unit)
+                continue
+            factor = unit
             if factor is None:
                 minus = self.take("-") if sign else ""
                 factor = self.power()
@@ -181,7 +192,7 @@ class _Reader:
                     factor = Expression("-", start, self.at, (factor,))
                 is_run = self.tex[start].isdigit() or self.tex[start] == "."
                 is_run &= SPACE.sub("", self.tex[product.start : start])[-1:] != "!"
-                if not sign and (is_run or _is_mixed(product, factor)):
+                if not sign and (is_run or is_mixed(product, factor)):
                     raise factor.not_understood("two numbers stand side by side")
                 is_spaced = self.tex[:start].rstrip().endswith(r"\,")
                 if not (sign or is_spaced) and product.kind == "symbol" and self.tex[start] in "([":
@@ -215,14 +226,11 @@ class _Reader:
         if upright is None:
             return None
         self.at = upright.end()
-        text = self.raw()
+        text = plain_unit(self.raw())
         if text in ("d", "e"):
             self.at = start
             return None
         exponent = "^" + self.raw() if self.take("^") else ""
-        text = re.sub(r"\\[,;: ]|\\cdot|~|·", "*", text)  # `kg*m^2` for `kg\,m^2`
-        text = text.replace(r"\mu", "µ").replace(r"\Omega", "Ω").replace(r"\%", "%")
-        text = re.sub(r"\^\{(-?\d+)\}", r"^\1", text).strip("*")
         return Expression("unit", start, self.at, text=text + exponent)
 
     def power(self, in_function: bool = False) -> Expression:
@@ -252,8 +260,12 @@ class _Reader:
         return power
 
     def degrees(self, number: Expression) -> Expression:
-        """Return a number of degrees, whose sign has been consumed."""
-        unit = Expression("unit", number.end, self.at, text="deg")
+        """Return a number of degrees, whose sign has been consumed: of an angle or a scale."""
+        scale = self.match(_SCALE)
+        if scale is not None:
+            self.at = scale.end()
+        text = f"°{scale[1] or scale[2]}" if scale is not None else "deg"
+        unit = Expression("unit", number.end, self.at, text=text)
         return Expression("*", number.start, self.at, (number, unit))
 
     def base(self) -> Expression:
@@ -341,6 +353,10 @@ class _Reader:
 
     def fraction(self, start: int) -> Expression:
         """Parse a fraction or a derivative."""
+        if units := self.match(_UNIT_FRACTION):
+            self.at = units.end()
+            text = "/".join(f"({plain_unit(unit)})" for unit in units.groups())
+            return Expression("unit", start, self.at, text=text)
         numerator_start = self.at
         has_brace = self.take("{")
         if has_brace and self.match(_DIFFERENTIAL):
@@ -431,11 +447,3 @@ class _Reader:
                 raise self.not_understood("it may be a factor of the function, or of what it is of")
             factor = self.power(in_function=True)
             argument = Expression("*", argument.start, self.at, (argument, factor), SIDE_BY_SIDE)
-
-
-def _is_mixed(left: Expression, right: Expression) -> bool:
-    """Whether this is a mixed number: a number before a fraction of numbers."""
-    is_fraction = right.kind == "/" and all(part.kind == "number" for part in right.parts)
-    while left.kind in ("*", "-") and left.parts:
-        left = left.parts[-1]
-    return is_fraction and left.kind == "number"

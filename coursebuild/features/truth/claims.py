@@ -31,10 +31,10 @@ from msgspec.structs import replace
 from coursebuild.core import model
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
-from coursebuild.core.text.numbers import Number, scan_prose
+from coursebuild.core.text.numbers import Number, point_decimals, scan_prose
 from coursebuild.core.text.source import Excerpt, Span
-from coursebuild.core.text.units import UNITS_SHOWN, find_unit
-from coursebuild.features.arithmetic.evaluate import FormulaComparison, read_numeral
+from coursebuild.core.text.units import UNIT_PATTERN, find_unit
+from coursebuild.features.arithmetic.evaluate import FormulaComparison, measure, read_numeral
 from coursebuild.features.arithmetic.expressions import Expression
 from coursebuild.features.arithmetic.statements import FormulaSide, read_statements
 from coursebuild.features.arithmetic.symbol_values import check_formulas
@@ -62,32 +62,33 @@ class NamedNumber(Struct, frozen=True):
         )
 
 
-def named_numbers(inlines: Iterable[model.Inline]) -> Iterator[NamedNumber]:
+def named_numbers(document: model.Document) -> Iterator[NamedNumber]:
     """Yield the numbers of a document whose source is a path."""
-    for inline in inlines:
+    for inline in model.document_inlines(document):
         source = getattr(inline, "source", None) or ""
         if _PATH.fullmatch(source) is None:
             continue
         if isinstance(inline, model.NumberBinding):
-            numbers = tuple(scan_prose(inline.text))
+            text = point_decimals(inline.text) if inline.comma else inline.text
+            numbers = scan_prose(text)
             unit_text = inline.text[numbers[-1].end :].strip() if numbers else ""
             unit = find_unit(unit_text) if unit_text else None
-            size = float(unit.size) if unit is not None else 1.0
+            size = float(measure(unit)) if unit is not None else 1.0
+            zero = float(unit.zero) if unit is not None else 0.0
             for number in numbers:
                 value, step = float(number.value), 10.0**number.place
-                values = (value, step), (value * size, step * size)
+                values = (value, step), ((value + zero) * size, step * size)
                 yield NamedNumber(inline.text_span, source, number.text, values)
         elif isinstance(inline, model.Math):
-            sides = (s for statement in read_statements(inline.tex.text) for s in statement.sides)
+            statements = read_statements(inline.tex.text, document.comma)
+            sides = (side for statement in statements for side in statement.sides)
             for side in sides:
                 expression = side.expression if side.is_numeric else None
                 numeral = read_numeral(expression) if isinstance(expression, Expression) else None
                 if numeral is not None:
-                    pair, size = (
-                        (float(numeral.value), float(numeral.step)),
-                        float(numeral.unit_size),
-                    )
-                    values = (pair[0] / size, pair[1] / size), pair
+                    step, size = float(numeral.step), float(numeral.unit_size)
+                    value = float(numeral.express(numeral.value))
+                    values = (value, step / size), (float(numeral.value), step)
                     text = inline.tex.text[side.start : side.end].strip()
                     yield NamedNumber(inline.tex.span(side.start, side.end), source, text, values)
 
@@ -125,7 +126,7 @@ _NO_SOURCE = "unsourced"
 
 _COUNTS = 12
 _YEARS = range(1600, 2100)
-_UNIT = re.compile(rf"[\s\u00a0\u202f]*(?:{UNITS_SHOWN})")
+_UNIT = re.compile(rf"[\s\u00a0\u202f]*(?:{UNIT_PATTERN})")
 _DECIMAL = re.compile(r"\d\.\d")
 _MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
 """Every formula with claims matches this."""
@@ -217,7 +218,7 @@ def document_claims(document: model.Document) -> Claims:
         for r in model.find_blocks(document, model.Recording)
         if r.script
     )
-    counter = _Counter(outputs, check_formulas(document))
+    counter = _Counter(outputs, check_formulas(document), document.comma)
     output_ids: set[int] = set()
     for block in model.walk_blocks(document.blocks):
         if isinstance(block, model.Recording):
@@ -236,7 +237,7 @@ def document_claims(document: model.Document) -> Claims:
         open=tuple(counter.open),
         places=tuple(counter.places),
         unsourced=tuple(counter.unsourced),
-        named=tuple(named_numbers(model.document_inlines(document))),
+        named=tuple(named_numbers(document)),
     )
 
 
@@ -245,9 +246,10 @@ class _Counter:
         self,
         outputs: Sequence[tuple[int, str]],
         comparisons: Mapping[int, tuple[FormulaComparison, ...]],
+        comma: bool,
     ) -> None:
         """`outputs` are the ends of recorded outputs, in order, with their scripts."""
-        self.outputs, self.comparisons = outputs, comparisons
+        self.outputs, self.comparisons, self.comma = outputs, comparisons, comma
         self.kinds: list[str] = []
         self.open: list[Span] = []
         self.unsourced: list[Span] = []
@@ -282,7 +284,7 @@ class _Counter:
                     if inline.value is not None:
                         self.marked_number(inline.value)
                 case model.Image():
-                    numbers = {number.text for number in find_claims(inline.alt)}
+                    numbers = {number.text for number in find_claims(inline.alt, self.comma)}
                     self.alternatives += [(inline.span, number) for number in sorted(numbers)]
                 case model.Link(target=model.UrlTarget() | model.TermTarget() as target):
                     texts = (child for child in inline.children if isinstance(child, model.Text))
@@ -302,7 +304,8 @@ class _Counter:
             above = self.outputs[at - 1][1] if at else ""
             proofs = tuple(filter(None, (number.script or above,)))
         kind = _given_kind(number.source) if number.source is not None else "bound"
-        for part in scan_prose(number.text):
+        text = point_decimals(number.text) if number.comma else number.text
+        for part in scan_prose(text):
             first_kind, scripts = self.marked.setdefault(part.text, (kind, proofs))
             # What one place gives, or another script prints, is proven by that.
             if first_kind == kind == "bound":
@@ -317,7 +320,7 @@ class _Counter:
     def text(self, text: model.Text) -> None:
         """Add the claims of plain text."""
         is_verbatim = text.span.end - text.span.start == len(text.text)
-        for number in find_claims(text.text):
+        for number in find_claims(text.text, self.comma):
             span = text.span
             if is_verbatim:
                 span = Span(span.source, span.start + number.start, span.start + number.end)
@@ -329,21 +332,22 @@ class _Counter:
             return
         comparisons = self.comparisons.get(tex.span().start, ())
         proofs = [comparison for comparison in comparisons if comparison.kind == "holds"]
-        for statement in read_statements(tex.text):
+        for statement in read_statements(tex.text, self.comma):
             first, last = statement.sides[0], statement.sides[-1]
             if any(first.start <= proof.start < last.end for proof in proofs):
                 self.add("computed", (), tex.span(first.start, last.end))
                 continue
             for side in statement.sides:
-                if _is_claim(side, tex.text):
+                if _is_claim(side):
                     part = tex.text[side.start : side.end]
                     start, end = side.end - len(part.lstrip()), side.start + len(part.rstrip())
                     place = tex.span(start, end)
                     self.add("" if source is None else _given_kind(source), (), place)
 
 
-def find_claims(text: str) -> Iterator[Number]:
-    """Yield the numbers of a text that are claims."""
+def find_claims(text: str, comma: bool = False) -> Iterator[Number]:
+    """Yield the numbers of a text that are claims; `comma`: it may stand before decimals."""
+    text = point_decimals(text) if comma else text
     if _DIGIT.search(text) is None:
         return  # saves time: most texts have no number, and scanning is slow
     for number in scan_prose(text):
@@ -359,7 +363,8 @@ def _given_kind(source: str) -> str:
     return "given" if source else _NO_SOURCE
 
 
-def _is_claim(side: FormulaSide, tex: str) -> bool:
+def _is_claim(side: FormulaSide) -> bool:
+    tex = side.tex
     if not side.is_numeric and "." not in tex[side.start : side.end]:
         return False
     if not isinstance(side.expression, Expression):

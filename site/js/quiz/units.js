@@ -4,11 +4,12 @@
  *   readUnit('kg·m²')[0]                     → { scale: 1, offset: 0, powers: { kg: 1, m: 2 } }
  *   relation(readUnit('g cm^2'), readUnit('kg m^2'))  → { factor: 1e-7, offset: 0 }
  *
- * The SI with its prefixes, other common units, and angles. An angle is no dimension, but treating it as one reveals mistakes: `rad`
+ * The units are those of the course's checks, in `unit-table.js`. An angle is no dimension, but treating it as one reveals mistakes: `rad`
  * and `deg` may be omitted or added, but hertz count cycles and are not taken for radians per second.
  */
 
 import { normalise } from './numbers.js'
+import { UNITS } from './unit-table.js'
 
 const PREFIXES = {
   Q: 30, R: 27, Y: 24, Z: 21, E: 18, P: 15, T: 12, G: 9, M: 6, k: 3, h: 2, da: 1,
@@ -16,69 +17,10 @@ const PREFIXES = {
 }
 const ANGLE = 'rad'
 const CYCLES = 'cycle'
-const DEGREE = Math.PI / 180
-
-/** Symbol: scale, powers of the base units, whether it takes prefixes. */
-const UNITS = {
-  m: [1, { m: 1 }, true],
-  g: [1e-3, { kg: 1 }, true],
-  s: [1, { s: 1 }, true],
-  A: [1, { A: 1 }, true],
-  K: [1, { K: 1 }, true],
-  mol: [1, { mol: 1 }, true],
-  cd: [1, { cd: 1 }, true],
-  rad: [1, { [ANGLE]: 1 }, true],
-  sr: [1, { [ANGLE]: 2 }, true],
-  Hz: [1, { s: -1, [CYCLES]: 1 }, true],
-  N: [1, { kg: 1, m: 1, s: -2 }, true],
-  Pa: [1, { kg: 1, m: -1, s: -2 }, true],
-  J: [1, { kg: 1, m: 2, s: -2 }, true],
-  W: [1, { kg: 1, m: 2, s: -3 }, true],
-  C: [1, { A: 1, s: 1 }, true],
-  V: [1, { kg: 1, m: 2, s: -3, A: -1 }, true],
-  F: [1, { kg: -1, m: -2, s: 4, A: 2 }, true],
-  Ω: [1, { kg: 1, m: 2, s: -3, A: -2 }, true],
-  ohm: [1, { kg: 1, m: 2, s: -3, A: -2 }, true],
-  S: [1, { kg: -1, m: -2, s: 3, A: 2 }, true],
-  Wb: [1, { kg: 1, m: 2, s: -2, A: -1 }, true],
-  T: [1, { kg: 1, s: -2, A: -1 }, true],
-  H: [1, { kg: 1, m: 2, s: -2, A: -2 }, true],
-  lm: [1, { cd: 1, [ANGLE]: 2 }, true],
-  lx: [1, { cd: 1, m: -2, [ANGLE]: 2 }, true],
-  Bq: [1, { s: -1 }, true],
-  Gy: [1, { m: 2, s: -2 }, true],
-  Sv: [1, { m: 2, s: -2 }, true],
-  kat: [1, { mol: 1, s: -1 }, true],
-  min: [60, { s: 1 }, false],
-  h: [3600, { s: 1 }, false],
-  d: [86400, { s: 1 }, false],
-  t: [1e3, { kg: 1 }, true],
-  l: [1e-3, { m: 3 }, true],
-  L: [1e-3, { m: 3 }, true],
-  eV: [1.602176634e-19, { kg: 1, m: 2, s: -2 }, true],
-  Da: [1.6605390666e-27, { kg: 1 }, true],
-  au: [149597870700, { m: 1 }, false],
-  bar: [1e5, { kg: 1, m: -1, s: -2 }, true],
-  atm: [101325, { kg: 1, m: -1, s: -2 }, false],
-  in: [0.0254, { m: 1 }, false],
-  ft: [0.3048, { m: 1 }, false],
-  mi: [1609.344, { m: 1 }, false],
-  lb: [0.45359237, { kg: 1 }, false],
-  psi: [6894.757293168361, { kg: 1, m: -1, s: -2 }, false],
-  kgf: [9.80665, { kg: 1, m: 1, s: -2 }, false],
-  cal: [4.184, { kg: 1, m: 2, s: -2 }, true],
-  Å: [1e-10, { m: 1 }, false],
-  '°': [DEGREE, { [ANGLE]: 1 }, false],
-  "'": [DEGREE / 60, { [ANGLE]: 1 }, false],
-  turn: [2 * Math.PI, { [ANGLE]: 1 }, false],
-  rpm: [Math.PI / 30, { s: -1, [ANGLE]: 1 }, false],
-  '%': [1e-2, {}, false],
-  '‰': [1e-3, {}, false],
-  '°C': [1, { K: 1 }, false],
-}
 
 /** Other ways to write a unit. */
 const NAMES = {
+  "'": '′', degF: '°F', fahrenheit: '°F', kelvins: 'K',
   deg: '°', degree: '°', degrees: '°', arcmin: "'", radian: 'rad', radians: 'rad', degC: '°C', celsius: '°C',
   grad: '°', Grad: '°', grado: '°', grados: '°', degré: '°', degrés: '°',
   rev: 'turn', revs: 'turn', turns: 'turn', revolution: 'turn', revolutions: 'turn', RPM: 'rpm',
@@ -89,8 +31,6 @@ const NAMES = {
   inch: 'in', inches: 'in', foot: 'ft', feet: 'ft', mile: 'mi', miles: 'mi', pound: 'lb', pounds: 'lb',
   litres: 'l', liters: 'l', percent: '%', Kg: 'kg', KG: 'kg', hz: 'Hz', HZ: 'Hz', Rad: 'rad', Deg: '°', Nm: 'N m',
 }
-
-const KELVIN = 273.15
 
 /**
  * @typedef {{scale: number, offset: number, powers: Object<string, number>}} Unit in base units; `offset` (K) is added first (°C)
@@ -268,9 +208,9 @@ function single(symbol) {
 }
 
 function base(symbol, prefix) {
-  const [scale, powers] = UNITS[symbol]
+  const [scale, powers, , offset = 0] = UNITS[symbol]
   // So that a kilogram is exactly 1.
-  return { scale: prefix === 1e3 && scale === 1e-3 ? 1 : scale * prefix, offset: symbol === '°C' ? KELVIN : 0, powers }
+  return { scale: prefix === 1e3 && scale === 1e-3 ? 1 : scale * prefix, offset, powers }
 }
 
 function multiply(first, second, sign) {

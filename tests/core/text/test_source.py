@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.text.source import Excerpt, Source, Span
-from coursebuild.core.text.units import check_unit, find_unit, with_unit
+from coursebuild.core.text.units import check_unit, find_units, with_unit
 
 
 @pytest.mark.parametrize(
@@ -128,11 +128,26 @@ def test_units_that_are_equal_have_one_size_and_one_dimension() -> None:
         ("N m", "kg m^2/s^2"),
         ("m/m", "1"),
         ("m^12", "m^6 m^6"),
-        ("mm²", "1e-6 m²"),
+        ("mm²", "µm m"),
         ("J/(kg K)", "m²/(s² K)"),
         ("kHz", "1/ms"),
         ("μm", "µm"),
+        ("psi", "lbf/in^2"),
+        ("metres per second", "m s^{-1}"),
+        ("rpm", "rev/min"),
+        ("kWh", "kW h"),
     ):
-        assert find_unit(unit) is not None and find_unit(unit) == find_unit(same_unit), unit
-    assert find_unit("m^12") != find_unit("m")
-    assert find_unit("strides") is None
+        pairs = [find_units(text) for text in (unit, same_unit)]
+        assert all(pairs) and pairs[0][0].is_same(pairs[1][0]), unit
+    for unit, another_unit in (
+        ("m^12", "m"),
+        ("Hz", "rad/s"),
+        ("°C", "K"),
+        ("N m", "N"),
+        ("rpm", "Hz"),
+    ):
+        assert not any(a.is_same(b) for a in find_units(unit) for b in find_units(another_unit)), (
+            unit
+        )
+    assert find_units("strides") == find_units("m//s") == find_units("link") == ()
+    assert len(find_units("J/kg K")) == len(find_units("rpm")) == 2

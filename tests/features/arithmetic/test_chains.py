@@ -9,10 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.text.units import find_unit
-from coursebuild.features.arithmetic.chains import SymbolQuantity, check_arithmetic
+from coursebuild.features.arithmetic.chains import check_arithmetic
 from coursebuild.features.arithmetic.evaluate import measure
 from coursebuild.features.arithmetic.identities import check_identity
 from coursebuild.features.arithmetic.real import Real
+from coursebuild.features.arithmetic.symbol_comparison import SymbolQuantity
 
 HOLDS = r"""
 I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168\ \mathrm{kg\,m^2}.

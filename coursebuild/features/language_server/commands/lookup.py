@@ -290,7 +290,7 @@ class _Lookup:
         return Referent(formula.span, "\n".join(lines), next(at_offset, declarations[0]).span)
 
     def look_up_binding(self, binding: model.NumberBinding) -> Referent | None:
-        results, number = self.library.results, BoundText.of(binding.text)
+        results, number = self.library.results, BoundText.of(binding.text, binding.comma)
         printed = PrintedOutputs(results.verdicts, results.runs, self.library.scripts)
         for verdict in printed.of_binding(binding) if number.numbers else ():
             for window in number.windows(printed.lines(verdict)):

@@ -1,0 +1,220 @@
+"""The unit of a number in a line of text: behind it, in its label or above its column.
+
+Entry points: `printed_unit(line, start, end)`, `unit_of_column(line, start, above)`, for what a
+program printed; `unit_behind(text)`, `unit_of_header(text)`, for what an author writes;
+`are_different(left, right)`, which is certain.
+
+1. What has two readings is read in both: `m` is a metre or a minute, `C` a coulomb or a degree.
+   Units differ if no reading of one is a reading of the other.
+2. What may be no unit is none: `T` in `l 2.0 T 2.8` and `m` in `m = 2 n = 3` are names, as is `t`
+   in `x(t)`; `in` is a word before another one, and `min` beside `max` a minimum.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from msgspec import Struct
+
+from coursebuild.core.text.numbers import Number, only_number
+from coursebuild.core.text.units import NAMES, Unit, find_units, is_name
+
+_SECOND_READINGS = {
+    "m": ("min",),
+    "C": ("°C",),
+    "F": ("°F",),
+    "°": ("°C", "°F"),
+    "g": ("Gal",),
+}
+"""What text means besides: an acceleration in `2 g` is 981 Gal."""
+
+_SIGNS = frozenset(("/", "·", "⋅", "*", "per"))
+_PER_UNIT = re.compile(r"/[^\W\d_]")
+_GAP = re.compile(r"[ \t]{2,}|\t")
+_REACH = 80
+_LONGEST_PRODUCT = 4
+_CLOSING = ".,;:!?”\"'*_|>}"
+_UPRIGHT = re.compile(r"\$\s*(?:\\[,;: ])*\\(?:mathrm|text|textrm)\s*\{([^{}$]*)\}\s*\$")
+_TEX_SIGNS = (
+    (re.compile(r"\\(?:mathrm|text|textrm|operatorname)\s*(?:\{([^{}]*)\}|(\w))"), r" \1\2"),
+    (re.compile(r"\^?\{?\\(?:circ|degree)\}?"), "°"),
+    (re.compile(r"°\s+(?=[CF]\b)"), "°"),
+    (re.compile(r"\\cdot"), "·"),
+    (re.compile(r"\\mu\s*"), "µ"),
+    (re.compile(r"\\Omega"), "Ω"),
+    (re.compile(r"\\[td]?frac\{([^{}]*)\}\{([^{}]*)\}"), r"(\1)/(\2)"),
+    (re.compile(r"\\%"), "%"),
+    (re.compile(r"\\[,;:! ]|[~$]"), " "),
+)
+_BRACKET = re.compile(r"(?P<before>.?)[(\[](?P<unit>(?:[^()\[\]]|\([^()]*\))*)[)\]]\s*\Z")
+_SOLIDUS = re.compile(r"\s*/\s*(?P<unit>[^/=:]+)\Z")
+_IN_WORDS = re.compile(r"(?P<symbol>\S+)\s+in\s+(?P<unit>\S+)\Z")
+_SYMBOL = re.compile(r"\w{1,2}|\\[a-z]+")
+_TO_NUMBER = re.compile(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")
+"""From the end of a label to a number, perhaps past other numbers."""
+_CELLS = (
+    re.compile(r"[^\s|;,](?:(?!\s\s|\s*[\t|;,]).)*"),
+    re.compile(r"[^\s|;,]+(?: ?[(\[][^()\[\]]*[)\]])?"),
+)
+"""Cells of a row, with wide gaps or signs between them, and with single spaces."""
+_RULE = re.compile(r"[\s\-=+|:─━═┼]*")
+
+
+class UnitText(Struct, frozen=True):
+    """A unit as it is written, and what it may be; false for none."""
+
+    text: str = ""
+    readings: tuple[Unit, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.readings)
+
+
+NO_UNIT = UnitText()
+
+
+def read_unit(text: str) -> UnitText:
+    """The unit that a whole text is, with all its readings."""
+    text = plain_unit(text)
+    readings = [*find_units(text)] if text else []
+    for reading in _SECOND_READINGS.get(NAMES.get(text, text), ()):
+        readings += find_units(reading)
+    return UnitText(text, tuple(readings))
+
+
+def plain_unit(tex: str) -> str:
+    r"""The text of a unit that may be written in TeX: `\mathrm{m\,s^{-1}}` is `m s^{-1}`."""
+    for sign, replacement in _TEX_SIGNS:
+        tex = sign.sub(replacement, tex)
+    return " ".join(tex.split())
+
+
+def are_different(left: UnitText, right: UnitText) -> bool:
+    """Whether both are units, and certainly not the same one."""
+    return (
+        bool(left)
+        and bool(right)
+        and not any(a.is_same(b) for a in left.readings for b in right.readings)
+    )
+
+
+def printed_unit(line: str, start: int, end: int) -> UnitText:
+    """The unit of the number at `line[start:end]` in what a program printed, in its own line."""
+    return unit_behind(line, end, has_names=line[:1].isalpha()) or _unit_of_label(line[:start])
+
+
+def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
+    """The unit that stands behind a number, at a place of a text: as many words as are a product.
+
+    `has_names`: names may stand before the numbers of the text, as in `l 2.0 T 2.8`.
+    """
+    if _GAP.match(text, at):
+        return NO_UNIT  # the next column
+    rest = _UPRIGHT.sub(lambda match: plain_unit(match[1]), text[at : at + _REACH])
+    phrase = _GAP.split(rest.replace("&nbsp;", " ").lstrip("*_ \n"))[0]
+    words = phrase.split()[: _LONGEST_PRODUCT + 1]
+    unit = NO_UNIT
+    for count, word in enumerate(words[:_LONGEST_PRODUCT], 1):
+        product = " ".join(words[:count])
+        bare = _without_closing(product)
+        follows = words[count] if bare == product and count < len(words) else ""
+        is_open = bare.count("(") > bare.count(")") or word in _SIGNS
+        longer = read_unit(bare)
+        is_certain = re.match("[=:]", follows) is None
+        if has_names or count > 1:
+            is_certain &= re.match(r"[\d.+−-]", follows) is None
+        if longer and not unit:
+            is_word = is_name(bare) and (follows[:1].isalnum() or _has_maximum(text))
+            if is_word or not is_certain:
+                return NO_UNIT
+            unit = longer
+        elif longer and (is_name(_without_closing(word)) or not is_certain):
+            unit = UnitText(unit.text, unit.readings + longer.readings)  # `kW h` or `m in`
+            break
+        elif longer:
+            unit = longer
+        if not longer and not is_open and words[count - 2 : count - 1] == ["per"]:
+            return NO_UNIT  # `degrees per step`
+        if bare != product or not (longer or is_open):
+            break
+    is_attached = at > 0 and text[at : at + 1].isalpha()
+    if is_attached and (len(unit.text) == 1 or is_name(unit.text)):
+        return unit if "." in text[:at].split()[-1] else NO_UNIT  # `4A` and `2d`
+    return unit
+
+
+def _has_maximum(text: str) -> bool:
+    """Whether `min` is a minimum."""
+    return "max" in text.casefold()
+
+
+def _without_closing(text: str) -> str:
+    """A text without the marks of the sentence, and the brackets, that end behind it."""
+    bare = text.rstrip(_CLOSING)
+    while any(bare.count(end) > bare.count(begin) for begin, end in ("()", "[]")):
+        bare = bare[:-1].rstrip(_CLOSING)
+    return bare
+
+
+def numbers_of_quantities(text: str, numbers: Iterable[Number]) -> tuple[Number, ...]:
+    """The numbers of a text but for the 1 of a unit, as in `0.5 1/s`."""
+    quantities: list[Number] = []
+    for number in numbers:
+        follows = bool(quantities) and not text[quantities[-1].end : number.start].strip()
+        if not (follows and number.text == "1" and _PER_UNIT.match(text, number.end)):
+            quantities.append(number)
+    return tuple(quantities)
+
+
+def unit_of_header(text: str) -> UnitText:
+    """The unit in a label or the header of a column: `τ (min)`, `v [m/s]`, `t / s`, `time in s`."""
+    text = plain_unit(text)
+    bracket = _BRACKET.search(text)
+    if bracket is not None:
+        unit = read_unit(bracket["unit"])
+        is_letter = len(unit.text) == 1
+        is_index = bracket["before"].strip() != "" and is_letter
+        is_round = text.rstrip().endswith(")")
+        if is_index or (is_letter and is_round and is_name(unit.text)):
+            return NO_UNIT  # `x(t)`, `y[m]` and `error (h)`
+        return NO_UNIT if unit.text == "min" and _has_maximum(text) else unit
+    in_words, quotient = _IN_WORDS.search(text), _SOLIDUS.search(text)
+    if in_words is not None:
+        unit = read_unit(in_words["unit"])  # `F in N`, but not `change in V`
+        is_certain = len(unit.text) > 1 or _SYMBOL.fullmatch(in_words["symbol"]) is not None
+    elif quotient is not None:
+        unit, tail = read_unit(quotient["unit"]), text.split()[-1]
+        is_unit_itself = find_units(text) or ("/" in tail and find_units(tail))  # `at 200 rad/s`
+        is_certain = not is_unit_itself and unit.text not in _SECOND_READINGS
+    else:
+        return NO_UNIT
+    return unit if is_certain and not is_name(unit.text) else NO_UNIT
+
+
+def _unit_of_label(before: str) -> UnitText:
+    """The unit in the label that ends right before a number, or the list that it stands in."""
+    before = before[-_REACH:]
+    gap = _TO_NUMBER.search(before)
+    return NO_UNIT if gap is None else unit_of_header(before[: gap.start()])
+
+
+def unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
+    """The unit in the header above a number of a row; none if it is uncertain which is its own.
+
+    `above`: the lines above the row, the last of which stands right above.
+    """
+    for pattern in _CELLS:
+        row = [*pattern.finditer(line)]
+        column = next((i for i, cell in enumerate(row) if cell.end() > start), 0)
+        if len(row) < 2 or not all(only_number(cell[0]) for cell in row[1:]):
+            continue
+        for header in reversed(above):
+            cells = pattern.findall(header)
+            if _RULE.fullmatch(header) and header.strip():
+                continue
+            if len(cells) != len(row):
+                break
+            if not any(only_number(cell) for cell in cells):
+                return unit_of_header(cells[column])
+    return NO_UNIT

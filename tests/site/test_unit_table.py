@@ -1,0 +1,49 @@
+"""The units that quizzes read in a page are those of the one table in `core/text/units.py`.
+
+`pytest tests/site/test_unit_table.py --rewrite-fixtures` writes them into the site's half.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.text.units import UNITS, Unit, find_symbol
+
+PAGE_TABLE = Path(__file__).parents[2] / "site/js/quiz/unit-table.js"
+HEAD = """\
+/**
+ * Generated from coursebuild/core/text/units.py by tests/site/test_unit_table.py: symbol, and its
+ * scale, powers of the base units, whether it takes prefixes, and where its scale begins (K).
+ */
+export const UNITS = {
+"""
+_SYMBOLS = {"length": "m", "mass": "kg", "time": "s", "current": "A", "temperature": "K"}
+_SYMBOLS |= {"substance": "mol", "luminosity": "cd", "angle": "rad"}
+
+
+def rows() -> Iterator[str]:
+    for symbol, row in UNITS.items():
+        for unit in (
+            find_symbol(symbol)[-1:] if row.base.startswith("cycle") else find_symbol(symbol)[:1]
+        ):
+            powers = {_SYMBOLS.get(name, name): int(power) for name, power in unit.powers}
+            fields = [size_of(unit), powers, "*" in row.marks, float(unit.size * unit.zero)]
+            texts = json.dumps(fields[: 4 if fields[3] else 3])
+            yield f"  {json.dumps(symbol, ensure_ascii=False)}: {texts},\n"
+
+
+def size_of(unit: Unit) -> float:
+    """The size as the nearest number that a page computes with."""
+    return float(unit.size) * math.pi**unit.pi
+
+
+def test_pages_have_the_units_of_the_table(request: pytest.FixtureRequest) -> None:
+    text = f"{HEAD}{''.join(rows())}}}\n"
+    if request.config.getoption("--rewrite-fixtures"):
+        PAGE_TABLE.write_text(text, encoding="utf-8")
+    assert PAGE_TABLE.read_text(encoding="utf-8") == text, "run pytest with --rewrite-fixtures"
