@@ -133,18 +133,16 @@ class _Updater:
             for d in self.extracted_scripts.diagnostics
             if d.rule == "script-repeated"
         }
-        printed = {
-            r.path: r.stdout
-            for r in runs
-            if r.outcome is Outcome.OK and r.path not in repeated_paths
+        good_runs = {
+            r.path: r for r in runs if r.outcome is Outcome.OK and r.path not in repeated_paths
         }
         edits: dict[Source, list[Edit]] = {}
         refusals: list[Diagnostic] = []
         for recording in self.recordings:
-            if recording.script not in printed:
+            if (good_run := good_runs.get(recording.script or "")) is None:
                 continue
             comparison = self.course.comparison_of(recording)
-            edit = update_body(recording, comparison, printed[recording.script])
+            edit = update_body(recording, comparison, good_run.output_of(recording))
             if isinstance(edit, Edit):
                 edits.setdefault(recording.span.source, []).append(edit)
             elif edit is not None:

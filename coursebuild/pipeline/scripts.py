@@ -180,7 +180,7 @@ class _Records:
         outputs = self._outputs.get(script_run.path, ())
         figures = self._figures.get(script_run.path, ())
         holds = all(
-            compare(r, self._course.comparison_of(r), script_run.stdout).status != "drift"
+            compare(r, self._course.comparison_of(r), script_run.output_of(r)).status != "drift"
             for r in outputs
         ) and not any(
             finding

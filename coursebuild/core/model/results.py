@@ -51,6 +51,8 @@ class ScriptJob(Struct, frozen=True):
     figures: tuple[str, ...] = ()
     memory: int = Limits().scripts
     """MiB that it may take, where the system can enforce that."""
+    part_lines: tuple[int, ...] = ()
+    """The lines of its file, from 1, at which its parts but the first begin."""
 
 
 class Sign(enum.Enum):
@@ -171,6 +173,13 @@ class ScriptRun(Struct, frozen=True):
     unrepeated: bool = False
     """Whether something else was recorded when it ran, or nothing: what is recorded from it since
     then, no other run bears out."""
+    part_starts: tuple[int, ...] = ()
+    """Where in `stdout` the output of each of its parts but the first begins."""
+
+    def output_of(self, recording: Recording) -> str:
+        """What the part above a recording printed; of a script without parts, all of it."""
+        edges, part = (0, *self.part_starts, len(self.stdout)), recording.part
+        return self.stdout[edges[part] : edges[part + 1]] if part + 1 < len(edges) else ""
 
     @property
     def did_run(self) -> bool:

@@ -198,8 +198,9 @@ def _check(
         return _orphan_diagnostic(binding, path, outputs)
     run = outputs.runs.get(path)
     ran_well = run is not None and run.outcome is Outcome.OK
+    printed = [] if run is None else [run.output_of(v.recording) for v in verdicts] or [run.stdout]
     if run is not None and (
-        run.outcome in _SILENT_OUTCOMES or (verdicts and ran_well and not run.stdout.strip())
+        run.outcome in _SILENT_OUTCOMES or (verdicts and ran_well and not "".join(printed).strip())
     ):
         return ()
     if not verdicts and not ran_well:
@@ -215,8 +216,9 @@ def _check(
         v.comparison.ellipsis or isinstance(v.recording.body, model.Table) for v in steady
     )
     drifted = any(v.status == "drift" for v in steady)
-    if (partial or drifted or not verdicts) and run is not None and ran_well:
-        lines = lines_of_run(run.stdout, [f for v in steady for f in v.comparison.own_filters])
+    if (partial or drifted or not verdicts) and ran_well:
+        filters = [f for v in steady for f in v.comparison.own_filters]
+        lines = [n for text in dict.fromkeys(printed) for n in lines_of_run(text, filters)]
         if _holds(bound_text, lines):
             return lines
     varying = [v.recording for v in verdicts if v not in steady or v.comparison.volatile]

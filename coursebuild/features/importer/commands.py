@@ -128,10 +128,11 @@ def _try_scripts(options: Options, notebook_outputs: Mapping[str, str]) -> tuple
             notebook = notebook_outputs.get(script.path)
             for recording in script_recordings:
                 comparison = course.comparison_of(recording)
-                verdict = compare(recording, comparison, script_run.stdout)
+                printed = script_run.output_of(recording)
+                verdict = compare(recording, comparison, printed)
                 if not _is_blank(recording) and (notebook is None or not verdict.changes):
                     continue
-                edit = update_body(recording, comparison, script_run.stdout)
+                edit = update_body(recording, comparison, printed)
                 if isinstance(edit, Edit):
                     changes.append(edit)
                     if not _is_blank(recording):
