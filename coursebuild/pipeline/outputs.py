@@ -142,7 +142,7 @@ class _Updater:
             if (good_run := good_runs.get(recording.script or "")) is None:
                 continue
             comparison = self.course.comparison_of(recording)
-            edit = update_body(recording, comparison, good_run.output_of(recording))
+            edit = update_body(recording, comparison, good_run.output_of(recording.part))
             if isinstance(edit, Edit):
                 edits.setdefault(recording.span.source, []).append(edit)
             elif edit is not None:
@@ -241,12 +241,12 @@ def extract(options: Options, *, adopt: bool = False) -> Report:
             if files_read:
                 parsed_course = load(options.root)
                 course = parsed_course.value or course
-                # A block holds no line ends of an editor's and no blank lines at the end: a file
-                # that does would count as edited for ever.
+                # A block holds no line ends of an editor's and no blank lines at the end, and one
+                # parts it from the next: a file that differs would count as edited for ever.
                 for extraction in extract_course(course).value:
                     path, data = extraction.path, extraction.data
                     old = files_read.get(path, data)
-                    if old != data and block_text(old) == extraction.text:
+                    if old != data and _has_code(old, extraction.text):
                         write_atomic(options.root, path, data, expected=old, durable=False)
                 extracted_scripts = extract_scripts(course, options)
             remarks += [*adoptions, *_list_changes(extracted_scripts)]
@@ -263,6 +263,13 @@ def _list_changes(extracted_scripts: ExtractedScripts) -> list[str]:
     return [*(f"wrote {path}" for path in extracted_scripts.files.written), *removals]
 
 
+def _has_code(data: bytes, code: str) -> bool:
+    """Whether a file holds this code, whatever its line ends and empty lines are."""
+    texts = (block_text(data) or "", code)
+    lines, code_lines = ([line for line in text.split("\n") if line] for text in texts)
+    return lines == code_lines
+
+
 def _adopt(
     options: Options, extracted_scripts: ExtractedScripts
 ) -> tuple[list[str], list[Diagnostic], dict[str, bytes]]:
@@ -276,14 +283,14 @@ def _adopt(
         if extraction is None or example.obstacle not in (Obstacle.EDITED, Obstacle.FOREIGN):
             continue
         data = read_bytes(options.root, example.path)
-        if example.diverged and block_text(data) != extraction.text:
+        if example.diverged and not _has_code(data, extraction.text):
             continue  # taking one would lose the other; the diagnostic says how to go on
         adoption = adopt_file(extraction.script, data)
-        if isinstance(adoption, Edit):
-            edits.setdefault(adoption.span.source, []).append(adoption)
-            files_read[example.path] = data
-        else:
+        if isinstance(adoption, Diagnostic):
             refusals.append(adoption)
+        else:
+            edits.setdefault(extraction.script.span.source, []).extend(adoption)
+            files_read[example.path] = data
     remarks: list[str] = []
     for source in edits:  # all or none
         check_writable(options.root, source.path)

@@ -222,7 +222,7 @@ def _outputs(session: Session, library: Library, document: Document) -> Iterator
                 run = library.runs[verdict.recording.script or ""]
                 edit = new_output(session, library, verdict)
                 output |= {
-                    "rows": diff_rows(verdict, run.output_of(recording)),
+                    "rows": diff_rows(verdict, run.output_of(recording.part)),
                     "offer": Offer.of(edit) if isinstance(edit, Edit) else None,
                     "refused": edit.message if isinstance(edit, Diagnostic) else "",
                 }
@@ -234,7 +234,8 @@ def new_output(session: Session, library: Library, verdict: Verdict) -> Edit | D
     recording = verdict.recording
     run = library.runs[recording.script or ""]
     unstable_output = find_instability(verdict, run, session.runs.other_runs())
-    return unstable_output or update_body(recording, verdict.comparison, run.output_of(recording))
+    printed = run.output_of(recording.part)
+    return unstable_output or update_body(recording, verdict.comparison, printed)
 
 
 # --- figures

@@ -176,9 +176,9 @@ class ScriptRun(Struct, frozen=True):
     part_starts: tuple[int, ...] = ()
     """Where in `stdout` the output of each of its parts but the first begins."""
 
-    def output_of(self, recording: Recording) -> str:
-        """What the part above a recording printed; of a script without parts, all of it."""
-        edges, part = (0, *self.part_starts, len(self.stdout)), recording.part
+    def output_of(self, part: int) -> str:
+        """What a part printed, counted from 0: of a script that is not in parts, all of it."""
+        edges = (0, *self.part_starts, len(self.stdout))
         return self.stdout[edges[part] : edges[part + 1]] if part + 1 < len(edges) else ""
 
     @property

@@ -139,8 +139,14 @@ class PageWriter(PageContext, frozen=True):
                 code = self.highlight("python", block.code.text)
                 html = self.template("blocks/code.html", language="python", html=code)
                 if block.source is not None:
-                    path = block.source.path
-                    html = self.template("blocks/source_part.html", path=path, code=html)
+                    source = block.source
+                    lines = re.fullmatch(r"L(\d+)(?:-L(\d+))?", source.part)
+                    part = source.part
+                    if lines is not None:
+                        part = self._lines(int(lines[1]), int(lines[2] or lines[1]))
+                    html = self.template(
+                        "blocks/source_part.html", path=source.path, part=part, code=html
+                    )
             case model.FeatureBlock():
                 html = kind_of_block(block).draw(self, block)
             case _:
@@ -186,12 +192,11 @@ class PageWriter(PageContext, frozen=True):
             stretches = (Part(1, len(lines), folded=show == "folded"),)
         parts: list[CodePart] = []
         for part in stretches:
-            key = "code.lines" if part.first < part.last else "code.line"
             holds = [words("code.docstring")] if part.docstring else []
             holds += [words("code.imports")] if part.imports else []
             holds += part.names
             start, end = part.first + first - 1, part.last + first - 1
-            label = words(key, first=start, last=end)
+            label = self._lines(start, end)
             label += f": {', '.join(holds)}" if holds else ""
             shown_lines = lines[part.first - 1 : part.last]
             if show == "hidden":
@@ -200,6 +205,9 @@ class PageWriter(PageContext, frozen=True):
                 CodePart(numbered_lines(shown_lines, block.path, start), start, part.folded, label)
             )
         return tuple(parts)
+
+    def _lines(self, first: int, last: int) -> str:
+        return self.words("code.lines" if first < last else "code.line", first=first, last=last)
 
     def _output(self, block: model.Recording) -> OutputView:
         script, table = block.script, block.body

@@ -53,7 +53,7 @@ def verify(course: model.Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ..
                 paths.add(block.path)
             elif isinstance(block, model.Recording) and block.script is not None:
                 comparison, run = course.comparison_of(block), by_path.get(block.script)
-                printed = "" if run is None else run.output_of(block)
+                printed = "" if run is None else run.output_of(block.part)
                 if not printed.strip() or is_repeated or not block.readable:
                     verdicts.append(Verdict(block, comparison, "unchecked"))
                 else:
@@ -158,7 +158,7 @@ def repeat_findings(
             if recording.script == now.path and recording.readable
         ]
         may_differ = {before.outcome, now.outcome} == {Outcome.OK} and all(
-            compare(r, course.comparison_of(r), run.output_of(r)).status != "drift"
+            compare(r, course.comparison_of(r), run.output_of(r.part)).status != "drift"
             for r in recordings
             for run in (before, now)
         )

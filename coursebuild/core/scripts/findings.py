@@ -91,7 +91,7 @@ def output_findings(
             yield from _find_loose(verdict)
             run = outputs.runs.get(recording.script or "")
             ran_well = run is not None and run.outcome is Outcome.OK
-            if run is not None and ran_well and not run.output_of(recording).strip():
+            if run is not None and ran_well and not run.output_of(recording.part).strip():
                 yield failures.silence_diagnostic(recording, run)
             elif run is not None and run.outcome is Outcome.UNRECORDED:
                 yield drift_diagnostic(verdict, owner.id)
@@ -177,10 +177,10 @@ def find_instability(
     earlier_run = other_runs.get(recording.script or "")
     if run is None or earlier_run is None or {run.outcome, earlier_run.outcome} != {Outcome.OK}:
         return None
-    changes = compare(recording, comparison, earlier_run.output_of(recording)).changes
+    changes = compare(recording, comparison, earlier_run.output_of(recording.part)).changes
     if [(c.span, c.printed) for c in changes] == [(c.span, c.printed) for c in verdict.changes]:
         return None
-    outputs = (r.output_of(recording) for r in (earlier_run, run))
+    outputs = (r.output_of(recording.part) for r in (earlier_run, run))
     before, now = (Side.of(output, comparison.filters) for output in outputs)
     return instability_diagnostic(recording, before, now, comparison)
 
