@@ -108,18 +108,21 @@ def test_outputs_are_those_of_their_parts_and_everything_else_has_the_whole_file
     result = folder.main("build")
     assert result.status == 0, result.out
     page = folder.text("public/lessons/1.1-one.html")
-    figures = re.findall(
-        r'<figure class="script[^"]*"[^>]*data-script="examples/heat.py".*?</figure>', page, re.S
-    )
-    bare = [re.sub(r"<[^>]*>", "", figure) for figure in figures]
-    assert ["cells: 5" in f for f in bare] == [True, False, False, False]
-    assert ["max 0.3125" in f for f in bare] == [False, False, True, False]
-    assert ["checked True" in f for f in bare] == [False, False, False, True]
-    assert ["<details" in figure for figure in figures] == [False, True, False, False]
-    assert ["download>" in figure for figure in figures] == [True, False, False, False]
-    assert ["python examples/heat.py" in f for f in bare] == [True, False, False, False]
-    assert "rod == rod" not in page and 'id="heat.L16"' in page
+    figures = re.findall(r"<figure [^>]*data-script=.*?</figure>", page, re.DOTALL)
+    bare = [re.sub(r"<[^>]*>", "", figure).replace("&quot;", '"') for figure in figures]
+    assert ["cells: 5" in text for text in bare] == [True, False, False, False, False]
+    assert ["max 0.3125" in text for text in bare] == [False, False, True, False, False]
+    assert ["rod == rod" in text for text in bare] == [False, False, False, True, False]
+    assert ["checked True" in text for text in bare] == [False, False, False, False, True]
+    assert ["<details" in figure for figure in figures] == [False, True, False, False, False]
+    assert ["download>" in figure for figure in figures] == [True, False, False, False, False]
+    assert ["python examples/heat.py" in text for text in bare] == [True] + [False] * 4
+    assert f'<div hidden="until-found">{figures[3]}' in page and page.count("until-found") == 1
     assert all(page.count(f'id="heat.L{line}"') == 1 for line in (1, 5, 7, 9, 12, 14, 16))
+    assert folder.main("export", "epub").status == 0
+    book = zipfile.ZipFile(io.BytesIO(folder.read("course.epub")))
+    text = book.read("EPUB/1.1-one.xhtml").decode()
+    assert "hidden" not in text and all(f'id="heat.L{line}"' in text for line in (1, 9, 16))
     archive = zipfile.ZipFile(io.BytesIO(folder.read("public/lessons/1.1-one.zip")))
     (name,) = [name for name in archive.namelist() if name.endswith("heat.py")]
     assert archive.read(name) == folder.read("public/examples/heat.py") == FILE.encode()

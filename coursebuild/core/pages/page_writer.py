@@ -136,7 +136,7 @@ class PageWriter(PageContext, frozen=True):
                     engine=self.inputs.engine,
                 )
             case model.PlainCode():
-                code = self.highlight("python", block.code.text)
+                code = self.highlight("python", block.code.text.rstrip("\n"))
                 html = self.template("blocks/code.html", language="python", html=code)
                 if block.source is not None:
                     source = block.source
@@ -169,7 +169,6 @@ class PageWriter(PageContext, frozen=True):
             label=block.label,
             number=self.number(block.label),
             parts=parts,
-            lines=parts[0].label if script.parts else "",
             is_hidden=block.show == "hidden",
             anchor=model.listing_anchor(block.path),
             href=self.place.href(block.path),
@@ -198,12 +197,8 @@ class PageWriter(PageContext, frozen=True):
             start, end = part.first + first - 1, part.last + first - 1
             label = self._lines(start, end)
             label += f": {', '.join(holds)}" if holds else ""
-            shown_lines = lines[part.first - 1 : part.last]
-            if show == "hidden":
-                shown_lines = (Markup(),) * len(lines)  # a link to one leads to its place
-            parts.append(
-                CodePart(numbered_lines(shown_lines, block.path, start), start, part.folded, label)
-            )
+            html = numbered_lines(lines[part.first - 1 : part.last], block.path, start)
+            parts.append(CodePart(html, start, part.folded, label))
         return tuple(parts)
 
     def _lines(self, first: int, last: int) -> str:
