@@ -12,7 +12,7 @@ from __future__ import annotations
 import difflib
 import functools
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.examples import Obstacle
@@ -20,9 +20,11 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import check_writable, write_atomic
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
+from coursebuild.core.model.results import Outcome, ScriptRun, TrialLine, Verdict
+from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import adopt_file, apply_edits, block_text, update_body
+from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.extract import extract as extract_course
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import collect_evidence, script_findings
@@ -46,7 +48,7 @@ from coursebuild.pipeline.scripts import (
     run,
     script_lines,
 )
-from coursebuild.report import Report
+from coursebuild.report import UNASKED, Report, ScriptLine
 
 
 def update(options: Options, names: tuple[str, ...] = (), *, dry_run: bool = False) -> Report:
@@ -108,16 +110,17 @@ class _Updater:
         diagnostics += self._diagnose_updated(new_course, runs)
         if not remarks and all(not d.is_error for d in diagnostics):
             remarks = ["every recorded output is up to date"]
+        verdicts = [v for v in compare_all(new_course, runs) if v.status == "verified"]
+        asked_paths = {extraction.path for extraction in self.scripts}
+        others = (e for e in self.extracted_scripts.extractions if e.path not in asked_paths)
+        reason = "update runs what is recorded"
+        scripts, labs = _unasked_lines(self.course, others, self.documents, reason)
         return judge(
             self.course,
             diagnostics,
             began,
-            scripts=script_lines(
-                self.scripts,
-                runs,
-                [v for v in compare_all(new_course, runs) if v.status == "verified"],
-                self.course,
-            ),
+            scripts=(*script_lines(self.scripts, runs, verdicts, self.course), *scripts),
+            labs=labs,
             documents=self.documents,
             remarks=tuple(remarks),
         )
@@ -253,7 +256,32 @@ def extract(options: Options, *, adopt: bool = False) -> Report:
         diagnostics = [*parsed_course.diagnostics, *extracted_scripts.diagnostics, *refusals]
         if not remarks and all(not d.is_error for d in diagnostics):
             remarks.append("every script is extracted already")
-        return judge(course, diagnostics, began, remarks=tuple(remarks))
+        scripts, labs = _unasked_lines(
+            course, extracted_scripts.extractions, None, "extract runs nothing"
+        )
+        return judge(course, diagnostics, began, scripts=scripts, labs=labs, remarks=tuple(remarks))
+
+
+def _unasked_lines(
+    course: Course,
+    extractions: Iterable[Extraction],
+    documents: Collection[str] | None,
+    reason: str,
+) -> tuple[tuple[ScriptLine, ...], tuple[TrialLine, ...]]:
+    """The lines of what a command was not asked to run in these documents, or in all."""
+    paths = {document.source.path for document in course.documents}
+    paths &= paths if documents is None else {*documents}
+    scripts = (
+        ScriptLine(e.path, e.owner, UNASKED, 0.0, False, reasons=(reason,))
+        for e in extractions
+        if e.document in paths
+    )
+    labs = (
+        TrialLine(trial.name, "", trial.owner, UNASKED, untried=reason)
+        for _, trial in feature_trials(course).values()
+        if trial.block.span.path in paths
+    )
+    return tuple(scripts), tuple(labs)
 
 
 def _list_changes(extracted_scripts: ExtractedScripts) -> list[str]:
