@@ -68,7 +68,8 @@ class CourseTests:
     """The tests of a course, and their results, which `check` finds when the first of them runs."""
 
     def __init__(self, root: Path) -> None:
-        from coursebuild.core.model import FeatureBlock, Recording, Script, document_blocks
+        from coursebuild.core.model import FeatureBlock, Recording, document_blocks
+        from coursebuild.core.model.blocks import Script, ScriptPart
         from coursebuild.core.registry import feature_trials
         from coursebuild.pipeline.load import load
 
@@ -86,8 +87,10 @@ class CourseTests:
             tests: dict[str, _Lines] = {_PAGE: ()}
             for block in document_blocks(document):
                 name: str | None = None
-                if isinstance(block, Script | Recording):
-                    name = block.path if isinstance(block, Script) else block.script
+                if isinstance(block, Script | ScriptPart):
+                    name = block.path
+                elif isinstance(block, Recording):
+                    name = block.script
                 elif isinstance(block, FeatureBlock):  # a lab or a quiz
                     name = trials.get(id(block)) or (block.progress_keys() or (None,))[0]
                 if name is not None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import difflib
 import functools
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.examples import Obstacle
@@ -20,9 +20,11 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import change_files, check_writable, write_atomic
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
+from coursebuild.core.model.results import Outcome, ScriptRun, TrialLine, Verdict
+from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import adopt_file, apply_edits, block_text, update_body
+from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.extract import extract as extract_course
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import collect_evidence, script_findings
@@ -47,7 +49,7 @@ from coursebuild.pipeline.scripts import (
     run,
     script_lines,
 )
-from coursebuild.report import Report
+from coursebuild.report import UNASKED, Report, ScriptLine
 
 
 def update(options: Options, names: tuple[str, ...] = (), *, dry_run: bool = False) -> Report:
@@ -111,16 +113,17 @@ class _Updater:
         if not remarks and all(not d.is_error for d in diagnostics):
             remarks = ["every recorded output is up to date"]
         remarks += record_remarks
+        verdicts = [v for v in compare_all(new_course, runs) if v.status == "verified"]
+        asked_paths = {extraction.path for extraction in self.scripts}
+        others = (e for e in self.extracted_scripts.extractions if e.path not in asked_paths)
+        reason = "update runs what is recorded"
+        scripts, labs = _unasked_lines(self.course, others, self.documents, reason)
         return judge(
             self.course,
             diagnostics,
             began,
-            scripts=script_lines(
-                self.scripts,
-                runs,
-                [v for v in compare_all(new_course, runs) if v.status == "verified"],
-                self.course,
-            ),
+            scripts=(*script_lines(self.scripts, runs, verdicts, self.course), *scripts),
+            labs=labs,
             documents=self.documents,
             remarks=tuple(remarks),
         )
@@ -136,18 +139,16 @@ class _Updater:
             for d in self.extracted_scripts.diagnostics
             if d.rule == "script-repeated"
         }
-        printed = {
-            r.path: r.stdout
-            for r in runs
-            if r.outcome is Outcome.OK and r.path not in repeated_paths
+        good_runs = {
+            r.path: r for r in runs if r.outcome is Outcome.OK and r.path not in repeated_paths
         }
         edits: dict[Source, list[Edit]] = {}
         refusals: list[Diagnostic] = []
         for recording in self.recordings:
-            if recording.script not in printed:
+            if (good_run := good_runs.get(recording.script or "")) is None:
                 continue
             comparison = self.course.comparison_of(recording)
-            edit = update_body(recording, comparison, printed[recording.script])
+            edit = update_body(recording, comparison, good_run.output_of(recording.part))
             if isinstance(edit, Edit):
                 edits.setdefault(recording.span.source, []).append(edit)
             elif edit is not None:
@@ -260,19 +261,44 @@ def extract(options: Options, *, adopt: bool = False) -> Report:
             if files_read:
                 parsed_course = load(options.root)
                 course = parsed_course.value or course
-                # A block holds no line ends of an editor's and no blank lines at the end: a file
-                # that does would count as edited for ever.
+                # A block holds no line ends of an editor's and no blank lines at the end, and one
+                # parts it from the next: a file that differs would count as edited for ever.
                 for extraction in extract_course(course).value:
                     path, data = extraction.path, extraction.data
                     old = files_read.get(path, data)
-                    if old != data and block_text(old) == extraction.text:
+                    if old != data and _has_code(old, extraction.text):
                         write_atomic(options.root, path, data, expected=old, durable=False)
                 extracted_scripts = extract_scripts(course, options)
             remarks += [*adoptions, *_list_changes(extracted_scripts)]
         diagnostics = [*parsed_course.diagnostics, *extracted_scripts.diagnostics, *refusals]
         if not remarks and all(not d.is_error for d in diagnostics):
             remarks.append("every script is extracted already")
-        return judge(course, diagnostics, began, remarks=tuple(remarks))
+        scripts, labs = _unasked_lines(
+            course, extracted_scripts.extractions, None, "extract runs nothing"
+        )
+        return judge(course, diagnostics, began, scripts=scripts, labs=labs, remarks=tuple(remarks))
+
+
+def _unasked_lines(
+    course: Course,
+    extractions: Iterable[Extraction],
+    documents: Collection[str] | None,
+    reason: str,
+) -> tuple[tuple[ScriptLine, ...], tuple[TrialLine, ...]]:
+    """The lines of what a command was not asked to run in these documents, or in all."""
+    paths = {document.source.path for document in course.documents}
+    paths &= paths if documents is None else {*documents}
+    scripts = (
+        ScriptLine(e.path, e.owner, UNASKED, 0.0, False, reasons=(reason,))
+        for e in extractions
+        if e.document in paths
+    )
+    labs = (
+        TrialLine(trial.name, "", trial.owner, UNASKED, untried=reason)
+        for _, trial in feature_trials(course).values()
+        if trial.block.span.path in paths
+    )
+    return tuple(scripts), tuple(labs)
 
 
 def _list_changes(extracted_scripts: ExtractedScripts) -> list[str]:
@@ -280,6 +306,13 @@ def _list_changes(extracted_scripts: ExtractedScripts) -> list[str]:
         f"removed {path}, which no lesson has now" for path in extracted_scripts.files.removed
     )
     return [*(f"wrote {path}" for path in extracted_scripts.files.written), *removals]
+
+
+def _has_code(data: bytes, code: str) -> bool:
+    """Whether a file holds this code, whatever its line ends and empty lines are."""
+    texts = (block_text(data) or "", code)
+    lines, code_lines = ([line for line in text.split("\n") if line] for text in texts)
+    return lines == code_lines
 
 
 def _adopt(
@@ -295,14 +328,14 @@ def _adopt(
         if extraction is None or example.obstacle not in (Obstacle.EDITED, Obstacle.FOREIGN):
             continue
         data = read_bytes(options.root, example.path)
-        if example.diverged and block_text(data) != extraction.text:
+        if example.diverged and not _has_code(data, extraction.text):
             continue  # taking one would lose the other; the diagnostic says how to go on
         adoption = adopt_file(extraction.script, data)
-        if isinstance(adoption, Edit):
-            edits.setdefault(adoption.span.source, []).append(adoption)
-            files_read[example.path] = data
-        else:
+        if isinstance(adoption, Diagnostic):
             refusals.append(adoption)
+        else:
+            edits.setdefault(extraction.script.span.source, []).extend(adoption)
+            files_read[example.path] = data
     remarks: list[str] = []
     for source in edits:  # all or none
         check_writable(options.root, source.path)

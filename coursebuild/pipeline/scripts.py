@@ -184,9 +184,9 @@ class _Records:
         """The run, with whether it bears out what is recorded now."""
         outputs = self._outputs.get(script_run.path, ())
         figures = self._figures.get(script_run.path, ())
+        comparison_of, output_of = self._course.comparison_of, script_run.output_of
         holds = all(
-            compare(r, self._course.comparison_of(r), script_run.stdout).status != "drift"
-            for r in outputs
+            compare(r, comparison_of(r), output_of(r.part)).status != "drift" for r in outputs
         ) and not any(
             finding
             for figure, record in figures

@@ -246,7 +246,7 @@ def _outputs(session: Session, library: Library, document: Document) -> Iterator
                 run = library.runs[verdict.recording.script or ""]
                 edit = new_output(session, library, verdict)
                 output |= {
-                    "rows": diff_rows(verdict, run.stdout),
+                    "rows": diff_rows(verdict, run.output_of(recording.part)),
                     "offer": Offer.of(edit) if isinstance(edit, Edit) else None,
                     "refused": edit.message if isinstance(edit, Diagnostic) else "",
                 }
@@ -255,9 +255,11 @@ def _outputs(session: Session, library: Library, document: Document) -> Iterator
 
 def new_output(session: Session, library: Library, verdict: Verdict) -> Edit | Diagnostic | None:
     """Make the edit that `coursebuild update` would, unless another run printed something else."""
-    run = library.runs[verdict.recording.script or ""]
+    recording = verdict.recording
+    run = library.runs[recording.script or ""]
     unstable_output = find_instability(verdict, run, session.runs.other_runs())
-    return unstable_output or update_body(verdict.recording, verdict.comparison, run.stdout)
+    printed = run.output_of(recording.part)
+    return unstable_output or update_body(recording, verdict.comparison, printed)
 
 
 # --- figures

@@ -13,6 +13,7 @@ from coursebuild.core.text.source import Span
 from coursebuild.report.text import Style as Style
 from coursebuild.report.text import diagnostic_text as diagnostic_text
 from coursebuild.report.text import location, to_text
+from coursebuild.report.values import UNASKED as UNASKED
 from coursebuild.report.values import Report as Report
 from coursebuild.report.values import ScriptLine as ScriptLine
 from coursebuild.report.values import json_text, plain, unrun_reason

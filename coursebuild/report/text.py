@@ -21,6 +21,7 @@ from coursebuild.core.text.characters import TAB, cells
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Span
 from coursebuild.report.values import (
+    UNASKED,
     Report,
     ScriptLine,
     plural,
@@ -145,8 +146,8 @@ def to_text(report: Report, style: Style, *, brief: bool = False) -> str:
     if brief and report.ok and not report.diagnostics:
         return ""
     parts = list(diagnostic_paragraphs(report.diagnostics, style))
-    lines = [script_line(line, style) for line in report.scripts]
-    lines += [lab_line(line, style) for line in report.labs]
+    lines = [script_line(line, style) for line in report.scripts if line.status != UNASKED]
+    lines += [lab_line(line, style) for line in report.labs if line.status != UNASKED]
     if lines and not brief:
         parts.append("".join(line + "\n" for line in lines))
     if report.sensitivity and not brief:

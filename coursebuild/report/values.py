@@ -17,6 +17,10 @@ from coursebuild.core.scripts.sensitivity import Sensitivity
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.core.text.source import Span
 
+UNASKED = "unasked"
+"""The status of what a command was not asked to run; it counts, and the terminal does not list it.
+"""
+
 
 class ScriptLine(Struct, frozen=True):
     """One script, as a report lists it."""

@@ -10,6 +10,8 @@ import subprocess
 
 import pytest
 
+from support.lab_lessons import BALL, RIGHT
+from support.lab_lessons import fence as lab_fence
 from support.scratch_course import GOOD, WAIT_FOR_GO, Make, block, command, kill_at_end
 from support.waiting import wait_until
 
@@ -114,6 +116,21 @@ def test_update_writes_what_drifted_in_the_chosen_lessons_and_nothing_the_second
     assert "\n3 lessons, 0 scripts run, 3 cached" in result.out
     assert folder.tree("content") == once
     assert {p: (folder.root / "content" / p).stat().st_mtime_ns for p in once} == times
+
+
+def test_what_was_neither_run_nor_tried_does_not_hold(make: Make) -> None:
+    folder = make(GOOD, f"## Two\n\n{lab_fence(RIGHT)}" + block("two.py", "print(2)"))
+    folder.write("models/ball.xml", BALL)
+    for arguments, counts, claim in (
+        (("extract",), "2 lessons, 0 scripts run", "2 scripts that were not run and 1 lab"),
+        (("update",), "2 lessons, 1 script run", "1 script that was not run and 1 lab"),
+        (("update", "1.1"), "1 lesson, 0 scripts run, 1 cached", ""),
+    ):
+        result = folder.main(*arguments)
+        last = result.out.splitlines()[-1]
+        assert result.status == 0 and last.startswith(f"{counts}: "), result.out
+        assert (claim in last, "everything holds" in last) == (True, not claim), last
+        assert "unasked" not in result.out
 
 
 def test_dry_run_shows_the_difference_and_writes_nothing(make: Make) -> None:

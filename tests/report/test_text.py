@@ -192,13 +192,15 @@ LINES: tuple[ScriptLine | TrialLine, ...] = (
     TrialLine("l", "", "1.1", "ok", tried=1),
     TrialLine("l", "", "1.1", "failed"),
     TrialLine("l", "", "1.1", "untried", untried="other mistakes"),
+    ScriptLine("a.py", "1.1", "unasked", 0.0, False),
+    TrialLine("l", "", "1.1", "unasked", untried="extract runs nothing"),
 )
 
 
 @pytest.mark.parametrize("form", ("text", *FORMATS))
 def test_everything_holds_only_where_all_was_run_and_nothing_failed(form: str) -> None:
     """Of every way in which a script or a lab can end, with no mistake, a warning, or an error."""
-    unrun = {"skipped", "norun", "unrecorded", "blocked", "untried"}
+    unrun = {"skipped", "norun", "unrecorded", "blocked", "untried", "unasked"}
     for line, diagnostics in product(LINES, ((), (WARNING,), (ERROR,))):
         if isinstance(line, ScriptLine) and line.status in unrun:
             line = replace(line, reasons=("norun",))

@@ -30,8 +30,12 @@ def job(
     timeout: float = 120.0,
     requires: Sequence[str] = (),
     perturbation: int = 0,
+    part_lines: Sequence[int] = (),
 ) -> ScriptJob:
-    return ScriptJob(path, tuple(args), timeout, tuple(requires), perturbation)
+    requirements = tuple(requires)
+    return ScriptJob(
+        path, tuple(args), timeout, requirements, perturbation, part_lines=tuple(part_lines)
+    )
 
 
 def is_alive(pid: int) -> bool:

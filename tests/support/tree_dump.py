@@ -93,6 +93,8 @@ def _value(name: str, value: object) -> str:
         return f"[{value.mode.value}{tolerances}{' ellipsis' if value.ellipsis else ''}]"
     if name == "checked" and value is not None:
         return f"checked={value}"
+    if name == "part" and value == 0:  # of a recording: nearly all scripts have one part
+        return ""
     if value is None or value is False or value == () or value == "" or isinstance(value, Table):
         return ""
     if isinstance(value, tuple) and not all(isinstance(v, str | None) for v in value):

@@ -6,6 +6,7 @@ import enum
 import re
 from collections.abc import Mapping
 from decimal import Decimal
+from itertools import accumulate
 from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from msgspec import Meta, Struct
@@ -135,16 +136,35 @@ class FigureName(Struct, frozen=True):
     span: Span
 
 
-class Script(Labelled, frozen=True):
-    """A complete script: ```` ```python file=examples/x.py ````."""
+Show: TypeAlias = Literal["open", "folded", "hidden"]
+"""How much of a script's code a page shows at first."""
+
+
+class ScriptPart(Labelled, frozen=True):
+    """A part of a script that another block begins: ```` ```python file=examples/x.py part ````."""
 
     path: str
     path_span: Span
     code: Excerpt
-    """The block's text, ending in exactly one newline."""
     prefix: str
     """The text before each line of the code in the lesson (`> ` in a callout, indentation in a
     list)."""
+    body_span: Span
+    """The lines between the fences, to the start of the closing one."""
+    show: Show = "open"
+
+
+class Script(Labelled, frozen=True):
+    """A complete script, or its beginning: ```` ```python file=examples/x.py ````.
+
+    The block has the code that stands in it; `document_scripts` gives the script as a whole.
+    """
+
+    path: str
+    path_span: Span
+    code: Excerpt
+    prefix: str
+    """As that of a `ScriptPart`."""
     timeout: float
     """Seconds."""
     requires: tuple[str, ...]
@@ -152,7 +172,6 @@ class Script(Labelled, frozen=True):
     args: tuple[str, ...]
     norun: bool
     body_span: Span
-    """The lines between the fences, to the start of the closing one."""
     diverges: bool = False
     deep: bool = False
     """Whether the author expects deep penetrations of bodies in it."""
@@ -160,6 +179,16 @@ class Script(Labelled, frozen=True):
     once: bool = False
     """Whether the course keeps its output, and it runs only on request."""
     figures: tuple[FigureName, ...] = ()
+    show: Show | None = None
+    """`None`: a long one folds by itself."""
+    parts: tuple[Script | ScriptPart, ...] = ()
+    """The blocks of a whole script that stands in several."""
+
+    @property
+    def part_lines(self) -> tuple[int, ...]:
+        """The lines of the file, from 1, at which its parts but the first begin."""
+        sizes = (part.code.text.count("\n") for part in self.parts[:-1])
+        return tuple(1 + size for size in accumulate(sizes))
 
 
 class Mode(enum.Enum):
@@ -230,6 +259,8 @@ class Recording(Struct, frozen=True):
     """`None`: the course's default."""
     script: str | None
     """The path of the nearest script above; `None` only in a document with an error."""
+    part: int = 0
+    """The number of the script's part that is nearest above, from 0."""
     readable: bool = True
     """Whether the fence's way of comparing is valid; if not, nothing is compared."""
 
@@ -248,7 +279,7 @@ class SourcePart(Struct, frozen=True):
 
     path: str
     part: str
-    """The name of a function, class or method; empty for the whole file."""
+    """The name of a function, class or method, or lines (`L3-L9`); empty for the whole file."""
     place: Span
     body_span: Span
     prefix: str
@@ -318,6 +349,7 @@ Block: TypeAlias = (
     | MathBlock
     | Table
     | Script
+    | ScriptPart
     | Recording
     | Mjcf
     | FeatureBlock

@@ -52,6 +52,8 @@ class ScriptJob(Struct, frozen=True):
     figures: tuple[str, ...] = ()
     memory: int = Limits().scripts
     """MiB that it may take, where the system can enforce that."""
+    part_lines: tuple[int, ...] = ()
+    """The lines of its file, from 1, at which its parts but the first begin."""
 
 
 class Sign(enum.Enum):
@@ -174,6 +176,13 @@ class ScriptRun(Struct, frozen=True):
     then, no other run bears out."""
     provenance: Provenance | None = None
     """What it ran with; `None` where it did not run, and while it is stored."""
+    part_starts: tuple[int, ...] = ()
+    """Where in `stdout` the output of each of its parts but the first begins."""
+
+    def output_of(self, part: int) -> str:
+        """What a part printed, counted from 0: of a script that is not in parts, all of it."""
+        edges = (0, *self.part_starts, len(self.stdout))
+        return self.stdout[edges[part] : edges[part + 1]] if part + 1 < len(edges) else ""
 
     @property
     def did_run(self) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple, TypeVar, assert_never
 
 from msgspec.structs import replace
@@ -32,6 +32,7 @@ from coursebuild.core.model.blocks import (
     PlainCode,
     Recording,
     Script,
+    ScriptPart,
     Table,
     ThematicBreak,
 )
@@ -47,7 +48,7 @@ from coursebuild.core.model.inlines import (
     RawInline,
     Term,
 )
-from coursebuild.core.text.source import Span, key_of
+from coursebuild.core.text.source import Excerpt, Span, key_of
 
 Value = TypeVar("Value")
 AnyBlock = TypeVar("AnyBlock", bound=Block)
@@ -180,8 +181,33 @@ def is_comment(html: HtmlBlock | RawInline) -> bool:
 
 
 def document_scripts(document: Document) -> tuple[Script, ...]:
-    """The complete scripts of a document."""
-    return computed_once(document, "scripts", lambda: tuple(find_blocks(document, Script)))
+    """The complete scripts of a document, each with the code of all its parts."""
+
+    def join() -> tuple[Script, ...]:
+        parts: dict[str, list[ScriptPart]] = {}
+        for part in find_blocks(document, ScriptPart):
+            parts.setdefault(part.path, []).append(part)
+        return tuple(
+            _whole_script(script, parts.pop(script.path, []))
+            for script in find_blocks(document, Script)
+        )
+
+    return computed_once(document, "scripts", join)
+
+
+def _whole_script(script: Script, further_parts: Sequence[ScriptPart]) -> Script:
+    parts: list[Script | ScriptPart] = [script, *further_parts]
+    parts[:-1] = [replace(part, code=_with_empty_line(part.code)) for part in parts[:-1]]
+    code = Excerpt.join([part.code for part in parts])
+    code = code.slice(0, len(code.text.rstrip("\n")) + 1)
+    return replace(script, code=code, parts=tuple(parts) if further_parts else ())
+
+
+def _with_empty_line(code: Excerpt) -> Excerpt:
+    """The code of a part, which an empty line parts from the next one in the file."""
+    if code.text.endswith("\n\n") or code.text == "\n":
+        return code
+    return Excerpt(code.source, code.text + "\n", code.pieces)
 
 
 def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
@@ -250,7 +276,7 @@ def without_prose(document: Document) -> Document:
                 blocks += _paragraph_of(block.span, _summary_inlines(block))
             case Heading():
                 blocks.append(replace(block, children=_summary_inlines(block)))
-            case Script() | Mjcf() | HtmlBlock():
+            case Script() | ScriptPart() | Mjcf() | HtmlBlock():
                 blocks.append(block)
             case Recording():
                 recorded_ids.add(id(block.body))

@@ -177,7 +177,9 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
         outputs: dict[int, tuple[model.Recording, ...]] = {}
         for siblings in model.sibling_groups(self.document):
             for number, block in enumerate(siblings):
-                if not isinstance(block, model.Script):
+                if not isinstance(block, model.Script | model.ScriptPart):
+                    continue
+                if isinstance(block, model.ScriptPart) and block.show == "hidden":
                     continue
                 following: list[model.Recording] = []
                 for sibling in siblings[number + 1 :]:
@@ -188,6 +190,15 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
                     following.append(sibling)
                 outputs[block.span.start] = tuple(following)
         return outputs
+
+    @cached_property
+    def script_places(self) -> Mapping[int, tuple[model.Script, int]]:
+        """The whole script of each block with code of it, and its first line, by its offset."""
+        return {
+            block.span.start: (script, line)
+            for script in model.document_scripts(self.document)
+            for block, line in zip(script.parts or (script,), (1, *script.part_lines), strict=True)
+        }
 
     @cached_property
     def numbered_items(self) -> Mapping[int, model.NumberedItem]:

@@ -254,8 +254,8 @@ def named_models(document: model.Document) -> Mapping[str, tuple[str, ...]]:
             if isinstance(block, model.FeatureBlock):
                 yield from ((name, BY_LAB) for name in block.models())
                 yield from ((name, BY_LINK) for name in block.mentioned_models())
-            elif isinstance(block, model.Script):
-                yield from ((name, BY_SCRIPT) for name in models_named(block))
+        for script in model.document_scripts(document):
+            yield from ((name, BY_SCRIPT) for name in models_named(script))
         for link in model.find_inlines(document, model.Link):
             if isinstance(link.target, model.ModelTarget):
                 yield link.target.name, BY_LINK

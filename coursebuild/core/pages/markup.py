@@ -25,6 +25,7 @@ SpecialBlock: TypeAlias = (
     | model.FeatureBlock
     | model.Recording
     | model.Script
+    | model.ScriptPart
 )
 
 
@@ -214,7 +215,9 @@ class HtmlWriter:
                 return self._captioned(block, (), self.block(block))
             case model.Callout() | model.Mjcf():
                 return self.block(block)
-            case model.Recording() | model.Script() | model.FeatureBlock():
+            case model.Script() | model.ScriptPart():
+                return self.block(block)
+            case model.Recording() | model.FeatureBlock():
                 return self.block(block)
             case _:
                 assert_never(block)

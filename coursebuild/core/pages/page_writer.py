@@ -121,7 +121,7 @@ class PageWriter(PageContext, frozen=True):
                     title=self.inlines(block.title),
                     body=self.blocks(block.blocks),
                 )
-            case model.Script():
+            case model.Script() | model.ScriptPart():
                 html = self._script(block, self.script_outputs.get(block.span.start, ()))
             case model.Recording():
                 if any(block in group for group in self.script_outputs.values()):
@@ -136,42 +136,73 @@ class PageWriter(PageContext, frozen=True):
                     engine=self.inputs.engine,
                 )
             case model.PlainCode():
-                code = self.highlight("python", block.code.text)
+                code = self.highlight("python", block.code.text.rstrip("\n"))
                 html = self.template("blocks/code.html", language="python", html=code)
                 if block.source is not None:
-                    path = block.source.path
-                    html = self.template("blocks/source_part.html", path=path, code=html)
+                    source = block.source
+                    lines = re.fullmatch(r"L(\d+)(?:-L(\d+))?", source.part)
+                    part = source.part
+                    if lines is not None:
+                        part = self._lines(int(lines[1]), int(lines[2] or lines[1]))
+                    html = self.template(
+                        "blocks/source_part.html", path=source.path, part=part, code=html
+                    )
             case model.FeatureBlock():
                 html = kind_of_block(block).draw(self, block)
             case _:
                 assert_never(block)
         return html + Markup("\n") if html else html
 
-    def _script(self, block: model.Script, recordings: tuple[model.Recording, ...]) -> Markup:
-        """A script and the outputs that belong to it, as one object."""
-        text, words = block.code.text.rstrip("\n"), self.words
+    def _script(
+        self, block: model.Script | model.ScriptPart, recordings: tuple[model.Recording, ...]
+    ) -> Markup:
+        """A script or a part of one, and the outputs that belong to it, as one object."""
+        script, first = self.script_places[block.span.start]
+        parts = self._code_parts(block, first, is_whole=not script.parts)
+        receipt = None
+        if isinstance(block, model.Script) and not recordings:
+            receipt = script_receipt(self, block)
+        return self.template(
+            "blocks/script.html",
+            script=script,
+            begins=isinstance(block, model.Script),
+            label=block.label,
+            number=self.number(block.label),
+            parts=parts,
+            is_hidden=block.show == "hidden",
+            anchor=model.listing_anchor(block.path),
+            href=self.place.href(block.path),
+            command=shlex.join(("python", block.path, *script.args)),
+            outputs=tuple(map(self._output, recordings)),
+            receipt=receipt,
+        )
+
+    def _code_parts(
+        self, block: model.Script | model.ScriptPart, first: int, *, is_whole: bool
+    ) -> tuple[CodePart, ...]:
+        """The stretches of a block whose code begins at line `first` of its file."""
+        words, text, show = self.words, block.code.text.rstrip("\n"), block.show
         lines = highlight_lines("python", text)
+        if show is None and isinstance(block, model.Script) and block.figures:
+            show = "folded"
+        if show is None and is_whole:
+            stretches = fold(text)
+        else:
+            stretches = (Part(1, len(lines), folded=show == "folded"),)
         parts: list[CodePart] = []
-        for part in (Part(1, len(lines), folded=True),) if block.figures else fold(text):
-            key = "code.lines" if part.first < part.last else "code.line"
+        for part in stretches:
             holds = [words("code.docstring")] if part.docstring else []
             holds += [words("code.imports")] if part.imports else []
             holds += part.names
-            label = words(key, first=part.first, last=part.last)
+            start, end = part.first + first - 1, part.last + first - 1
+            label = self._lines(start, end)
             label += f": {', '.join(holds)}" if holds else ""
-            html = numbered_lines(lines[part.first - 1 : part.last], block.path, part.first)
-            parts.append(CodePart(html, part.first, part.folded, label))
-        return self.template(
-            "blocks/script.html",
-            script=block,
-            number=self.number(block.label),
-            parts=tuple(parts),
-            anchor=model.listing_anchor(block.path),
-            href=self.place.href(block.path),
-            command=shlex.join(("python", block.path, *block.args)),
-            outputs=tuple(map(self._output, recordings)),
-            receipt=None if recordings else script_receipt(self, block),
-        )
+            html = numbered_lines(lines[part.first - 1 : part.last], block.path, start)
+            parts.append(CodePart(html, start, part.folded, label))
+        return tuple(parts)
+
+    def _lines(self, first: int, last: int) -> str:
+        return self.words("code.lines" if first < last else "code.line", first=first, last=last)
 
     def _output(self, block: model.Recording) -> OutputView:
         script, table = block.script, block.body
@@ -303,7 +334,7 @@ def article(page: PageContext, document: model.Document) -> Markup:
     return Markup("\n").join(filter(None, (*parts, page.footnotes(), page.references())))
 
 
-_WIDE = (model.Script, model.Recording, model.Mjcf, model.Table, model.HtmlBlock)
+_WIDE = (model.Script, model.ScriptPart, model.Recording, model.Mjcf, model.Table, model.HtmlBlock)
 
 
 def _is_wide(block: model.Block) -> bool:

@@ -110,6 +110,7 @@ def inputs_of(job: ScriptJob, text: bytes, conditions: tuple[tuple[str, str], ..
         "folders that it may write into": " ".join(job.writes),
         "figures that it draws": " ".join(job.figures),
         "MiB that it may take": "" if job.memory == Limits().scripts else str(job.memory),
+        "lines at which its parts begin": " ".join(map(str, job.part_lines)),
         _PERTURBATION: str(job.perturbation or ""),
     }
     job_conditions += [(name, value) for name, value in options.items() if value]

@@ -26,6 +26,7 @@ from typing import Any, TypedDict
 
 from coursebuild.core.run import mujoco_tracing, mujoco_watching, perturbation
 from coursebuild.core.run.matplotlib_watching import FigureWatch
+from coursebuild.core.run.part_marks import PartMark, compile_parts
 from coursebuild.core.run.tracing import Tracer
 
 _IMPORTS = {"numpy": ("numpy", "numpy.random"), "mujoco": ("numpy", "mujoco")}
@@ -61,6 +62,10 @@ class Job(TypedDict):
     """Names of files that it draws, in its working directory."""
     memory: int
     """MiB that it may take."""
+    part_lines: list[int]
+    """The lines at which its parts but the first begin."""
+    part_mark: str
+    """What stands in its output between two of them, in hexadecimal digits."""
     perturbation: int
     """The direction in which initial states are moved (`perturbation`); 0: none;
     −n: each step is made as 2ⁿ."""
@@ -238,6 +243,9 @@ class ScriptProcess:
             redirect_figures(job, self._environment["TMPDIR"])
         tracer.install()
         tracer.begin(standard)
+        if job["part_lines"]:
+            mark = PartMark(bytes.fromhex(job["part_mark"]))
+            return compile_parts(text, self.path, job["part_lines"], mark)
         return compile(text, self.path, "exec", dont_inherit=True)
 
     def _tracer(self) -> Tracer:

@@ -266,6 +266,8 @@ class _Work:
             "writes": [f"{self.root}/{folder}" for folder in job.writes],
             "copies": self.copies,
             "figures": list(job.figures),
+            "part_lines": list(job.part_lines),
+            "part_mark": "",
             "perturbation": job.perturbation,
             "memory": job.memory,
         }
@@ -328,6 +330,7 @@ class _Work:
             missing=report.missing,
             trace=read_records(trace, str(self.root), job.path) if trace else None,
             figures=tuple((name, data) for name, data in named_figures if data is not None),
+            part_starts=_places_in_text(report.part_starts, out, len(job.part_lines)),
         )
         if self.sandbox is not None and run.trace is not None:
             reason = run.trace.opaque or sandbox_difference(job, run.trace, self.sources)
@@ -340,3 +343,10 @@ class _Work:
     def _finish(self, index: int, run: ScriptRun) -> None:
         self.runs[index] = run
         self.on_finish(run)
+
+
+def _places_in_text(offsets: Sequence[int], data: bytes, count: int) -> tuple[int, ...]:
+    """Where the output of `count` parts begins in the text; that of parts not reached is empty."""
+    offsets = [*offsets, *[len(data)] * count][:count]
+    befores = (data[:offset].decode("utf-8", "ignore") for offset in offsets)
+    return tuple(len(before.replace("\r\n", "\n")) for before in befores)

@@ -42,6 +42,7 @@ from pathlib import Path
 
 from coursebuild.core.engine.lifetime import end_with_parent
 from coursebuild.core.files.locks import remove_folder
+from coursebuild.core.run.part_marks import split_output
 from coursebuild.core.run.script_process import (
     Job,
     PreloadedPackages,
@@ -182,6 +183,8 @@ class _Supervisor:
             environment["PYTHONPATH"] = os.pathsep.join(path)
         if self.may_fork:
             self.preloaded.load(job["packages"])
+        mark = os.urandom(16)  # which a script prints only where it was told to
+        job["part_mark"] = mark.hex()
         folder = ""
         script: RunningScript | ScriptProcess | None = None
         try:
@@ -203,14 +206,17 @@ class _Supervisor:
             finally:
                 script.end()
             trace = _read_notes(script.shared, notes_folder(folder))
-            stdout, stderr = script.stdout[:STDOUT_LIMIT], script.stderr[-STDERR_KEPT:]
+            stdout, part_starts = split_output(bytes(script.stdout), mark)
+            stdout, stderr = stdout[:STDOUT_LIMIT], script.stderr[-STDERR_KEPT:]
             paths = (Path(figure_path(folder, name)) for name in job["figures"])
             # One that is too large is cut off, so that it cannot be shown.
             figures = (_read_regular(path, FIGURE_LIMIT + 1) for path in paths)
-            parts = bytes(stdout), _OUR_FRAME.sub(b"", bytes(stderr)), trace, *figures
+            parts = stdout, _OUR_FRAME.sub(b"", bytes(stderr)), trace, *figures
             status = script.exit_status()
             outcome = script.limit or ("killed" if status < 0 else "failed" if status else "ok")
-            return _report(outcome, abs(status), script.seconds, parts=parts)
+            return _report(
+                outcome, abs(status), script.seconds, parts=parts, part_starts=part_starts
+            )
         finally:
             if folder and not isinstance(script, ScriptProcess):
                 remove_folder(folder)
@@ -378,6 +384,7 @@ def _report(
     seconds: float = 0.0,
     missing: Sequence[str] = (),
     parts: Sequence[bytes | None] = (b"", b"", b""),
+    part_starts: Sequence[int] = (),
 ) -> bytes:
     report = {
         "outcome": outcome,
@@ -385,6 +392,7 @@ def _report(
         "seconds": seconds,
         "missing": list(missing),
         "parts": [None if part is None else part.decode("latin-1") for part in parts],
+        "part_starts": list(part_starts),
     }
     data = json.dumps(report, ensure_ascii=False).encode()
     return LENGTH.pack(len(data)) + data

@@ -214,8 +214,10 @@ def _check(
         return _orphan_diagnostic(binding, path, outputs)
     run = outputs.runs.get(path)
     ran_well = run is not None and run.outcome is Outcome.OK
+    outputs_of_run = () if run is None else (run.output_of(v.recording.part) for v in verdicts)
+    printed = dict.fromkeys(outputs_of_run)
     if run is not None and (
-        run.outcome in _SILENT_OUTCOMES or (verdicts and ran_well and not run.stdout.strip())
+        run.outcome in _SILENT_OUTCOMES or (verdicts and ran_well and not "".join(printed).strip())
     ):
         return ()
     if not verdicts and not ran_well:
@@ -232,7 +234,8 @@ def _check(
     )
     drifted = any(v.status == "drift" for v in steady)
     if (partial or drifted or not verdicts) and run is not None and ran_well:
-        lines = lines_of_run(run.stdout, [f for v in steady for f in v.comparison.own_filters])
+        filters = [f for v in steady for f in v.comparison.own_filters]
+        lines = [line for text in printed or [run.stdout] for line in lines_of_run(text, filters)]
         if _holds(bound_text, lines):
             return lines
     varying = [v.recording for v in verdicts if v not in steady or v.comparison.volatile]

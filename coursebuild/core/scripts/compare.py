@@ -42,7 +42,7 @@ def verify(course: model.Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ..
     Where two blocks have the same path, only the first is run; what is recorded below the second
     is not compared with its output. Nor is an output whose fence has mistakes in its options.
     """
-    by_path = {run.path: run for run in runs if run.outcome is Outcome.OK and run.stdout.strip()}
+    by_path = {run.path: run for run in runs if run.outcome is Outcome.OK}
     paths: set[str] = set()
     verdicts: list[Verdict] = []
     for document in course.documents:
@@ -53,10 +53,11 @@ def verify(course: model.Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ..
                 paths.add(block.path)
             elif isinstance(block, model.Recording) and block.script is not None:
                 comparison, run = course.comparison_of(block), by_path.get(block.script)
-                if run is None or is_repeated or not block.readable:
+                printed = "" if run is None else run.output_of(block.part)
+                if not printed.strip() or is_repeated or not block.readable:
                     verdicts.append(Verdict(block, comparison, "unchecked"))
                 else:
-                    verdicts.append(compare(block, comparison, run.stdout))
+                    verdicts.append(compare(block, comparison, printed))
     return tuple(verdicts)
 
 
@@ -157,7 +158,7 @@ def repeat_findings(
             if recording.script == now.path and recording.readable
         ]
         may_differ = {before.outcome, now.outcome} == {Outcome.OK} and all(
-            compare(r, course.comparison_of(r), run.stdout).status != "drift"
+            compare(r, course.comparison_of(r), run.output_of(r.part)).status != "drift"
             for r in recordings
             for run in (before, now)
         )

@@ -11,18 +11,19 @@
 4. The new text is compared with the run: an output that the lesson's text cannot hold is refused.
 
 Code that lessons show from the project's files is what these hold, or gets the edit that makes it
-so. A part is a function, a class or a method with its decorators, or the whole file; indentation
-and white space at the ends of lines do not count.
+so. A part is a function, a class or a method with its decorators, some lines, or the whole file;
+indentation and white space at the ends of lines do not count.
 """
 
 from __future__ import annotations
 
 import ast
 import contextlib
+import difflib
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import groupby, zip_longest
+from itertools import groupby, pairwise, zip_longest
 
 from msgspec.structs import replace
 
@@ -182,8 +183,8 @@ def _fence_edit(recording: model.Recording, lines: Sequence[str]) -> Edit | Diag
     return whole_lines(recording.body_span, recording.prefix, lines)
 
 
-def adopt_file(script: model.Script, data: bytes) -> Edit | Diagnostic:
-    """What to write into the block so that it extracts to `data`; a diagnostic where that fails."""
+def adopt_file(script: model.Script, data: bytes) -> list[Edit] | Diagnostic:
+    """What to write into the blocks of a script, so that they extract to `data`; or why not."""
 
     def refuse(reason: str) -> Diagnostic:
         message = f"{script.path} cannot be brought into the lesson: {reason}"
@@ -194,12 +195,37 @@ def adopt_file(script: model.Script, data: bytes) -> Edit | Diagnostic:
         return refuse("it is not UTF-8")
     if text == "\n":
         return refuse("it is empty")
-    lines = text.removesuffix("\n").split("\n")
-    if _longest_marks(lines, _opening_fence(script.body_span).text):
-        return refuse("one of its lines would close the fence, or begin another")
     if "\0" in text:
         return refuse("it holds a NUL")
-    return whole_lines(script.body_span, script.prefix, lines)
+    lines_of_parts = _split_lines(script, text.removesuffix("\n").split("\n"))
+    if lines_of_parts is None:
+        return refuse("a change goes from one of its parts into the next")
+    edits: list[Edit] = []
+    for block, lines in zip(script.parts or (script,), lines_of_parts, strict=True):
+        if _longest_marks(lines, _opening_fence(block.body_span).text):
+            return refuse("one of its lines would close the fence, or begin another")
+        edits.append(whole_lines(block.body_span, block.prefix, lines))
+    return [edit for edit in edits if edit.text != edit.span.text]
+
+
+def _split_lines(script: model.Script, lines: Sequence[str]) -> list[Sequence[str]] | None:
+    """The lines of each part of an edited script; `None` where it is not clear which are whose."""
+    old_lines = script.code.text.split("\n")
+    matcher = difflib.SequenceMatcher(None, old_lines, lines, autojunk=False)
+    blocks = [block for block in matcher.get_matching_blocks() if block.size]
+    edges = [0]
+    for line in script.part_lines:
+        offsets = (
+            block.b + line - 1 - block.a
+            for block in blocks
+            if 0 <= line - 1 - block.a <= block.size
+        )
+        if (edge := next(offsets, None)) is None:
+            return None
+        edges.append(edge)
+    parts = [lines[start:end] for start, end in pairwise([*edges, len(lines)])]
+    # An empty line after a part is that which the file has and the lesson has not.
+    return [p[:-1] if p[-1:] == [""] and p[-2:] != ["", ""] else p for p in parts]
 
 
 def block_text(data: bytes) -> str | None:
@@ -289,18 +315,29 @@ ReadText = Callable[[str], str | None]
 
 
 def shown_files(course: model.Course) -> frozenset[str]:
-    """The files of which lessons show parts."""
-    return frozenset(source.path for _, source in _source_parts(course))
+    """The files of which lessons show parts, but for the scripts of lessons."""
+    paths = {source.path for _, source in _source_parts(course)}
+    return frozenset(paths.difference(_script_texts(course)))
 
 
 def check_source_parts(course: model.Course, read: ReadText) -> Iterator[Diagnostic]:
     """A diagnostic, with an edit, for each part that differs from its file."""
+    scripts = _script_texts(course)
     for block, source in _source_parts(course):
-        text = read(source.path)
+        text = scripts.get(source.path) or read(source.path)
         if text is None:
             yield diagnose("source-part", source.place, f"there is no text file `{source.path}`")
             continue
         parts = _read_parts(text)
+        if (match := _LINES.fullmatch(source.part)) is not None:
+            rows, first = text.rstrip("\n").split("\n"), int(match[1])
+            last = int(match[2] or first)
+            if not 1 <= first <= last <= len(rows):
+                message = f"`{source.path}` has no lines {first} to {last}"
+                help = f"its last line is {len(rows)}"
+                yield diagnose("source-part", source.place, message, help=help)
+                continue
+            parts[source.part] = _lines("\n".join(rows[first - 1 : last]))
         if source.part not in parts:
             message = f"`{source.path}` has no function or class `{source.part}`"
             help = did_you_mean(source.part, [name for name in parts if name])
@@ -321,6 +358,17 @@ def check_source_parts(course: model.Course, read: ReadText) -> Iterator[Diagnos
             help = Fix("run `coursebuild update`, which copies it here", edits=edits, safe=True)
             message = f"this differs from what `{source.path}` holds"
             yield diagnose("source-part", span, message, label=label, help=help)
+
+
+_LINES = re.compile(r"L(\d{1,9})(?:-L(\d{1,9}))?")
+
+
+def _script_texts(course: model.Course) -> dict[str, str]:
+    return {
+        script.path: script.code.text
+        for document in course.documents
+        for script in model.document_scripts(document)
+    }
 
 
 def _source_parts(course: model.Course) -> Iterator[tuple[model.PlainCode, model.SourcePart]]:

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from coursebuild.core.model import Course, Limits, Script, document_scripts
 from coursebuild.core.model.results import ScriptJob
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, Parsed, diagnose
 from coursebuild.core.text.source import Span
 
 
@@ -79,16 +79,21 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
                 extractions.append(extraction)
                 continue
             path, first_path = script.path, first.path
+            help: str = "give one of them another path"
             note = f"`{first_path}` is written here"
             if first_path == path:
                 message, note = f"two blocks have the file `{path}`", "the first one is here"
+                if first.document == document.source.path:
+                    end = script.span.first_line().end
+                    edits = (Edit(script.span.source.span(end, end), " part"),)
+                    help = Fix(f"{help}, or say `part` if it goes on with the file", edits=edits)
             elif key in files:
                 message = f"`{path}` and `{first_path}` are one file where case does not count"
             elif key in folders:
                 message = f"`{path}` is a file here and a folder of `{first_path}`"
             else:
                 message = f"`{first_path}` is a file and cannot be a folder of `{path}`"
-            help, notes = "give one of them another path", [Note(note, first.script.path_span)]
+            notes = [Note(note, first.script.path_span)]
             diagnostics.append(
                 diagnose("script-repeated", script.path_span, message, help=help, notes=notes)
             )
@@ -114,6 +119,7 @@ def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[Scri
             extraction.script.writes,
             tuple(figure.name for figure in extraction.script.figures),
             extraction.memory,
+            extraction.script.part_lines,
         )
         for extraction in extractions
     )

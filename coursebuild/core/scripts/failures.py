@@ -159,9 +159,10 @@ def _failure_wording(extraction: Extraction, run: ScriptRun) -> tuple[str, str, 
             assert_never(run.outcome)
 
 
-def silence_diagnostic(recording: Recording, path: str) -> Diagnostic:
-    """An output is recorded, and the script printed no line."""
-    message = f"an output is recorded here, but `{path}` printed nothing"
+def silence_diagnostic(recording: Recording, run: ScriptRun) -> Diagnostic:
+    """An output is recorded, and the script, or its part above, printed no line."""
+    subject = f"this part of `{run.path}`" if run.part_starts else f"`{run.path}`"
+    message = f"an output is recorded here, but {subject} printed nothing"
     help = "print what is recorded, or remove the recorded output"
     return diagnose("script-silent", recording.caption_span, message, help=help)
 

@@ -92,8 +92,9 @@ def output_findings(
             recording = verdict.recording
             yield from _find_loose(verdict)
             run = outputs.runs.get(recording.script or "")
-            if run is not None and run.outcome is Outcome.OK and not run.stdout.strip():
-                yield failures.silence_diagnostic(recording, run.path)
+            ran_well = run is not None and run.outcome is Outcome.OK
+            if run is not None and ran_well and not run.output_of(recording.part).strip():
+                yield failures.silence_diagnostic(recording, run)
             elif run is not None and run.outcome is Outcome.UNRECORDED:
                 yield drift_diagnostic(verdict, owner.id)
             elif unstable_output := find_instability(verdict, run, other_runs or {}):
@@ -156,7 +157,8 @@ def _find_unmarked(
             run = runs.get(script.path)
             if script.span.start > block.span.start or run is None or run.outcome is not Outcome.OK:
                 continue
-            is_printed = text.lines == Side.of(run.stdout, comparison.filters).lines
+            printed = Side.of(run.stdout, comparison.filters).lines
+            is_printed = text.lines == printed
             if not is_printed or len(block.code.text.strip()) <= 3:
                 continue
             message = f"this is what `{script.path}` printed, and nothing compares the two"
@@ -178,10 +180,11 @@ def find_instability(
     earlier_run = other_runs.get(recording.script or "")
     if run is None or earlier_run is None or {run.outcome, earlier_run.outcome} != {Outcome.OK}:
         return None
-    changes = compare(recording, comparison, earlier_run.stdout).changes
+    changes = compare(recording, comparison, earlier_run.output_of(recording.part)).changes
     if [(c.span, c.printed) for c in changes] == [(c.span, c.printed) for c in verdict.changes]:
         return None
-    before, now = (Side.of(r.stdout, comparison.filters) for r in (earlier_run, run))
+    outputs = (r.output_of(recording.part) for r in (earlier_run, run))
+    before, now = (Side.of(output, comparison.filters) for output in outputs)
     return instability_diagnostic(recording, before, now, comparison)
 
 

@@ -200,7 +200,7 @@ def _standing(
         return Standing.DRIFTED
     if not recordings:
         return Standing.UNRECORDED
-    if any(compare(*pair, base.stdout).status == "drift" for pair in recordings):
+    if any(compare(r, c, base.output_of(r.part)).status == "drift" for r, c in recordings):
         return Standing.DRIFTED
     if moved_runs is None:
         return Standing.MEASURED
@@ -225,7 +225,7 @@ def _find_doubts(
     exact = replace(comparison, mode=Mode.EXACT)
 
     def find_changes(run: ScriptRun) -> dict[tuple[int, int], Change]:
-        changes = compare(recording, exact, run.stdout).changes
+        changes = compare(recording, exact, run.output_of(recording.part)).changes
         return {(change.span.start, change.span.end): change for change in changes}
 
     changes_of_base = find_changes(base)

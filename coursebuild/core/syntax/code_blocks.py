@@ -12,7 +12,16 @@ from collections.abc import Callable
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import Block, CodeBlock, Mjcf, PlainCode, Script, SourcePart
+from coursebuild.core.model import (
+    Block,
+    CodeBlock,
+    Mjcf,
+    PlainCode,
+    Script,
+    ScriptPart,
+    Show,
+    SourcePart,
+)
 from coursebuild.core.model.blocks import FigureName, Labelled
 from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import (
@@ -24,7 +33,7 @@ from coursebuild.core.syntax.fence import (
 )
 from coursebuild.core.syntax.other_tools import check_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.syntax.python_syntax import check_syntax, find_windows
+from coursebuild.core.syntax.python_syntax import check_syntax
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose, write
 from coursebuild.core.text.source import Excerpt
@@ -34,6 +43,8 @@ DEFAULT_TIMEOUT, MAX_TIMEOUT = 60.0, 86400.0
 
 _VALUES = ("timeout", "requires", "args", "writes", "record", "figure")
 _FLAGS = ("norun", "diverges", "deep")
+_SHOWS: tuple[Show, ...] = ("open", "folded", "hidden")
+_WHOLE_STATEMENTS = "a part holds whole statements: a function or a loop stands in one part"
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _DEVICE = re.compile(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
 _UNPORTABLE = re.compile(r'[\x00-\x1f\x7f<>:"|?*;&$!#%`{}\'\ud800-\udfff]')
@@ -46,28 +57,31 @@ _FIGURE = re.compile(r"[A-Za-z0-9][\w-]*(?:\.[\w-]+)*\.(?:svg|png|csv)", re.ASCI
 _ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
 
 
-def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
-    """A `python` fence: a `Script` if it has a valid `file=`, else `PlainCode`."""
-    keys = fence.keys(values=("file", "show", *_VALUES), flags=(*_FLAGS, "fragment"))
-    diagnostics = list(keys.diagnostics)
-    file, fragment = keys.value.get("file"), keys.value.get("fragment")
+def parse_python(fence: Fence) -> Parsed[Script | ScriptPart | PlainCode]:
+    """A `python` fence: a script or a part of one if it has a valid `file=`, else `PlainCode`."""
+    flags = (*_FLAGS, "part", *_SHOWS)
+    keys = fence.keys(values=("file", "show", *_VALUES), flags=flags)
+    diagnostics = [_explain_fragment(fence, mistake) for mistake in keys.diagnostics]
+    file, show = keys.value.get("file"), keys.value.get("show")
     has_file = any(word.key == "file" for word in split_words(fence.info).value)
     if file is None and not diagnostics:
-        for word in (keys.value.get(key) for key in (*_VALUES, *_FLAGS)):
+        for word in (keys.value.get(key) for key in (*_VALUES, *_FLAGS, "part", *_SHOWS)):
             if word is not None:
-                message = f"`{word.key}` says how to run a script, and this block has no `file`"
+                message = f"`{word.key}` is said of a script, and this block has no `file`"
                 help = "add `file=examples/….py`, or leave it out"
                 diagnostics.append(diagnose("fence-key-value", word.key_span, message, help=help))
-    if fragment is not None and has_file:
-        message = "a block with `file` is run, so it cannot be a `fragment`"
-        diagnostics.append(diagnose("fence-key-value", fragment.span, message))
-    show = keys.value.get("show")
-    if show is not None and (has_file or fragment is not None):
-        message = "a block shows a part of a file, or it is a script or a fragment of its own"
+    if show is not None and has_file:
+        message = "a block shows a part of a file, or it is a script of its own"
         diagnostics.append(diagnose("fence-key-value", show.span, message))
-    elif has_file:  # what is only shown may be a part, a session or of another version
-        diagnostics += check_syntax(fence.body)
-    script = None if file is None else _build_script(fence, file, keys.value, diagnostics)
+    elif has_file:  # what is only shown may be incomplete, a session or of another version
+        for mistake in check_syntax(fence.body):
+            is_part, help = keys.value.get("part") is not None, mistake.help
+            help = help or (_WHOLE_STATEMENTS if is_part else "")
+            diagnostics.append(replace(mistake, help=help))
+    script: Script | ScriptPart | None = None
+    if file is not None:
+        build = _build_script if keys.value.get("part") is None else _build_part
+        script = build(fence, file, keys.value, diagnostics)
     source = None
     if show is not None and not has_file:
         path, _, part = (show.value or "").partition("#")
@@ -83,9 +97,31 @@ def parse_python(fence: Fence) -> Parsed[Script | PlainCode]:
     return Parsed(script or code, tuple(diagnostics))
 
 
-def _build_script(
+def _explain_fragment(fence: Fence, mistake: Diagnostic) -> Diagnostic:
+    """For one release: what takes the place of a key that blocks had which are only shown."""
+    if mistake.rule != "fence-key-unknown" or mistake.span.text != "fragment":
+        return mistake
+    removal = next(w.removal for w in split_words(fence.info).value if w.key == "fragment")
+    help = Fix("leave it out: what is only shown need not parse", edits=removal, safe=True)
+    return diagnose("fence-key-unknown", mistake.span, mistake.message, help=help)
+
+
+def _build_part(
     fence: Fence, file: Word, keys: FenceKeys, diagnostics: list[Diagnostic]
-) -> Script | None:
+) -> ScriptPart | None:
+    for word in (keys.get(key) for key in (*_VALUES, *_FLAGS)):
+        if word is not None:
+            message = f"`{word.key}` is said of the whole script"
+            help = "write it on the block that begins the script"
+            diagnostics.append(diagnose("fence-key-value", word.key_span, message, help=help))
+    show = _read_show(keys, diagnostics) or "open"
+    if not _check_path(fence, file, diagnostics):
+        return None
+    path, place, code = file.value or "", file.value_span, _code_of(fence)
+    return ScriptPart(fence.span, path, place, code, fence.prefix, fence.body_span, show)
+
+
+def _check_path(fence: Fence, file: Word, diagnostics: list[Diagnostic]) -> bool:
     path = file.value or ""
     mistake, help = path_mistake(path), "a script is written to `examples/`, for example "
     help += "`examples/l4_2_inertia.py`"
@@ -95,9 +131,30 @@ def _build_script(
         if "is not below" in mistake and not fence.nested:
             help = Fix(help, f"examples/{path.rpartition('/')[2]}", path)
         diagnostics.append(diagnose("script-path", file.value_span, mistake, help=help))
-    code = fence.body.slice(0, len(fence.body.text.rstrip("\n")) + 1)  # with one line end
-    if not code.text.endswith("\n"):
-        code = Excerpt(code.source, code.text + "\n", code.pieces)
+    return not mistake
+
+
+def _read_show(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Show | None:
+    shows = [show for show in _SHOWS if keys.get(show) is not None]
+    for show in shows[1:]:
+        message = f"`{show}` contradicts `{shows[0]}`"
+        place = keys.place(show)
+        assert place is not None
+        diagnostics.append(diagnose("fence-key-value", place, message))
+    return shows[0] if shows else None
+
+
+def _code_of(fence: Fence) -> Excerpt:
+    body = fence.body
+    if body.text.endswith("\n"):
+        return body
+    return Excerpt(body.source, body.text + "\n", body.pieces)
+
+
+def _build_script(
+    fence: Fence, file: Word, keys: FenceKeys, diagnostics: list[Diagnostic]
+) -> Script | None:
+    has_path = _check_path(fence, file, diagnostics)
     timeout = _read_timeout(keys.get("timeout"), diagnostics)
     requires = [part.text for part in _read_list("requires", keys, diagnostics)]
     writes = [part.text.rstrip("/") for part in _read_list("writes", keys, diagnostics)]
@@ -114,15 +171,14 @@ def _build_script(
         help = Fix("write `record=once`", "once")
         diagnostics.append(diagnose("fence-key-value", record.value_span, message, help=help))
     figures = _read_list("figure", keys, diagnostics)
-    if keys.get("figure") is None and keys.get("norun") is None:
-        diagnostics += find_windows(fence.body)
-    if mistake:
+    show = _read_show(keys, diagnostics)
+    if not has_path:
         return None
     return Script(
         fence.span,
-        path,
+        file.value or "",
         file.value_span,
-        code,
+        _code_of(fence),
         fence.prefix,
         timeout,
         tuple(dict.fromkeys(requires)),
@@ -134,6 +190,7 @@ def _build_script(
         tuple(writes),
         once=record is not None,
         figures=tuple(FigureName(name.text, name.span()) for name in figures),
+        show=show,
     )
 
 
@@ -251,13 +308,7 @@ def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
         case "python":
             python = parse_python(fence)
             state.diagnostics += python.diagnostics
-            if isinstance(python.value, Script):
-                state.script, state.has_invalid_script = python.value.path, False
-                names = (figure.name for figure in python.value.figures)
-                state.figures += [name for name in names if not name.endswith(".csv")]
-            elif not fence.nested and any(d.rule in _HEAD_RULES for d in python.diagnostics):
-                state.script, state.has_invalid_script = None, True
-            return python.value
+            return _place_python(fence, python, state)
         case "output" if fence.nested:
             message = "a text of a quiz or lab cannot hold a recorded output"
             state.report(diagnose("fence-info", fence.head, message))
@@ -296,6 +347,34 @@ def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
         case _:
             state.diagnostics += check_kind(fence)
             return fence.code()
+
+
+def _place_python(
+    fence: Fence, python: Parsed[Script | ScriptPart | PlainCode], state: ParsingState
+) -> Block:
+    """The block, after which outputs are those of its script, and figures may be its figures."""
+    block = python.value
+    is_invalid = any(d.rule in _HEAD_RULES for d in python.diagnostics)
+    if isinstance(block, ScriptPart) and block.path not in state.parts:
+        message = f"no block above this part begins `{block.path}`"
+        help = "the parts of a script stand in one lesson, in the order of the file; "
+        help += "the first one does not say `part`"
+        state.report(diagnose("script-part", block.path_span, message, help=help))
+        block, is_invalid = PlainCode(fence.span, fence.body), True
+    match block:
+        case Script():
+            state.parts[block.path] = 0
+            names = (figure.name for figure in block.figures)
+            state.figures += [name for name in names if not name.endswith(".csv")]
+            state.script, state.has_invalid_script = block.path, False
+        case ScriptPart():
+            state.parts[block.path] += 1
+            state.script, state.has_invalid_script = block.path, False
+        case PlainCode() if is_invalid and not fence.nested:
+            state.script, state.has_invalid_script = None, True
+        case _:
+            pass
+    return block
 
 
 def _read_unclosed(fence: Fence, state: ParsingState) -> CodeBlock:

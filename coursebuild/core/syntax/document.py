@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from msgspec.structs import replace
 
@@ -13,6 +13,7 @@ from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.model.walk import DisplayFormula, feature_block_ids
 from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
+from coursebuild.core.syntax.python_syntax import check_syntax, find_windows
 from coursebuild.core.syntax.recording import ILLUSTRATION
 from coursebuild.core.syntax.spans import read_markdown
 from coursebuild.core.syntax.tree import TextReader
@@ -68,6 +69,7 @@ def parse_document(
     if conflict is not None:  # the rest follows from it
         return Parsed(document, (conflict,))
     state.diagnostics += (*_check_placement(document), *_check_ids(document))
+    state.diagnostics += _check_scripts(document, state.diagnostics)
     if (at := source.text.find("\0")) >= 0:
         message = "the text contains a NUL character"
         places = [match.start() for match in re.finditer("\0", source.text)]
@@ -78,11 +80,26 @@ def parse_document(
         match block:
             case model.Recording():
                 state.diagnostics += find_reordering(block.body_span, is_code=True)
-            case model.Script() | model.PlainCode() | model.CodeBlock() | model.Mjcf():
+            case model.Script() | model.ScriptPart() | model.PlainCode():
+                state.diagnostics += find_reordering(block.span, is_code=True)
+            case model.CodeBlock() | model.Mjcf():
                 state.diagnostics += find_reordering(block.span, is_code=True)
             case _:
                 pass
     return Parsed(document, sort_diagnostics(state.diagnostics))
+
+
+def _check_scripts(
+    document: model.Document, diagnostics: Sequence[Diagnostic]
+) -> Iterator[Diagnostic]:
+    """Report what is wrong with scripts as a whole; that their parts parse is known."""
+    for script in model.document_scripts(document):
+        parts = script.parts
+        mistakes = [d for d in diagnostics if d.rule == "python-syntax"]
+        if parts and not any(p.span.contains(d.span) for p in parts for d in mistakes):
+            yield from check_syntax(script.code)
+        if not (script.figures or script.norun):
+            yield from find_windows(script.code)
 
 
 def find_reordering(place: Span, *, is_code: bool) -> Iterator[Diagnostic]:

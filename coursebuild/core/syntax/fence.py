@@ -197,7 +197,7 @@ class Fence(Struct, frozen=True):
             key = word.key
             if key not in keys:
                 message = f"`{kind}` has no key `{key}`" if keys else f"`{kind}` takes no keys"
-                help = did_you_mean(key, keys)
+                help = did_you_mean(key, keys, most=len(keys))
                 diagnostics.append(diagnose("fence-key-unknown", word.key_span, message, help=help))
             elif key in words_by_key:
                 notes = [Note("first given here", words_by_key[key].key_span)]

@@ -34,6 +34,9 @@ class ParsingState:
         self.diagnostics: list[Diagnostic] = []
         self.report = self.diagnostics.append
         self.script: str | None = None
+        """The path of the nearest script above."""
+        self.parts: dict[str, int] = {}
+        """The number of the last part of each script above, from 0."""
         self.figures: list[str] = []
         """Names of figures of scripts above that no paragraph has shown yet."""
         self.has_invalid_script = False

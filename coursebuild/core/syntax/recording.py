@@ -102,6 +102,7 @@ def record_fence(
         fence.prefix,
         comparison,
         _find_script(caption_span, state),
+        state.parts.get(state.script or "", 0),
         readable=not diagnostics,
     )
 
@@ -116,7 +117,8 @@ def record_table(
         help = "write what the script prints into the rows below the header"
         state.report(diagnose("recording-body", table.span.first_line(), message, help=help))
     caption = _own_caption(caption, state.words)
-    return model.Recording(span, caption, caption_span, table, table.span, "", None, script)
+    part = state.parts.get(script or "", 0)
+    return model.Recording(span, caption, caption_span, table, table.span, "", None, script, part)
 
 
 def _own_caption(caption: tuple[model.Inline, ...], words: Words) -> tuple[model.Inline, ...]:

@@ -181,12 +181,12 @@ class Parsed(Struct, Generic[T_co], frozen=True):
     diagnostics: tuple[Diagnostic, ...] = ()
 
 
-def did_you_mean(name: str, known_names: Iterable[str]) -> str:
-    """The fix that writes the nearest known name, or a help that lists them if few; or nothing."""
+def did_you_mean(name: str, known_names: Iterable[str], most: int = 12) -> str:
+    """The fix that writes the nearest known name, or a help that lists up to `most`; or nothing."""
     names = sorted(set(known_names))
     if (likely := nearest(name, names)) is not None:
         return propose(name, likely)
-    return "known: " + ", ".join(f"`{n}`" for n in names) if 0 < len(names) <= 12 else ""
+    return "known: " + ", ".join(f"`{n}`" for n in names) if 0 < len(names) <= most else ""
 
 
 def propose(name: str, likely: str) -> Fix:

@@ -155,6 +155,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "source-part": "A block differs from the file that it shows.",
         "script-unproven": "A script was not run, so nothing proves its output.",
         "script-repeated": "Two blocks have the same path.",
+        "script-part": "A part of a script has no beginning above it.",
         "python-syntax": "A script cannot be parsed.",
         "example-edited": "An extracted file was changed by hand.",
         "script-failed": "A script exited with an error.",

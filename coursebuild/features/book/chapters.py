@@ -112,7 +112,8 @@ def _rewrite_attribute(
 ) -> str | None:
     if name in _LEFT_OUT or name.startswith("on"):
         return None
-    if name == "tabindex" or name.startswith("data-"):
+    is_hidden_code = name == "hidden" and value == "until-found"
+    if name == "tabindex" or name.startswith("data-") or is_hidden_code:
         return value if rules.live else None
     if name == "id" or (name == "name" and element.name == "a"):
         return rules.id(value)

@@ -1,8 +1,6 @@
 """Fences, directives and callouts of other tools as Markdown of coursebuild.
 
-Scripts of coursebuild are complete. So all cells of a lesson, which share their names, become one
-script, which stands where the last of them stood; the ones before are shown where they stood, as
-parts of it.
+The cells of a lesson, which share their names, become the parts of one script.
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ import contextlib
 import functools
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from msgspec.structs import replace
 
@@ -26,7 +24,6 @@ from coursebuild.features.importer.source_files import Segment, read_yaml
 
 _OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULTILINE)
 """An option of a cell, as Quarto and as MyST write it."""
-_DEFINITION = re.compile(r"(?:@|(?:async )?def |class )")
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
 _WINDOW = re.compile(r"^plt\.show\(\)[ \t]*\n?", re.MULTILINE)
 """What opens a window where there is none."""
@@ -36,27 +33,22 @@ _ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 _MAGIC = re.compile(r"^[ \t]*(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
 
-def join_cells(codes: Iterable[str], title: str) -> str:
-    """Return the script of a lesson with this title, from the code of its cells."""
-    summary = re.sub(r'[\\"]', "", title).strip().rstrip(".") or "The cells of this lesson"
-    script = f'"""{summary}."""\n'
-    before = ""
-    for code in codes:
-        ends_indented = before.split("\n")[-1].startswith((" ", "\t"))
-        is_apart = ends_indented or _DEFINITION.match(code)
-        script += ("\n\n" if before and is_apart else "\n") + code + "\n"
-        before = code
-    return script
-
-
-def join_outputs(codes: Iterable[tuple[Segment, str]]) -> str:
-    """Return what is recorded of the cells whose code the script has: what it should print."""
+def recorded_output(cell: Segment, code: str) -> str:
+    """Return what is recorded of a cell which the script has as `code`: what it should print."""
     output = ""
-    for cell, code in codes:
-        prints_value = code.count("print(") > cell.text.count("print(")
-        for text in (cell.printed, cell.value if prints_value else ""):
-            output += text and text.removesuffix("\n") + "\n"
+    prints_value = code.count("print(") > cell.text.count("print(")
+    for text in (cell.printed, cell.value if prints_value else ""):
+        output += text and text.removesuffix("\n") + "\n"
     return _ESCAPE.sub("", output).strip("\n")
+
+
+def how_shown(cell: Segment) -> str:
+    """Return the word for a cell whose code its tool folds or hides, after a blank."""
+    options = {quarto or myst: value.strip() for quarto, myst, value in _OPTION.findall(cell.text)}
+    tags = cell.head + options.get("tags", "")
+    if "remove-input" in tags or options.get("echo") == "false":
+        return " hidden"
+    return " folded" if "hide-input" in tags or options.get("code-fold") == "true" else ""
 
 
 def code_for_readers(cell: Segment) -> str:
@@ -149,7 +141,7 @@ def convert_segment(segment: Segment, context: LessonContext) -> str:
         return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
     if segment.kind == "cell":
         context.add_leftover("a cell inside another block is shown and not run")
-        return fence("python fragment", code_for_readers(segment))
+        return fence("python", code_for_readers(segment))
     directive = _DIRECTIVE.fullmatch(segment.head)
     if directive is not None:
         return _convert_directive(directive["name"], directive["argument"], segment.text, context)

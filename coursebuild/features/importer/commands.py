@@ -128,18 +128,21 @@ def _try_scripts(options: Options, notebook_outputs: Mapping[str, str]) -> tuple
             notebook = notebook_outputs.get(script.path)
             for recording in script_recordings:
                 comparison = course.comparison_of(recording)
-                verdict = compare(recording, comparison, script_run.stdout)
+                printed = script_run.output_of(recording.part)
+                verdict = compare(recording, comparison, printed)
                 if not _is_blank(recording) and (notebook is None or not verdict.changes):
                     continue
-                edit = update_body(recording, comparison, script_run.stdout)
+                edit = update_body(recording, comparison, printed)
                 if isinstance(edit, Edit):
                     changes.append(edit)
                     if not _is_blank(recording):
                         remarks.append(f"{notebook}: {_describe_changes(verdict.changes)}")
-            if not script_recordings and script_run.stdout.strip() and not script.prefix:
-                end = script.span.end
-                text = fence("output", script_run.stdout.rstrip("\n"))
-                changes.append(Edit(Span(script.span.source, end, end), f"\n\n{text}"))
+            for part, block in enumerate(script.parts or (script,)):
+                printed = script_run.output_of(part)
+                is_recorded = any(recording.part == part for recording in script_recordings)
+                if printed.strip() and not is_recorded and not block.prefix:
+                    end, text = block.span.end, fence("output", printed.rstrip("\n"))
+                    changes.append(Edit(Span(block.span.source, end, end), f"\n\n{text}"))
     file_changes = (
         FileChange(source.path, source.text.encode(), apply_edits(source.text, changes).encode())
         for source, changes in edits.items()

@@ -28,8 +28,8 @@ from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.blocks import (
     code_for_readers,
     convert_segment,
-    join_cells,
-    join_outputs,
+    how_shown,
+    recorded_output,
     runnable_code,
 )
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
@@ -179,39 +179,26 @@ def _convert_texts(
 
 
 def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
-    """Return a lesson or page in Markdown of coursebuild, with its cells as one script.
-
-    The script takes the place of its last cell. Earlier cells are shown where they stood, except
-    for those directly before the script, which would only repeat it.
-    """
+    """Return a lesson or page in Markdown of coursebuild, with its cells as parts of one script."""
     folder = posixpath.dirname(text.path)
     context = replace(course_context, path=text.file, folder=folder, pictures=text.pictures)
-    codes = {
-        number: code
-        for number, segment in enumerate(text.segments)
-        if segment.kind == "cell" and (code := runnable_code(segment, context))
-    }
-    last = max(codes, default=None)
+    words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
+    script_path = f"examples/{'' if words and words[0].isalpha() else 'l'}{'_'.join(words)}.py"
+    head = f"python file={script_path}"
     parts: list[str] = []
-    shown_end = 0
-    for number, segment in enumerate(text.segments):
-        if number == last:
-            words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
-            script_path = f"examples/{'' if words[0].isalpha() else 'l'}{'_'.join(words)}.py"
-            script = join_cells(codes.values(), text.title)
-            parts[shown_end:] = [fence(f"python file={script_path}", script)]
-            output = join_outputs((text.segments[cell], code) for cell, code in codes.items())
-            if output.strip():
-                parts.append(fence("output", output))
-                context.notebook_outputs[script_path] = text.file
-            continue
+    for segment in text.segments:
         if segment.kind != "cell":
             parts.append(convert_segment(segment, context))
+        elif code := runnable_code(segment, context):
+            parts.append(fence(head + how_shown(segment), code))
+            head = f"python file={script_path} part"
+            if output := recorded_output(segment, code):
+                parts.append(fence("output", output))
+                context.notebook_outputs[script_path] = text.file
         elif (magic := re.match(r"\s*%%(\w+).*\n", segment.text)) is not None:
             parts.append(fence(magic[1], segment.text[magic.end() :].strip("\n")))
         elif shown_code := code_for_readers(segment):
-            parts.append(fence("python fragment", shown_code))
-        shown_end = shown_end if number in codes else len(parts)
+            parts.append(fence("python", shown_code))
     return "\n\n".join(part.strip("\n") for part in parts if part.strip()) + "\n"
 
 

@@ -24,8 +24,8 @@ from coursebuild.core.registry import kind_of_block
 from coursebuild.features.markdown.from_html import html_to_markdown
 
 _SPACED_BLOCKS = (
-    *(model.Callout, model.PlainCode, model.Script, model.Recording, model.Mjcf),
-    *(model.FeatureBlock, model.HtmlBlock, model.Table, model.MathBlock),
+    *(model.Callout, model.PlainCode, model.Script, model.ScriptPart, model.Recording),
+    *(model.Mjcf, model.FeatureBlock, model.HtmlBlock, model.Table, model.MathBlock),
 )
 """Blocks with empty lines around them, even in a tight list."""
 
@@ -121,24 +121,8 @@ class DocumentWriter:
                 return marks.block_quote(f"{head}\n\n{inner}" if inner else head)
             case model.PlainCode():
                 return self._below_caption(block, marks.fence("python", block.code.text))
-            case model.Script():
-                href = self.locate(self.page.place.href(block.path))
-                name = marks.link(marks.code_span(block.path), href)
-                if number := self.number(block.label):
-                    name = f"**{marks.escape_marks(number)}** {name}"
-                if self.notebook:
-                    return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
-                command = marks.code_span(shlex.join(("python", block.path, *block.args)))
-                run = f"{self.words('code.run')}: {command}"
-                if block.requires:
-                    run += f" ({self.words('code.requires', modules=', '.join(block.requires))})"
-                parts = [f"{name}:", marks.fence("python", block.code.text), run]
-                recordings = self.page.script_outputs.get(block.span.start, ())
-                parts += [self.recording(recording) for recording in recordings]
-                if not recordings:
-                    receipt = script_receipt(self.page, block)
-                    parts.append(f"*{marks.escape_marks(receipt.text)}*")
-                return "\n\n".join(parts)
+            case model.Script() | model.ScriptPart():
+                return self._script(block)
             case model.Recording():
                 is_joined = any(block in outputs for outputs in self.page.script_outputs.values())
                 return "" if is_joined else self.recording(block)
@@ -314,6 +298,42 @@ class DocumentWriter:
         return marks.escape_marks(self.page.renderer.words(key, **values))
 
     # --- scripts and outputs
+
+    def is_cell(self, block: model.Script | model.ScriptPart) -> bool:
+        """Whether a notebook has the whole script in a cell at the place of this block."""
+        parts = self.page.script_places[block.span.start][0].parts
+        return self.notebook and (not parts or parts[-1].span == block.span)
+
+    def _script(self, block: model.Script | model.ScriptPart) -> str:
+        """Write a script or a part of one, with the outputs that follow it."""
+        script, first = self.page.script_places[block.span.start]
+        begins = isinstance(block, model.Script)
+        name = marks.link(
+            marks.code_span(block.path), self.locate(self.page.place.href(block.path))
+        )
+        if number := self.number(block.label):
+            name = f"**{marks.escape_marks(number)}** {name}"
+        if self.is_cell(block):
+            return self.words("exports.cell_below", path="\ue000").replace("\ue000", name)
+        recordings = self.page.script_outputs.get(block.span.start, ())
+        parts = [self.recording(recording) for recording in recordings]
+        if self.notebook and block.show == "hidden":
+            return "\n\n".join(parts)
+        if begins and not self.notebook:
+            command = marks.code_span(shlex.join(("python", block.path, *script.args)))
+            run = f"{self.words('code.run')}: {command}"
+            if script.requires:
+                run += f" ({self.words('code.requires', modules=', '.join(script.requires))})"
+            parts.insert(0, run)
+        if script.parts:
+            last = first + block.code.text.rstrip("\n").count("\n")
+            lines = self.words("code.lines", first=first, last=last)
+            name += f", {lines if first < last else self.words('code.line', first=first)}"
+        parts[:0] = [f"{name}:", marks.fence("python", block.code.text.rstrip("\n"))]
+        if isinstance(block, model.Script) and not recordings and not self.notebook:
+            receipt = script_receipt(self.page, block)
+            parts.append(f"*{marks.escape_marks(receipt.text)}*")
+        return "\n\n".join(parts)
 
     def recording(self, block: model.Recording) -> str:
         """Write an output with its caption and its receipt."""

@@ -56,9 +56,9 @@ _CODE_WORD = re.compile(
     r"|(?<=\")[A-Za-z]\w+(?=\")"
 )
 """A word of code that inline code could mean."""
-_CODE = (
-    model.Script | model.PlainCode | model.CodeBlock | model.Mjcf | model.FeatureBlock
-) | model.Recording
+_CODE = (model.Script | model.ScriptPart | model.PlainCode | model.CodeBlock) | (
+    model.Mjcf | model.FeatureBlock | model.Recording
+)
 _CALLED = re.compile(r"([A-Za-z_]\w*)\(.*\)")
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
 _DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
@@ -128,6 +128,8 @@ def document_names(document: model.Document) -> DocumentNames | None:
     places: list[Span] = []
     words: set[str] = set()
     names = CodeNames((), frozenset(), {}, {}, {})
+    for script in model.document_scripts(document):
+        _read_script(script, names)
     inner: set[int] = set()
     for block in model.document_blocks(document):
         if isinstance(block, model.FeatureBlock):
@@ -139,17 +141,15 @@ def document_names(document: model.Document) -> DocumentNames | None:
             if isinstance(block, model.FeatureBlock):  # its inline code makes claims of its own
                 text = re.sub(r"(?<!`)`[^`\n]+`(?!`)", "", text)
             words.update(_CODE_WORD.findall(text))
-        if isinstance(block, model.Script):
-            _read_script(block, names)
         link_parts: set[int] = set()
         for inline in model.walk_inlines(model.block_inlines(block)):
-            script = ""
+            path = ""
             if isinstance(inline, model.Link):
                 link_parts |= {id(child) for child in model.walk_inlines(inline.children)}
                 if isinstance(inline.target, model.ExampleTarget) and len(inline.children) == 1:
-                    script, inline = inline.target.path, inline.children[0]
+                    path, inline = inline.target.path, inline.children[0]
             if isinstance(inline, model.CodeSpan) and not inline.literal:
-                for claim, place in claims_of(inline, script):
+                for claim, place in claims_of(inline, path):
                     claims.append(
                         replace(
                             claim, linked=may_link and claim.linked and id(inline) not in link_parts

@@ -2,10 +2,10 @@
 
 1. A new Markdown cell begins at each heading and after each script. The id of a cell depends on the
    heading above it, or on its script.
-2. Each script is a cell of its own. The magic `%%example`, defined by a cell at the start, writes
-   the cell to its file and runs it in a process of its own, under the conditions of recorded
-   outputs: `__file__`, `sys.argv`, `sys.exit`, imports of other scripts and the hash seed are as
-   they are when the course is checked, and scripts do not share state.
+2. Each script is a cell of its own, at the place of its last part. The magic `%%example`, defined
+   by a cell at the start, writes the cell to its file and runs it in a process of its own, under
+   the conditions of recorded outputs: `__file__`, `sys.argv`, `sys.exit`, imports of other scripts
+   and the hash seed are as they are when the course is checked, and scripts do not share state.
 3. Where the course map says in `[launch]` where notebooks can be run, the first cell with code
    installs the packages, in the versions of the runs that were verified.
 4. A cell at the start contains the files that scripts need (models, `mjcourse`, other scripts),
@@ -67,7 +67,7 @@ def note_cells(inputs: PageInputs, page: PageContext | None, body: str) -> bytes
     if references := writer.references():
         cells.append(_text_cell("references", references))
     for note in footnotes:
-        for script in _find_scripts(note.blocks):
+        for script in _find_scripts(writer, note.blocks):
             cells += _script_cells(writer, "footnotes", script)
     counts: Counter[str] = Counter()
     for cell in cells:
@@ -119,37 +119,48 @@ def _block_cells(writer: DocumentWriter, blocks: Iterable[model.Block]) -> Itera
         if isinstance(block, model.Heading) and block.level <= _MAX_LEVEL:
             yield from flush()
             section = block.anchor
-        if not isinstance(block, model.Script):
+        scripts = _find_scripts(writer, (block,))
+        if block not in scripts:
             pending.append(block)
-        if scripts := _find_scripts((block,)):
+        if scripts:
             yield from flush()
             for script in scripts:
                 yield from _script_cells(writer, section, script)
     yield from flush()
 
 
-def _find_scripts(blocks: tuple[model.Block, ...]) -> list[model.Script]:
-    return [block for block in model.walk_blocks(blocks) if isinstance(block, model.Script)]
+_ScriptBlock: TypeAlias = "model.Script | model.ScriptPart"
 
 
-def _script_cells(writer: DocumentWriter, section: str, block: model.Script) -> Iterator[Cell]:
+def _find_scripts(writer: DocumentWriter, blocks: tuple[model.Block, ...]) -> list[_ScriptBlock]:
+    """The blocks at whose places a cell has a script: of one with parts, the last part."""
+    return [
+        block
+        for block in model.walk_blocks(blocks)
+        if isinstance(block, model.Script | model.ScriptPart) and writer.is_cell(block)
+    ]
+
+
+def _script_cells(writer: DocumentWriter, section: str, block: _ScriptBlock) -> Iterator[Cell]:
+    script = writer.page.script_places[block.span.start][0]
     recordings = writer.page.script_outputs.get(block.span.start, ())
     run = writer.page.inputs.runs.get(block.path)
     is_run = run is not None and run.outcome is Outcome.OK
     output = None
     remarks: list[str] = []
     for recording in recordings:
-        if is_run and output is None and not isinstance(recording.body, model.Table):
+        is_first = is_run and output is None and not script.parts
+        if is_first and not isinstance(recording.body, model.Table):
             output = f"{recording.body.text.rstrip()}\n"
             remarks.append(f"{writer.caption(recording)} {writer.receipt(recording)}")
         else:
             remarks.append(writer.recording(recording))
-    if block.norun:
+    if script.norun:
         remarks.insert(0, writer.words("exports.norun"))
-    options = [f"--requires={','.join(block.requires)}"] if block.requires else []
-    options += ["--norun"] if block.norun else []
-    magic = shlex.join((_MAGIC, *options, block.path, *block.args))
-    yield code_cell(f"code-{_slug(block.path)}", f"{magic}\n{block.code.text}", output)
+    options = [f"--requires={','.join(script.requires)}"] if script.requires else []
+    options += ["--norun"] if script.norun else []
+    magic = shlex.join((_MAGIC, *options, script.path, *script.args))
+    yield code_cell(f"code-{_slug(script.path)}", f"{magic}\n{script.code.text}", output)
     if remarks:
         yield _text_cell(section, "\n\n".join(remarks))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
@@ -112,19 +113,22 @@ def check_output_lines(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Di
 
     Nor is a line an answer that its recording leaves out of the comparison.
     """
-    printed = {run.path: run.stdout for run in runs if run.outcome is Outcome.OK}
+    good_runs = {run.path: run for run in runs if run.outcome is Outcome.OK}
     recordings: dict[str, list[Recording]] = {}
     for document in course.documents:
         for recording in find_blocks(document, Recording):
             recordings.setdefault(recording.script or "", []).append(recording)
     course_quizzes = (quiz for document in course.documents for quiz in find_blocks(document, Quiz))
     for question in (q for quiz in course_quizzes for q in quiz.output_questions()):
-        if question.script in printed:
-            lines = printed[question.script].rstrip().split("\n")
+        if (run := good_runs.get(question.script)) is not None:
+            lines = run.stdout.rstrip().split("\n")
             count = len(lines)
             if question.line <= count:
                 line = lines[question.line - 1].rstrip()
-                if any(_is_left_out(course, r, line) for r in recordings.get(question.script, ())):
+                start = sum(len(before) + 1 for before in lines[: question.line - 1])
+                part = bisect_right(run.part_starts, start)
+                of_part = [r for r in recordings.get(question.script, ()) if r.part == part]
+                if any(_is_left_out(course, r, line) for r in of_part):
                     message = f"output line {question.line} of `{question.script}` is not compared"
                     help = "ask for a line that its recorded output compares"
                     yield diagnose("quiz-output", question.line_span, message, help=help)

@@ -149,7 +149,7 @@ class SectionReader:
                 self.add("text", unescape(_TAG.sub(" ", block.html)))
             case model.ThematicBreak():
                 pass
-            case model.CodeBlock() | model.PlainCode() | model.Mjcf():
+            case model.CodeBlock() | model.PlainCode() | model.ScriptPart() | model.Mjcf():
                 self.add("code", block.code.text)
             case model.Script():
                 self._names[block.path] = None

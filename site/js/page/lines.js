@@ -38,7 +38,6 @@ function mark(document, lines) {
     if (!line) break
     line.classList.add('marked')
     unfold(line)
-    line.closest('[hidden]')?.dispatchEvent(new Event('beforematch'))
     elements.push(line)
   }
   return elements

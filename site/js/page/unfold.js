@@ -1,9 +1,13 @@
 /** Opens the folds that a link leads into: not every browser does, and a script that marks lines has to. */
 
 const FOLD = 'details:not([open])'
+const HIDDEN = '[hidden="until-found"]'
 
-/** Open each fold around an element. */
+/** Open each fold around an element, and show it if it is hidden until it is found, as a browser does that finds it. */
 export function unfold(element) {
+  const hidden = element.closest(HIDDEN)
+  hidden?.dispatchEvent(new Event('beforematch'))
+  hidden?.removeAttribute('hidden')
   for (let fold = element.closest(FOLD); fold; fold = fold.closest(FOLD)) fold.open = true
 }
 
@@ -12,7 +16,7 @@ export function unfoldLinked(window) {
   const open = () => {
     const target = window.document.getElementById(decode(window.location.hash.slice(1)))
     const text = target?.matches('.further > :first-child') ? target.nextElementSibling : target
-    if (!text?.closest(FOLD)) return
+    if (!text?.closest(`${FOLD}, ${HIDDEN}`)) return
     unfold(text)
     target.scrollIntoView()
   }

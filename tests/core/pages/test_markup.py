@@ -190,7 +190,7 @@ def test_code_without_a_file_is_shown_with_its_language_escaped(make: Make) -> N
         '<div class="code" data-copy>\n<pre tabindex="0" role="group" aria-label="Code">'
         '<code class="language-sh">ls *.py\n</code></pre>\n</div>\n'
     )
-    assert 'class="language-python"' in make("```python fragment\nx = (\n```\n").html()
+    assert 'class="language-python"' in make("```python\nx = (\n```\n").html()
     hostile = make('```"><script>alert(1)</script>\nx\n```\n').html()
     assert "<script" not in hostile
 

@@ -269,7 +269,7 @@ def test_numbers_are_written(make: Make) -> None:
     text = (
         "## Part {#part}\n\n$$\na = b % so\n$$ {#eq:one}\n\nBy $$c$$ {#eq:two} and [](#eq:two), "
         "from [](#eq:one) and [](#tab:x).\n\nTable: *Some*. {#tab:x}\n\n| a |\n| --- |\n| b |\n\n"
-        "```python fragment {#lst:x}\nx = 1\n```\n"
+        "```python {#lst:x}\nx = 1\n```\n"
     )
     copy = site(make, text)["lessons/0.1-falling.md"].decode()
     assert "[Table 0.1.1](#tab:x)" in copy

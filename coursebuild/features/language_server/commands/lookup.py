@@ -151,7 +151,7 @@ class _Lookup:
                 return Referent(node.kind_span, f"**{label}**\n\n{promise}")
             case model.CodeSpan():
                 return self.look_up_code(node, offset) or self.look_up_name(node, offset)
-            case model.Script() | model.PlainCode() | model.FeatureBlock():
+            case model.Script() | model.ScriptPart() | model.PlainCode() | model.FeatureBlock():
                 return self.look_up_code(node, offset)
             case _:
                 return None
@@ -303,18 +303,22 @@ class _Lookup:
 
     def look_up_code(
         self,
-        node: model.Script | model.PlainCode | model.FeatureBlock | model.CodeSpan,
+        node: (
+            model.Script | model.ScriptPart | model.PlainCode | model.FeatureBlock | model.CodeSpan
+        ),
         offset: int,
     ) -> Referent | None:
-        text = node.span.source.text
+        text, code = node.span.source.text, node.span.text
         for string in _STRING.finditer(text, node.span.start, node.span.end):
             if _covers(place := node.span.source.span(*string.span(2)), offset):
                 model_name = place.text.removeprefix("models/").removesuffix(".xml")
                 if text_and_place := self.describe_model(model_name):
                     return Referent(place, *text_and_place)
         model_names: Iterable[str] = ()
-        if isinstance(node, model.Script):
-            model_names = models_named(node)
+        if isinstance(node, model.Script | model.ScriptPart):
+            scripts = model.document_scripts(self.document)
+            script = next(script for script in scripts if script.path == node.path)
+            model_names, code = models_named(script), script.code.text
         elif isinstance(node, model.FeatureBlock):
             model_names = node.models()
         names = _NAME.finditer(text, node.span.start, node.span.end)
@@ -324,12 +328,12 @@ class _Lookup:
         end = text.find(".", offset, match.end())
         span = node.span.source.span(match.start(), end if end >= 0 else match.end())
         *path, last = span.text.split(".")
-        name = members(self.texts, tuple(path), node.span.text).get(last) if path else None
+        name = members(self.texts, tuple(path), code).get(last) if path else None
         if name is None:
             return None
-        code = fence("python" if "(" in name.text else "c", name.text)
+        head = fence("python" if "(" in name.text else "c", name.text)
         shape = _describe_shape(name.extent, self.facts(sorted(model_names)))
-        return Referent(span, _paragraphs(f"{code}\n{escape_text(name.doc)}", shape))
+        return Referent(span, _paragraphs(f"{head}\n{escape_text(name.doc)}", shape))
 
     def look_up_name(self, code: model.CodeSpan, offset: int) -> Referent | None:
         note = document_names(self.document)

@@ -159,9 +159,18 @@ def _find_names(
         case "element" | "attribute" | "name":
             return _find_engine_names(texts, cursor.source, subject, prefix)
         case _:
-            _, code = fence_at(cursor.source, cursor.start) or ("", cursor)
-            names = members(texts, tuple(prefix["path"].split(".")), code.text)
+            names = members(texts, tuple(prefix["path"].split(".")), _code_at(texts, cursor))
             return {name: member.doc for name, member in names.items()}
+
+
+def _code_at(texts: OpenTexts, cursor: Span) -> str:
+    """The code at a place, that of a script with all its parts."""
+    document = texts.document(cursor.source)
+    for script in () if document is None else model.document_scripts(document):
+        if any(part.span.start <= cursor.start <= part.span.end for part in script.parts):
+            return script.code.text
+    _, code = fence_at(cursor.source, cursor.start) or ("", cursor)
+    return code.text
 
 
 def _find_engine_names(

@@ -1,0 +1,162 @@
+"""Scripts in parts: which part printed what, and that the script sees nothing of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
+from pathlib import Path
+
+import pytest
+
+from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.run.script_server import ScriptServer
+from support.runners import Run, both_ways, job
+
+pytestmark = pytest.mark.site
+
+
+def lines_of(parts: Sequence[str]) -> list[int]:
+    """The lines at which further parts begin, where each part ends with its line."""
+    return [1 + lines for lines in accumulate(part.count("\n") + 1 for part in parts[:-1])]
+
+
+def outputs(result: ScriptRun) -> list[str]:
+    edges = (0, *result.part_starts, len(result.stdout))
+    return [result.stdout[start:end] for start, end in pairwise(edges)]
+
+
+PRINTED: list[tuple[str, Sequence[str], Sequence[str]]] = [
+    (
+        "buffered",
+        ["print('a')", "print('b')\nprint('c')", "print('d', end='')"],
+        ["a|", "b|c|", "d"],
+    ),
+    ("nothing", ["x = 1", "# a comment", "", "print(x)", "def f(): pass"], ["", "", "", "1|", ""]),
+    ("half a line", ["print('a', end='')", "print('b')"], ["a", "b|"]),
+    (
+        "the C library",
+        ["import ctypes\nc = ctypes.CDLL(None)\nc.printf(b'a')", "c.puts(b'b')", "c.printf(b'c')"],
+        ["a", "b|", "c"],
+    ),
+    ("os.write", ["import os\nprint('a')\nos.write(1, b'b')", "os.write(1, b'c')"], ["ba|", "c"]),
+    (
+        "another process",
+        [
+            "import subprocess\nprint('a')",
+            "subprocess.run(['echo', 'b'])\nprint('c')",
+            "subprocess.run('printf d', shell=True)",
+        ],
+        ["a|", "b|c|", "d"],
+    ),
+    (
+        "threads",
+        [
+            "from threading import Thread\nt = Thread(target=lambda: [print(n) for n in 'abc'])",
+            "t.start(); t.join()",
+            "print('d')",
+        ],
+        ["", "a|b|c|", "d|"],
+    ),
+    ("at the exit", ["import atexit\natexit.register(print, 'bye')", "print('b')"], ["", "b|bye|"]),
+    (
+        "a copy of the process",
+        [
+            "import os\nprint('a', flush=True)\nchild = os.fork()",
+            "if child: os.waitpid(child, 0)\nelse: print('c', flush=True)",
+            "if child: print('d')",
+        ],
+        ["a|", "c|", "d|"],
+    ),
+    (
+        "a stream in place of the output",
+        [
+            "import io, sys\nprint('a')\nsys.stdout = io.StringIO()",
+            "print('b')\nkept, sys.stdout = sys.stdout.getvalue(), sys.__stdout__",
+            "print(kept.upper(), end='')",
+        ],
+        ["a|", "", "B|"],
+    ),
+    (
+        "an output that goes elsewhere for a while",
+        [
+            "import os\nprint('a', flush=True)\nkept = os.dup(1)\nother = os.memfd_create('x')",
+            "os.dup2(other, 1)\nprint('b')",
+            "print('c', flush=True)\nos.dup2(kept, 1)",
+            "print(os.lseek(other, 0, 1))",
+        ],
+        ["a|", "", "", "4|"],
+    ),
+    ("a closed stream", ["import sys\nprint('a')\nsys.stdout.close()", "x = 1"], ["a|", ""]),
+    ("letters of several bytes", ["print('ä€😀')", "print('ö')"], ["ä€😀|", "ö|"]),
+    ("line ends", [r"print('a\r\nb\r\n', end='')", r"print('\r\nc')"], ["a|b|", "|c|"]),
+    ("an end in the first part", ["print('a')\nraise SystemExit", "print('b')"], ["a|", ""]),
+    (
+        "an end without ceremony",
+        ["import os\nprint('a', flush=True)\nos._exit(0)", "1"],
+        ["a|", ""],
+    ),
+    (
+        "an output that must not wait",
+        ["import os\nos.set_blocking(1, False)\nprint('x' * 9000)", "print('b')"],
+        ["x" * 9000 + "|", "b|"],
+    ),
+    (
+        "a docstring and a feature below a comment",
+        ["# first", '"""Of the module."""\nfrom __future__ import annotations', "print(__doc__)"],
+        ["", "", "Of the module.|"],
+    ),
+]
+
+
+def test_each_part_has_what_it_printed(run: Run) -> None:
+    for title, parts, expected in PRINTED:
+        result = run("\n".join(parts), part_lines=lines_of(parts))
+        assert result.outcome is Outcome.OK, (title, result.stderr)
+        assert outputs(result) == [text.replace("|", "\n") for text in expected], title
+
+
+SEEN = '''"""Of the module."""
+import inspect, sys, warnings
+x: int = 1
+def f():
+    return 1
+print(__doc__, __file__, __annotations__)
+"no docstring"
+print(inspect.getsource(f), f.__code__.co_firstlineno, sys._getframe().f_code.co_name)
+print(sorted(globals()), sorted(vars(sys.modules["builtins"])))
+print(sys._getframe().f_lineno, inspect.stack()[0].lineno)
+@(lambda function: function)
+class C:
+    y: str
+print(C.__doc__, inspect.getsource(C), sys.modules["__main__"].__dict__ is globals())
+'''
+WRONG = "def f(x):\n    return 1 / x\nprint('before')\nf(0)\nprint('after')\n"
+
+
+@both_ways
+def test_a_script_sees_nothing_of_its_parts(run: Run) -> None:
+    whole, parted = run(SEEN), run(SEEN, part_lines=(3, 6, 7, 8, 10, 11, 14))
+    assert (whole.stdout, whole.stderr) == (parted.stdout, parted.stderr)
+    assert parted.outcome is Outcome.OK and len(parted.part_starts) == 7
+    whole, parted = run(WRONG), run(WRONG, part_lines=(3, 4, 5))
+    assert parted.outcome is Outcome.FAILED and 'x.py", line 4, in <module>' in parted.stderr
+    assert (whole.stdout, whole.stderr) == (parted.stdout, parted.stderr)
+    assert outputs(parted) == ["", "before\n", "", ""]
+
+
+def test_what_was_printed_before_a_part_without_end_is_known(
+    server: ScriptServer, root: Path
+) -> None:
+    code = "print('a')\nwhile True:\n    pass\n"
+    (root / "examples/x.py").write_text(code)
+    (result,) = server.run(root, [job(timeout=1.0, part_lines=[2])], parallel=1)
+    assert result.outcome is Outcome.TIMEOUT and outputs(result) == ["a\n", ""]
+    assert re.search(r'x\.py", line [23] in <module>', result.stderr)
+
+
+def test_marks_of_an_output_beyond_the_limit_are_cut(run: Run) -> None:
+    code = "print('x' * 600_000)\nprint('y' * 600_000)\nprint('z')\n"
+    result = run(code, part_lines=(2, 3))
+    assert result.outcome is Outcome.OUTPUT_LIMIT and result.stdout.startswith("x")
+    assert "".join(outputs(result)) == result.stdout and set(outputs(result)[0]) == {"x", "\n"}
