@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.model.inlines import Inline, Label, Located, RawHtml
+from coursebuild.core.model.inlines import Inline, Label, Located, RawHtml, SourceMark
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 _TITLE = re.compile(r"\ufeff?(?:[ \t\r]*\n)*# +(.*\S)")
@@ -45,6 +45,7 @@ class Paragraph(Labelled, frozen=True):
     tight: bool = False
     figure: bool = False
     """Whether it begins with `Figure:` and shows an image; the rest of it is the caption."""
+    source_mark: SourceMark | None = None
 
 
 class ListItem(Located, frozen=True):
@@ -59,6 +60,7 @@ class ListBlock(Located, frozen=True):
 
     items: tuple[ListItem, ...]
     start: int | None
+    source_mark: SourceMark | None = None
 
 
 class BlockQuote(Located, frozen=True):
@@ -124,6 +126,7 @@ class Table(Labelled, frozen=True):
     rows: tuple[tuple[Cell, ...], ...]
     caption: tuple[Inline, ...] = ()
     """The rest of a paragraph `Table: …` above it."""
+    source_mark: SourceMark | None = None
 
 
 class FigureName(Struct, frozen=True):
@@ -259,8 +262,10 @@ class PlainCode(Labelled, frozen=True):
     source: SourcePart | None = None
 
 
-class FeatureBlock(Labelled, frozen=True):
+class FeatureBlock(Labelled, frozen=True, kw_only=True):
     """A block that a feature adds; its methods answer what the rest of the tool must know."""
+
+    source_mark: SourceMark | None = None
 
     def child_blocks(self) -> tuple[Block, ...]:
         """The Markdown blocks in it, in the order of the page."""

@@ -302,9 +302,6 @@ class Course(Struct, frozen=True):
     licence: str
     engine: str | None
     engine_span: Span
-    truth: float | None
-    """The share of the numbers in the text that must be proven."""
-    truth_span: Span
     comparison: Comparison
     filters: tuple[Filter, ...]
     callouts: tuple[CalloutKind, ...]

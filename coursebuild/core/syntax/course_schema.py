@@ -9,7 +9,7 @@ import copy
 import re
 import unicodedata
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import msgspec
 from msgspec import Meta, Struct
@@ -240,6 +240,10 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
 class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
     """How recorded outputs are compared where a fence says nothing."""
 
+    replaced: ClassVar = {
+        "truth": "delete it: no share is required; `check --truth` lists what nothing gives"
+    }
+
     compare: Annotated[
         Literal["exact", "digits", "rtol"] | None,
         describe("the same text, the same digits, or within rtol and atol; else exact"),
@@ -253,10 +257,6 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
     env: Annotated[dict[str, str], describe("environment variables of scripts")] = {}
     python: Annotated[
         InterpreterPath | None, describe("what runs the scripts, relative to the course's folder")
-    ] = None
-    truth: Annotated[
-        Annotated[float, Meta(ge=0, le=1)] | None,
-        describe("the share of the numbers in lessons that must be proven, from 0 to 1"),
     ] = None
     strict: Annotated[bool, describe("warnings are errors, as with `--strict`")] = False
     unproven: Annotated[

@@ -125,8 +125,6 @@ def _build_course(
         engine=settings.engine,
         engine_span=table.place("engine"),
         comparison=comparison(gate, verify),
-        truth=verify.truth,
-        truth_span=gate.place("truth"),
         filters=verify.filter,
         callouts=tuple(kinds.values()),
         silences=fields.silence,
