@@ -50,7 +50,8 @@ _MODEL_PATH = re.compile(r"models/([\w/-]+)\.xml")
 
 _COUNTS = 12
 _YEARS = range(1600, 2100)
-_UNIT = re.compile(rf"[\s\u00a0\u202f]*({UNITS_SHOWN})")
+_UNIT = re.compile(rf"(?:\s*×\s*[\d.]+)*[\s\u00a0\u202f]*({UNITS_SHOWN})")
+"""The unit behind a number, or behind those with which it is multiplied: `20 × 10 × 4 cm`."""
 _HEADER_UNIT = re.compile(r"[(\[]([^()\[\]]+)[)\]]\s*$")
 _DECIMAL = re.compile(r"\d\.\d")
 _MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")

@@ -23,7 +23,7 @@ t = {max = 2.5}
 states = {v = {start = 0, rate = "-9.81"}}
 ```
 
-A box of `20 × 10 cm`{given="lab"} turns with 6.25 rad/s, or falls with 9.81 m/s². {given="lab"}
+A box of 20 × 10 cm turns with 6.25 rad/s, or falls with 9.81 m/s². {given="lab"}
 
 It turns with 6.25 rad/s, and not for 2.5 s. {given="#lab:box"}
 
