@@ -224,7 +224,8 @@ class Session:
             if source != owner.document.source or self._diagnostics_by_file.get(path):
                 course = self.library.course
                 (parsed_document,) = self._reader.read_documents(
-                    [(source, isinstance(owner, Lesson))], course.callout_names, course.words
+                    [(source, isinstance(owner, Lesson), course.words_of(owner))],
+                    course.callout_names,
                 )
                 diagnostics = (*read.diagnostics, *parsed_document.diagnostics)
                 changed_owners.append((replace(owner, document=parsed_document.value), diagnostics))

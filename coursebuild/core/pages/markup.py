@@ -188,7 +188,7 @@ class HtmlWriter:
             case model.Paragraph() if block.figure:
                 image = next(part for part in block.children if isinstance(part, model.Image))
                 caption = self._inlines(part for part in block.children if part is not image)
-                return self.figure(block, image, Markup(caption.removeprefix("Figure:").strip()))
+                return self.figure(block, image, Markup(caption.strip()))
             case model.Paragraph():
                 inner = self._inlines(block.children)
                 return inner if block.tight else f"<p{_source(block.source_mark)}>{inner}</p>\n"

@@ -24,6 +24,7 @@ from coursebuild.core.drawing.contrast import (
 from coursebuild.core.model import Filter, LessonTable, Limits, Silence
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
 from coursebuild.core.model.fields import (
+    Language,
     NotNegative,
     RelativeTolerance,
     Slug,
@@ -158,9 +159,6 @@ def check_launch(node: ObjectNode, fields: Launch, repository: str | None) -> It
 
 Url: TypeAlias = Annotated[
     str, matching(r"^https?://[^\s/]\S*$", "an address that begins with `https://` or `http://`")
-]
-Language: TypeAlias = Annotated[
-    str, matching(r"^[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*$", "a language tag, as in `en` or `pt-BR`")
 ]
 Version: TypeAlias = Annotated[
     str, matching(r"^[0-9]+\.[0-9]+\.[0-9]+$", "a version of three numbers, as in `3.14.0`")
@@ -312,6 +310,7 @@ class PageTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = ""
     menu: Annotated[bool, describe("whether it is in the menu of every page")] = True
     names: Annotated[bool, describe("whether names in its code have to be known")] = True
+    language: Annotated[Language | None, describe("its language, if not the course's")] = None
 
 
 class SecurityTable(Struct, frozen=True, forbid_unknown_fields=True):

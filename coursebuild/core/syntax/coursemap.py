@@ -131,7 +131,15 @@ def _build_course(
         levels=levels,
         pages=tuple(
             model.Page(
-                node.span, page.id, page.title, page.file, None, page.menu, page.names, page.section
+                node.span,
+                page.id,
+                page.title,
+                page.file,
+                None,
+                page.menu,
+                page.names,
+                page.section,
+                page.language,
             )
             for node, page in zip(root.objects("page"), fields.page, strict=True)
         ),

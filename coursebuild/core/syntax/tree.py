@@ -28,8 +28,7 @@ from coursebuild.core.syntax.html import Balance, find_forbidden, find_media, ta
 from coursebuild.core.syntax.inline_tree import read_inlines
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
-    FIGURE,
-    TABLE,
+    caption_start,
     check_code_above,
     check_missing_body,
     diagnose_wrong_body,
@@ -120,7 +119,7 @@ class TextReader:
         block = self._read_content(content, token)
         if isinstance(block, model.Paragraph):
             return replace(block, span=block.span.to(mark.span), source_mark=mark)
-        blocks = [block]
+        blocks: list[model.Block] = [block]
         self._give(mark, blocks)
         return blocks[0]
 
@@ -150,18 +149,19 @@ class TextReader:
             recording = self._read_recording(children, span)
             if recording is not None:
                 return recording
-        if not self.nested and content.text.startswith(FIGURE):
-            children, shows_image = read_figure(children, span, self.state.figures)
+        if not self.nested and caption_start(content.text, self.state.words.figure):
+            children, shows_image = read_figure(children, span, self.state)
             return model.Paragraph(span, children, token.hidden, shows_image)
         return model.Paragraph(span, children, token.hidden)
 
     def _read_labelled_caption(self, content: Excerpt) -> model.Block | None:
         """The block of a caption that ends with a label, or that stands above its table."""
         caption, braces = split_label(content)
-        span, following = content.span(), self._peek()
-        if caption.text.startswith(TABLE) and following and following.type == "table_open":
+        span, following, words = content.span(), self._peek(), self.state.words
+        start = caption_start(caption.text, words.table)
+        if start and following and following.type == "table_open":
             label = self.state.take_label(braces, "tab")
-            inlines = self.inlines(trim(caption.slice(len(TABLE))))
+            inlines = self.inlines(trim(caption.slice(start)))
             self.index += 1
             table = self._read_table(following)
             mark = model.SourceMark(label.span, label.source) if label and label.source else None
@@ -169,15 +169,14 @@ class TextReader:
             return replace(table, span=whole, label=label, caption=inlines, source_mark=mark)
         if braces is None:
             return None
-        if caption.text.startswith(FIGURE):
+        if caption_start(caption.text, words.figure):
             label = self.state.take_label(braces, "fig")
-            inlines, shows_image = read_figure(self.inlines(caption), span, self.state.figures)
+            inlines, shows_image = read_figure(self.inlines(caption), span, self.state)
             if not shows_image:
                 message = "no image stands in the paragraph of this label"
                 self.state.reject_label(braces, message, "show one: `![…](file.svg)`")
             return model.Paragraph(span, inlines, False, shows_image, label=label)
-        words = (TABLE, *self.state.words.output)
-        if not any(word in caption.text[:24] for word in words):
+        if not any(word in caption.text[:24] for word in (*words.table, *words.output)):
             return None
         inlines, recording = self.inlines(caption), None
         if self._is_caption(caption, inlines):

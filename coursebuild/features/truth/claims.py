@@ -215,7 +215,8 @@ class _Counter:
         for block in blocks:
             first = len(self.open)
             if isinstance(block, model.MathBlock):
-                self.formula(block.tex, block.label and block.label.source, block.span)
+                source = None if block.label is None else block.label.source
+                self.formula(block.tex, source, block.span)
             elif isinstance(block, model.Table):
                 self.inlines(block.caption)
                 self.table(block)
