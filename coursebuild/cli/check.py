@@ -41,7 +41,7 @@ _FLAGS = {
     "--hints": "also show what is only likely to be a mistake",
     "--sensitivity": "repeat recorded runs, move initial states, halve timesteps, and report which "
     "digits hold",
-    "--truth": "list numbers and arithmetic that nothing proves",
+    "--truth": "list results that are stated and not bound",
 }
 
 

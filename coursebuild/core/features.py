@@ -362,9 +362,8 @@ class Feature(Struct, frozen=True, kw_only=True):
     check: Callable[[Course, Collection[Document]], Iterable[Diagnostic]] | None = None
     """The diagnostics about some documents of the course that parsing did not find."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None
-    unproven: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic | str]] | None = None
-    """What nothing in the course proves, given the runs of its scripts, and summary lines, for
-    `check --truth`."""
+    unproven: Callable[[Course], Iterable[Diagnostic]] | None = None
+    """What the course states, and nothing in it gives, for `check --truth`."""
     check_models: (
         Callable[[Course, Callable[[FeatureBlock], ModelFacts | None]], Iterable[Diagnostic]] | None
     ) = None

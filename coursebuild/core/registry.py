@@ -207,11 +207,10 @@ def page_copies() -> tuple[PageCopy, ...]:
     return tuple(sorted(copies, key=lambda copy: not copy.download))
 
 
-def unproven(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic | str, ...]:
-    """What nothing in the course proves, given the runs of its scripts, and summary lines."""
-    runs = tuple(runs)
+def unproven(course: Course) -> tuple[Diagnostic, ...]:
+    """What the course states, and nothing in it gives."""
     makers = (feature.unproven for feature in features() if feature.unproven is not None)
-    return tuple(entry for list_unproven in makers for entry in list_unproven(course, runs))
+    return tuple(entry for list_unproven in makers for entry in list_unproven(course))
 
 
 def summarize(document: Document, mathml: Mathml) -> Parsed[dict[str, Struct]]:

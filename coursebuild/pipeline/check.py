@@ -55,8 +55,8 @@ def check(
 
     `shard` is the part of the scripts and labs that this run takes; `timings` the file into which
     it writes how long each took. `sensitivity`: run again what was recorded from one run, and say
-    which printed digits repeat when initial states are moved a little. `truth`: list what nothing
-    in the course proves.
+    which printed digits repeat when initial states are moved a little. `truth`: list the
+    results that nothing in the course gives.
     """
     with project_lock(options.root, options.progress.say):
         with Reader(options) as reader:
@@ -71,9 +71,8 @@ def check(
             seconds |= {lab.name: lab.seconds for lab in verification.labs if lab.tried}
             names_of_course = [*(e.path for e in extract(course).value), *feature_trials(course)]
             write_timings(timings, seconds, names_of_course)
-        claims = unproven(course, verification.results.runs) if truth else ()
         diagnostics: list[Diagnostic] = []
-        remarks = [claim for claim in claims if isinstance(claim, str)]
+        remarks: list[str] = []
         sensitivities: tuple[Sensitivity, ...] | None = None
         if sensitivity:
             from coursebuild.core.scripts.sensitivity import noise_warnings
@@ -83,10 +82,10 @@ def check(
                 course, checked_course.options, runs, selected, halve=True
             )
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
-        inventory = [claim for claim in claims if isinstance(claim, Diagnostic)]
+        inventory: list[Diagnostic] = []
         if truth:
-            results = verification.results
-            inventory += unproven_units(course, results.runs, results.verdicts)
+            runs, verdicts = verification.results.runs, verification.results.verdicts
+            inventory = [*unproven(course), *unproven_units(course, runs, verdicts)]
         report = checked_course.report(diagnostics, inventory)
         if shard is None:
             remarks += remarks_on_proofs(

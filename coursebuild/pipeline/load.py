@@ -138,9 +138,9 @@ class _Loader:
 
         self._read_map, self._read_declarations = parse_course_map, parse_declarations
         self._check = check_course
-        self._read_documents = lambda sources, callouts, words: [
+        self._read_documents = lambda sources, callouts: [
             parse_document(source, callouts, lesson=lesson, words=words)
-            for source, lesson in sources
+            for source, lesson, words in sources
         ]
 
     def load(self) -> Course | None:
@@ -149,10 +149,12 @@ class _Loader:
         declarations = self._parse_declarations()
         if course is None:
             if self.files.map is not None:
-                lessons = [(source, True) for source in self.files.lessons]
-                self._parse_documents(lessons, frozenset(CALLOUTS), ENGLISH)
+                lessons = [(source, True, ENGLISH) for source in self.files.lessons]
+                self._parse_documents(lessons, frozenset(CALLOUTS))
             return None
-        course = replace(course, words=words_for(template_texts(), course.language))
+        languages = {course.language, *map(course.language_of, course.owners)}
+        words = {name: words_for(template_texts(), name) for name in sorted(languages)}
+        course = replace(course, words=words)
         self._compare_lessons(course)
         course = self._attach_documents(course, self._find_pages(course))
         course = replace(
@@ -386,9 +388,11 @@ class _Loader:
     def _attach_documents(self, course: Course, pages: Iterable[Source]) -> Course:
         """Parse the lessons, also those that the map does not name, and the pages."""
         planned = {lesson.path for lesson in course.lessons if lesson.status == "planned"}
-        sources = [(s, True) for s in self.files.lessons if s.path not in planned]
-        sources += [(source, False) for source in pages]
-        documents = self._parse_documents(sources, course.callout_names, course.words)
+        owners = {owner.path: owner for owner in course.owners}
+        texts = [(s, True) for s in self.files.lessons if s.path not in planned]
+        texts += [(source, False) for source in pages]
+        sources = [(s, lesson, course.words_of(owners.get(s.path))) for s, lesson in texts]
+        documents = self._parse_documents(sources, course.callout_names)
 
         def attach(lesson: Lesson) -> Lesson:
             return replace(lesson, document=documents.get((lesson.path, True)))
@@ -404,12 +408,12 @@ class _Loader:
         )
 
     def _parse_documents(
-        self, sources: list[tuple[Source, bool]], callouts: frozenset[str], words: Words
+        self, sources: list[tuple[Source, bool, Words]], callouts: frozenset[str]
     ) -> dict[tuple[str, bool], Document]:
         """Parse texts; return the documents by path, and by whether they are lessons."""
         documents = {}
-        parsed_documents = self._read_documents(sources, callouts, words)
-        for (source, lesson), parsed_document in zip(sources, parsed_documents, strict=True):
+        parsed_documents = self._read_documents(sources, callouts)
+        for (source, lesson, _), parsed_document in zip(sources, parsed_documents, strict=True):
             self.diagnostics += parsed_document.diagnostics
             documents[source.path, lesson] = parsed_document.value
         return documents

@@ -201,15 +201,15 @@ class Reader:
     # --- documents
 
     def read_documents(
-        self, sources: Sequence[tuple[Source, bool]], callouts: frozenset[str], words: Words
+        self, sources: Sequence[tuple[Source, bool, Words]], callouts: frozenset[str]
     ) -> list[Parsed[Document]]:
         """Return documents without their prose, and what is wrong in them.
 
-        Each text is given with whether it is a lesson.
+        Each text is given with whether it is a lesson, and the words by which it is read.
         """
         texts = [
             SourceText.of(source, callouts, lesson=lesson, words=words)
-            for source, lesson in sources
+            for source, lesson, words in sources
         ]
         summaries = {text.key: self._find_summary(text) for text in texts}
         missing = [text for text in texts if summaries[text.key] is None]
@@ -367,7 +367,9 @@ class Reader:
             new = renderer_for(
                 assets, request.language, request.templates, is_manual=request.is_manual
             )
-            self._renderers = {kind: new}
+            if len(self._renderers) > 8:  # as many as a preview made of changed templates
+                self._renderers.clear()
+            self._renderers[kind] = new
         renderer = self._renderers[kind]
         return renderer if whole is None else replace(renderer, formulas=whole.formulas)
 

@@ -330,18 +330,19 @@ def text_of(entry: PageEntry, library: Library) -> SourceText | None:
     lesson = library.lessons.get(entry.id)
     is_lesson = lesson is not None and lesson.document is document
     course = library.course
+    owner = next((owner for owner in course.owners if owner.document is document), None)
     return SourceText.of(
-        document.source, course.callout_names, lesson=is_lesson, words=course.words
+        document.source, course.callout_names, lesson=is_lesson, words=course.words_of(owner)
     )
 
 
 def page_request(entry: PageEntry, library: Library, mistakes: Mistakes = ()) -> PageRequest:
     """Make the request to draw a page."""
-    course = library.course
+    course, inputs = library.course, entry.inputs(library)
     return PageRequest.of(
-        entry.inputs(library),
+        inputs,
         text_of(entry, library),
-        course.language,
+        inputs.head.language or course.language,
         course.base_url,
         course.theme.template_texts,
         is_manual=course.is_manual,
@@ -389,7 +390,7 @@ def _find_in_texts(course: Course, page: str, url: str) -> Span | None:
             continue
         lesson = isinstance(owner, Lesson)
         document = parse_document(
-            summary.source, course.callout_names, lesson=lesson, words=course.words
+            summary.source, course.callout_names, lesson=lesson, words=course.words_of(owner)
         ).value
         for node in (*document_blocks(document), *document_inlines(document)):
             if isinstance(node, HtmlBlock | RawInline) and (at := find_address(node.html, url)):

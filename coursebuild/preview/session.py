@@ -233,7 +233,7 @@ class Session:
         assert self.library is not None
         course = self.library.course
         (parsed_document,) = self._reader.read_documents(
-            [(source, isinstance(owner, Lesson))], course.callout_names, course.words
+            [(source, isinstance(owner, Lesson), course.words_of(owner))], course.callout_names
         )
         return parsed_document
 

@@ -16,7 +16,6 @@ from support.fixture_cases import fixture_text
 from support.live_course import Live
 from support.live_course import live as live
 from support.markdown_files import DOCS, fences
-from support.rendered_course import Make
 from support.scratch_course import Folder
 
 CODE = [fence for fence in fences(DOCS / "how-to/features.md") if fence.kind == "python"]
@@ -299,16 +298,6 @@ def test_a_feature_that_fails_is_named_with_the_lesson(course: Folder) -> None:
         assert f"for {course.lesson()}{line}\n" in last_lines, error
         if "Shout(fence" in new:
             assert "TypeError: `parse` returned a value of the type Shout; return `Parsed(" in error
-
-
-def test_table_links_to_the_lessons(make: Make) -> None:
-    text = "It weighs 1.5 kg.\n\n```truth\n```\n"
-    site = make(text, **{"1.1": "Nothing."}).site()
-    page = site["lessons/0.1-falling.html"].decode()
-    assert '<a href="0.1-falling.html">0.1 Falling</a></td>' in page
-    assert '<a href="1.1-spinning.html">1.1 Spinning &lt;fast&gt;</a>' in page
-    copy = site["lessons/0.1-falling.md"].decode()
-    assert '| <a href="0.1-falling.html">0.1 Falling</a> | 0.0 % | 1 |' in copy
 
 
 def test_help_shows_each_part_of_the_interface() -> None:

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.model.inlines import Inline, Label, Located, RawHtml
+from coursebuild.core.model.inlines import Inline, Label, Located, RawHtml, SourceMark
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 _TITLE = re.compile(r"\ufeff?(?:[ \t\r]*\n)*# +(.*\S)")
@@ -46,6 +46,7 @@ class Paragraph(Labelled, frozen=True):
     tight: bool = False
     figure: bool = False
     """Whether it begins with `Figure:` and shows an image; the rest of it is the caption."""
+    source_mark: SourceMark | None = None
 
 
 class ListItem(Located, frozen=True):
@@ -60,6 +61,7 @@ class ListBlock(Located, frozen=True):
 
     items: tuple[ListItem, ...]
     start: int | None
+    source_mark: SourceMark | None = None
 
 
 class BlockQuote(Located, frozen=True):
@@ -127,6 +129,7 @@ class Table(Labelled, frozen=True):
     """The rest of a paragraph `Table: …` above it."""
     comma: bool = False
     """Whether a comma may stand before the decimals of its numbers."""
+    source_mark: SourceMark | None = None
 
 
 class FigureName(Struct, frozen=True):
@@ -292,8 +295,10 @@ class PlainCode(Labelled, frozen=True):
     source: SourcePart | None = None
 
 
-class FeatureBlock(Labelled, frozen=True):
+class FeatureBlock(Labelled, frozen=True, kw_only=True):
     """A block that a feature adds; its methods answer what the rest of the tool must know."""
+
+    source_mark: SourceMark | None = None
 
     def child_blocks(self) -> tuple[Block, ...]:
         """The Markdown blocks in it, in the order of the page."""

@@ -26,12 +26,14 @@ CALLOUTS: tuple[str, ...] = tuple(
 
 
 class Words(Struct, frozen=True):
-    """The words by which a text is read: `Output:` above an output, mentions as in "Lesson 4.3".
+    """The words by which a text is read: of captions, and of mentions as in "Lesson 4.3".
 
-    Of a course in another language they are the interface texts `words.…`, then the English ones.
+    Of a text in another language they are the interface texts `words.…`, then the English ones.
     """
 
     output: tuple[str, ...] = ("Output",)
+    figure: tuple[str, ...] = ("Figure",)
+    table: tuple[str, ...] = ("Table",)
     lesson: tuple[str, ...] = ("Lesson",)
     lessons: tuple[str, ...] = ("Lessons",)
     level: tuple[str, ...] = ("Level",)
@@ -40,6 +42,8 @@ class Words(Struct, frozen=True):
     """Between the numbers of lessons or levels."""
     decimal: tuple[str, ...] = (".",)
     """The signs before the decimals of a number."""
+    range: tuple[str, ...] = ("to",)
+    """Those of them that stand for all numbers between."""
 
 
 ENGLISH = Words()
@@ -159,6 +163,9 @@ class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
         Annotated[int, Meta(ge=1, le=100_000)] | None,
         describe("minutes of the sections marked `{.further}`"),
     ] = None
+    language: Annotated[fields.Language | None, describe("its language, if not the course's")] = (
+        None
+    )
 
 
 class Lesson(LessonTable, frozen=True, kw_only=True):
@@ -200,6 +207,7 @@ class Page(Struct, frozen=True):
     """Whether names in its inline code have to be known."""
     section: str = ""
     """The heading under which it stands among the pages; empty where it is in no list."""
+    language: str | None = None
 
     @property
     def is_home(self) -> bool:
@@ -305,9 +313,6 @@ class Course(Struct, frozen=True):
     licence: str
     engine: str | None
     engine_span: Span
-    truth: float | None
-    """The share of the numbers in the text that must be proven."""
-    truth_span: Span
     comparison: Comparison
     filters: tuple[Filter, ...]
     callouts: tuple[CalloutKind, ...]
@@ -348,7 +353,8 @@ class Course(Struct, frozen=True):
     launch: Launch | None = None
     """Where notebooks can be run; its `repository` is set."""
     theme: Theme = Theme()
-    words: Words = Words()
+    words: Mapping[str, Words] = {}
+    """By language: of the course, and of the lessons and pages in others."""
     version: str = ""
     """Of the course, the name of a folder; sites of several may stand beside each other."""
     bibliography: Source | None = None
@@ -367,6 +373,15 @@ class Course(Struct, frozen=True):
         """How a recorded output is compared."""
         comparison = recording.comparison or self.comparison
         return replace(comparison, course_filters=self.filters)
+
+    def language_of(self, owner: Owner) -> str:
+        """The language of a lesson or page."""
+        return owner.language or self.language
+
+    def words_of(self, owner: Owner | None) -> Words:
+        """The words by which a text is read; one that the map does not name is as the course."""
+        language = self.language if owner is None else self.language_of(owner)
+        return self.words.get(language, ENGLISH)
 
     @property
     def callout_names(self) -> frozenset[str]:

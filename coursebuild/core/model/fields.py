@@ -45,6 +45,11 @@ def matching(pattern: str, expects: str) -> Meta:
     return Meta(pattern=pattern, extra={"expects": expects})
 
 
+Language: TypeAlias = Annotated[
+    str, matching(r"^[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*$", "a language tag, as in `en` or `pt-BR`")
+]
+"""Of a text and of the interface."""
+
 WebPlace: TypeAlias = Annotated[
     str,
     matching(

@@ -64,11 +64,21 @@ class NumberBinding(Located, frozen=True):
     script: str | None
     """The path given by `{out=…}`; `None`: the script of the nearest recorded output above."""
     source: str | None = None
-    """Its source from `{given="…"}`, perhaps empty; `None` where a script has printed it."""
+    """Its source from `{given="…"}`, empty for a symbol's value without one; `None` where a script
+    has printed it."""
     unit: str = ""
     """That of a symbol whose value it is."""
     comma: bool = False
     """Whether a comma may stand before its decimals, as in the language of the text."""
+
+
+class SourceMark(Located, frozen=True):
+    """`{given="models/x.xml"}` behind a paragraph, or below one, a list or a table.
+
+    It is the source of all numbers in it that have no mark of their own.
+    """
+
+    source: str
 
 
 LABEL_KINDS = {
@@ -87,7 +97,7 @@ class Label(Located, frozen=True):
     id: str
     """With its prefix and colon."""
     source: str | None = None
-    """The source of its numbers from `given="…"`, perhaps empty; `None` where none is given."""
+    """The source of its numbers from `given="…"`."""
     domain: Excerpt | None = None
     """The conditions of `check="x > 0"`, perhaps empty, under which an identity is tried; `None`
     where `check` does not stand."""

@@ -147,6 +147,8 @@ class PageHead(Struct, frozen=True):
     description: str
     json_ld: Markup = Markup()
     indexed: bool = True
+    language: str = ""
+    """Empty for that of the course."""
 
 
 class PageInputs(Struct, frozen=True):

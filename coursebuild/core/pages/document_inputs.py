@@ -233,7 +233,14 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
     }
     data = lesson_data(library, lesson)
     return PageInputs(
-        PageHead(place.path, "lesson", lesson.title, lesson.summary, data),
+        PageHead(
+            place.path,
+            "lesson",
+            lesson.title,
+            lesson.summary,
+            data,
+            language=lesson.language or "",
+        ),
         "lesson.html",
         values,
         document_inputs=document_inputs(library, place, document, number_prefix(lesson.id)),

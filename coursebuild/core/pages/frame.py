@@ -156,9 +156,8 @@ class PageFrame(Struct, frozen=True):
     def render(self, head: PageHead, parts: tuple[str, ...], body: str) -> str:
         """The whole page around a body that has these parts; see `parts_of`."""
         inputs, names, kind = self.inputs, self.inputs.names, page_kind(head.kind)
-        renderer = renderer_for(
-            self.assets, inputs.language, inputs.templates, is_manual=inputs.is_manual
-        )
+        language = head.language or inputs.language
+        renderer = renderer_for(self.assets, language, inputs.templates, is_manual=inputs.is_manual)
         place = place_of(inputs.base_url, head.path)
         looks = ("figure-light", "figure-dark") if names.logo and names.logo_dark else ("", "")
         logos = zip((names.logo, names.logo_dark), looks, strict=True)
@@ -185,7 +184,8 @@ class PageFrame(Struct, frozen=True):
                 if not copy.lessons and has_copies(head.path)
             ),
             kind=head.kind,
-            direction=direction(inputs.language),
+            language=language,
+            direction=direction(language),
             root=place.href(urls.HOME).removesuffix(urls.HOME),
             robots="" if head.indexed else "noindex",
             icon=place.href(names.icon),
@@ -273,7 +273,7 @@ def _resource(library: Library, lesson: Lesson) -> dict[str, Json]:
             "name": lesson.title,
             "description": lesson.summary,
             "url": urls.absolute(library.course.base_url, urls.lesson_path(lesson)),
-            "inLanguage": library.course.language,
+            "inLanguage": library.course.language_of(lesson),
             "learningResourceType": "lesson",
             "teaches": list(lesson.objectives),
             "competencyRequired": needs,

@@ -189,10 +189,10 @@ class HtmlWriter:
             case model.Paragraph() if block.figure:
                 image = next(part for part in block.children if isinstance(part, model.Image))
                 caption = self._inlines(part for part in block.children if part is not image)
-                return self.figure(block, image, Markup(caption.removeprefix("Figure:").strip()))
+                return self.figure(block, image, Markup(caption.strip()))
             case model.Paragraph():
                 inner = self._inlines(block.children)
-                return inner if block.tight else f"<p>{inner}</p>\n"
+                return inner if block.tight else f"<p{_source(block.source_mark)}>{inner}</p>\n"
             case model.Heading():
                 return self._heading(block)
             case model.ListBlock():
@@ -234,7 +234,7 @@ class HtmlWriter:
         start = "" if block.start is None or block.start == 1 else f' start="{block.start}"'
         name = "ul" if block.start is None else "ol"
         tasks = any(item.checked is not None for item in block.items)
-        mark = ' class="task-list"' if tasks else ""
+        mark = (' class="task-list"' if tasks else "") + _source(block.source_mark)
         return f"<{name}{start}{mark}>\n{''.join(map(self._item, block.items))}</{name}>\n"
 
     def _item(self, item: model.ListItem) -> str:
@@ -257,7 +257,7 @@ class HtmlWriter:
         head = self._row(table.header, table, 'th scope="col"')
         rows = "".join(self._row(row, table, "td") for row in table.rows)
         body = f"<tbody>\n{rows}</tbody>\n" if rows else ""
-        html = f"<table>\n<thead>\n{head}</thead>\n{body}</table>\n"
+        html = f"<table{_source(table.source_mark)}>\n<thead>\n{head}</thead>\n{body}</table>\n"
         label = escape(self.words("markup.table"))
         html = f'<div class="table" role="group" aria-label="{label}" tabindex="0">\n{html}</div>\n'
         return self._captioned(table, table.caption, html)
@@ -366,3 +366,8 @@ class HtmlWriter:
             f'<a href="#{reference_id(number, occurrence)}" class="footnote-back"'
             f' role="doc-backlink" aria-label="{label}">{arrow}{mark}</a>'
         )
+
+
+def _source(mark: model.SourceMark | None) -> str:
+    """The attribute by which a block names the source of its numbers to who points at it."""
+    return "" if mark is None else f' title="{escape(mark.source)}"'

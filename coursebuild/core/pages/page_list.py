@@ -335,7 +335,7 @@ def page_inputs(library: Library, page: Page, document: Document) -> PageInputs:
         "following": links[order[position + 1]] if position + 1 < len(order) else None,
     }
     return PageInputs(
-        PageHead(place.path, "page", page.title, ""),
+        PageHead(place.path, "page", page.title, "", language=page.language or ""),
         "page.html",
         values,
         document_inputs=document_inputs(library, place, document),

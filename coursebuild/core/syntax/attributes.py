@@ -13,6 +13,7 @@ from coursebuild.core.model import (
     Inline,
     Meaning,
     NumberBinding,
+    SourceMark,
     plain_text,
     walk_inlines,
 )
@@ -34,6 +35,7 @@ SYMBOL = re.compile(r"(\{\s*(?:symbol|unit|value|given)\b[^{}]{0,400}\}?)")
 LABEL = re.compile(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 """The attributes of a term, a symbol or a formula; group 1 is the braces, the last of which may be
 missing."""
+_GIVEN = re.compile(r'(?:^|(?<=\s))\{given="([^{}"]*\S[^{}"]*)"\}$')
 _LAST_LABEL = re.compile(r"(?:^|(?<=\s))\{#[^{}$\n]{0,200}\}?$")
 _PAIR = re.compile(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
 _MISQUOTED = re.compile(
@@ -44,7 +46,12 @@ _NUMBER = re.compile(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` if the glossary should name it differently'
 _SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the unit may be left out'
-_VALUE_HELP = 'write `value=9.81 given="its source"`, or `value=9.81 out=examples/x.py`'
+_VALUE_HELP = "write `value=9.81`, or `value=9.81 out=examples/x.py` for what a script prints"
+NO_SOURCE = "`given` names no source here"
+SOURCE_HELP = (
+    'name it, as in `{given="models/pendulum.xml"}`; a number that is chosen needs no mark, so '
+    "delete this one and the backticks before it"
+)
 
 
 def collapse_spaces(text: str) -> str:
@@ -88,6 +95,8 @@ def read_pairs(
             return diagnose(rule, span, f"`{key}` is given twice", help=help)
         group = pair.lastindex or 1
         values[key] = braces.slice(*pair.span(group)) if group > 1 else None
+        if key == "given" and not value_text(values[key]):
+            return diagnose(rule, span, NO_SOURCE, help=SOURCE_HELP)
         at = pair.end()
     return values
 
@@ -116,7 +125,8 @@ def read_meaning(
         return None, None, None
     source = value_text(values["given"]) if "given" in values else None
     value, number = values.get("value"), None
-    if value is not None and _NUMBER.fullmatch(value.text) and not {"out", "given"} <= {*values}:
+    is_number = value is not None and _NUMBER.fullmatch(value.text) is not None
+    if value is not None and is_number and not {"out", "given"} <= {*values}:
         script = value_text(values.get("out")) or None
         origin = None if "out" in values else source or ""
         unit = value_text(values.get("unit"))
@@ -124,7 +134,7 @@ def read_meaning(
     elif "value" in values or "out" in values:
         text = "" if value is None else value.text
         reason = f"`{text}` is no value of a symbol"
-        if _NUMBER.fullmatch(text):
+        if is_number:
             reason = "a value is either given or printed by a script"
         elif "value" not in values:
             reason = "`out` binds a value, and there is none"
@@ -149,16 +159,28 @@ def value_text(value: Excerpt | None) -> str:
 
 
 _UNREAD = re.compile(
-    r"(?<=`)(?<!\\`)\{\s*(?P<binding>out|given|code)\b[^{}`\n]*\}?"
+    r"(?<!\\)\{\s*(?P<given>given)\b[^{}`\n]*\}?"
+    r"|(?<=`)(?<!\\`)\{\s*(?P<binding>out|code)\b[^{}`\n]*\}?"
     r"|(?<=\$)(?<!\\\$)\{\s*(?P<symbol>symbol|unit|value)\b[^{}\n]*\}?"
     r"|(?<=\])(?<!\\\])\{\s*(?P<term>term)\b[^{}\n]*\}?"
 )
-"""Braces directly after code, a formula or a bracket that begin as an attribute there does."""
+"""Braces that begin as an attribute does: after code, a formula, a bracket, or for a source
+anywhere."""
 _BINDING_HELP = (
-    "write `{out}`, `{out=examples/x.py}`, `{given}` or `{code}`; write `\\{` for a brace that "
+    "write `{out}`, `{out=examples/x.py}` or `{code}`; write `\\{` for a brace that readers should "
+    "see"
+)
+_GIVEN_HELP = (
+    'write `{given="its source"}` behind a number in backticks, a formula or a paragraph, or alone '
+    "below a paragraph, a list or a table, after an empty line; write `\\{` for a brace that "
     "readers should see"
 )
-_HELPS = {"binding": _BINDING_HELP, "symbol": _SYMBOL_HELP, "term": _TERM_HELP}
+_HELPS = {
+    "binding": _BINDING_HELP,
+    "given": _GIVEN_HELP,
+    "symbol": _SYMBOL_HELP,
+    "term": _TERM_HELP,
+}
 
 
 def check_unread_attributes(content: Excerpt, start: int, text: str) -> Iterator[Diagnostic]:
@@ -167,9 +189,20 @@ def check_unread_attributes(content: Excerpt, start: int, text: str) -> Iterator
         if match.start() >= start + len(text):
             break
         kind = match.lastgroup or ""
-        message = f"`{collapse_spaces(match[0])}` cannot be read"
-        place = content.span(*match.span())
-        yield diagnose(f"{kind}-attribute", place, message, help=_HELPS[kind])
+        message, help = f"`{collapse_spaces(match[0])}` cannot be read", _HELPS[kind]
+        if re.fullmatch(r'\{given(?:="\s*")?\}', match[0]):
+            message, help = NO_SOURCE, SOURCE_HELP
+        place, rule = content.span(*match.span()), "binding" if kind == "given" else kind
+        yield diagnose(f"{rule}-attribute", place, message, help=help)
+
+
+def split_source_mark(text: Excerpt) -> tuple[Excerpt, SourceMark | None]:
+    """The content of a paragraph, and the source of its numbers at its end, if there is one."""
+    match = _GIVEN.search(text.text) if text.text.endswith("}") else None
+    if match is None:
+        return text, None
+    mark = SourceMark(text.span(*match.span()), collapse_spaces(match[1]))
+    return trim(text.slice(0, match.start())), mark
 
 
 def split_label(text: Excerpt) -> tuple[Excerpt, Excerpt | None]:

@@ -9,7 +9,7 @@ import copy
 import re
 import unicodedata
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import msgspec
 from msgspec import Meta, Struct
@@ -24,6 +24,7 @@ from coursebuild.core.drawing.contrast import (
 from coursebuild.core.model import Filter, LessonTable, Limits, Silence
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
 from coursebuild.core.model.fields import (
+    Language,
     NotNegative,
     RelativeTolerance,
     Slug,
@@ -159,9 +160,6 @@ def check_launch(node: ObjectNode, fields: Launch, repository: str | None) -> It
 Url: TypeAlias = Annotated[
     str, matching(r"^https?://[^\s/]\S*$", "an address that begins with `https://` or `http://`")
 ]
-Language: TypeAlias = Annotated[
-    str, matching(r"^[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*$", "a language tag, as in `en` or `pt-BR`")
-]
 Version: TypeAlias = Annotated[
     str, matching(r"^[0-9]+\.[0-9]+\.[0-9]+$", "a version of three numbers, as in `3.14.0`")
 ]
@@ -240,6 +238,10 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
 class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
     """How recorded outputs are compared where a fence says nothing."""
 
+    replaced: ClassVar = {
+        "truth": "delete it: no share is required; `check --truth` lists what nothing gives"
+    }
+
     compare: Annotated[
         Literal["exact", "digits", "rtol"] | None,
         describe("the same text, the same digits, or within rtol and atol; else exact"),
@@ -253,10 +255,6 @@ class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
     env: Annotated[dict[str, str], describe("environment variables of scripts")] = {}
     python: Annotated[
         InterpreterPath | None, describe("what runs the scripts, relative to the course's folder")
-    ] = None
-    truth: Annotated[
-        Annotated[float, Meta(ge=0, le=1)] | None,
-        describe("the share of the numbers in lessons that must be proven, from 0 to 1"),
     ] = None
     strict: Annotated[bool, describe("warnings are errors, as with `--strict`")] = False
     unproven: Annotated[
@@ -312,6 +310,7 @@ class PageTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = ""
     menu: Annotated[bool, describe("whether it is in the menu of every page")] = True
     names: Annotated[bool, describe("whether names in its code have to be known")] = True
+    language: Annotated[Language | None, describe("its language, if not the course's")] = None
 
 
 class SecurityTable(Struct, frozen=True, forbid_unknown_fields=True):

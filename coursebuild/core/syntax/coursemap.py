@@ -125,15 +125,21 @@ def _build_course(
         engine=settings.engine,
         engine_span=table.place("engine"),
         comparison=comparison(gate, verify),
-        truth=verify.truth,
-        truth_span=gate.place("truth"),
         filters=verify.filter,
         callouts=tuple(kinds.values()),
         silences=fields.silence,
         levels=levels,
         pages=tuple(
             model.Page(
-                node.span, page.id, page.title, page.file, None, page.menu, page.names, page.section
+                node.span,
+                page.id,
+                page.title,
+                page.file,
+                None,
+                page.menu,
+                page.names,
+                page.section,
+                page.language,
             )
             for node, page in zip(root.objects("page"), fields.page, strict=True)
         ),

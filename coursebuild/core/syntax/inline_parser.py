@@ -49,14 +49,14 @@ def _emphasis(state: rules_inline.StateInline, silent: bool) -> bool:
 
 
 _BINDING = re.compile(
-    r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}|\{(given)(?:="([^{}"]+)")?\}|\{code\}"""
+    r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}|\{(given)="([^{}"]+)"\}|\{code\}"""
 )
 
 
 def _code_span(state: rules_inline.StateInline, silent: bool) -> bool:
     """A code span; with `{out}` after it a `number_binding`, the script's path in its `info`.
 
-    With `{given}` it is a `number_given`, and its `info` the source; that of code is `code`, if
+    With `{given="…"}` it is a `number_given`, and its `info` the source; that of code is `code`, if
     `{code}` follows.
     """
     start = state.pos

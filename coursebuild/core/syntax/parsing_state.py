@@ -66,12 +66,10 @@ class ParsingState:
                 message = f"`{braces.text}` is not a label of {subject}"
             self.reject_label(braces, message, f"{help}, of letters, digits, `-` and `_`")
             return None
-        end, keys = match.end(), ("check", "given") if kind == "eq" else ()
+        end, keys = match.end(), {"eq": ("check", "given"), "tab": ("given",)}.get(kind, ())
         if keys:
-            help = (
-                'write `{#eq:name check}`, `{#eq:name check="x > 0"}` or'
-                ' `{#eq:name given="its source"}`'
-            )
+            help = f'write `{{#{kind}:name}}` or `{{#{kind}:name given="its source"}}`'
+            help += ', and `check` or `check="x > 0"` for an identity' if kind == "eq" else ""
         values = read_pairs(braces.slice(end - 1), keys, "label-attribute", help)
         if isinstance(values, Diagnostic):
             self.report(values)

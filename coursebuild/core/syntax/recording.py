@@ -20,7 +20,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.patterns import matches_empty_text, pattern_mistake
 from coursebuild.core.text.source import Span
 
-FIGURE, TABLE, OUTPUT_KIND = "Figure:", "Table:", "output"
+OUTPUT_KIND = "output"
 _BODY_KINDS = ("text", OUTPUT_KIND)
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _VALUES = ("rtol", "atol", "volatile")
@@ -49,6 +49,12 @@ def _match_caption(caption: tuple[model.Inline, ...], words: Words) -> re.Match[
     names = "|".join(map(re.escape, words.output))
     pattern = rf"\s*(?:{names})(\s*\([^()]*\)|,[^:]*)?\s*:\s*"
     return re.fullmatch(pattern, model.plain_text(caption))
+
+
+def caption_start(text: str, names: tuple[str, ...]) -> int:
+    """Where the text of a caption begins, behind one of these words; 0 if there is none."""
+    match = re.match(rf"(?:{'|'.join(map(re.escape, names))})[ \u00a0\u202f]?:\s*", text)
+    return 0 if match is None else match.end()
 
 
 def check_code_above(above: Sequence[model.Block], block: model.Block) -> Iterator[Diagnostic]:
@@ -221,16 +227,25 @@ def _read_tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal
 
 
 def read_figure(
-    children: tuple[model.Inline, ...], span: Span, figure_names: list[str]
+    children: tuple[model.Inline, ...], span: Span, state: ParsingState
 ) -> tuple[tuple[model.Inline, ...], bool]:
     """The inlines of a paragraph that begins with `Figure:`, and whether it shows an image.
 
-    Without an image it shows the first of `figure_names`, those of scripts above that nothing
-    has shown yet, with its text as the alternative.
+    Then they are without that word. Without an image it shows the first figure of the scripts
+    above that nothing has shown yet, with its text as the alternative.
     """
+    figure_names = state.figures
     image = next((child for child in children if isinstance(child, model.Image)), None)
+    first = children[0] if children else None
+    if isinstance(first, model.Text) and (image is not None or figure_names):
+        start = caption_start(first.text, state.words.figure)
+        place = Span(
+            first.span.source, min(first.span.start + start, first.span.end), first.span.end
+        )
+        rest = (model.Text(place, first.text[start:]),) if first.text[start:] else ()
+        children = (*rest, *children[1:])
     if image is None and figure_names:
-        text = " ".join(model.plain_text(children).removeprefix(FIGURE).split())
+        text = " ".join(model.plain_text(children).split())
         image = model.Image(span, figure_names[0], text, "", span)
         children = (*children, image)
     name = "" if image is None else posixpath.basename(image.url)

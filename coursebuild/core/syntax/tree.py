@@ -10,7 +10,13 @@ from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.model.addresses import html_ids
-from coursebuild.core.syntax.attributes import LABEL, check_heading, read_attributes, split_label
+from coursebuild.core.syntax.attributes import (
+    LABEL,
+    check_heading,
+    read_attributes,
+    split_label,
+    split_source_mark,
+)
 from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.code_blocks import read_block
 from coursebuild.core.syntax.containers import (
@@ -22,8 +28,7 @@ from coursebuild.core.syntax.html import Balance, find_forbidden, find_media, ta
 from coursebuild.core.syntax.inline_tree import read_inlines
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.recording import (
-    FIGURE,
-    TABLE,
+    caption_start,
     check_code_above,
     check_missing_body,
     diagnose_wrong_body,
@@ -89,7 +94,9 @@ class TextReader:
             if token.type == stop:
                 break
             block = _READERS[token.type](self, token)
-            if block is not None:
+            if isinstance(block, model.SourceMark):
+                self._give(block, blocks)
+            elif block is not None:
                 self.state.diagnostics += check_code_above(blocks, block)
                 blocks.append(block)
         self.balance.leave()
@@ -101,9 +108,39 @@ class TextReader:
 
     # -- leaves
 
-    def _read_paragraph(self, token: PositionedToken) -> model.Block:
+    def _read_paragraph(self, token: PositionedToken) -> model.Block | model.SourceMark:
+        """A paragraph or what it is the caption of; its source alone, if it is nothing else."""
         self.index += 2
-        content = trim(token.text)
+        content, mark = split_source_mark(trim(token.text))
+        if mark is None:
+            return self._read_content(content, token)
+        if not content.text:
+            return mark
+        block = self._read_content(content, token)
+        if isinstance(block, model.Paragraph):
+            return replace(block, span=block.span.to(mark.span), source_mark=mark)
+        blocks: list[model.Block] = [block]
+        self._give(mark, blocks)
+        return blocks[0]
+
+    def _give(self, mark: model.SourceMark, blocks: list[model.Block]) -> None:
+        """Give the last block the source of its numbers."""
+        match blocks[-1:]:
+            case [
+                model.Paragraph()
+                | model.ListBlock()
+                | model.Table()
+                | model.FeatureBlock() as block
+            ]:
+                blocks[-1] = replace(block, source_mark=mark)
+            case _:
+                message = "nothing above this source holds numbers that it could give"
+                help = (
+                    "it stands behind a paragraph, or below one, a list, a table, a quiz or a lab"
+                )
+                self.state.report(diagnose("binding-attribute", mark.span, message, help=help))
+
+    def _read_content(self, content: Excerpt, token: PositionedToken) -> model.Block:
         span = content.span()
         if not self.nested and (caption := self._read_labelled_caption(content)) is not None:
             return caption
@@ -112,32 +149,34 @@ class TextReader:
             recording = self._read_recording(children, span)
             if recording is not None:
                 return recording
-        if not self.nested and content.text.startswith(FIGURE):
-            children, shows_image = read_figure(children, span, self.state.figures)
+        if not self.nested and caption_start(content.text, self.state.words.figure):
+            children, shows_image = read_figure(children, span, self.state)
             return model.Paragraph(span, children, token.hidden, shows_image)
         return model.Paragraph(span, children, token.hidden)
 
     def _read_labelled_caption(self, content: Excerpt) -> model.Block | None:
         """The block of a caption that ends with a label, or that stands above its table."""
         caption, braces = split_label(content)
-        span, following = content.span(), self._peek()
-        if caption.text.startswith(TABLE) and following and following.type == "table_open":
+        span, following, words = content.span(), self._peek(), self.state.words
+        start = caption_start(caption.text, words.table)
+        if start and following and following.type == "table_open":
             label = self.state.take_label(braces, "tab")
-            inlines = self.inlines(trim(caption.slice(len(TABLE))))
+            inlines = self.inlines(trim(caption.slice(start)))
             self.index += 1
             table = self._read_table(following)
-            return replace(table, span=span.to(table.span), label=label, caption=inlines)
+            mark = model.SourceMark(label.span, label.source) if label and label.source else None
+            whole = span.to(table.span)
+            return replace(table, span=whole, label=label, caption=inlines, source_mark=mark)
         if braces is None:
             return None
-        if caption.text.startswith(FIGURE):
+        if caption_start(caption.text, words.figure):
             label = self.state.take_label(braces, "fig")
-            inlines, shows_image = read_figure(self.inlines(caption), span, self.state.figures)
+            inlines, shows_image = read_figure(self.inlines(caption), span, self.state)
             if not shows_image:
                 message = "no image stands in the paragraph of this label"
                 self.state.reject_label(braces, message, "show one: `![…](file.svg)`")
             return model.Paragraph(span, inlines, False, shows_image, label=label)
-        words = (TABLE, *self.state.words.output)
-        if not any(word in caption.text[:24] for word in words):
+        if not any(word in caption.text[:24] for word in (*words.table, *words.output)):
             return None
         inlines, recording = self.inlines(caption), None
         if self._is_caption(caption, inlines):
@@ -242,8 +281,9 @@ class TextReader:
                 title, rest = self.inlines(head.value.title), head.value.rest
                 self.index += 3
                 blocks: tuple[model.Block, ...] = ()
+                rest, mark = split_source_mark(rest)
                 if rest.text:
-                    blocks = (model.Paragraph(rest.span(), self.inlines(rest)),)
+                    blocks = (model.Paragraph(rest.span(), self.inlines(rest), source_mark=mark),)
                 blocks += self._read_blocks("blockquote_close")
                 return model.Callout(span, kind, place, title, folded, blocks)
         return model.BlockQuote(span, self._read_blocks("blockquote_close"))
@@ -299,7 +339,9 @@ class TextReader:
 
 
 _SENTENCE_MARK = re.compile(r"[ \t]*([.,;:])")
-_READERS: dict[str, Callable[[TextReader, PositionedToken], model.Block | None]] = {
+_READERS: dict[
+    str, Callable[[TextReader, PositionedToken], model.Block | model.SourceMark | None]
+] = {
     "paragraph_open": TextReader._read_paragraph,
     "heading_open": TextReader._read_heading,
     "fence": TextReader._read_fence,

@@ -10,7 +10,7 @@ from msgspec import Struct
 
 from coursebuild.core.features import Feature
 from coursebuild.core.model import Course, Document, find_formulas
-from coursebuild.core.model.results import Mathml, ScriptRun
+from coursebuild.core.model.results import Mathml
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Parsed, diagnose
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Excerpt, Span
@@ -29,8 +29,6 @@ _OTHER_NUMBERS = (
 class FormulaSummary(Struct, frozen=True):
     """What checks of the whole course need of a document's formulas."""
 
-    unread: tuple[tuple[Span, str], ...]
-    """Places of arithmetic that is not understood, and the reasons."""
     symbols: tuple[tuple[str, str], ...]
     """Symbols whose meaning the document declares, and their units."""
     identities: tuple[tuple[Excerpt, str, Span], ...]
@@ -39,7 +37,6 @@ class FormulaSummary(Struct, frozen=True):
 
 def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]:
     """Summarize the formulas of a document; diagnostics are for numbers that are wrong."""
-    unread: list[tuple[Span, str]] = []
     identities: list[tuple[Excerpt, str, Span]] = []
     symbols, comparisons = read_symbols(document), check_formulas(document)
     diagnostics = list(symbols.diagnostics)
@@ -58,12 +55,9 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
                 fix = Fix(help, comparison.result if are_plain else None)
                 mistake = diagnose("formula-arithmetic", span, message, help=fix)
                 diagnostics.append(mistake)
-            elif comparison.kind == "unread":
-                unread.append((span, message))
     units = tuple((symbol.name, symbol.unit_text) for symbol in symbols.declarations.values())
-    is_empty = not (unread or units or identities)
-    formulas = FormulaSummary(tuple(unread), units, tuple(identities))
-    return Parsed(None if is_empty else formulas, tuple(diagnostics))
+    formulas = FormulaSummary(units, tuple(identities)) if units or identities else None
+    return Parsed(formulas, tuple(diagnostics))
 
 
 def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
@@ -114,19 +108,10 @@ def _summary_of(document: Document) -> FormulaSummary | None:
     return summary if isinstance(summary, FormulaSummary) else None
 
 
-def unproven(course: Course, runs: Iterable[ScriptRun]) -> Iterator[Diagnostic]:
-    """Yield a warning for each place of arithmetic that is not understood."""
-    for document in course.documents:
-        summary = _summary_of(document)
-        for span, reason in summary.unread if summary is not None else ():
-            yield diagnose("formula-unread", span, f"this is not computed: {reason}")
-
-
 FEATURE = Feature(
     name="arithmetic",
     summary=summary,
     check=check,
-    unproven=unproven,
     rules=(
         Rule("formula-arithmetic", "error", "A number in a formula is not the result."),
         Rule(
@@ -137,6 +122,5 @@ FEATURE = Feature(
         Rule(
             "symbol-value", "error", "A symbol has two values in a section, or cannot have a value."
         ),
-        Rule("formula-unread", "warning", "The arithmetic in a formula cannot be computed."),
     ),
 )

@@ -246,7 +246,6 @@ def _indent(lines: Sequence[str], indent: str) -> list[str]:
 
 
 _NUMBER = r"(?>[0-9]+(?:\.[0-9]+)+)"
-_RANGE = re.compile(rf"(?i)\blessons\s+({_NUMBER})\s?(?:–|-|to\b)\s?({_NUMBER})")
 
 
 def rename_references(course: Course, lesson: Lesson, new: str) -> list[Edit]:
@@ -284,9 +283,18 @@ def doubtful_places(
     """
     edited_spans = [edit.span for edit in edits]
     id = re.escape(lesson.id)
+    words = [words for _, words in sorted(course.words.items())]
+    singular, plural, conjunctions, ranges = (
+        "|".join(dict.fromkeys(re.escape(name) for each in words for name in getattr(each, field)))
+        for field in ("lesson", "lessons", "conjunctions", "range")
+    )
     names = re.compile(
         rf"lesson:({id})(?!\w|\.\w)|(?<![\w.])({id})-{lesson.slug}(?![\w-])"
-        rf"|(?i:\blessons?)\s(?:{_NUMBER}|[\s,–-]|and\b|or\b|to\b)*?(?<![\w.])({id})(?!\w|\.\w)"
+        rf"|(?i:\b(?:{plural}|{singular}))\s(?:{_NUMBER}|[\s,،–-]|(?:{conjunctions})(?![A-Za-z]))*?"
+        rf"(?<![\w.])({id})(?!\w|\.\w)"
+    )
+    series = re.compile(
+        rf"(?i)\b(?:{plural})\s+({_NUMBER})\s?(?:–|-|(?:{ranges})(?![A-Za-z]))\s?({_NUMBER})"
     )
     places = []
     for source in (*course.sources, *code):
@@ -296,7 +304,7 @@ def doubtful_places(
                 places.append(place)
         places += [
             source.span(*match.span())
-            for match in _RANGE.finditer(source.text)
+            for match in series.finditer(source.text)
             if id_order(match[1]) <= id_order(lesson.id) <= id_order(match[2])
         ]
     # Patterns that match the lesson's old path, and not the new one

@@ -8,7 +8,7 @@ FEATURE = Feature(
     commands=(
         Command(
             name="diff",
-            summary="show what a change does to outputs, figures, labs, truth and page weight",
+            summary="show what a change does to outputs, figures, labs, results and page weight",
             module=f"{__name__}.commands",
         ),
     ),

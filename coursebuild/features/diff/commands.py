@@ -8,6 +8,7 @@ import functools
 import io
 import json
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from html import escape
 from itertools import zip_longest
@@ -35,7 +36,7 @@ from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.figures import ReadFile, describe_difference
 from coursebuild.core.scripts.findings import classes
 from coursebuild.core.text.source import Excerpt
-from coursebuild.features.truth.claims import Claims, course_claims, sum_claims
+from coursebuild.features.truth.claims import unbound_results
 from coursebuild.pipeline.load import Code, load_course
 from coursebuild.pipeline.recordings import read_recorded
 
@@ -105,7 +106,7 @@ def report(base: str, old: CourseState, new: CourseState) -> str:
             ("in", "lab", "change"),
             [(*map(escape_text, lab), change) for lab, change in labs],
         ),
-        _truth_section(old.course, new.course),
+        _results_section(old.course, new.course),
     )
     return "\n".join(parts)
 
@@ -229,29 +230,23 @@ def _describe_lab_change(before: LabState, now: LabState) -> str:
     return ", ".join((*parts, *(f"model {code_span(name)} {change}" for name, change in models)))
 
 
-# --- truth
+# --- results
 
 
-def _truth_section(old: Course, new: Course) -> str:
+def _results_section(old: Course, new: Course) -> str:
     before, now = (
-        {owner.id: claims for owner, claims in course_claims(course)} for course in (old, new)
+        {owner.id: Counter(c.text for c in claims) for owner, claims in unbound_results(course)}
+        for course in (old, new)
     )
-    no_claims = Claims(0, 0, 0, ())
-    pairs = {id: (before.get(id, no_claims), now.get(id, no_claims)) for id in {**before, **now}}
-    pairs["all"] = sum_claims(before.values()), sum_claims(now.values())
-    counts = {id: [(*claims.counts, claims.share) for claims in pair] for id, pair in pairs.items()}
+    changes = ((id, results - before.get(id, Counter())) for id, results in now.items())
     return section(
-        "Truth",
-        "Numbers in the text, and those that a script prints, a formula computes, or the author"
-        " gives with a source. `check` tells whether they hold.",
-        ("in", "numbers", "printed", "computed", "given", "no source", "unproven", "proven"),
+        "Results",
+        "What the text states anew, and no script, formula or source gives.",
+        ("in", "result"),
         [
-            (
-                escape_text(id),
-                *(a if a == b else f"{a} → {b}" for a, b in zip(old_row, new_row, strict=True)),
-            )
-            for id, (old_row, new_row) in counts.items()
-            if old_row != new_row
+            (escape_text(id), ", ".join(map(code_span, results)))
+            for id, results in changes
+            if results
         ],
     )
 

@@ -89,7 +89,6 @@ class DocumentWriter:
             case model.Paragraph():
                 text = self._inlines(block.children)
                 if number := self.number(block.label):
-                    text = text.removeprefix("Figure:").lstrip()
                     text = f"**{marks.escape_marks(number)}:** {text}"
                 return text
             case model.HtmlFlow():

@@ -1,57 +1,76 @@
-"""Finds the numbers that a document claims, and what proves each.
+"""Finds the numbers that a document states, and what each is held against.
 
-Entry points: `document_claims(document)`, `course_claims(course)`, `sum_claims(claims)`;
-`check_sources`, of the numbers that name a file of the course as their source.
+Entry points: `document_claims(document)`; `check_sources`, of the numbers whose source is a part of
+the course; `unbound_results`, of those that neither a script, a formula nor a source gives.
 
 1. A number in digits is a claim, except: a whole number up to twelve without a unit, which counts
    or names as a word does; a year; what only looks like a number (versions, dates, `x1`).
 2. Headings, footnotes (which name sources), code, addresses, links to lessons, pages and models,
-   and recorded outputs have no claims.
+   recorded outputs and the texts of quizzes and labs have no claims but those with a source.
 3. In formulas a side that is a number is one claim, and so is a side with symbols in which a number
-   has a point. A chain whose arithmetic was checked is one claim, with symbols that have values
-   too. The value of a symbol is one where it is given, and proven by its source or its script.
-4. A number bound to the output of a script that was not run is not proven.
-5. A number in an alternative text, where nothing can be marked, is proven if the same number is
-   bound or given in the document.
-6. A file that is named as a source must have the number: in the unit of the text or in base units,
-   perhaps with more digits. A model may have half of it, since MJCF writes radii and half-lengths.
-   A source that is no path is for readers to judge.
+   has a point. A chain whose arithmetic was checked has none, and its numbers are inputs.
+4. A number in an alternative text, where nothing can be marked, is a claim unless the same number
+   is bound or given in the document.
+5. A source that is a part of the course must have the number: in the unit of the text or in base
+   units, perhaps with more digits. A model may have half of it, since MJCF writes radii and
+   half-lengths. Any other source is for readers to judge.
+6. What the lesson's own scripts, models and labs hold is an input, not a result.
 """
 
 from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from functools import cache
+from itertools import groupby
 from operator import itemgetter
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.results import ScriptRun
+from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import Number, point_decimals, scan_prose
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import UNIT_PATTERN, find_unit
 from coursebuild.features.arithmetic.evaluate import FormulaComparison, measure, read_numeral
-from coursebuild.features.arithmetic.expressions import Expression
+from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 from coursebuild.features.arithmetic.statements import FormulaSide, read_statements
 from coursebuild.features.arithmetic.symbol_values import check_formulas
 
-_PATH = re.compile(r"[\w.-]+(?:/[\w.-]+)+\.[a-z]+|(?:content|examples|lib|models|runs)/.*")
-"""A source that is a file, also where its name is misspelt."""
-_NUMBER = re.compile(r"(?<![\w.])(?:\d+(?:_\d{3})*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_PART = re.compile(
+    r"[\w.-]+(?:/[\w.-]+)+\.[a-z]+|(?:content|examples|lib|models|runs)/\S*|lab|#lab:\S+|lesson:\S+"
+)
+"""A source that is a part of the course, also where its name is misspelt."""
+_LITERAL = re.compile(r"(?<![\w.])(?:\d+(?:_\d{3})*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_MODEL_PATH = re.compile(r"models/([\w/-]+)\.xml")
+
+_COUNTS = 12
+_YEARS = range(1600, 2100)
+_UNIT = re.compile(rf"(?:\s*×\s*[\d.]+)*[\s\u00a0\u202f]*({UNIT_PATTERN})")
+"""The unit behind a number, or behind those with which it is multiplied: `20 × 10 × 4 cm`."""
+_HEADER_UNIT = re.compile(r"[(\[]([^()\[\]]+)[)\]]\s*$")
+_DECIMAL = re.compile(r"\d\.\d")
+_MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
+"""Every formula with claims matches this."""
+_DIGIT = re.compile("[0-9]")
 
 
-class NamedNumber(Struct, frozen=True):
-    """A number whose source is a file."""
+class Claim(Struct, frozen=True):
+    """A number that a document states."""
 
     span: Span
-    path: str
     text: str
-    values: tuple[tuple[float, float], ...]
-    """Its value and one unit of its last place: as literals, and in base units."""
+    """Empty for a mark that stands beside no number."""
+    values: tuple[tuple[float, float], ...] = ()
+    """Its value and one unit of its last place: as it is written, and in base units."""
+    sources: tuple[str, ...] = ()
+    """The parts of the course of which one must hold it."""
+    mark: Span | None = None
+    """Where these are named."""
 
     def is_in(self, numbers: Iterable[float]) -> bool:
         """Whether one of these, rounded to its digits, is this number."""
@@ -62,230 +81,207 @@ class NamedNumber(Struct, frozen=True):
         )
 
 
-def named_numbers(document: model.Document) -> Iterator[NamedNumber]:
-    """Yield the numbers of a document whose source is a path."""
-    for inline in model.document_inlines(document):
-        source = getattr(inline, "source", None) or ""
-        if _PATH.fullmatch(source) is None:
-            continue
-        if isinstance(inline, model.NumberBinding):
-            text = point_decimals(inline.text) if inline.comma else inline.text
-            numbers = scan_prose(text)
-            unit_text = inline.text[numbers[-1].end :].strip() if numbers else ""
-            unit = find_unit(unit_text) if unit_text else None
-            size = float(measure(unit)) if unit is not None else 1.0
-            zero = float(unit.zero) if unit is not None else 0.0
-            for number in numbers:
-                value, step = float(number.value), 10.0**number.place
-                values = (value, step), ((value + zero) * size, step * size)
-                yield NamedNumber(inline.text_span, source, number.text, values)
-        elif isinstance(inline, model.Math):
-            statements = read_statements(inline.tex.text, document.comma)
-            sides = (side for statement in statements for side in statement.sides)
-            for side in sides:
-                expression = side.expression if side.is_numeric else None
-                numeral = read_numeral(expression) if isinstance(expression, Expression) else None
-                if numeral is not None:
-                    step, size = float(numeral.step), float(numeral.unit_size)
-                    value = float(numeral.express(numeral.value))
-                    values = (value, step / size), (float(numeral.value), step)
-                    text = inline.tex.text[side.start : side.end].strip()
-                    yield NamedNumber(inline.tex.span(side.start, side.end), source, text, values)
-
-
-def check_sources(course: model.Course, numbers: Iterable[NamedNumber]) -> Iterator[Diagnostic]:
-    """Yield a diagnostic for each number that its file does not hold."""
-    scripts = (s for document in course.documents for s in model.document_scripts(document))
-    texts = {f"models/{file.name}.xml": file.source.text for file in course.models}
-    texts |= {script.path: script.code.text for script in scripts}
-    numbers_by_path: dict[str, set[float]] = {}
-    for number in numbers:
-        if number.path not in texts:
-            message = f"`{number.path}` is no script and no model of this course"
-            help = did_you_mean(number.path, texts)
-            if isinstance(help, Fix):  # the path stands behind the number
-                source, end = number.span.source, number.span.end
-                line_end = source.line_start(number.span.end_line + 1)
-                help = help.at(source.span(end, line_end))
-            yield diagnose("given-source", number.span, message, help=help)
-            continue
-        if number.path not in numbers_by_path:
-            matches = _NUMBER.finditer(texts[number.path])
-            literals = {float(match[0].replace("_", "").rstrip(".")) for match in matches}
-            doubles = {2 * value for value in literals if number.path.endswith(".xml")}
-            numbers_by_path[number.path] = literals | doubles
-        if not number.is_in(numbers_by_path[number.path]):
-            message = f"`{number.path}` has no number `{number.text}`"
-            help = "bind the number to an output, or name where it is from"
-            yield diagnose("given-source", number.span, message, help=help)
-
-
-KINDS = ("bound", "computed", "given")
-"""The fields of `Claims` that count what is proven."""
-_NO_SOURCE = "unsourced"
-
-_COUNTS = 12
-_YEARS = range(1600, 2100)
-_UNIT = re.compile(rf"[\s\u00a0\u202f]*(?:{UNIT_PATTERN})")
-_DECIMAL = re.compile(r"\d\.\d")
-_MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
-"""Every formula with claims matches this."""
-_DIGIT = re.compile("[0-9]")
-
-
 class Claims(Struct, frozen=True):
-    """The number of proven claims of a document, and the places of those that are not proven."""
+    """The claims of a document that its scripts and formulas do not prove."""
 
-    bound: int
-    """Printed by a script."""
-    computed: int
-    """Computed in a formula."""
-    given: int
-    """Given by the author, with a source."""
-    open: tuple[Span, ...]
-    """The places of the others."""
-    places: tuple[tuple[Span, tuple[str, ...]], ...] = ()
-    """Of those that scripts print: where each stands, and the scripts of which any proves it."""
-    unsourced: tuple[Span, ...] = ()
-    """The places of those that are given without a source, which count as unproven."""
-    named: tuple[NamedNumber, ...] = ()
-    """Those whose source is a file."""
-
-    def drop(self, scripts: Collection[str]) -> Claims:
-        """The claims where these scripts prove nothing."""
-        lost = tuple(at for at, proofs in self.places if proofs and {*proofs} <= {*scripts})
-        if not lost:
-            return self
-        order = sorted((*self.open, *lost), key=lambda span: span.start)
-        return replace(self, bound=self.bound - len(lost), open=tuple(order), places=())
-
-    @property
-    def proven(self) -> int:
-        return self.bound + self.computed + self.given
-
-    @property
-    def all(self) -> int:
-        return self.proven + len(self.unsourced) + len(self.open)
-
-    @property
-    def share(self) -> str:
-        """The share of proven claims, rounded down."""
-        return f"{1000 * self.proven // self.all / 10:.1f} %" if self.all else "–"
-
-    @property
-    def counts(self) -> tuple[str, ...]:
-        """The numbers of all claims, of those proven in each way, and of the others."""
-        rest = len(self.unsourced), len(self.open)
-        return tuple(map(str, (self.all, self.bound, self.computed, self.given, *rest)))
+    open: tuple[Claim, ...]
+    """Those that name no source."""
+    sourced: tuple[Claim, ...] = ()
+    """Those whose source is a part of the course."""
+    inputs: tuple[float, ...] = ()
+    """The numbers that are given, or computed with."""
 
 
-def course_claims(
-    course: model.Course, runs: Iterable[ScriptRun] = ()
-) -> Iterator[tuple[model.Owner, Claims]]:
-    """Yield what counts, with its claims: lessons, and pages in the menu.
+# --- held against the course
 
-    `runs`: those of scripts, as far as they are known.
-    """
-    unrun = {run.path for run in runs if not run.did_run}
-    for document in course.documents:
-        unrun |= {script.path for script in model.document_scripts(document) if script.norun}
+
+class _Parts:
+    """The texts of a course that can be named as a source."""
+
+    def __init__(self, course: model.Course) -> None:
+        self.models = {file.name: file.source.text for file in course.models}
+        scripts = (s for document in course.documents for s in model.document_scripts(document))
+        self.texts = {f"models/{name}.xml": text for name, text in self.models.items()}
+        self.texts |= {script.path: script.code.text for script in scripts}
+        self.texts |= {
+            f"lesson:{owner.id}": document.source.text
+            for owner, document in course.owned_documents
+            if isinstance(owner, model.Lesson)
+        }
+        self.numbers = cache(lambda name: frozenset(_literals(name, self.texts[name])))
+
+    def of_labs(self, document: model.Document) -> dict[str, str]:
+        """The texts of a document's labs, with the models that they show."""
+        labs: dict[str, str] = {}
+        for block in model.find_blocks(document, model.FeatureBlock):
+            if kind_of_block(block).label == "lab":
+                models = (self.models.get(name, "") for name in block.models())
+                text = "\n".join((block.span.text, *models))
+                labs["lab"] = labs.get("lab", "") + text
+                if block.label is not None:
+                    labs[f"#{block.label.id}"] = text
+        return labs
+
+    def inputs(self, document: model.Document) -> set[float]:
+        """The numbers in the scripts and labs of a document, and in the models that these name."""
+        scripts = [script.code.text for script in model.document_scripts(document)]
+        texts = [*scripts, self.of_labs(document).get("lab", "")]
+        names = {name for text in texts for name in _MODEL_PATH.findall(text)}
+        paths = {f"models/{name}.xml" for name in names & {*self.models}}
+        numbers = {number for text in texts for number in _literals("lab", text)}
+        return numbers.union(*map(self.numbers, paths))
+
+
+def _literals(name: str, text: str) -> Iterator[float]:
+    for match in _LITERAL.finditer(text):
+        value = float(match[0].replace("_", "").rstrip("."))
+        yield value
+        if name == "lab" or name.endswith(".xml"):
+            yield 2 * value
+
+
+def check_sources(
+    course: model.Course, documents: Iterable[tuple[model.Document, Claims]]
+) -> Iterator[Diagnostic]:
+    """Yield a diagnostic for each number that the part named as its source does not hold."""
+    parts = _Parts(course)
+    for document, claims in documents:
+        labs = parts.of_labs(document) if claims.sourced else {}
+        for claim in claims.sourced:
+            unknown = [name for name in claim.sources if name not in parts.texts | labs]
+            if unknown:
+                message = f"`{unknown[0]}` names no script, model, lab or lesson here"
+                names = [n for n in (*parts.texts, *labs) if not n.startswith("lesson:")]
+                help = did_you_mean(unknown[0], names)
+                if isinstance(help, Fix) and claim.mark is not None:
+                    help = help.at(claim.mark)
+                yield diagnose("given-source", claim.span, message, help=help)
+                continue
+            numbers = (
+                _literals("lab", labs[name]) if name in labs else parts.numbers(name)
+                for name in claim.sources
+            )
+            if not claim.is_in(number for part in numbers for number in part):
+                subject = " and ".join(f"`{name}`" for name in claim.sources)
+                verb = "has" if len(claim.sources) == 1 else "have"
+                message = f"{subject} {verb} no number `{claim.text}`"
+                help = "bind the number to an output, or name where it is from"
+                if not claim.text:
+                    message = f"no number stands here that {subject} could hold"
+                    help = "delete the mark"
+                yield diagnose("given-source", claim.span, message, help=help)
+
+
+def unbound_results(course: model.Course) -> Iterator[tuple[model.Owner, tuple[Claim, ...]]]:
+    """Yield the results that each lesson and page of the menu states, and nothing gives."""
+    parts = _Parts(course)
     for owner, document in course.owned_documents:
         if isinstance(owner, model.Lesson) or owner.menu:
             summary = (document.summaries or {}).get("truth")
             claims = summary if isinstance(summary, Claims) else document_claims(document)
-            yield owner, claims.drop(unrun)
+            inputs = parts.inputs(document).union(claims.inputs) if claims.open else ()
+            yield owner, tuple(claim for claim in claims.open if not claim.is_in(inputs))
 
 
-def sum_claims(claims: Iterable[Claims]) -> Claims:
-    """Return the claims of several documents."""
-    terms = tuple(claims)
-    bound_count, computed_count, given_count = (
-        sum(getattr(term, kind) for term in terms) for kind in KINDS
-    )
-    return Claims(
-        bound_count,
-        computed_count,
-        given_count,
-        open=tuple(place for term in terms for place in term.open),
-        unsourced=tuple(place for term in terms for place in term.unsourced),
-    )
+# --- found in a document
 
 
 def document_claims(document: model.Document) -> Claims:
     """Find the claims of a document in its text."""
-    outputs = sorted(
-        (r.body_span.end, r.script)
-        for r in model.find_blocks(document, model.Recording)
-        if r.script
-    )
-    counter = _Counter(outputs, check_formulas(document), document.comma)
-    output_ids: set[int] = set()
-    for block in model.walk_blocks(document.blocks):
-        if isinstance(block, model.Recording):
-            output_ids.add(id(block.body))
-        if isinstance(block, model.MathBlock):
-            counter.formula(block.tex, block.label.source if block.label is not None else None)
-        elif not isinstance(block, model.Heading) and id(block) not in output_ids:
-            counter.inlines(model.block_inlines(block))
-    for span, number in counter.alternatives:
-        counter.add(*counter.marked.get(number, ("", ())), span)
-    bound_count, computed_count, given_count = map(counter.kinds.count, KINDS)
-    return Claims(
-        bound_count,
-        computed_count,
-        given_count,
-        open=tuple(counter.open),
-        places=tuple(counter.places),
-        unsourced=tuple(counter.unsourced),
-        named=tuple(named_numbers(document)),
-    )
+    counter = _Counter(check_formulas(document), document.comma)
+    counter.blocks(document.blocks)
+    count = len(counter.open)
+    for footnote in document.footnotes:
+        counter.blocks(footnote.blocks)
+    del counter.open[count:]
+    bound_texts = {part.text for text in counter.marked for part in scan_prose(text)}
+    alternatives = (claim for claim in counter.alternatives if claim.text not in bound_texts)
+    claims = sorted((*counter.open, *alternatives), key=lambda claim: claim.span.start)
+    return Claims(tuple(claims), tuple(counter.sourced), tuple(sorted(counter.inputs)))
 
 
 class _Counter:
     def __init__(
-        self,
-        outputs: Sequence[tuple[int, str]],
-        comparisons: Mapping[int, tuple[FormulaComparison, ...]],
-        comma: bool,
+        self, comparisons: Mapping[int, tuple[FormulaComparison, ...]], comma: bool
     ) -> None:
-        """`outputs` are the ends of recorded outputs, in order, with their scripts."""
-        self.outputs, self.comparisons, self.comma = outputs, comparisons, comma
-        self.kinds: list[str] = []
-        self.open: list[Span] = []
-        self.unsourced: list[Span] = []
-        self.places: list[tuple[Span, tuple[str, ...]]] = []
-        self.marked: dict[str, tuple[str, tuple[str, ...]]] = {}
-        """How a number is proven, and the scripts that print it; none if it is given."""
-        self.alternatives: list[tuple[Span, str]] = []
+        """`comma`: whether one may stand before the decimals of a number."""
+        self.comparisons, self.comma = comparisons, comma
+        self.open: list[Claim] = []
+        self.sourced: list[Claim] = []
+        self.inputs: set[float] = set()
+        self.marked: set[str] = set()
+        """The texts that are bound or given."""
+        self.alternatives: list[Claim] = []
 
-    def add(self, kind: str, proofs: tuple[str, ...], span: Span) -> None:
-        """Add a claim and what proves it; an empty kind stands for no proof."""
-        if kind in KINDS:
-            self.kinds.append(kind)
-            self.places += [(span, proofs)] if proofs else []
-        else:
-            (self.unsourced if kind else self.open).append(span)
+    def blocks(self, blocks: Iterable[model.Block]) -> None:
+        """Add the claims of blocks."""
+        for block in blocks:
+            first = len(self.open)
+            if isinstance(block, model.MathBlock):
+                source = None if block.label is None else block.label.source
+                self.formula(block.tex, source, block.span)
+            elif isinstance(block, model.Table):
+                self.inlines(block.caption)
+                self.table(block)
+            else:
+                self.inlines(model.block_inlines(block))
+                self.blocks(model.child_blocks(block))
+            mark = getattr(block, "source_mark", None)
+            if mark is not None:
+                self.give(mark.source, mark.span, self.open[first:])
+            elif isinstance(block, model.Recording) and isinstance(block.body, model.Table):
+                del self.open[first:]
+            if mark is not None or isinstance(block, model.Heading | model.FeatureBlock):
+                del self.open[first:]
+
+    def table(self, table: model.Table) -> None:
+        """Add the claims of cells, a number alone in its cell with the unit of its column."""
+        headers = (model.plain_text(cell.children) for cell in table.header)
+        matches = (_HEADER_UNIT.search(header) for header in headers)
+        units = [match[1] if match else "" for match in matches]
+        for row in (table.header, *table.rows):
+            for cell, unit in zip(row, units, strict=True):
+                text = model.plain_text(cell.children).strip()
+                numbers = scan_prose(text) if table.source_mark is not None else ()
+                is_plain = all(isinstance(child, model.Text) for child in cell.children)
+                if is_plain and len(numbers) == 1 and numbers[0].text == text:
+                    self.open.append(_claim(numbers[0], cell.span, unit))
+                else:
+                    self.inlines(cell.children)
+
+    def give(self, source: str, mark: Span, claims: Iterable[Claim]) -> None:
+        """Give claims their source; a part of the course is kept with each of them."""
+        names = tuple(name.strip() for name in source.split(","))
+        claims = tuple(claims)
+        self.inputs |= {value for claim in claims for value, _ in claim.values[:1]}
+        if all(map(_PART.fullmatch, names)):
+            claims = claims or (Claim(mark, ""),)
+            self.sourced += (replace(claim, sources=names, mark=mark) for claim in claims)
 
     def inlines(self, inlines: Iterable[model.Inline]) -> None:
         """Add the claims of inlines."""
-        for inline in inlines:
+        row = tuple(inlines)
+        for is_text, group in groupby(row, lambda i: isinstance(i, model.Text | model.SoftBreak)):
+            if is_text:  # a unit may stand on the next line
+                self.open += _text_claims(group, self.comma)
+        for inline in row:
             match inline:
-                case model.Text():
-                    self.text(inline)
                 case model.NumberBinding():
-                    self.marked_number(inline)
+                    self.number(inline)
                 case model.Math():
                     source = inline.source
                     if source is None and inline.label is not None:
                         source = inline.label.source
                     if inline.meaning is not None and source is None and inline.value is None:
                         source = ""  # a symbol stands for a value because the author says so
-                    self.formula(inline.tex, source)
                     if inline.value is not None:
-                        self.marked_number(inline.value)
+                        self.number(inline.value)
+                        source = None
+                    self.formula(inline.tex, source, inline.span)
                 case model.Image():
-                    numbers = {number.text for number in find_claims(inline.alt, self.comma)}
-                    self.alternatives += [(inline.span, number) for number in sorted(numbers)]
+                    found = find_numbers(inline.alt, self.comma)
+                    numbers = {number.text: number for number in found}
+                    self.alternatives += (_claim(n, inline.span) for n in numbers.values())
                 case model.Link(target=model.UrlTarget() | model.TermTarget() as target):
                     texts = (child for child in inline.children if isinstance(child, model.Text))
                     text = "".join(child.text for child in texts)
@@ -296,56 +292,43 @@ class _Counter:
                 case _:
                     pass
 
-    def marked_number(self, number: model.NumberBinding) -> None:
-        """Add the claims of a number that is bound or given."""
-        proofs: tuple[str, ...] = ()
+    def number(self, number: model.NumberBinding) -> None:
+        """Add a number that is bound or given."""
+        self.marked.add(number.text)
         if number.source is None:
-            at = bisect_right(self.outputs, number.span.start, key=itemgetter(0))
-            above = self.outputs[at - 1][1] if at else ""
-            proofs = tuple(filter(None, (number.script or above,)))
-        kind = _given_kind(number.source) if number.source is not None else "bound"
+            return
         text = point_decimals(number.text) if number.comma else number.text
-        for part in scan_prose(text):
-            first_kind, scripts = self.marked.setdefault(part.text, (kind, proofs))
-            # What one place gives, or another script prints, is proven by that.
-            if first_kind == kind == "bound":
-                union = tuple(sorted({*scripts, *proofs})) if scripts and proofs else ()
-                self.marked[part.text] = kind, union
-            elif "given" in (first_kind, kind):
-                self.marked[part.text] = "given", ()
-            elif kind == "bound":
-                self.marked[part.text] = kind, proofs
-            self.add(kind, proofs, number.text_span)
+        numbers = scan_prose(text)
+        unit = number.unit or (text[numbers[-1].end :].strip() if numbers else "")
+        mark = Span(number.span.source, number.text_span.end, number.span.end)
+        claims = (_claim(part, number.text_span, unit) for part in numbers)
+        self.give(number.source, mark, claims)
 
-    def text(self, text: model.Text) -> None:
-        """Add the claims of plain text."""
-        is_verbatim = text.span.end - text.span.start == len(text.text)
-        for number in find_claims(text.text, self.comma):
-            span = text.span
-            if is_verbatim:
-                span = Span(span.source, span.start + number.start, span.start + number.end)
-            self.add("", (), span)
-
-    def formula(self, tex: Excerpt, source: str | None) -> None:
+    def formula(self, tex: Excerpt, source: str | None, span: Span) -> None:
         """Add the claims of a formula."""
-        if _MAY_CLAIM.search(tex.text) is None:
+        if source is None and _MAY_CLAIM.search(tex.text) is None:
             return
         comparisons = self.comparisons.get(tex.span().start, ())
         proofs = [comparison for comparison in comparisons if comparison.kind == "holds"]
+        claims: list[Claim] = []
         for statement in read_statements(tex.text, self.comma):
             first, last = statement.sides[0], statement.sides[-1]
             if any(first.start <= proof.start < last.end for proof in proofs):
-                self.add("computed", (), tex.span(first.start, last.end))
+                numbers = scan_prose(tex.text[first.start : last.end])
+                self.inputs |= {float(number.value) for number in numbers if number.is_finite}
                 continue
             for side in statement.sides:
-                if _is_claim(side):
-                    part = tex.text[side.start : side.end]
-                    start, end = side.end - len(part.lstrip()), side.start + len(part.rstrip())
-                    place = tex.span(start, end)
-                    self.add("" if source is None else _given_kind(source), (), place)
+                is_numeral = source is not None and side.is_numeric
+                if is_numeral or _is_claim(side, tex.text):
+                    claims.append(_side_claim(side, tex))
+        if source is None:
+            self.open += claims
+        else:
+            compared = [claim for claim in claims if claim.values]
+            self.give(source, Span(span.source, tex.span().end, span.end), compared)
 
 
-def find_claims(text: str, comma: bool = False) -> Iterator[Number]:
+def find_numbers(text: str, comma: bool = False) -> Iterator[Number]:
     """Yield the numbers of a text that are claims; `comma`: it may stand before decimals."""
     text = point_decimals(text) if comma else text
     if _DIGIT.search(text) is None:
@@ -359,12 +342,45 @@ def find_claims(text: str, comma: bool = False) -> Iterator[Number]:
             yield number
 
 
-def _given_kind(source: str) -> str:
-    return "given" if source else _NO_SOURCE
+def _text_claims(inlines: Iterable[model.Inline], comma: bool) -> Iterator[Claim]:
+    places: list[tuple[int, str, Span]] = []
+    text = ""
+    for inline in inlines:
+        piece = inline.text if isinstance(inline, model.Text) else " "
+        places.append((len(text), piece, inline.span))
+        text += piece
+    for number in find_numbers(text, comma):
+        start, piece, span = places[bisect_right(places, number.start, key=itemgetter(0)) - 1]
+        if span.end - span.start == len(piece):  # not so with escapes in it
+            first = span.start + number.start - start
+            span = Span(span.source, first, first + len(number.text))
+        unit = _UNIT.match(text, number.end)
+        yield _claim(number, span, unit[1] if unit else "")
 
 
-def _is_claim(side: FormulaSide) -> bool:
-    tex = side.tex
+def _claim(number: Number, span: Span, unit_text: str = "") -> Claim:
+    unit = find_unit(unit_text) if unit_text else None
+    size = float(measure(unit)) if unit is not None else 1.0
+    zero = float(unit.zero) if unit is not None else 0.0
+    value, step = float(number.value), 10.0**number.place
+    return Claim(span, number.text, ((value, step), ((value + zero) * size, step * size)))
+
+
+def _side_claim(side: FormulaSide, tex: Excerpt) -> Claim:
+    part = tex.text[side.start : side.end]
+    place = tex.span(side.end - len(part.lstrip()), side.start + len(part.rstrip()))
+    expression = side.expression if side.is_numeric else None
+    numeral = None
+    with suppress(NotUnderstood):  # a unit may be a word
+        numeral = read_numeral(expression) if isinstance(expression, Expression) else None
+    if numeral is None:
+        return Claim(place, place.text)
+    step, size = float(numeral.step), float(numeral.unit_size)
+    value = float(numeral.express(numeral.value))
+    return Claim(place, place.text, ((value, step / size), (float(numeral.value), step)))
+
+
+def _is_claim(side: FormulaSide, tex: str) -> bool:
     if not side.is_numeric and "." not in tex[side.start : side.end]:
         return False
     if not isinstance(side.expression, Expression):

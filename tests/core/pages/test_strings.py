@@ -9,7 +9,15 @@ from unicodedata import normalize
 
 import pytest
 
-from coursebuild.core.model import Link, Recording, find_blocks, find_inlines
+from coursebuild.core.model import (
+    Link,
+    Paragraph,
+    Recording,
+    Table,
+    find_blocks,
+    find_inlines,
+    plain_text,
+)
 from coursebuild.core.model.course import ENGLISH
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.materials import strings_for, words_for
@@ -53,13 +61,20 @@ def test_lists_and_pairs_have_the_marks_of_the_language(assets: Assets) -> None:
 def test_captions_and_mentions_follow_the_language(assets: Assets) -> None:
     """However letters with marks are typed; English ones hold too."""
     assert words_for(assets.templates, "en") == words_for(assets.templates, "pt") == ENGLISH
-    for language, caption, mention, unlike in (
-        ("ar", "المخرجات:", "الدروس 1.1 و1.2", "المدخلات:"),
-        ("de", "Ausgabe:", "Lektionen 1.1 und 1.2", "Aufgabe:"),
-        ("de-CH", "Ausgabe :", "Lektion 1.1 und Stufe 1.2", "Angabe:"),
-        ("es", "Salida:", "las lecciones 1.1 y 1.2", "Subida:"),
-        ("fr", "Sortie\u202f:", "la leçon 1.1 et Niveau 1.2", "Partie\u00a0:"),
-        ("fr", "Output:", "Lessons 1.1, 1.2", "Outset:"),
+    for language, caption, mention, unlike, figure, table in (
+        ("ar", "المخرجات:", "الدروس 1.1 و1.2", "المدخلات:", "الشكل:", "الجدول:"),
+        ("de", "Ausgabe:", "Lektionen 1.1 und 1.2", "Aufgabe:", "Abbildung:", "Tabelle:"),
+        ("de-CH", "Ausgabe :", "Lektion 1.1 und Stufe 1.2", "Angabe:", "Bild:", "Tabelle:"),
+        ("es", "Salida:", "las lecciones 1.1 y 1.2", "Subida:", "Figura:", "Cuadro:"),
+        (
+            "fr",
+            "Sortie\u202f:",
+            "leçon 1.1 et Niveau 1.2",
+            "Partie\u00a0:",
+            "Figure :",
+            "Tableau :",
+        ),
+        ("fr", "Output:", "Lessons 1.1, 1.2", "Outset:", "Figure:", "Table:"),
     ):
         words = words_for(assets.templates, language)
         for form in ("NFC", "NFD"):
@@ -70,6 +85,16 @@ def test_captions_and_mentions_follow_the_language(assets: Assets) -> None:
             assert parsed_text.diagnostics == (), language
             (recording,) = find_blocks(parsed_text.value, Recording)
             assert recording.caption == (), "it is shown in the language of the page"
+            captions = (
+                f"{figure} ![a](a.svg) *A* {{#fig:a}}\n\n{table} T {{#tab:b}}\n\n| a |\n| - |\n"
+            )
+            source = Source("y.md", normalize(form, captions))
+            parsed_captions = parse_document(source, frozenset(), lesson=True, words=words)
+            assert parsed_captions.diagnostics == (), language
+            (paragraph,) = find_blocks(parsed_captions.value, Paragraph)
+            assert plain_text(paragraph.children).split() == ["a", "A"]
+            (caption_of_table,) = find_blocks(parsed_captions.value, Table)
+            assert plain_text(caption_of_table.caption) == "T"
             links = find_inlines(parsed_text.value, Link)
             assert [getattr(link.target, "id", "") for link in links] == ["1.1", "1.2"], mention
 

@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
         if documents is not None and owner.path not in documents:
             continue
         source, lesson, width = document.source, isinstance(owner, Lesson), course.width
-        callouts, words = course.callout_names, course.words
+        callouts, words = course.callout_names, course.words_of(owner)
         new = format_document(source, callouts, lesson=lesson, width=width, words=words)
         mistakes = [f"{location(d.span)}: {d.message}" for d in new.diagnostics]
         if read_bytes(root, source.path) != source.text.encode():

@@ -77,7 +77,7 @@ def completions(
     offset = texts.places.offset(source, params.position)
     cursor = source.span(offset, offset)
     line = source.text[source.line_starts[cursor.line - 1] : offset]
-    words = texts.library.course.words
+    words = texts.library.course.words_of(texts.owner(source))
     mentions = "|".join((*words.lessons, *words.lesson))
     for subject, kind, pattern in _SUBJECTS:
         prefix = re.search(pattern.replace("LESSON", mentions), line)

@@ -91,7 +91,7 @@ def format_text(
     owner, course = texts.owner(source), texts.library.course
     if owner is None:
         return []
-    lesson, width, words = isinstance(owner, Lesson), course.width, course.words
+    lesson, width, words = isinstance(owner, Lesson), course.width, course.words_of(owner)
     new = format_document(
         source, course.callout_names, lesson=lesson, width=width, words=words
     ).value

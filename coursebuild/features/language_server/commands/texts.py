@@ -114,7 +114,8 @@ class OpenTexts(Struct, frozen=True):
         if owner is None:
             return None
         course = self.library.course
-        return _parse(source, course.callout_names, isinstance(owner, Lesson), course.words)
+        words = course.words_of(owner)
+        return _parse(source, course.callout_names, isinstance(owner, Lesson), words)
 
     def owner(self, source: Source) -> Owner | None:
         """Return the lesson or page of a text, unless the text is too long to be read."""
