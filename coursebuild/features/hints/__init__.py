@@ -38,9 +38,9 @@ _BRACKETS = (
         r"(?:(?<!!)\[(?![\^(])|\ue000)([^\[\]\ue000]{0,400})\](?![(\[{])"
     ),
     re.compile(  # {1, 2}, \{a}
-        rf"(?:(?<![\w{_OTHER}\])}}{{])\{{(?![%#.:])|\ue001)([^{{}}\ue001]{{0,400}})\}}(?!\}})"
+        rf"(?:(?<![\w{_OTHER}\])}}{{])\{{(?![%#.:])|\ue001)([^{{}}\ue001]{{0,400}})\}}"
     ),
-    re.compile(r"\ue002([^<>\ue002]{0,400})>"),  # \<a>
+    re.compile(r"(?:(?<=\w)<|\ue002)([^<>\ue002]{0,400})>"),  # \<a>; List< [Item](#item)>
 )
 """Brackets that belong together, around what they hold."""
 _ORDINARY = (
@@ -50,12 +50,12 @@ _ORDINARY = (
     rf"(?<=\w)\*(?![*\w{_OTHER}])|(?<=[{_OTHER})\].!?])\*(?![*\w{_OTHER}])",  # RRT*, find_*
     r"(?<![^\s(\"“„«'‘])(?:[*_^~#<>=\\]|<<|>>|[<>]=|\*\*)(?![^\s).,;:?!\"”“»'’])(?<!\s\*\*)(?<!^\*\*)",
     r"(?<=\S\s)\|{1,2}(?=\s\S)",  # alone
-    r"(?<![#\w])#(?=\w)|(?<=[^\W_])#(?!#)|~(?=[\w/.+−-])(?<!~~)",  # #3, C#, ~20, ~/.config
+    r"(?<![#\w])#(?=\w)|(?<=[^\W_])#(?!#)|~(?=[\w/.=+−-])(?<!~~)",  # #3, C#, ~20, ~/.config
     r"[A-Z]{0,3}\$(?=[ \u202f]?[-+−]?\d)|(?<=\d)[ \u202f]?\$|[A-Z]{1,3}\$(?!\w)|\$[A-Z_]{2,}\b",
     r"<?[-=]{1,3}>|<[-=]{1,3}|<3|\^_+\^|[<>]=?(?=[ \u202f]?[-+−.~]?[\d∞])",  # arrows, signs
     r"\b[A-Za-z]:\\|\^(?=[A-Z\d])|\\[a-z](?![a-z])",  # C:\, ^C, \n
     r"(?<!\w)__\w{1,60}__(?!\w)|(?<!\w)_(?=[^\W_])|(?<=[^\W_])_(?!\w)",  # __init__, _x, class_
-    r"\|{1,2}\S(?:[^|\n]{0,40}\S)?\|{1,2}|[<>]=(?=\w)",  # |x|, >=a
+    r"\|(?=[^|\s]{1,20}⟩)|\|{1,2}\S(?:[^|\n]{0,40}\S)?\|{1,2}|[<>]=(?=\w)",  # |0⟩, |x|, >=a
     rf"<{_OTHER}[^<>\n]{{0,80}}>",  # <link>
 )
 _PROSE = re.compile("|".join(_ORDINARY))
@@ -65,7 +65,7 @@ _PROSE = re.compile("|".join(_ORDINARY))
 def find_mark(text: str) -> re.Match[str] | None:
     """The first mark of a text of one paragraph that is no part of prose."""
     rest = text
-    for pair in (*_BRACKETS, _BRACKETS[2], _BRACKETS[2]):
+    for pair in _BRACKETS * 3:  # brackets in brackets
         rest = pair.sub(r"(\1)", rest)
     rest = _PROSE.sub(lambda match: "x" * len(match[0]), rest)
     return _MARKS.search(rest)
@@ -80,6 +80,8 @@ def unread_marks(document: Document) -> Iterator[Diagnostic]:
         runs = [cell.children for cell in cells] or [model.block_inlines(block)]
         for inlines in runs if not isinstance(block, model.HtmlFlow) else ():
             text, places = _source_text(inlines)
+            if cells:  # a bar in a cell is always escaped
+                text = text.replace("|", _OTHER)
             mark = find_mark(text) if _MARKS.search(text) else None
             if mark is not None:
                 span = document.source.span(places[mark.start()], places[mark.end() - 1] + 1)
