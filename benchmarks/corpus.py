@@ -25,6 +25,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import re
 import sys
 import tempfile
 import tomllib
@@ -61,6 +62,7 @@ SHARE = 10_000
 
 Judgements: TypeAlias = dict[str, str]
 """A letter by the hash of a rule and a line."""
+_LINE_OF_WORDS = re.compile(r"(?:[^\w\n]*\n){0,3}[^\n]*")
 
 
 class Body(Struct, frozen=True):
@@ -91,9 +93,11 @@ class Row(Struct, frozen=True):
 
 
 def line_of(diagnostic: Diagnostic) -> str:
-    """The whole line in which a diagnostic begins."""
+    """The line in which a diagnostic begins; one without words, such as `$$`, with those below."""
     text, start = diagnostic.span.source.text, diagnostic.span.start
-    return text[text.rfind("\n", 0, start) + 1 :].partition("\n")[0].strip()
+    line = _LINE_OF_WORDS.match(text, text.rfind("\n", 0, start) + 1)
+    assert line is not None
+    return line[0].strip()
 
 
 def hash_of(diagnostic: Diagnostic) -> str:

@@ -117,8 +117,8 @@ def math_block(state: StateBlock, start_line: int, end_line: int, silent: bool) 
         if line >= end_line or state.isEmpty(line) or state.sCount[line] < state.blkIndent:
             break
         start = state.bMarks[line] + state.tShift[line]
-    if silent:
-        return True
+    if silent:  # without an end it may be that of a formula in the paragraph
+        return is_closed
     state.line = line
     token = state.push("math_block", "", 0)
     token.content = state.getLines(start_line, line, state.sCount[start_line], False)

@@ -30,14 +30,13 @@ ILLUSTRATION = "illustration"
 """The flag of a `text` fence that resembles an output and is none."""
 
 
-def is_caption(inlines: tuple[model.Inline, ...], words: Words, *, has_script: bool) -> bool:
-    """Whether a paragraph is a caption: `Output:`, and below a script `Output (again):` as well.
+def is_caption(inlines: tuple[model.Inline, ...], words: Words) -> bool:
+    """Whether a paragraph below a script is a caption: `Output:`, `Output (again):`.
 
     Instead of what stands in brackets there may be what follows a comma. A sentence that begins
     with the word is none.
     """
-    match = _match_caption(inlines, words)
-    return match is not None and (has_script or not match[1])
+    return _match_caption(inlines, words) is not None
 
 
 def _is_bare(caption: tuple[model.Inline, ...], words: Words) -> bool:

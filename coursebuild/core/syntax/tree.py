@@ -58,6 +58,9 @@ class TextReader:
             read_inlines, state=state, references=references, balance=self.balance
         )
         for i, token in enumerate(self.tokens):
+            if token.type in ("html_block", "inline") and "<" in token.content:
+                for id in html_ids(_CODE_SPAN.sub("", token.content)):
+                    self.state.anchors.reserve(id)  # links mean the id that its author wrote
             if token.type == "heading_open" and self.tokens[i + 1].content.endswith("}"):
                 name = read_attributes(trim(token.text)).value.id
                 if name is not None:
@@ -192,12 +195,12 @@ class TextReader:
         return recording or model.Paragraph(span, inlines)
 
     def _is_caption(self, content: Excerpt, inlines: tuple[model.Inline, ...]) -> bool:
-        """Whether a paragraph is the caption of an output, which begins with a word for it."""
+        """Whether a paragraph is the caption of an output: below a script, with a word for it."""
         words = self.state.words
-        if not any(name in content.text[:24] for name in words.output):
+        if self.state.script is None and not self.state.has_invalid_script:
             return False
-        has_script = self.state.script is not None or self.state.has_invalid_script
-        return is_caption(inlines, words, has_script=has_script)
+        is_likely = any(name in content.text[:24] for name in words.output)
+        return is_likely and is_caption(inlines, words)
 
     def _peek(self) -> PositionedToken | None:
         return self.tokens[self.index] if self.index < len(self.tokens) else None
@@ -217,9 +220,6 @@ class TextReader:
             state.level = level
         classes, id = attributes.value.classes, attributes.value.id
         if id is None:
-            for inline in model.walk_inlines(children):  # links mean the id that its author wrote
-                for name in html_ids(inline.html) if isinstance(inline, model.RawInline) else ():
-                    state.anchors.reserve(name)
             anchor = state.anchors.make(model.plain_text(children))
             return model.Heading(span, level, children, anchor, False, classes)
         state.anchors.take(id.text[1:], id.span())
@@ -338,6 +338,7 @@ class TextReader:
         return None
 
 
+_CODE_SPAN = re.compile(r"(?<!`)(`+)(?!`).*?(?<!`)\1(?!`)", re.DOTALL)
 _SENTENCE_MARK = re.compile(r"[ \t]*([.,;:])")
 _READERS: dict[
     str, Callable[[TextReader, PositionedToken], model.Block | model.SourceMark | None]

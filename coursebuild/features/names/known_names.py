@@ -4,8 +4,8 @@ Entry points: `EngineNames`; `engine_names`, the table, which one child process 
 version of MuJoCo; `list_names` for another interpreter; `find_engine_name`,
 `element_href`, what a name means and where MuJoCo's manual has it.
 
-Of coursebuild, `options_by_command`; `tables_of` a kind of file, as the course map; `known_keys`;
-and what a name of each sort means: `resolve_command`, `resolve_option`, `resolve_table`.
+Of coursebuild, `options_by_command`; `tables_of` a kind of file, as the course map; and what a name
+of each sort means: `resolve_command`, `resolve_option`, `resolve_table`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from coursebuild.core.registry import CORE_COMMANDS, features
 from coursebuild.core.run import mjcf
 from coursebuild.core.run.child import JsonChild
 from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
-from coursebuild.core.syntax.course_schema import CourseFile, schema_roots
+from coursebuild.core.syntax.course_schema import CourseFile
 from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.core.text.source import key_of
 from coursebuild.features.names import introspect
@@ -293,13 +293,6 @@ def tables_of(root: type[Struct]) -> dict[str, frozenset[str]]:
 
     add("", inspect.type_info(root))
     return tables
-
-
-@functools.cache
-def known_keys() -> frozenset[str]:
-    """The keys of everything that coursebuild reads: the course map, labs, quizzes."""
-    tables = (tables_of(root) for root, _ in schema_roots().values())
-    return frozenset(key for table in tables for keys in table.values() for key in keys)
 
 
 def resolve_command(manual: str, name: str) -> Answer:

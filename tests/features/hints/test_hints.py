@@ -10,13 +10,23 @@ import pytest
 from support.scratch_course import Folder
 
 MakeCourse = Callable[..., Folder]
-LIKELY = "## Heights\n\nThe box **falls, and `update_positon` is called.\n"
-CODE = "```c\nvoid update_position(void);\n```\n"
+LIKELY = "## Heights\n\nThe box **falls.\n"
+MODEL = """```mjcf
+<mujoco>
+  <worldbody>
+    <body>
+      <joint type="hinge" range="-1.5708 1.5708"/>
+      <geom size="0.1"/>
+    </body>
+  </worldbody>
+</mujoco>
+```
+"""
 
 
 @pytest.fixture
 def course(make_course: MakeCourse) -> Folder:
-    return make_course(f"{LIKELY}\n{CODE}")
+    return make_course(f"{LIKELY}\n{MODEL}")
 
 
 @pytest.mark.parametrize("options", [(), ("--strict",)])
@@ -34,7 +44,7 @@ def test_hints_are_printed_as_diagnostics_where_somebody_asks(course: Folder) ->
     result = course.main("check", "--hints")
     assert result.status == 0
     assert "hint[shown-as-written]: `**` would be shown as written" in result.out
-    assert "hint[name-near]: `update_positon` stands nowhere else" in result.out
+    assert "hint[angle-unit]: `-1.5708` has the look of radians" in result.out
     assert "everything holds" in result.out and "shows them" not in result.out
 
 
