@@ -27,6 +27,7 @@ from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Course
 from coursebuild.core.model.addresses import RecordedFigure, recorded_figures
+from coursebuild.core.model.report_files import FOLDER
 from coursebuild.core.model.results import Machine, Outcome, ScriptRun
 from coursebuild.core.run.dependencies import (
     Inputs,
@@ -43,7 +44,6 @@ from coursebuild.core.scripts.extract import Extraction, jobs
 from coursebuild.core.scripts.figures import SVG_HELP, describe_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.reports.records import FOLDER
 from coursebuild.pipeline.options import Options
 
 

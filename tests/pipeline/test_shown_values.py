@@ -29,8 +29,8 @@ from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.numerics.reports.case_report import CaseReport
-from coursebuild.numerics.reports.diet_report import DietReport
-from coursebuild.numerics.reports.scene_report import SceneReport
+from coursebuild.core.model.measurements import DietReport
+from coursebuild.core.model.measurements import SceneReport
 from coursebuild.pipeline.check import read_and_verify
 from coursebuild.pipeline.reader import PageRequest, Reader
 from coursebuild.pipeline.site import Site, page_request, text_of

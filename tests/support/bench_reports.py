@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from coursebuild.core.model.results import Machine
-from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.scene_report import (
+from coursebuild.core.model.measurements import Interval
+from coursebuild.core.model.measurements import (
     FittedOrder,
     MeasuredSetting,
     OrderRow,

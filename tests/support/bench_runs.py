@@ -7,7 +7,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from coursebuild.numerics.reports.scene_report import ScenarioReport, WorkPrecisionRow
+from coursebuild.core.model.measurements import ScenarioReport, WorkPrecisionRow
 from coursebuild.numerics.scene import scenes
 from coursebuild.numerics.work_precision import measure_scenario
 from support.surveys import parse_declared

@@ -5,7 +5,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Reports
-from coursebuild.numerics.reports import Interval
+from coursebuild.core.model.measurements import Interval
 from coursebuild.numerics.reports.case_report import (
     BoundaryLine,
     CaseReport,
@@ -13,7 +13,7 @@ from coursebuild.numerics.reports.case_report import (
     ReferenceLine,
     StepCost,
 )
-from coursebuild.numerics.reports.diet_report import (
+from coursebuild.core.model.measurements import (
     MEASURED_LABEL,
     PROVED_LABEL,
     DietReport,
@@ -22,7 +22,7 @@ from coursebuild.numerics.reports.diet_report import (
     ModelPlace,
     Saving,
 )
-from coursebuild.numerics.reports.scene_report import FigureLine, OrderRow, SceneCard, SceneReport
+from coursebuild.core.model.measurements import FigureLine, OrderRow, SceneCard, SceneReport
 from support.bench_reports import FIRST, MACHINE, awkward, swing
 from support.bench_reports import row as row
 from support.bench_reports import scenario as scenario

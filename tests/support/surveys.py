@@ -15,7 +15,7 @@ from coursebuild.numerics.pruning.comparison import pruning_scenes
 from coursebuild.numerics.pruning.model_text import ModelText, open_model
 from coursebuild.numerics.pruning.readers import read_code
 from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
-from coursebuild.numerics.reports.diet_report import Finding
+from coursebuild.core.model.measurements import Finding
 from support.bench_reports import MACHINE
 
 PATH = "models/a.xml"

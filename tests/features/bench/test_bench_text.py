@@ -18,9 +18,9 @@ from coursebuild.features.bench.commands.measurement import (
     format_checks,
     measurement_json,
 )
-from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.records import Departure, RecordCheck
-from coursebuild.numerics.reports.scene_report import FigureLine, RowVerdict
+from coursebuild.core.model.measurements import Interval
+from coursebuild.core.model.report_files import Departure, RecordCheck
+from coursebuild.core.model.measurements import FigureLine, RowVerdict
 from coursebuild.report import Style
 from coursebuild.report.text import Column, cells, fit, table
 from support.bench_reports import awkward, row, scenario, scene

@@ -8,7 +8,7 @@ import pytest
 
 from coursebuild.core.run.script_environment import machine
 from coursebuild.features.bench.commands.measuring import add_card
-from coursebuild.numerics.reports.scene_report import SceneReport
+from coursebuild.core.model.measurements import SceneReport
 from coursebuild.pipeline.scenes import find_scenes
 
 pytestmark = pytest.mark.site

@@ -7,7 +7,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coursebuild.features.bench.commands.diet import diet_text
-from coursebuild.numerics.reports.diet_report import (
+from coursebuild.core.model.measurements import (
     MEASURED_LABEL,
     DietScenario,
     ModelPlace,

@@ -18,14 +18,14 @@ from coursebuild.features.bench.commands.engines import (
     chosen_engines,
     engines_text,
 )
-from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.engine_report import (
+from coursebuild.core.model.measurements import Interval
+from coursebuild.core.model.measurements import (
     BatchCost,
     EngineReport,
     EngineRow,
     EngineScenario,
 )
-from coursebuild.numerics.reports.records import ENGINES
+from coursebuild.core.model.report_files import ENGINES
 from coursebuild.report.text import Style
 from support.bench_reports import MACHINE, swing
 from support.fake_engines import ENGINES as FAKE_ENGINES

@@ -9,7 +9,7 @@ import pytest
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.measurement import CannotMeasureError
 from coursebuild.features.bench.commands.measuring import compile_scene, run_scenario
-from coursebuild.numerics.reports.scene_report import ScenarioReport
+from coursebuild.core.model.measurements import ScenarioReport
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import write
 
