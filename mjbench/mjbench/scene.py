@@ -160,27 +160,29 @@ def scenes(model: Any, declarations: Declarations, *, quick: bool = False) -> tu
 def _check_fit(declarations: Declarations, model: Any) -> None:
     """Check that a model has what scenarios name; a `SceneError` where it does not."""
     for scenario in declarations.scenarios:
-        key = scenario.keyframe
         names = [str(model.key(number).name) for number in range(int(model.nkey))]
-        if (isinstance(key, int) and key >= len(names)) or (
-            isinstance(key, str) and key not in names
-        ):
-            raise SceneError(f"the model has no keyframe `{key}`", scenario.place("keyframe"))
+        known = names if isinstance(scenario.keyframe, str) else range(len(names))
+        if scenario.keyframe is not None and scenario.keyframe not in known:
+            message = f"the model has no keyframe `{scenario.keyframe}`"
+            raise SceneError(message, scenario.place("keyframe"))
         commands = [("controls", row, model.nu) for row in scenario.controls]
         state = [("qpos", scenario.qpos, model.nq), ("qvel", scenario.qvel, model.nv)]
         for field, values, count in (*state, *commands):
             if values and len(values) != count:
                 message = f"`{field}` has {len(values)} numbers, and the model takes {count}"
                 raise SceneError(message, scenario.place(field))
+        sample = scenario.sample
+        for field, length in (("duration", scenario.duration), ("hold", scenario.hold)):
+            if sample is not None and length is not None and not is_multiple(length, sample):
+                message = f"`{field}` ({length:g} s) is not a multiple of `sample` ({sample:g} s)"
+                raise SceneError(message, scenario.place(field))
         if len(scenario.controls) > 1 and scenario.hold is None:
             raise SceneError("`hold` is missing: commands follow each other", scenario.table)
         measured = scenario.observable
         if measured is not None:
-            count = {"body": model.nbody, "site": model.nsite, "sensor": model.nsensor}[
-                measured.kind
-            ]
             things = getattr(model, measured.kind)
-            if measured.name not in {str(things(number).name) for number in range(int(count))}:
+            numbers = range(int(getattr(model, f"n{measured.kind}")))
+            if measured.name not in {str(things(number).name) for number in numbers}:
                 message = f"the model has no {measured.kind} `{measured.name}`"
                 raise SceneError(message, scenario.place("measure"))
 

@@ -22,8 +22,8 @@ from mjbench.reports import Interval
 from mjbench.reports.scene_report import MeasuredSetting, WorkPrecisionRow
 from mjbench.reports.shown_errors import FrontPoint, Quantity, front
 from mjbench.scene import scenes
-from support.bench_reports import diverged_row, row
-from support.surveys import NO_DECLARATIONS
+from samples.reports import diverged_row, row
+from samples.surveys import NO_DECLARATIONS
 
 
 class Machine:

@@ -19,7 +19,7 @@ from mjbench.problems import all_problems
 from mjbench.scene import scenes, thickness
 from mjbench.simulation import advance, compile_model, refsafe_active, simulate
 from mjbench.stability import attempt
-from support.surveys import parse_declared
+from samples.surveys import parse_declared
 
 SPRING = """
 <mujoco>

@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.core.model.course import CLOSED_FORMS
 from mjbench.known_motion import KnownMotion, find_reference, self_reference
 from mjbench.pilot import run_pilot
 from mjbench.problem import Integrator
-from mjbench.problems import all_problems
 from mjbench.scene import SceneError, scenes
-from support.surveys import NO_DECLARATIONS, parse_declared
+from samples.surveys import NO_DECLARATIONS, parse_declared
 
-pytestmark = pytest.mark.site
+pytestmark = pytest.mark.long
 
 PENDULUM = """\
 <mujoco>
@@ -47,11 +45,6 @@ def reference_of(
 ) -> KnownMotion:
     (scene,) = scenes(model, parse_declared("[[scenario]]\n" + text), quick=True)
     return find_reference(model, run_pilot(model, scene), quick=True)
-
-
-def test_names_of_closed_forms_are_those_of_the_hard_cases() -> None:
-    names = [p.name for p in all_problems().values() if p.reference.kind == "closed"]
-    assert list(CLOSED_FORMS) == names
 
 
 def test_a_smooth_scene_is_integrated_twice() -> None:

@@ -25,7 +25,7 @@ from mjbench.problems import all_problems, extremes, impact, linked_bodies
 from mjbench.reports.case_report import ErrorLine
 from mjbench.scene import Scene, scenes
 from mjbench.simulation import EngineStates, simulate
-from support.surveys import NO_DECLARATIONS, parse_declared
+from samples.surveys import NO_DECLARATIONS, parse_declared
 
 FIRST = tuple(integrator for integrator in STANDARD if integrator is not Integrator.RK4)
 
@@ -43,7 +43,7 @@ def slopes(name: str, integrator: Integrator) -> dict[str, float]:
     return {part: fit.value for part, fit in parts.items() if fit is not None}
 
 
-@pytest.mark.site
+@pytest.mark.long
 def test_the_euler_family_is_of_first_order() -> None:
     names = ("tumbling-box", "damped-spring-0", "free-top", "projectile")
     for name, integrator in itertools.product(names, FIRST):
@@ -55,7 +55,7 @@ def test_the_euler_family_is_of_first_order() -> None:
     assert set(slopes("tumbling-box", Integrator.EULER)) == {"attitude", "velocity"}
 
 
-@pytest.mark.site
+@pytest.mark.long
 def test_orders_of_rk4() -> None:
     """Second in attitude; fourth in velocity, unless the torque depends on the attitude."""
     turning = {"velocity": 4.0, "attitude": 2.0}
@@ -171,7 +171,7 @@ MEASURED_ORDERS = (
 )
 
 
-@pytest.mark.site
+@pytest.mark.long
 def test_figures_are_those_of_theory_or_known_to_be_others() -> None:
     mismatches = []
     for name, part, integrators, room in AS_THEORY_SAYS:
@@ -189,7 +189,7 @@ def test_figures_are_those_of_theory_or_known_to_be_others() -> None:
         mujoco.MjModel.from_xml_string(extremes.ROUNDED_PLATE)
 
 
-@pytest.mark.site
+@pytest.mark.long
 def test_restitution_comes_to_one_with_more_steps_in_a_contact() -> None:
     """In second order: by π²/8n² at most, to leading order, as lesson 4.3 derives for Euler."""
     for steps in (5, 10, 20, 40, 80):

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from xml.etree import ElementTree
 
 import mujoco
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.core.model.scenarios import BenchTable
+from mjbench.declarations import BenchTable
 from mjbench.reports import Interval
 from mjbench.reports.records import scene_departures
-from mjbench.reports.report_plots import sweep_svg
-from mjbench.reports.scene_report import SweepReport, SweepRow, shown_figures
+from mjbench.reports.scene_report import SweepReport, SweepRow
 from mjbench.scene import SceneError, scenes
 from mjbench.sweep import measure_sweep
-from support.bench_reports import scene
-from support.surveys import parse_declared
+from samples.reports import scene
+from samples.surveys import parse_declared
 
 pytestmark = pytest.mark.long
 
@@ -107,7 +105,6 @@ def test_in_chaos_a_change_has_a_time_and_no_size(start: str, is_chaotic: bool) 
     assert (undamped.change, undamped.parted) == (0.0, None)
     if is_chaotic:
         assert damped.change is None and damped.parted is not None and 0.2 < damped.parted < 9
-        assert "1: just visible" not in sweep_svg(report, name="s")
     else:
         assert damped.parted is None and damped.change is not None and damped.change > 1
 
@@ -170,7 +167,7 @@ def test_what_is_no_parameter_is_told(vary: str, message: str) -> None:
     with pytest.raises(SceneError) as caught:
         run_sweep(f"vary = {vary}")
     assert message in caught.value.message
-    assert caught.value.span is not None and caught.value.span.path == "models/a.toml"
+    assert caught.value.place is not None and caught.value.place.path == "models/a.toml"
 
 
 def test_costs_and_threads_have_intervals() -> None:
@@ -198,28 +195,6 @@ ROWS = (
     SweepRow("option.cone", "elliptic", own=False, status="diverged", reasons=("lost",)),
     SweepRow("threads", "2", own=False, status="ok", throughput=Interval(2e3, 1e3, 3e3)),
 )
-
-
-def test_figures_that_differ_are_shown_unless_others_are_named() -> None:
-    assert shown_figures(table(*ROWS)) == ("penetration",)
-    assert shown_figures(table(*ROWS, show=("slip",))) == ("slip",)
-    assert sweep_svg(table(), name="p") == ""
-
-
-@pytest.mark.parametrize("narrow", [False, True])
-def test_every_value_is_a_dot_in_the_plot(narrow: bool) -> None:
-    report = table(*ROWS, show=("penetration", "throughput"))
-    root = ElementTree.fromstring(sweep_svg(report, name="p", narrow=narrow))
-    titles = [element.text for path in root.iter("path") for element in path.iter("title")]
-    assert titles == [
-        "geom.solref[0] 0.01: 0.0001",
-        "geom.solref[0] 0.1: 0.01",
-        "threads 2: 2000 ± 50 %",
-    ]
-    texts = [element.text for element in root.iter("text")]
-    assert {"geom.solref[0]", "option.cone", "diverged", "as the model is", "depth (m)"} <= {*texts}
-    assert len(list(root.iter("circle"))) == 2, "around the own value, and in the key"
-    assert "option.cone elliptic: depth (m) diverged" in root.findtext("desc", "")
 
 
 def test_a_figure_that_left_its_band_is_told() -> None:

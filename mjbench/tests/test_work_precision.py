@@ -16,8 +16,8 @@ from mjbench.problem import Array
 from mjbench.reports.scene_report import ScenarioReport
 from mjbench.scene import ExactMotion, ExactStates, SceneError, scenes
 from mjbench.work_precision import measure_scenario
-from support.bench_runs import FAMILY, MODELS, measure, orders, row
-from support.surveys import NO_DECLARATIONS, parse_declared
+from samples.runs import BOX, FAMILY, FLIP, measure, orders, row
+from samples.surveys import NO_DECLARATIONS, parse_declared
 
 pytestmark = pytest.mark.long
 
@@ -25,9 +25,7 @@ pytestmark = pytest.mark.long
 @functools.cache
 def of_box() -> ScenarioReport:
     """The first flip of the tumbling box."""
-    text = (MODELS / "tumbling_box.toml").read_text(encoding="utf-8")
-    model = mujoco.MjModel.from_xml_path(str(MODELS / "tumbling_box.xml"))
-    scene = next(s for s in scenes(model, parse_declared(text)) if s.name == "first-flip")
+    (scene,) = scenes(model := mujoco.MjModel.from_xml_string(BOX), parse_declared(FLIP))
     return measure_scenario(model, scene, clock=None)
 
 

@@ -15,9 +15,9 @@ from msgspec.structs import replace
 
 from coursebuild.cli import main
 from coursebuild.core.model import Declarations
-from coursebuild.core.run.script_environment import engine_version
-from coursebuild.core.model.report_files import BENCH, DIET, STABILITY
 from coursebuild.core.model.measurements import SceneReport
+from coursebuild.core.model.report_files import BENCH, DIET, STABILITY
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.scenes import scene_digest
 from support.edited_course import drawn_pages

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from coursebuild.core.engine.store import Store
+from coursebuild.core.model.measurements import ScenarioReport, SceneReport
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.measurement import CannotMeasureError
 from coursebuild.features.bench.commands.measuring import CompiledScene
-from coursebuild.core.model.measurements import ScenarioReport, SceneReport
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene
 from support.bench_reports import swing

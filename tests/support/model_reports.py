@@ -4,8 +4,21 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
+from coursebuild.core.model.measurements import (
+    MEASURED_LABEL,
+    PROVED_LABEL,
+    DietReport,
+    DietScenario,
+    FigureLine,
+    Finding,
+    Interval,
+    ModelPlace,
+    OrderRow,
+    Saving,
+    SceneCard,
+    SceneReport,
+)
 from coursebuild.core.model.results import Reports
-from coursebuild.core.model.measurements import Interval
 from coursebuild.numerics.reports.case_report import (
     BoundaryLine,
     CaseReport,
@@ -13,16 +26,6 @@ from coursebuild.numerics.reports.case_report import (
     ReferenceLine,
     StepCost,
 )
-from coursebuild.core.model.measurements import (
-    MEASURED_LABEL,
-    PROVED_LABEL,
-    DietReport,
-    DietScenario,
-    Finding,
-    ModelPlace,
-    Saving,
-)
-from coursebuild.core.model.measurements import FigureLine, OrderRow, SceneCard, SceneReport
 from support.bench_reports import FIRST, MACHINE, awkward, swing
 from support.bench_reports import row as row
 from support.bench_reports import scenario as scenario

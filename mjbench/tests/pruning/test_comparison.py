@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.core.model.scenarios import BenchTable, DeclaredScenario
+from mjbench.declarations import BenchTable, DeclaredScenario, Place
 from mjbench.problem import Scenario
 from mjbench.pruning.comparison import (
     ALIKE,
@@ -25,7 +25,7 @@ from mjbench.pruning.comparison import (
 )
 from mjbench.scene import Scene
 from mjbench.simulation import initial_data
-from support.surveys import NO_DECLARATIONS, parse_declared
+from samples.surveys import NO_DECLARATIONS, parse_declared
 
 DOUBLE_PENDULUM = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0"/>
   <body pos="1 0 0"><joint axis="0 1 0"/><geom size=".1" pos=".5 0 0" mass="{mass!r}"/></body>
@@ -34,7 +34,7 @@ DOUBLE_PENDULUM = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size=".
 
 def scene_of(duration: float, keyframe: int = -1) -> Scene:
     scenario = Scenario(duration, 0.002, keyframe=keyframe)
-    nobody = DeclaredScenario("go", span=NO_DECLARATIONS.source.span(0, 0))
+    nobody = DeclaredScenario("go", table=Place(NO_DECLARATIONS.path))
     return Scene("go", "go", scenario, (0.002,), 0.002, BenchTable(), nobody)
 
 

@@ -12,7 +12,7 @@ import pytest
 from mjbench.pruning.model_text import ModelTextError
 from mjbench.pruning.survey import Survey
 from mjbench.reports.diet_report import PROVED_LABEL
-from support.surveys import PATH, findings_by_kind, fixed_text, names, open_files, run_survey
+from samples.surveys import PATH, findings_by_kind, fixed_text, names, open_files, run_survey
 
 pytestmark = pytest.mark.long
 

@@ -9,7 +9,7 @@ import pytest
 
 from mjbench.pruning.comparison import ALIKE, compare, index_map, pruning_scenes, watch
 from mjbench.reports.diet_report import MEASURED_LABEL
-from support.surveys import (
+from samples.surveys import (
     NO_DECLARATIONS,
     PATH,
     findings_by_kind,

@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from mjbench.reports.diet_report import MEASURED_LABEL, PROVED_LABEL
-from support.surveys import (
+from samples.surveys import (
     PENDULUM,
     field,
     findings_by_kind,
@@ -119,7 +119,7 @@ def test_geoms_that_can_touch_nothing_need_no_contact() -> None:
     assert "collision-unreachable" not in findings_by_kind(run_survey(left))
 
 
-@pytest.mark.site
+@pytest.mark.long
 def test_all_of_a_field_of_rubble_goes_and_the_arm_stays() -> None:
     """All forty boxes and sixty fixed geoms, of which no single one is in the arm's way."""
     posts = "".join(

@@ -51,7 +51,7 @@ def random_state(random: np.random.Generator, model: mujoco.MjModel, data: mujoc
             data.qpos[at] = random.uniform(-np.pi, np.pi)
 
 
-@pytest.mark.site
+@pytest.mark.long
 def test_what_is_said_to_be_separate_never_touches() -> None:
     mismatches = []
     for seed in range(10):

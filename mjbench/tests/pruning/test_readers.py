@@ -6,7 +6,7 @@ import textwrap
 
 import pytest
 
-from support.surveys import names, parse_declared, run_survey, scene
+from samples.surveys import names, parse_declared, run_survey, scene
 
 pytestmark = pytest.mark.long
 

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from mjbench.reports.diet_report import PROVED_LABEL
-from support.surveys import (
+from samples.surveys import (
     PATH,
     PENDULUM,
     field,

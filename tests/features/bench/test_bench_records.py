@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from coursebuild.core.model.measurements import ScenarioReport, SceneReport
+from coursebuild.core.model.report_files import BENCH
 from coursebuild.features.bench.commands.bench import bench, check
 from coursebuild.features.bench.commands.measurement import Measurement
-from coursebuild.core.model.report_files import BENCH
-from coursebuild.core.model.measurements import ScenarioReport, SceneReport
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import BOX, PATH, TOML, Fake, bench_course, options, swing, write

@@ -12,15 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from coursebuild.core.model.measurements import FigureLine, Interval, RowVerdict
+from coursebuild.core.model.report_files import Departure, RecordCheck
 from coursebuild.features.bench.commands.bench import bench_text
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     format_checks,
     measurement_json,
 )
-from coursebuild.core.model.measurements import Interval
-from coursebuild.core.model.report_files import Departure, RecordCheck
-from coursebuild.core.model.measurements import FigureLine, RowVerdict
 from coursebuild.report import Style
 from coursebuild.report.text import Column, cells, fit, table
 from support.bench_reports import awkward, row, scenario, scene

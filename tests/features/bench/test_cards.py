@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from coursebuild.core.model.measurements import SceneReport
 from coursebuild.core.run.script_environment import machine
 from coursebuild.features.bench.commands.measuring import add_card
-from coursebuild.core.model.measurements import SceneReport
 from coursebuild.pipeline.scenes import find_scenes
 
 pytestmark = pytest.mark.site

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coursebuild.features.bench.commands.diet import diet_text
 from coursebuild.core.model.measurements import (
     MEASURED_LABEL,
     DietScenario,
@@ -16,6 +15,7 @@ from coursebuild.core.model.measurements import (
     StaleKeep,
     TextEdit,
 )
+from coursebuild.features.bench.commands.diet import diet_text
 from coursebuild.report import Style
 from support.fixture_cases import check_text
 from support.model_reports import diet, finding

@@ -11,6 +11,14 @@ from msgspec.structs import replace
 
 from coursebuild.cli import main
 from coursebuild.core.files.errors import EffectError, UsageError
+from coursebuild.core.model.measurements import (
+    BatchCost,
+    EngineReport,
+    EngineRow,
+    EngineScenario,
+    Interval,
+)
+from coursebuild.core.model.report_files import ENGINES
 from coursebuild.core.model.results import Reports
 from coursebuild.features.bench.commands.engines import (
     ChosenEngine,
@@ -18,14 +26,6 @@ from coursebuild.features.bench.commands.engines import (
     chosen_engines,
     engines_text,
 )
-from coursebuild.core.model.measurements import Interval
-from coursebuild.core.model.measurements import (
-    BatchCost,
-    EngineReport,
-    EngineRow,
-    EngineScenario,
-)
-from coursebuild.core.model.report_files import ENGINES
 from coursebuild.report.text import Style
 from support.bench_reports import MACHINE, swing
 from support.fake_engines import ENGINES as FAKE_ENGINES

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from coursebuild.core.model.measurements import ScenarioReport
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.features.bench.commands.bench import bench
-from coursebuild.core.model.measurements import ScenarioReport
 from coursebuild.pipeline.options import Progress
 from coursebuild.pipeline.scenes import find_scenes
 from support.measured_course import BOX, TOML, Fake, bench_course, options, swing, take_calls, write

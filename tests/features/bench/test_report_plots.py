@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.core.drawing.scales import text_width
-from coursebuild.core.model.measurements import Interval
+from coursebuild.core.model.measurements import Interval, ScenarioReport
 from coursebuild.features.bench.chart import line_look, outline
 from coursebuild.features.bench.report_plots import plot_svgs, work_precision
-from coursebuild.core.model.measurements import ScenarioReport
 from coursebuild.features.bench.shown_errors import main_quantity, quantities
 from support.bench_reports import diverged_row, row, scenario, swing
 

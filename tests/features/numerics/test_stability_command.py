@@ -9,9 +9,9 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.cli import main
+from coursebuild.core.model.report_files import STABILITY
 from coursebuild.features.numerics.commands import stability_text
 from coursebuild.numerics.problems import all_problems, impact
-from coursebuild.core.model.report_files import STABILITY
 from coursebuild.report import Style
 from support.fixture_cases import check_text
 from support.model_reports import case

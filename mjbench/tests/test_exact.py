@@ -1,4 +1,4 @@
-"""A course's own exact motion, `models/NAME.exact.py`: errors refer to it, or it is a mistake."""
+"""A known motion, `NAME.exact.py`: errors refer to it, or it is a mistake."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.features.bench.commands.measurement import CannotMeasureError
-from coursebuild.features.bench.commands.measuring import compile_scene, run_scenario
-from coursebuild.core.model.measurements import ScenarioReport
-from coursebuild.pipeline.scenes import find_scenes
-from support.measured_course import write
+from mjbench.bench import CannotMeasureError, compile_subject, run_scenario
+from mjbench.cli import read_subject
+from mjbench.host import LocalHost
+from mjbench.reports.scene_report import ScenarioReport
 
 pytestmark = pytest.mark.long
 
@@ -34,39 +32,41 @@ def motion(time, qpos, qvel):
 """
 
 
+def write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
 @pytest.fixture
-def course(tmp_path: Path) -> Path:
-    write(tmp_path / "content" / "course.toml", 'title = "A"\n')
-    write(tmp_path / "models" / "ball.xml", BALL)
-    write(tmp_path / "models" / "ball.toml", TOML)
+def folder(tmp_path: Path) -> Path:
+    write(tmp_path / "ball.xml", BALL)
     return tmp_path
 
 
-def report(course: Path, exact: str, toml: str = TOML) -> ScenarioReport:
-    write(course / "models" / "ball.exact.py", exact)
-    write(course / "models" / "ball.toml", toml)
-    (scene,) = find_scenes(course, ("ball",)).value
-    compiled_scene = compile_scene(course, scene, quick=True)
-    return run_scenario(compiled_scene, 0, quick=True, timed=False, tell=lambda _: None)
+def report(folder: Path, exact: str, toml: str = TOML) -> ScenarioReport:
+    write(folder / "ball.exact.py", exact)
+    write(folder / "ball.toml", toml)
+    host = LocalHost(folder, lambda text: None)
+    compiled = compile_subject(read_subject(folder / "ball.xml"), host, quick=True)
+    return run_scenario(compiled, 0, host, quick=True, timed=False)
 
 
-def mistake(course: Path, exact: str, toml: str = TOML) -> Diagnostic:
+def mistake(folder: Path, exact: str, toml: str = TOML) -> CannotMeasureError:
     with pytest.raises(CannotMeasureError) as caught:
-        report(course, exact, toml)
-    return caught.value.diagnostic
+        report(folder, exact, toml)
+    return caught.value
 
 
-def test_errors_are_taken_from_the_exact_motion(course: Path) -> None:
+def test_errors_are_taken_from_the_exact_motion(folder: Path) -> None:
     for velocity in (", qvel - 9.81 * time", ""):
-        scenario = report(course, EXACT.format(velocity=velocity))
-        assert (scenario.reference, scenario.source) == ("closed", "models/ball.exact.py")
+        scenario = report(folder, EXACT.format(velocity=velocity))
+        assert (scenario.reference, scenario.source) == ("closed", "ball.exact.py")
         assert scenario.second == "Bulirsch–Stoer over mj_forward" and scenario.floor < 1e-13
         (own_row,) = (row for row in scenario.rows if row.own)
         assert own_row.position is not None
         assert own_row.position[0] == pytest.approx(9.81 * 0.4 * 0.002 / 2)
         assert own_row.figure == pytest.approx(own_row.position)
     with_reference = TOML + 'reference = "ode"\n'
-    assert report(course, EXACT.format(velocity=""), with_reference).reference == "ode"
+    assert report(folder, EXACT.format(velocity=""), with_reference).reference == "ode"
 
 
 EQUATIONS = """\
@@ -75,21 +75,21 @@ def acceleration(time, qpos, qvel):
 """
 
 
-def test_equations_of_motion_are_integrated(course: Path) -> None:
-    scenario = report(course, EQUATIONS.format(""))
+def test_equations_of_motion_are_integrated(folder: Path) -> None:
+    scenario = report(folder, EQUATIONS.format(""))
     assert scenario.reference == "closed" and scenario.floor < 1e-11
-    help = mistake(course, EQUATIONS.format(" * (1 + 1e-5)")).help
+    help = mistake(folder, EQUATIONS.format(" * (1 + 1e-5)")).help
     assert help.startswith("in the scenario `up` it errs by 7.8e-06 in position: two integrations")
-    loose = report(course, EQUATIONS.format(" * (1 + 1e-5)"), TOML + "precision = 1e-4\n")
+    loose = report(folder, EQUATIONS.format(" * (1 + 1e-5)"), TOML + "precision = 1e-4\n")
     assert 1e-6 < loose.floor < 1e-4, "and no error is given that is not known"
 
 
-def test_two_motions_of_the_course_are_told_apart(course: Path) -> None:
+def test_two_motions_of_the_course_are_told_apart(folder: Path) -> None:
     """A formula and equations: the one that errs is named, and the engine decides."""
     exact = EXACT.format(velocity=", qvel - 9.81 * time") + "\n\n" + EQUATIONS
-    assert report(course, exact.format("")).floor < 1e-11
-    message = mistake(course, exact.format(" * (1 + 1e-5)")).message
-    assert message == "`models/ball.exact.py`, `acceleration`, is not this scene's motion"
+    assert report(folder, exact.format("")).floor < 1e-11
+    message = mistake(folder, exact.format(" * (1 + 1e-5)")).message
+    assert message == "`ball.exact.py`, `acceleration`, is not this scene's motion"
 
 
 PENDULUM = """\
@@ -110,23 +110,23 @@ def expected(qpos, qvel):
 """
 
 
-def test_quantities_of_theory_are_measured_by_their_formula(course: Path) -> None:
+def test_quantities_of_theory_are_measured_by_their_formula(folder: Path) -> None:
     """A pendulum let go at 90°: it is down after a quarter of its period, K(1/2)/√g."""
-    write(course / "models" / "ball.xml", PENDULUM.replace('"0 0 0"/>', '"1e-9 1e-9 1e-9"/>'))
+    write(folder / "ball.xml", PENDULUM.replace('"0 0 0"/>', '"1e-9 1e-9 1e-9"/>'))
     start = "qpos = [1.5707963267948966]\nduration = 1\nsample = 0.02\nmeasure = 'sensor:angle'\n"
     toml = f"[[scenario]]\nname = 'swing'\n{start}"
-    scenario = report(course, QUARTER, toml + "energy_bound = 9.9\n")
+    scenario = report(folder, QUARTER, toml + "energy_bound = 9.9\n")
     figures = {(line.integrator, line.name): line for line in scenario.figures}
     crossing = figures["RK4", "crossing"]
-    assert (crossing.unit, crossing.source) == ("s", "models/ball.exact.py")
+    assert (crossing.unit, crossing.source) == ("s", "ball.exact.py")
     assert crossing.exact == pytest.approx(0.59196, abs=1e-6)
     assert crossing.measured == pytest.approx(crossing.exact, abs=1e-6)
     euler = figures["Euler", "crossing"].measured
     assert euler is not None and 1e-5 < abs(euler - crossing.exact) < 1e-2
     assert figures["RK4", "largest"].measured == 1.5707963267948966, "where it begins"
     assert {row.energy for row in scenario.stable} == {9.9}
-    message = mistake(course, QUARTER.replace("largest", "loudest"), toml).message
-    assert message == "`models/ball.exact.py` expects `loudest`, which is not measured"
+    message = mistake(folder, QUARTER.replace("largest", "loudest"), toml).message
+    assert message == "`ball.exact.py` expects `loudest`, which is not measured"
 
 
 BOUNCE = """\
@@ -153,20 +153,20 @@ def motion(time, qpos, qvel):
 """
 
 
-def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(course: Path) -> None:
-    write(course / "models" / "ball.xml", BOUNCE)
+def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(folder: Path) -> None:
+    write(folder / "ball.xml", BOUNCE)
     toml = '[[scenario]]\nname = "slide"\nqvel = [1, 0]\nduration = 0.4\nsample = 0.02\n'
-    scenario = report(course, SLIDE.format(friction=0.5, height=0), toml)
+    scenario = report(folder, SLIDE.format(friction=0.5, height=0), toml)
     assert scenario.reference == "closed" and scenario.figures == ()
     (own_row,) = (row for row in scenario.rows if row.own)
     assert own_row.seen is not None and own_row.seen > 3 * scenario.least_seen, "resolved"
     toml_with_figures = toml + "expected = { penetration = 1e-4 }\nlimits = { Euler = 0.01 }\n"
-    scenario = report(course, SLIDE.format(friction=0.5, height=0), toml_with_figures)
+    scenario = report(folder, SLIDE.format(friction=0.5, height=0), toml_with_figures)
     depths = {line.integrator: (line.measured, line.exact) for line in scenario.figures}
     assert depths["Euler"] == (pytest.approx(2.1e-4, rel=0.2), 1e-4)
     assert scenario.stable[0].theory == 0.01
     for values in ({"friction": 0.6, "height": 0}, {"friction": 0.5, "height": "time"}):
-        diagnostic = mistake(course, SLIDE.format(**values), toml)
+        diagnostic = mistake(folder, SLIDE.format(**values), toml)
         assert "is not this scene's motion" in diagnostic.message, values
         assert "contacts as they are" in diagnostic.help, values
 
@@ -195,26 +195,26 @@ def motion(time, qpos, qvel):
 
 
 def test_an_exact_motion_with_contact_that_is_off_by_a_hundred_thousandth_is_refused(
-    course: Path,
+    folder: Path,
 ) -> None:
-    write(course / "models" / "ball.xml", ROLL)
+    write(folder / "ball.xml", ROLL)
     toml = '[[scenario]]\nname = "roll"\nduration = 1\nsample = 0.04\n'
-    scenario = report(course, ROLLED.format(g=9.81), toml)
+    scenario = report(folder, ROLLED.format(g=9.81), toml)
     assert scenario.reference == "closed" and scenario.floor < 1e-5
-    diagnostic = mistake(course, ROLLED.format(g=9.81 * (1 + 1e-5)), toml)
+    diagnostic = mistake(folder, ROLLED.format(g=9.81 * (1 + 1e-5)), toml)
     assert "is not this scene's motion" in diagnostic.message
     assert "4, 8, 16" in diagnostic.help, "where the softness of contacts hides it no longer"
 
 
 def test_velocities_of_an_exact_motion_with_contact_are_rates_of_its_positions(
-    course: Path,
+    folder: Path,
 ) -> None:
     """Against an engine whose contacts are soft only places are compared."""
-    write(course / "models" / "ball.xml", BOUNCE)
+    write(folder / "ball.xml", BOUNCE)
     toml = '[[scenario]]\nname = "slide"\nqvel = [1, 0]\nduration = 0.4\nsample = 0.02\n'
     slide = SLIDE.format(friction=0.5, height=0)[:-1] + ", [{} * (qvel[0] - 4.905 * stop), 0]\n"
-    assert report(course, slide.format(1), toml).reference == "closed"
-    diagnostic = mistake(course, slide.format(0.9), toml)
+    assert report(folder, slide.format(1), toml).reference == "closed"
+    diagnostic = mistake(folder, slide.format(0.9), toml)
     assert diagnostic.message.endswith("gives velocities that are not the rates of positions")
     assert diagnostic.help == "number 0 is 0.812 at 0.02 s, where the positions give 0.902"
 
@@ -242,12 +242,12 @@ def motion(time, qpos, qvel):
 
 
 def test_an_exact_motion_of_soft_contacts_is_known_as_well_as_the_engine_agrees(
-    course: Path,
+    folder: Path,
 ) -> None:
     """Stiffer contacts tend to something else, which says nothing of this motion."""
-    write(course / "models" / "ball.xml", SOFT)
+    write(folder / "ball.xml", SOFT)
     toml = '[[scenario]]\nname = "hit"\nqvel = [0, 0, -0.5, 0, 0, 0]\nduration = 0.2\n'
-    scenario = report(course, REBOUND, toml + "sample = 0.02\n")
+    scenario = report(folder, REBOUND, toml + "sample = 0.02\n")
     assert scenario.reference == "closed" and scenario.floor < 1e-4
     own_row = next(row for row in scenario.rows if row.own)
     assert own_row.position is not None and own_row.position[0] > 2 * scenario.floor
@@ -277,31 +277,31 @@ def motion(time, qpos, qvel):
 
 
 def test_an_exact_motion_is_that_of_a_soft_rope_or_of_one_that_does_not_stretch(
-    course: Path,
+    folder: Path,
 ) -> None:
-    write(course / "models" / "ball.xml", ROPE)
+    write(folder / "ball.xml", ROPE)
     toml = '[[scenario]]\nname = "hang"\nduration = 0.1\nsample = 0.01\n'
     stiff = "def motion(time, qpos, qvel):\n    return [0], [0]\n"
     for exact in (STRETCHED, stiff):
-        scenario = report(course, exact, toml)
+        scenario = report(folder, exact, toml)
         assert scenario.reference == "closed" and scenario.floor < 1e-5
-    diagnostic = mistake(course, STRETCHED.replace("0.02", "0.03"), toml)
+    diagnostic = mistake(folder, STRETCHED.replace("0.02", "0.03"), toml)
     assert "is not this scene's motion" in diagnostic.message
 
 
 def test_errors_are_resolved_down_to_the_floor_of_an_exact_motion_with_friction(
-    course: Path,
+    folder: Path,
 ) -> None:
     model = BALL.replace('axis="0 0 1"', 'axis="1 0 0" frictionloss="9"')
-    write(course / "models" / "ball.xml", model.replace('size="0.1"', 'size="0.1" mass="1"'))
-    scenario = report(course, FRICTION, TOML.replace("duration = 0.4", "duration = 0.5"))
+    write(folder / "ball.xml", model.replace('size="0.1"', 'size="0.1" mass="1"'))
+    scenario = report(folder, FRICTION, TOML.replace("duration = 0.4", "duration = 0.5"))
     own_row = next(row for row in scenario.rows if row.own)
     assert own_row.figure == pytest.approx(own_row.position) and own_row.seen
     assert own_row.figure[0] > scenario.least_figure and own_row.seen > scenario.least_seen
     assert "resolves no error" not in scenario.verdict.text
 
 
-def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:
+def test_what_is_not_exact_or_no_motion_is_a_mistake(folder: Path) -> None:
     cases = {
         EXACT.format(velocity="").replace("/ 2", "/ 3"): "is not this scene's motion",
         "def motion(time, qpos, qvel):\n    return [1, 2]\n": "gives numbers of coordinates that",
@@ -311,15 +311,14 @@ def test_what_is_not_exact_or_no_motion_is_a_mistake(course: Path) -> None:
         "def motion(time, qpos, qvel):\n    return [1] * int(1 + time * 9)\n": "coordinates change",
     }
     for text, message in cases.items():
-        diagnostic = mistake(course, text)
+        diagnostic = mistake(folder, text)
         assert message in diagnostic.message, text
-        assert diagnostic.span.path == "models/ball.exact.py", text
+        assert diagnostic.place.path == "ball.exact.py", text
 
 
-def test_what_was_measured_depends_on_it(course: Path) -> None:
-    digests = set()
-    for exact in (None, EXACT, EXACT + "\n"):
-        if exact is not None:
-            write(course / "models" / "ball.exact.py", exact)
-        digests.add(find_scenes(course, ("ball",)).value[0].digest)
+def test_what_was_measured_depends_on_it(folder: Path) -> None:
+    digests = {read_subject(folder / "ball.xml").digest}
+    for exact in (EXACT, EXACT + "\n"):
+        write(folder / "ball.exact.py", exact)
+        digests.add(read_subject(folder / "ball.xml").digest)
     assert len(digests) == 3

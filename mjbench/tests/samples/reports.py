@@ -1,13 +1,13 @@
-"""Made-up bench reports, for tests of their presentation."""
+"""Reports that nobody measured."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-from coursebuild.core.model.results import Machine
-from coursebuild.core.model.measurements import Interval
-from coursebuild.core.model.measurements import (
+from mjbench.machine import Machine
+from mjbench.reports import Interval
+from mjbench.reports.scene_report import (
     FittedOrder,
     MeasuredSetting,
     OrderRow,

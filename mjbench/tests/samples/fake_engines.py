@@ -9,8 +9,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from coursebuild.numerics.engines.engine_trial import Engine, Variant
-from coursebuild.numerics.problem import Array
+from mjbench.engines.engine_trial import Engine, Variant
+from mjbench.problem import Array
 
 SINGLE = Variant("cpu", "", 32)
 

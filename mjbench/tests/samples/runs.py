@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from msgspec.structs import replace
 
-from coursebuild.core.model.measurements import ScenarioReport, WorkPrecisionRow
-from coursebuild.numerics.scene import scenes
-from coursebuild.numerics.work_precision import measure_scenario
-from support.surveys import parse_declared
+from mjbench.reports.scene_report import ScenarioReport, WorkPrecisionRow
+from mjbench.scene import scenes
+from mjbench.work_precision import measure_scenario
+from samples.surveys import parse_declared
 
-MODELS = Path(__file__).parents[2] / "models"
+BOX = """\
+<mujoco>
+  <option integrator="RK4" timestep="0.002" gravity="0 0 0"/>
+  <worldbody>
+    <body pos="0 0 0.5">
+      <freejoint/>
+      <geom type="box" size="0.10 0.05 0.02" mass="1" contype="0" conaffinity="0"/>
+    </body>
+  </worldbody>
+  <keyframe><key name="intermediate" qvel="0 0 0 0.001 6 0"/></keyframe>
+</mujoco>
+"""
+FLIP = """\
+[[scenario]]
+name = "first-flip"
+keyframe = "intermediate"
+qvel = [0, 0, 0, 0.1, 6, 0]
+duration = 2
+sample = 0.1
+reference = "closed:tumbling-box"
+"""
 FAMILY = ("Euler", "implicit", "implicitfast", "discrete")
 
 

@@ -6,17 +6,15 @@ from collections.abc import Collection, Mapping
 
 import mujoco
 
-from coursebuild.core.model.scenarios import Declarations, Keep
-from coursebuild.core.syntax.declarations import parse_declarations
-from coursebuild.core.text.source import Source
-from coursebuild.numerics.costs import Clock
-from coursebuild.numerics.pruning.candidates import SETTINGS
-from coursebuild.numerics.pruning.comparison import pruning_scenes
-from coursebuild.numerics.pruning.model_text import ModelText, open_model
-from coursebuild.numerics.pruning.readers import read_code
-from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
-from coursebuild.core.model.measurements import Finding
-from support.bench_reports import MACHINE
+from mjbench.costs import Clock
+from mjbench.declarations import Declarations, parse_declarations
+from mjbench.pruning.candidates import SETTINGS
+from mjbench.pruning.comparison import pruning_scenes
+from mjbench.pruning.model_text import ModelText, open_model
+from mjbench.pruning.readers import read_code
+from mjbench.pruning.survey import Keep, Rerun, Survey, Surveyor
+from mjbench.reports.diet_report import Finding
+from samples.reports import MACHINE
 
 PATH = "models/a.xml"
 PENDULUM = """<body name="bob" pos="0 0 1"><joint name="pivot" axis="0 1 0"/>
@@ -65,9 +63,7 @@ def open_files(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
 
 
 def parse_declared(text: str) -> Declarations:
-    result = parse_declarations(Source("models/a.toml", text))
-    assert result.value is not None, result.diagnostics
-    return result.value
+    return parse_declarations("models/a.toml", text)
 
 
 NO_DECLARATIONS = parse_declared("")
@@ -86,7 +82,6 @@ def run_survey(
 ) -> Survey:
     """Survey a model; `lesson` is a script that uses it."""
     model = open_files(text if isinstance(text, Mapping) else {PATH: text})
-    place = Source("models/a.toml", "").span(0, 0)
     return Surveyor(
         model="a",
         digest="",
@@ -94,7 +89,9 @@ def run_survey(
         text=model,
         scenes=pruning_scenes(model.model, declarations, quick=quick),
         readers=(read_code("examples/a.py", lesson),) if lesson else (),
-        keeps={key: Keep(key, reason, finding_span=place) for key, reason in (keeps or {}).items()},
+        keeps={
+            key: Keep(key, reason, "models/a.toml", 1, 1) for key, reason in (keeps or {}).items()
+        },
         locked={},
         numbered_kinds=numbered_kinds,
         clock=clock,
