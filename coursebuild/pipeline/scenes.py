@@ -45,12 +45,8 @@ from coursebuild.core.text.source import Source
 from coursebuild.pipeline.options import UsageError
 
 if TYPE_CHECKING:  # a course without reports needs none of it
-    from coursebuild.core.model.measurements import (
-        CaseReport,
-        DietReport,
-        EngineReport,
-        SceneReport,
-    )
+    from coursebuild.core.model.diet_findings import DietReport
+    from coursebuild.core.model.measurements import CaseReport, EngineReport, SceneReport
     from coursebuild.core.model.report_files import ReportFailure, ReportKind
 
     _Scene = TypeVar("_Scene", SceneReport, DietReport, EngineReport)

@@ -92,7 +92,7 @@ class Subject(Struct, frozen=True):
         """The model's file."""
         return Place(self.path)
 
-    def declared(self) -> Declarations:
+    def read_declarations(self) -> Declarations:
         """The declarations; a `CannotMeasureError` where they cannot be read."""
         if not self.declarations_path:
             return Declarations(self.path)
@@ -118,33 +118,35 @@ class CompiledModel(Struct, frozen=True):
     declarations: Declarations
     scenarios: tuple[Scene, ...]
     spec: Any
-    """Its `mjSpec`, from which it can be compiled with other parameters."""
+    """Its `mjSpec`, from which it can be compiled_model with other parameters."""
 
 
 def compile_subject(subject: Subject, host: Host, *, quick: bool) -> CompiledModel:
     """Compile a model and find its scenarios; a `CannotMeasureError` where it cannot be done."""
-    declarations = subject.declared()
+    declarations = subject.read_declarations()
     with report_errors(subject):
         model = subject.compile()
         exact = _exact_motion(subject, host)
-        found = scenes(model, declarations, quick=quick)
-        found = tuple(replace(scene, exact=exact) for scene in found)
+        found_scenes = scenes(model, declarations, quick=quick)
+        found_scenes = tuple(replace(scene, exact=exact) for scene in found_scenes)
         spec = mujoco.MjSpec.from_file(str(Path(subject.folder, subject.path)))
-        return CompiledModel(subject, model, declarations, found, spec)
+        return CompiledModel(subject, model, declarations, found_scenes, spec)
 
 
 def run_scenario(
-    compiled: CompiledModel, number: int, host: Host, *, quick: bool, timed: bool
+    compiled_model: CompiledModel, number: int, host: Host, *, quick: bool, timed: bool
 ) -> ScenarioReport:
     """Measure a scenario, given by its number; a `CannotMeasureError` where it cannot be done."""
     clock = time.thread_time_ns if timed else None
-    with report_errors(compiled.subject), one_processor():
-        scenario = compiled.scenarios[number]
-        return measure_scenario(compiled.model, scenario, quick=quick, clock=clock, tell=host.tell)
+    with report_errors(compiled_model.subject), one_processor():
+        scenario = compiled_model.scenarios[number]
+        return measure_scenario(
+            compiled_model.model, scenario, quick=quick, clock=clock, tell=host.tell
+        )
 
 
 def run_sweep(
-    compiled: CompiledModel,
+    compiled_model: CompiledModel,
     name: str,
     host: Host,
     *,
@@ -158,27 +160,27 @@ def run_sweep(
     `part`: all, or only the number of threads, or only the other values; `piece`: which of these.
     """
     host.tell(name)
-    sweep = next(sweep for sweep in compiled.declarations.sweeps if sweep.name == name)
+    sweep = next(sweep for sweep in compiled_model.declarations.sweeps if sweep.name == name)
     clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
-    scenario = next(s for s in compiled.scenarios if sweep.scenario in (None, s.name))
+    scenario = next(s for s in compiled_model.scenarios if sweep.scenario in (None, s.name))
     of_threads = tuple(v for v in sweep.variations if v.parameter == THREADS)
     of_values = tuple(v for v in sweep.variations if v.parameter != THREADS)
     groups = {"all": (of_values, of_threads), "values": (of_values,), "threads": (of_threads,)}
     reports = []
-    with report_errors(compiled.subject):
+    with report_errors(compiled_model.subject):
         for variations in filter(None, groups[part]):
-            chosen = replace(sweep, variations=variations)
+            part_sweep = replace(sweep, variations=variations)
             # One processor, unless what is measured is how it goes on several.
             with one_processor() if variations is of_values else nullcontext():
                 report = measure_sweep(
-                    compiled.spec, scenario, chosen, clocks, quick=quick, piece=piece
+                    compiled_model.spec, scenario, part_sweep, clocks, quick=quick, piece=piece
                 )
             reports.append(report)
     return replace(reports[0], rows=tuple(row for report in reports for row in report.rows))
 
 
 def join_parts(
-    compiled: CompiledModel,
+    compiled_model: CompiledModel,
     scenarios: Sequence[ScenarioReport],
     sweeps: Sequence[SweepReport],
     host: Host,
@@ -188,14 +190,14 @@ def join_parts(
 ) -> SceneReport:
     """The report on a model of what was measured of it; with `card`, also what it is made of."""
     report = SceneReport(
-        model=compiled.subject.name,
-        digest=compiled.subject.digest,
+        model=compiled_model.subject.name,
+        digest=compiled_model.subject.digest,
         quick=quick,
         machine=this_machine(pinned=True),
         scenarios=tuple(scenarios),
         sweeps=tuple(sweeps),
     )
-    return replace(report, card=_card(compiled, host)) if card and scenarios else report
+    return replace(report, card=_card(compiled_model, host)) if card and scenarios else report
 
 
 @contextmanager
@@ -254,16 +256,16 @@ class _Answer(Struct, frozen=True):
     expected: dict[str, float] = {}
 
 
-def _card(compiled: CompiledModel, host: Host) -> SceneCard:
+def _card(compiled_model: CompiledModel, host: Host) -> SceneCard:
     """What a model is made of; how fast it runs in a browser is for the host to say."""
-    subject, model = compiled.subject, compiled.model
+    subject, model = compiled_model.subject, compiled_model.model
     with silent():  # MuJoCo would write its warnings into the working directory
         touching_pairs = {
             pair
-            for scene in scenes(model, compiled.declarations)
+            for scene in scenes(model, compiled_model.declarations)
             for pair in watch(model, scene).touching_pairs
         }
-    first = compiled.scenarios[0].scenario
+    first = compiled_model.scenarios[0].scenario
     key = None if first.keyframe < 0 else first.keyframe
     return SceneCard(
         bodies=int(model.nbody) - 1,

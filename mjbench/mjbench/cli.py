@@ -21,8 +21,7 @@ from mjbench.engines.engine_run import UnknownEngineError, chosen_engines, measu
 from mjbench.host import LocalHost
 from mjbench.machine import one_processor, package_version, this_machine
 from mjbench.problems import all_problems
-from mjbench.pruning.survey import Keep
-from mjbench.reports.diet_report import DietReport
+from mjbench.reports.diet_report import DietReport, Keep
 from mjbench.reports.records import (
     BENCH,
     DIET,
@@ -49,9 +48,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     if words and words[0] not in _COMMANDS and not words[0].startswith("-"):
         words.insert(0, "bench")
-    parsed = _parser().parse_args(words)
+    namespace = _parser().parse_args(words)
     try:
-        status: int = parsed.run(parsed)
+        status: int = namespace.run(namespace)
     except (_UsageError, UnknownEngineError, RecordError, OSError) as error:
         print(f"mjbench: error: {error}", file=sys.stderr)
         return 2
@@ -112,9 +111,9 @@ def read_subject(file: Path) -> Subject:
     folder, mjcf = file.parent.resolve(), file.read_bytes()
     declarations, exact = file.with_suffix(".toml"), file.with_suffix(".exact.py")
     digest, parts = hashlib.sha256(mjcf), 0
-    for beside in (declarations, exact):
-        if beside.is_file():
-            digest.update(beside.read_bytes())
+    for file_beside in (declarations, exact):
+        if file_beside.is_file():
+            digest.update(file_beside.read_bytes())
     for part in map(Path, mujoco.mju_getXMLDependencies(str(folder / file.name))):
         if part.exists() and not part.samefile(file):
             digest.update(part.read_bytes())
@@ -155,18 +154,18 @@ def _bench(arguments: argparse.Namespace) -> int:
         return _record(arguments, ENGINES.encode(report))
     timed = arguments.check is None
     recorded = None if timed else BENCH.decode(arguments.check.read_bytes())
-    compiled = bench.compile_subject(subject, host, quick=quick)
+    compiled_model = bench.compile_subject(subject, host, quick=quick)
     scenarios = [
-        bench.run_scenario(compiled, number, host, quick=quick, timed=timed)
-        for number in range(len(compiled.scenarios))
+        bench.run_scenario(compiled_model, number, host, quick=quick, timed=timed)
+        for number in range(len(compiled_model.scenarios))
     ]
     sweeps = [
-        bench.run_sweep(compiled, sweep.name, host, quick=quick, timed=timed)
-        for sweep in compiled.declarations.sweeps
+        bench.run_sweep(compiled_model, sweep.name, host, quick=quick, timed=timed)
+        for sweep in compiled_model.declarations.sweeps
     ]
-    scene = bench.join_parts(compiled, scenarios, sweeps, host, quick=quick, card=True)
+    scene = bench.join_parts(compiled_model, scenarios, sweeps, host, quick=quick, card=True)
     if recorded is not None:
-        departures = scene_departures(recorded, scene, compiled.declarations.bench)
+        departures = scene_departures(recorded, scene, compiled_model.declarations.bench)
         _print(arguments, departures, text.departures_text(departures))
         return 1 if departures else 0
     _print(arguments, scene, text.scene_text(scene))
@@ -175,21 +174,21 @@ def _bench(arguments: argparse.Namespace) -> int:
 
 def _stability(arguments: argparse.Namespace) -> int:
     problems = all_problems()
-    chosen = dict(problems) if not arguments.problems else {}
+    cases = dict(problems) if not arguments.problems else {}
     for name in arguments.problems:
         matches = {n: p for n, p in problems.items() if n == name or n.startswith(f"{name}-")}
         if not matches:
             raise _UsageError(f"no hard case is called `{name}`: {', '.join(problems)}")
-        chosen |= matches
+        cases |= matches
     recorded = None
     if arguments.check is not None:
         recorded = STABILITY.decode(arguments.check.read_bytes())
     machine, reports = this_machine(pinned=True), []
-    for problem in chosen.values():
+    for problem in cases.values():
         with one_processor():
             reports.append(measure_case(problem, machine, time.thread_time_ns))
     if recorded is not None:
-        departures = case_departures([c for c in recorded if c.name in chosen], reports)
+        departures = case_departures([c for c in recorded if c.name in cases], reports)
         _print(arguments, departures, text.departures_text(departures))
         return 1 if departures else 0
     _print(arguments, reports, "\n".join(map(text.case_text, reports)))
@@ -222,7 +221,7 @@ def _diet(arguments: argparse.Namespace) -> int:
 def _keeps(subject: Subject) -> Iterable[Keep]:
     """What the declarations keep, each with the first line that has it."""
     lines = subject.declarations.splitlines()
-    for keep in subject.declared().keep:
+    for keep in subject.read_declarations().keep:
         places = ((n, line.find(keep.finding)) for n, line in enumerate(lines, 1))
         line, column = next((place for place in places if place[1] >= 0), (1, 0))
         yield Keep(keep.finding, keep.reason, subject.declarations_path, line, column + 1)

@@ -25,9 +25,9 @@ from mjbench.machine import this_machine
 from mjbench.pruning.comparison import pruning_scenes
 from mjbench.pruning.model_text import ModelText, ModelTextError, model_bytes, open_model
 from mjbench.pruning.readers import VIEWS, ModelReader, read_code
-from mjbench.pruning.survey import Keep, Survey, Surveyor
+from mjbench.pruning.survey import Survey, Surveyor
 from mjbench.pruning.xml_edits import MarkupError
-from mjbench.reports.diet_report import DietReport
+from mjbench.reports.diet_report import DietReport, Keep
 
 _NOT_DRAWN = frozenset(("Sensor", "Actuator", "Keyframe", "Numeric", "Tuple"))
 """Kinds that a picture of the model does not show."""
@@ -86,7 +86,7 @@ def look_at(
     with the reason; `rerun`: whether the host runs programs with what is left.
     """
     files: dict[str, bytes | None] = {}
-    declarations = subject.declared()
+    declarations = subject.read_declarations()
 
     def read(path: str) -> bytes | None:
         if path not in files:

@@ -31,9 +31,8 @@ from mjbench.engines.engine_run import UnknownEngineError, chosen_engines, measu
 from mjbench.host import EXACT_SCRIPT, ExactRun, Host
 from mjbench.machine import Machine, code_digest, one_processor, this_machine
 from mjbench.problems import all_problems
-from mjbench.pruning.survey import Keep
 from mjbench.reports.case_report import CaseReport
-from mjbench.reports.diet_report import DietReport
+from mjbench.reports.diet_report import DietReport, Keep
 from mjbench.reports.engine_report import EngineReport
 from mjbench.reports.records import (
     BENCH,
@@ -246,18 +245,22 @@ def answer(job: Job, host: Host) -> object:
                 code_digest(), this_machine(), this_machine(pinned=True), tuple(all_problems())
             )
         case Scenario():
-            compiled = bench.compile_subject(job.subject, host, quick=job.quick)
-            return bench.run_scenario(compiled, job.number, host, quick=job.quick, timed=job.timed)
+            compiled_model = bench.compile_subject(job.subject, host, quick=job.quick)
+            return bench.run_scenario(
+                compiled_model, job.number, host, quick=job.quick, timed=job.timed
+            )
         case Sweep():
-            compiled = bench.compile_subject(job.subject, host, quick=job.quick)
+            compiled_model = bench.compile_subject(job.subject, host, quick=job.quick)
             piece = slice(job.first, job.end) if job.part == "values" else None
             settings = {"quick": job.quick, "timed": job.timed}
-            return bench.run_sweep(compiled, job.name, host, part=job.part, piece=piece, **settings)
+            return bench.run_sweep(
+                compiled_model, job.name, host, part=job.part, piece=piece, **settings
+            )
         case Join():
-            compiled = bench.compile_subject(job.subject, host, quick=job.quick)
+            compiled_model = bench.compile_subject(job.subject, host, quick=job.quick)
             sweeps = _join_pieces(job.sweeps)
             return bench.join_parts(
-                compiled, job.scenarios, sweeps, host, quick=job.quick, card=job.card
+                compiled_model, job.scenarios, sweeps, host, quick=job.quick, card=job.card
             )
         case Case():
             with one_processor():
@@ -281,7 +284,7 @@ def answer(job: Job, host: Host) -> object:
             engines, _ = chosen_engines(job.names)
             return measure_engines(job.subject, engines, host, quick=job.quick)
         case Write():
-            return _written(job)
+            return _file_text(job)
         case Compare():
             if job.recorded is not None and job.measured is not None:
                 return scene_departures(job.recorded, job.measured, job.bands)
@@ -297,7 +300,7 @@ def _join_pieces(pieces: tuple[SweepReport, ...]) -> list[SweepReport]:
     ]
 
 
-def _written(job: Write) -> str:
+def _file_text(job: Write) -> str:
     if job.bench is not None:
         data = BENCH.encode(job.bench)
     elif job.engines is not None:

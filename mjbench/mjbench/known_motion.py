@@ -1,8 +1,8 @@
 """The references that a scene's motion is measured against, and how well they are known.
 
-1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; DOP853 does it
-   again. Their difference bounds the error of the reference. Both take the same accelerations, so
-   the engine in ever smaller steps must tend to the same motion.
+1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; DOP853 does it again. Their
+   difference bounds the error of the reference. Both take the same accelerations, so the engine in
+   ever smaller steps must tend to the same motion.
 2. A closed form that the scenario names, or that the course has, comes first, and that integration
    second. A course's own is believed after it was checked only: in a smooth scene two integrations
    that agree, and the engine that tends to them, outvote it; elsewhere the model must come nearer
@@ -270,9 +270,9 @@ def _stiff_limit(model: Any, pilot: Pilot, times: float, *, quick: bool) -> Know
 
 
 def _no_integration(reason: str, declaration: DeclaredScenario) -> SceneError:
-    message = f"no integration can be the reference: {reason}"
     help = "leave `reference` out: the engine itself in small steps is the reference then"
-    return SceneError(message, declaration.place("reference"), help)
+    place = declaration.place("reference")
+    return SceneError(f"no integration can be the reference: {reason}", place, help)
 
 
 def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:

@@ -161,8 +161,8 @@ def _check_fit(declarations: Declarations, model: Any) -> None:
     """Check that a model has what scenarios name; a `SceneError` where it does not."""
     for scenario in declarations.scenarios:
         names = [str(model.key(number).name) for number in range(int(model.nkey))]
-        known = names if isinstance(scenario.keyframe, str) else range(len(names))
-        if scenario.keyframe is not None and scenario.keyframe not in known:
+        keyframes = names if isinstance(scenario.keyframe, str) else range(len(names))
+        if scenario.keyframe is not None and scenario.keyframe not in keyframes:
             message = f"the model has no keyframe `{scenario.keyframe}`"
             raise SceneError(message, scenario.place("keyframe"))
         commands = [("controls", row, model.nu) for row in scenario.controls]
@@ -178,12 +178,12 @@ def _check_fit(declarations: Declarations, model: Any) -> None:
                 raise SceneError(message, scenario.place(field))
         if len(scenario.controls) > 1 and scenario.hold is None:
             raise SceneError("`hold` is missing: commands follow each other", scenario.table)
-        measured = scenario.observable
-        if measured is not None:
-            things = getattr(model, measured.kind)
-            numbers = range(int(getattr(model, f"n{measured.kind}")))
-            if measured.name not in {str(things(number).name) for number in numbers}:
-                message = f"the model has no {measured.kind} `{measured.name}`"
+        quantity = scenario.observable
+        if quantity is not None:
+            things = getattr(model, quantity.kind)
+            numbers = range(int(getattr(model, f"n{quantity.kind}")))
+            if quantity.name not in {str(things(number).name) for number in numbers}:
+                message = f"the model has no {quantity.kind} `{quantity.name}`"
                 raise SceneError(message, scenario.place("measure"))
 
 

@@ -44,9 +44,9 @@ def _scenario(report: ScenarioReport) -> Iterator[str]:
         yield f"chaotic: errors mean something for {seconds_text(report.horizon)}"
     yield from report.notes
     yield ""
-    marked = [row for row in report.rows if not is_idle(row)]
+    visible_rows = [row for row in report.rows if not is_idle(row)]
     head = ["", "setting", "cost", "error", "status"]
-    yield from _table(head, [_setting(row, report) for row in marked])
+    yield from _table(head, [_setting(row, report) for row in visible_rows])
     yield "> the model's own   * on the Pareto front"
     if report.verdict.text:
         yield report.verdict.text
@@ -238,8 +238,8 @@ def _indent(lines: Iterable[str]) -> list[str]:
 
 def _table(head: _Row, rows: Sequence[_Row]) -> list[str]:
     """Columns as wide as their longest cell; those without any are left out."""
-    used = [n for n in range(len(head)) if any(row[n].strip() for row in rows)]
-    cells = [[head[n] for n in used], *([row[n] for n in used] for row in rows)]
+    columns = [n for n in range(len(head)) if any(row[n].strip() for row in rows)]
+    cells = [[head[n] for n in columns], *([row[n] for n in columns] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     return [
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()

@@ -46,8 +46,8 @@ def report(folder: Path, exact: str, toml: str = TOML) -> ScenarioReport:
     write(folder / "ball.exact.py", exact)
     write(folder / "ball.toml", toml)
     host = LocalHost(folder, lambda text: None)
-    compiled = compile_subject(read_subject(folder / "ball.xml"), host, quick=True)
-    return run_scenario(compiled, 0, host, quick=True, timed=False)
+    compiled_model = compile_subject(read_subject(folder / "ball.xml"), host, quick=True)
+    return run_scenario(compiled_model, 0, host, quick=True, timed=False)
 
 
 def mistake(folder: Path, exact: str, toml: str = TOML) -> CannotMeasureError:

@@ -10,12 +10,8 @@ from typing import Generic, TypeVar
 import msgspec
 from msgspec import Struct
 
-from coursebuild.core.model.measurements import (
-    CaseReport,
-    DietReport,
-    EngineReport,
-    SceneReport,
-)
+from coursebuild.core.model.diet_findings import DietReport
+from coursebuild.core.model.measurements import CaseReport, EngineReport, SceneReport
 
 FOLDER = "content/reports"
 VERSION = 3

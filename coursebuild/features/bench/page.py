@@ -13,10 +13,9 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import MjcfModel, find_blocks, scenario_anchor
+from coursebuild.core.model.diet_findings import DietReport, Finding
 from coursebuild.core.model.measurements import (
-    DietReport,
     EngineReport,
-    Finding,
     ScenarioReport,
     SceneReport,
     SweepReport,

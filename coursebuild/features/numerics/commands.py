@@ -107,10 +107,10 @@ def stability(
     measurement: Measurement[CaseReport] = Measurement(())
     if built_in or not own_models:
         run = _CaseRun(options, mjbench)
-        problems = _select_problems(options, run.about.problems, built_in)
+        problems = _select_problems(options, run.facts.problems, built_in)
         measurement = run.measure_each(problems, run.measure)
         if record and not measurement.failures:
-            measurement = _record(options, mjbench, run.about.problems, measurement, names)
+            measurement = _record(options, mjbench, run.facts.problems, measurement, names)
     if not own_models:
         return measurement
     return _join_reports(measurement, bench.bench(options, mjbench, own_models, record=record))
@@ -119,7 +119,7 @@ def stability(
 def _record(
     options: Options,
     mjbench: Mjbench,
-    known: Sequence[str],
+    problems: Sequence[str],
     measurement: Measurement[CaseReport],
     names: tuple[str, ...],
 ) -> Measurement[CaseReport]:
@@ -129,9 +129,9 @@ def _record(
         old = read_record(options.root, STABILITY)
         if isinstance(old, ReportFailure):
             return replace(measurement, failures=(old,))
-        kept = set(known) - {report.name for report in measurement.reports}
+        kept_names = set(problems) - {report.name for report in measurement.reports}
         values = recorded_value(options.root, STABILITY)
-        rest = [value for value in values if value["name"] in kept]
+        rest = [value for value in values if value["name"] in kept_names]
     data = file_of(mjbench, cases=[*rest, *measurement.values])
     return write_records(options.root, measurement, [(STABILITY.path(), data)])
 
@@ -173,7 +173,7 @@ def check_stability(
     measurement: Measurement[CaseReport] = Measurement(())
     if built_in or not own_models:
         run = _CaseRun(options, mjbench, use_store=False)
-        problems = _select_problems(options, run.about.problems, built_in)
+        problems = _select_problems(options, run.facts.problems, built_in)
         recorded = read_record(options.root, STABILITY)
         if isinstance(recorded, ReportFailure):
             measurement = Measurement((), failures=(recorded,))
@@ -208,16 +208,16 @@ class _CaseRun(MeasuringRun[CaseReport]):
 
     def measure(self, name: str) -> bytes | None:
         """Report on a case; `None` where its references disagree."""
-        found = self.results.pop((name,), b"")
+        data = self.results.pop((name,), b"")
         return self.load_or_measure(
             name,
             "stability",
             self._parts(name),
-            lambda: found or self.mjbench.do("case", name=name),
+            lambda: data or self.mjbench.do("case", name=name),
         )
 
     def _parts(self, name: str) -> tuple[object, ...]:
-        return name, self.code, self.about.pinned
+        return name, self.code, self.facts.pinned
 
     def tasks(self, name: str) -> Iterator[tuple[Any, ...]]:
         """The case, if it is not stored."""

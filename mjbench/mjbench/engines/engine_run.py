@@ -73,8 +73,8 @@ def chosen_engines(
     if names := tuple(dict.fromkeys(names)):
         for name in names:
             if name not in engines:
-                known = ", ".join(engines)
-                raise UnknownEngineError(f"there is no engine `{name}`: known are {known}")
+                names_there = ", ".join(engines)
+                raise UnknownEngineError(f"there is no engine `{name}`: known are {names_there}")
             if not _is_installed(engines[name].engine):
                 raise UnknownEngineError(_absence(engines[name].engine))
         return tuple(engines[name] for name in names), ()
@@ -103,14 +103,14 @@ def measure_engines(
     seconds: float = SECONDS,
 ) -> EngineReport:
     """Report on a model in engines; a `CannotMeasureError` where it cannot be measured at all."""
-    compiled = compile_subject(subject, host, quick=quick)
+    compiled_model = compile_subject(subject, host, quick=quick)
     load, scenarios = os.getloadavg()[0], []
     with report_errors(subject), tempfile.TemporaryDirectory() as folder:
         path = str(Path(folder, "model.mjb"))
-        mujoco.mj_saveModel(compiled.model, path, None)
-        for scene in compiled.scenarios:
+        mujoco.mj_saveModel(compiled_model.model, path, None)
+        for scene in compiled_model.scenarios:
             host.tell(f"{scene.name}: the reference")
-            basis = engine_basis(compiled.model, scene, quick=quick)
+            basis = engine_basis(compiled_model.model, scene, quick=quick)
             trial = EngineTrial(path, scene.scenario, len(scene.scenario.times))
             run = _ScenarioRun(basis, trial, host, quick, seconds)
             rows = tuple(row for choice in engines for row in run.rows(choice))

@@ -52,6 +52,7 @@ from mjbench.reports.diet_report import (
     DietReport,
     DietScenario,
     Finding,
+    Keep,
     ModelPlace,
     RejectedTrial,
     Saving,
@@ -65,16 +66,6 @@ _STARTS, _QUICK_STARTS = 2, 1
 """Random starts of each scenario, beside its own."""
 Rerun = Callable[[Mapping[str, bytes]], str]
 """New bytes of files → which script or lab then prints something else; empty where none does."""
-
-
-class Keep(Struct, frozen=True):
-    """A finding that its author keeps, and where that is said."""
-
-    finding: str
-    reason: str
-    path: str
-    line: int
-    column: int
 
 
 class Survey(Struct, frozen=True):

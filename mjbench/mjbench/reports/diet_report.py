@@ -129,6 +129,16 @@ class DietScenario(Record, frozen=True):
     reasons: tuple[str, ...]
 
 
+class Keep(Record, frozen=True):
+    """A finding that its author keeps, and where that is said."""
+
+    finding: str
+    reason: str
+    path: str
+    line: int
+    column: int
+
+
 class StaleKeep(Record, frozen=True):
     """An entry `[[keep]]` that keeps nothing any more."""
 

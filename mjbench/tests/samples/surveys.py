@@ -12,8 +12,8 @@ from mjbench.pruning.candidates import SETTINGS
 from mjbench.pruning.comparison import pruning_scenes
 from mjbench.pruning.model_text import ModelText, open_model
 from mjbench.pruning.readers import read_code
-from mjbench.pruning.survey import Keep, Rerun, Survey, Surveyor
-from mjbench.reports.diet_report import Finding
+from mjbench.pruning.survey import Rerun, Survey, Surveyor
+from mjbench.reports.diet_report import Finding, Keep
 from samples.reports import MACHINE
 
 PATH = "models/a.xml"

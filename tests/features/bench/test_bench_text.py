@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.core.model.measurements import FigureLine, Interval, RowVerdict
-from coursebuild.core.model.report_files import Departure, RecordCheck
 from coursebuild.features.bench.commands.bench import bench_text
 from coursebuild.features.bench.commands.measurement import (
+    Departure,
     Measurement,
+    RecordCheck,
     format_checks,
     measurement_json,
 )
@@ -84,7 +85,7 @@ def test_colour_marks_the_own_setting_the_front_and_what_was_lost() -> None:
 def test_a_verdict_is_green_where_the_own_setting_is_as_good_as_any(
     on_front: bool, noticeable: bool | None, colour: str
 ) -> None:
-    verdict = RowVerdict(on_front, None, None, None, noticeable, "So it is.")
+    verdict = RowVerdict(on_front, None, noticeable, "So it is.")
     text = bench_text([scene(scenario([row()], verdict=verdict))], Style(colour=True, width=80))
     assert f"\x1b[{colour}m    So it is." in text
 
@@ -128,7 +129,7 @@ def test_what_a_table_has_no_room_for_comes_in_the_next() -> None:
 
 @given(value=st.floats())
 def test_json_has_no_number_that_is_none(value: float) -> None:
-    odd = replace(row(), position=(value, value), cost=Interval(value, value, value), growth=value)
+    odd = replace(row(), position=(value, value), cost=Interval(value, value, value))
     report = scene(scenario([odd], horizon=value, floor=value))
     text = measurement_json({"scenes": [report]}, Measurement((report,)))
     (row_value,) = json.loads(text)["scenes"][0]["scenarios"][0]["rows"]

@@ -17,6 +17,8 @@ from coursebuild.features.bench.shown_errors import limit_text, map_text
 LOW, HIGH = 1.0, 1000.0
 ROW = StableRow("RK4", 25.44, (LOW, HIGH), None, 5.0, 1, 9, None, (25.44, 25.48))
 TRIES = ((10.0, 10, 0), (11.5, 10, 0), (13.0, 10, 0), (24.0, 10, 3), (24.55, 10, 10))
+GRID = (9.0, 10.35, 11.9, *(13.0 * 1.0227**n for n in range(30)))
+"""A step of 15 % below half the limit, and of 2.3 % above."""
 
 
 def test_only_digits_on_which_spans_and_starts_agree_are_printed() -> None:
@@ -41,7 +43,7 @@ def test_a_map_has_a_sign_for_each_timestep() -> None:
 
 def test_what_the_gaps_between_timesteps_may_hide_is_said() -> None:
     """Where limits have islands, their digits are no finer than the gaps."""
-    row = replace(ROW, islands=(60.0, 80.0), tries=TRIES)
+    row = replace(ROW, islands=(60.0, 80.0), tries=tuple((step, 10, 0) for step in GRID))
     assert limit_text(row) == "25 s"
     assert missed_islands(english(), [row]) == [
         "Islands of lost timesteps can be missed if they are narrower than 2.3 %, or than 15 % "

@@ -201,7 +201,7 @@ class SceneRun(MeasuringRun[SceneReport]):
         )
 
     def _parts(self, scene: CourseScene) -> tuple[object, ...]:
-        return scene.name, scene.digest, self.quick, self.code, self.about.pinned
+        return scene.name, scene.digest, self.quick, self.code, self.facts.pinned
 
     def tasks(self, scene: CourseScene) -> Iterator[tuple[Any, ...]]:
         """The scenarios of a scene, and its sweeps in pieces, that are not stored."""
@@ -250,8 +250,8 @@ class SceneRun(MeasuringRun[SceneReport]):
 
     def _measure_scenario(self, scene: CourseScene, number: int) -> tuple[bytes, ...]:
         task = self._task(scene, "", number, number + 1)
-        found = self.results.pop(task, b"")
-        return (found or self.mjbench.do("scenario", scene, number=number, **self._settings()),)
+        data = self.results.pop(task, b"")
+        return (data or self.mjbench.do("scenario", scene, number=number, **self._settings()),)
 
     def _measure_sweep(self, scene: CourseScene, sweep: DeclaredSweep) -> tuple[bytes, ...]:
         pieces = [self.results.pop(task, b"") for task in self._pieces(scene, sweep)]
@@ -278,9 +278,9 @@ class SceneRun(MeasuringRun[SceneReport]):
 
 def _scenario_count(scene: CourseScene) -> int:
     """How many scenarios are measured: none that nobody declared where nothing can move."""
-    declared = scene.declarations.scenarios
+    scenarios = scene.declarations.scenarios
     usual = keyframe_scenarios(scene.facts.keyframes) if scene.facts.nv else ()
-    return len(declared or usual)
+    return len(scenarios or usual)
 
 
 def measure_part(root: Path, data: bytes) -> bytes:

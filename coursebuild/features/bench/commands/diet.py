@@ -7,8 +7,7 @@
 3. Reports are stored by all that they depend on, as those of `bench`.
 4. `fix` takes out what is proved, again and again, as what only a removed part needed may go as
    well. A file that was edited meanwhile is left as it is.
-5. A finding is shown with its label, what it saves, its place, and the change itself; what was
-   tried and is needed stands on one line.
+5. A finding is shown with its label, what it saves and the change; what is needed, in one line.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError, require
 from coursebuild.core.files.read import read_course
 from coursebuild.core.files.write import FileChange, change_files
-from coursebuild.core.model.measurements import PROVED_LABEL, DietReport, Finding, Saving
+from coursebuild.core.model.diet_findings import PROVED_LABEL, DietReport, Finding, Saving
 from coursebuild.core.model.report_files import DIET, ReportFailure
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.values import decode, encode
@@ -256,7 +255,7 @@ class _DietRun(MeasuringRun[DietReport]):
 
     def _parts(self, model: DietModel) -> tuple[object, ...]:
         """Return all that a report depends on; first the digest of the model."""
-        scene, machine = model.scene, self.about.machine
+        scene, machine = model.scene, self.facts.machine
         parts: list[object] = [scene.digest, scene.name, self.quick, self.code, machine]
         for keep in scene.declarations.keep:
             place = keep.finding_span
@@ -303,13 +302,13 @@ def measure_part(root: Path, data: bytes) -> bytes:
             if scene.digest != digest:  # its files have been edited meanwhile
                 return b""
             model = DietModel(root, run.files, run.course, scene)
-            paths = [path for path in model.paths if (root / path).is_file()]
-            before = {path: (root / path).read_bytes() for path in paths}
+            files = {path: root / path for path in model.paths}
+            before = {path: file.read_bytes() for path, file in files.items() if file.is_file()}
             try:
                 report = run.report_here(model)
             except FailedJobError:  # which is found and told where the command is
                 return b""
-            after = {path: (root / path).read_bytes() for path in before}
+            after = {path: files[path].read_bytes() for path in before}
             changes = tuple((p, before[p], after[p]) for p in before if before[p] != after[p])
             return b"" if report is None else encode((report, changes, tuple(run.remarks)))
     return b""

@@ -258,17 +258,17 @@ def _find_readers(
 ) -> ModelReaders:
     """List everything in the course that may read a model, or a file of it in another model."""
     own_files = _included_files(files, scene.model.source)
-    own = readers_of(course, root, files, scene.name)
-    sources, modules = [*own.sources], own.modules
+    own_readers = readers_of(course, root, files, scene.name)
+    sources, modules = [*own_readers.sources], own_readers.modules
     tables = {table.path: table for table in files.declarations}
     for model in files.models:
         source = model.source
         shared = own_files.intersection((source.path, *model_files(root, source.path, source.text)))
         if not shared or source.path == scene.model.source.path:
             continue
-        others = readers_of(course, root, files, model.name)
-        sources += others.sources
-        modules |= others.modules
+        model_readers = readers_of(course, root, files, model.name)
+        sources += model_readers.sources
+        modules |= model_readers.modules
         if source.path not in own_files:
             sources.append(_reference_reader(files, source, source.path, shared))
         table = tables.get(f"{source.path.removesuffix('.xml')}.toml")

@@ -115,7 +115,7 @@ class _EngineRun(MeasuringRun[EngineReport]):
     def measure(self, scene: CourseScene) -> bytes | None:
         """Report on a scene; `None` if it cannot be measured."""
         engines = self.choice.engines
-        parts = (scene.name, scene.digest, self.quick, self.code, self.about.machine, engines)
+        parts = (scene.name, scene.digest, self.quick, self.code, self.facts.machine, engines)
         names = [name for name, _ in engines]
         return self.load_or_measure(
             scene.name,

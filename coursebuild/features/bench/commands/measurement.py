@@ -33,7 +33,7 @@ from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.features.bench.commands.measuring import (
-    About,
+    Facts,
     FailedJobError,
     Mjbench,
     diagnostic_of,
@@ -222,14 +222,14 @@ class MeasuringRun(Generic[_T]):
         options.store.listen(self.progress.say)
 
     @functools.cached_property
-    def about(self) -> About:
+    def facts(self) -> Facts:
         """What mjbench is here."""
-        return self.mjbench.about()
+        return self.mjbench.facts()
 
     @functools.cached_property
     def code(self) -> tuple[str, str]:
         """The code on which reports depend: mjbench's, and what exact motions may import."""
-        return self.about.code, code_digest("mjcourse/spatial")
+        return self.facts.code, code_digest("mjcourse/spatial")
 
     def measure_each(
         self, things: Sequence[_A], measure: Callable[[_A], bytes | None]
@@ -241,10 +241,10 @@ class MeasuringRun(Generic[_T]):
                 if self.options.executor is not None:
                     self._measure_elsewhere(self.options.executor, things)
                 reports = [measure(thing) for thing in things]
-        found = [report for report in reports if report is not None]
+        present = [report for report in reports if report is not None]
         return Measurement(
-            tuple(msgspec.json.decode(report, type=self.report_type) for report in found),
-            tuple(msgspec.json.decode(report) for report in found),
+            tuple(msgspec.json.decode(report, type=self.report_type) for report in present),
+            tuple(msgspec.json.decode(report) for report in present),
             sort_diagnostics(self.diagnostics),
             failures=tuple(self.failures),
             remarks=tuple(self.remarks),
@@ -253,7 +253,7 @@ class MeasuringRun(Generic[_T]):
     def _measure_elsewhere(self, executor: Executor, things: Sequence[Any]) -> None:
         """Have other processes measure what nobody has measured, so far as they can."""
         tasks = [task for thing in things for task in self.tasks(thing)]
-        data = [encode((task, self.about.machine)) for task in tasks]
+        data = [encode((task, self.facts.machine)) for task in tasks]
         for task, result in zip(
             tasks, executor.map(self.function, self.options.root, data), strict=True
         ):
@@ -322,7 +322,7 @@ def read_task(data: bytes, mjbench: Mjbench) -> tuple[Any, ...] | None:
     task, machine = decode(data, tuple[tuple[object, ...], Machine]) or ((), None)
     if machine is None:
         return None
-    own_machine = replace(mjbench.about().machine, processors=machine.processors)
+    own_machine = replace(mjbench.facts().machine, processors=machine.processors)
     return task if own_machine == machine else None
 
 

@@ -31,7 +31,7 @@ _SECONDS = 20.0
 """Limit of a run in the browser's engine, in seconds of processor time."""
 
 
-class About(Struct, frozen=True):
+class Facts(Struct, frozen=True):
     """What mjbench is here: all that its figures depend on beside the models."""
 
     code: str
@@ -114,9 +114,9 @@ class Mjbench:
                 with contextlib.suppress(BrokenPipeError):
                     file.close()
 
-    def about(self) -> About:
+    def facts(self) -> Facts:
         """Say what is here."""
-        return msgspec.json.decode(self.do("about"), type=About)
+        return msgspec.json.decode(self.do("about"), type=Facts)
 
     def do(self, job: str, scene: CourseScene | None = None, **values: object) -> bytes:
         """Do a job, about a scene if it is about one; return the JSON of its result.
@@ -198,8 +198,8 @@ class Mjbench:
 
 def subject_of(root: Path, scene: CourseScene) -> dict[str, object]:
     """A scene as mjbench is told of it: texts as they were read, so that all fits its digest."""
-    source, declared = scene.model.source, scene.declarations.source
-    exact, is_declared = exact_file(scene.name), declared.path != source.path
+    source, table = scene.model.source, scene.declarations.source
+    exact, is_declared = exact_file(scene.name), table.path != source.path
     files = (root / path for path in existing_files(root, source.path, source.text))
     return {
         "folder": str(root),
@@ -207,8 +207,8 @@ def subject_of(root: Path, scene: CourseScene) -> dict[str, object]:
         "mjcf": source.text,
         "name": scene.name,
         "digest": scene.digest,
-        "declarations_path": declared.path if is_declared else "",
-        "declarations": declared.text if is_declared else "",
+        "declarations_path": table.path if is_declared else "",
+        "declarations": table.text if is_declared else "",
         "exact": exact if (root / exact).is_file() else "",
         "parts": sum(path.stat().st_size for path in files),
     }
