@@ -7,7 +7,6 @@ import hashlib
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ from mjbench.reports.records import (
     case_departures,
     scene_departures,
 )
+from mjbench.schemas import schema_text
 
 _COMMANDS = ("bench", "stability", "diet", "schema", "jobs")
 _DESCRIPTION = """\
@@ -228,8 +228,7 @@ def _keeps(subject: Subject) -> Iterable[Keep]:
 
 
 def _schema(arguments: argparse.Namespace) -> int:
-    file = files("mjbench") / "schemas" / f"{arguments.format}.schema.json"
-    sys.stdout.write(file.read_text("utf-8"))
+    sys.stdout.write(schema_text(arguments.format))
     return 0
 
 

@@ -236,7 +236,7 @@ class DeclaredSweep(SweepTable, frozen=True, kw_only=True):
 class KeepTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A finding of the scene diet that is to stay as it is."""
 
-    finding: Annotated[fields.Text, describe("as `coursebuild diet` names it")]
+    finding: Annotated[fields.Text, describe("as `diet` names it")]
     reason: Annotated[fields.Text, describe("why it stays")]
 
 
