@@ -10,11 +10,12 @@ import ast
 import inspect
 import json
 from importlib.resources import files
+from itertools import pairwise
 from typing import Any
 
 import msgspec
 
-from mjbench.reports.records import BENCH, DIET, ENGINES, STABILITY, VERSION
+from mjbench.reports.records import BENCH, DIET, ENGINES, STABILITY, VERSION, ReportKind
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -28,8 +29,8 @@ def schema_text(name: str) -> str:
 
 def _report_schema() -> dict[str, Any]:
     """A file holds a report of one kind."""
-    kinds = (BENCH, ENGINES, DIET, STABILITY)
-    types: list[Any] = [kind.type for kind in kinds]
+    kinds: tuple[ReportKind[Any], ...] = (BENCH, ENGINES, DIET, STABILITY)
+    types = [kind.type for kind in kinds]
     reports, definitions = msgspec.json.schema_components(types, ref_template="#/$defs/{name}")
     descriptions = _field_descriptions()
     for name, definition in definitions.items():
@@ -76,12 +77,10 @@ def _field_descriptions() -> dict[tuple[str, str], str]:
 
 
 def _texts_below(node: ast.ClassDef) -> dict[str, str]:
-    texts = {}
-    for field, following in zip(node.body, node.body[1:], strict=False):
-        match field, following:
-            case (
-                ast.AnnAssign(target=ast.Name(id=name)),
-                ast.Expr(value=ast.Constant(value=str(text))),
-            ):
-                texts[name] = " ".join(text.split()).replace("`None`", "`null`")
-    return texts
+    return {
+        field.target.id: " ".join(text.value.value.split()).replace("`None`", "`null`")
+        for field, text in pairwise(node.body)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+        if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)
+        if isinstance(text.value.value, str)
+    }

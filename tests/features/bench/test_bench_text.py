@@ -133,4 +133,4 @@ def test_json_has_no_number_that_is_none(value: float) -> None:
     report = scene(scenario([odd], horizon=value, floor=value))
     text = measurement_json({"scenes": [report]}, Measurement((report,)))
     (row_value,) = json.loads(text)["scenes"][0]["scenarios"][0]["rows"]
-    assert row_value["growth"] == (value if math.isfinite(value) else None)
+    assert row_value["position"][0] == (value if math.isfinite(value) else None)
