@@ -15,7 +15,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 LOCK = $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 3.11 --generate-hashes \
-  --no-emit-index-url --custom-compile-command 'make lock'
+  --no-emit-index-url --no-emit-package mjbench --custom-compile-command 'make lock'
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -24,7 +24,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # What an installation depends on. It is editable: a change of Python code or of a template needs
 # none. Folders are listed because they change when a file in them is removed.
-BUILD_INPUTS := pyproject.toml requirements-course.txt requirements-build.txt hatch_build.py $(wildcard site/.npmrc site/*.json site/*.mjs site/*.py) \
+BUILD_INPUTS := pyproject.toml mjbench/pyproject.toml requirements-course.txt requirements-build.txt hatch_build.py $(wildcard site/.npmrc site/*.json site/*.mjs site/*.py) \
   $(shell find site/css site/js 2>/dev/null)
 
 # An environment does not outlive a move of its folder, whose path is in its scripts, nor the Python
@@ -50,7 +50,7 @@ help:
 	@echo 'make lint       check style and formatting; make format mends what can be mended'
 	@echo 'make types      check types, of Python and of JavaScript'
 	@echo 'make vscode     try and make the extension for Visual Studio Code, in editors/vscode/dist/'
-	@echo 'make dist       the wheel and the source distribution, in dist/'
+	@echo 'make dist       wheels and source distributions of coursebuild and mjbench, in dist/'
 	@echo 'make lock       lock what pyproject.toml newly asks for; UPGRADE=--upgrade: all, in newest versions'
 	@echo 'make clean      remove what was built; make distclean also what was installed'
 
@@ -79,7 +79,7 @@ release-files: tag-check $(VENV)/.site
 	rm -rf $(RELEASE)
 	$(MAKE) pages dist vscode
 	cp dist/* $(RELEASE)
-	cp editors/vscode/dist/coursebuild.vsix $(RELEASE)/$$(basename dist/*.tar.gz .tar.gz).vsix
+	cp editors/vscode/dist/coursebuild.vsix $(RELEASE)/$$(basename dist/coursebuild-*.tar.gz .tar.gz).vsix
 	$(BIN)/python docs/release.py notes $(RELEASE)
 
 tag-check:
@@ -118,8 +118,8 @@ OF_THIS_ENGINE := tests/core/text/test_format_mistakes.py tests/mjcourse/test_ag
 
 test-oldest: $(VENV)/.dev npm
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(OLDEST)
-	$(BIN)/uv pip compile --quiet --resolution lowest-direct pyproject.toml --extra lsp --extra figures --extra measure -o $(OLDEST)/packages.txt
-	$(BIN)/uv pip install --quiet --python $(OLDEST) -c $(OLDEST)/packages.txt --group dev --editable '.[figures,lsp,measure]'
+	$(BIN)/uv pip compile --quiet --resolution lowest-direct --no-emit-package mjbench pyproject.toml --extra lsp --extra figures --extra measure -o $(OLDEST)/packages.txt
+	$(BIN)/uv pip install --quiet --python $(OLDEST) -c $(OLDEST)/packages.txt --group dev --editable '.[figures,lsp,measure]' --editable ./mjbench
 	PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(OLDEST)/bin/python -m pytest $(QUICK) \
 	  $(addprefix --deselect ,$(OF_THIS_ENGINE))
 
@@ -145,6 +145,7 @@ vscode: $(VENV)/.site
 dist: $(VENV)/.site
 	rm -rf dist
 	$(BIN)/python -m hatchling build
+	cd mjbench && ../$(BIN)/python -m hatchling build -d ../dist
 
 lock: $(VENV)/.dev
 	$(LOCK) pyproject.toml -o requirements.txt
@@ -173,15 +174,15 @@ $(VENV)/.made:
 	@printf '%s' '$(CURDIR)' > $@
 
 $(VENV)/.site: $(VENV)/.made $(BUILD_INPUTS)
-	@echo 'installing coursebuild and what it needs (the first time takes minutes)'
+	@echo 'installing coursebuild, mjbench and what they need (the first time takes minutes)'
 	@$(INSTALL) --require-hashes -r requirements-course.txt -r requirements-build.txt
-	@$(INSTALL) --no-deps --no-build-isolation --editable .
+	@$(INSTALL) --no-deps --no-build-isolation --editable . --editable ./mjbench
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.made requirements-dev.txt $(BUILD_INPUTS)
-	@echo 'installing coursebuild, what it needs and what its tests need (the first time takes minutes)'
+	@echo 'installing coursebuild, mjbench, what they and their tests need (the first time takes minutes)'
 	@$(INSTALL) --require-hashes -r requirements-dev.txt
-	@$(INSTALL) --no-deps --no-build-isolation --editable .
+	@$(INSTALL) --no-deps --no-build-isolation --editable . --editable ./mjbench
 	@touch $(VENV)/.site $@
 
 # The packages that only tests use, beside those that are bundled.

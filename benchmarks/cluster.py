@@ -24,11 +24,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from distributed import LocalCluster
+from msgspec import Raw
 
 from coursebuild.core.engine.store import Store
+from coursebuild.core.model.report_files import BENCH
 from coursebuild.core.run import gate
-from coursebuild.features.bench.commands import bench, measuring
-from coursebuild.numerics.reports.records import BENCH
+from coursebuild.features.bench.commands import bench
+from coursebuild.features.bench.commands.measurement import file_of
+from coursebuild.features.bench.commands.measuring import Mjbench
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import find_scenes
 
@@ -99,10 +102,12 @@ def record(root: Path) -> None:
     """Record a report without times, which `bench --check` compares with and prints."""
     (scene,) = find_scenes(root).value
     options = Options(root, 1, Store(root))
-    report = bench.SceneRun(options, (), measuring, use_store=False).measure(scene)
-    assert report is not None
+    with Mjbench(root, "this benchmark") as mjbench:
+        report = bench.SceneRun(options, mjbench, (), use_store=False).measure(scene)
+        assert report is not None
+        data = file_of(mjbench, bench=Raw(report))
     (root / BENCH.path("arm")).parent.mkdir(parents=True)
-    (root / BENCH.path("arm")).write_bytes(BENCH.encode(report))
+    (root / BENCH.path("arm")).write_bytes(data)
 
 
 def run(root: Path, *arguments: str) -> tuple[str, float]:

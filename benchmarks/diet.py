@@ -14,8 +14,9 @@ import tempfile
 from pathlib import Path
 
 from coursebuild.core.engine.store import Store
+from coursebuild.core.model.diet_findings import DietReport
 from coursebuild.features.bench.commands.diet import diet
-from coursebuild.numerics.reports.diet_report import DietReport
+from coursebuild.features.bench.commands.measuring import Mjbench
 from coursebuild.pipeline.options import Options
 
 
@@ -65,12 +66,13 @@ def main() -> None:
         (root / "models" / "arm.xml").write_text(arm().replace("RUBBLE", ""))
         field = arm().replace("RUBBLE", rubble(arguments.pieces))
         (root / "models" / "rubble.xml").write_text(field)
-        measurement = diet(Options(root, 1, Store(root)))
-    for report in measurement.reports:
-        show(report)
+        with Mjbench(root, "this benchmark") as mjbench:
+            measurement = diet(Options(root, 1, Store(root)), mjbench)
+    for report, values in zip(measurement.reports, measurement.values, strict=True):
+        show(report, values["slim_difference"])
 
 
-def show(report: DietReport) -> None:
+def show(report: DietReport, difference: float | None) -> None:
     """A line for each finding that saves time, and one for all together."""
     print(f"{report.model}  (MuJoCo {report.machine.engine}, {report.machine.cpu})")
     for finding in report.findings:
@@ -79,8 +81,7 @@ def show(report: DietReport) -> None:
             print(f"  ×{saving.time:6.2f} ± {saving.spread:.2f}  {finding.kind}: {finding.label}")
     slim = report.slim
     if slim is not None and slim.time is not None:
-        difference = report.slim_difference
-        remark = "the same bits" if difference == 0 else f"differs by {difference:.1e}"
+        remark = f"differs by {difference:.1e}" if difference else "the same bits"
         print(f"  ×{slim.time:6.2f} ± {slim.spread:.2f}  all that goes together: {remark}")
 
 

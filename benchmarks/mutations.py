@@ -2,7 +2,7 @@
 
 Run: python benchmarks/mutations.py [FILE …] [--list END …] [--cases NAME …] [--every N] [--docs]
 
-FILE is a module of `coursebuild/numerics/problems`, such as `tops`. Each number there but 0, also
+FILE is a module of `mjbench/mjbench/problems`, such as `tops`. Each number there but 0, also
 in MJCF, is multiplied by 1 + 1e-6 in memory, one at a time; then the cases that it is part of are
 checked as `coursebuild stability` checks them. A number ends in one of these ways:
 
@@ -36,13 +36,13 @@ sys.path[:0] = [str(ROOT)]
 
 from benchmarks.measure.report import put_into  # noqa: E402
 from benchmarks.slips.constants import RULES, WHOLE, Number, numbers_of  # noqa: E402
-from coursebuild.numerics import cases, measure  # noqa: E402
-from coursebuild.numerics.integrate import forward_motion  # noqa: E402
-from coursebuild.numerics.problem import Integrator, Motion, Problem, ScalarCheck, Sizes  # noqa: E402
-from coursebuild.numerics.reports.scene_report import FLOORS  # noqa: E402
+from mjbench import cases, measure  # noqa: E402
+from mjbench.integrate import forward_motion  # noqa: E402
+from mjbench.problem import Integrator, Motion, Problem, ScalarCheck, Sizes  # noqa: E402
+from mjbench.reports.scene_report import FLOORS  # noqa: E402
 
 DOCS = ROOT / "docs/explanation/numerics.md"
-PACKAGE = "coursebuild.numerics.problems"
+PACKAGE = "mjbench.problems"
 FILES = ("oscillators", "tops", "tumbling_box", "contacts", "impact", "linked_bodies", "extremes")
 """In an order in which they can be imported."""
 OFF = 1 + 1e-6

@@ -35,6 +35,7 @@ from coursebuild import MANUAL, REPOSITORY, SITE, __version__  # noqa: E402
 PLACES = {
     "coursebuild/__init__.py": ['__version__ = "{}"\n'],
     "pyproject.toml": ['\nversion = "{}"\n'],
+    "mjbench/pyproject.toml": ['\nversion = "{}"\n'],
     "CITATION.cff": ["\nversion: {}\n"],
     "editors/vscode/package.json": ['\n  "version": "{}",\n'],
     "editors/vscode/package-lock.json": [

@@ -27,7 +27,6 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"core.run"}),
     frozenset({"core.features"}),
     frozenset({"core.registry"}),
-    frozenset({"numerics"}),
     frozenset({"features"}),
     frozenset({"pipeline"}),
     frozenset({"preview"}),
@@ -41,12 +40,11 @@ That no circle comes of it is a test of its own."""
 UNLAYERED_MODULES = {"__init__", "core.__init__"}
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 FILES = sorted(PACKAGE.rglob("*.py"))
+BENCH_FILES = sorted((ROOT / "mjbench/mjbench").rglob("*.py"))
 
 PURE = """
-core.text core.drawing core.model core.syntax core.checks core.scripts core.pages numerics report
+core.text core.drawing core.model core.syntax core.checks core.scripts core.pages report
 """.split()
-NUMERICS_NEEDS = ("numerics", "core.model", "core.text", "core.drawing")
-"""Measuring can be read alone."""
 IO_MODULES = {
     "os",
     "shutil",
@@ -110,13 +108,11 @@ def part(names: tuple[str, ...]) -> str:
 
 
 def is_allowed(importer: str, name: str) -> bool:
-    """Whether a part may import a module; `mjcourse` is for lesson scripts and for numerics."""
+    """Whether a part may import a module; `mjcourse` is for lesson scripts, `mjbench` is apart."""
     package, _, rest = name.partition(".")
     if package != "coursebuild":
-        return package != "" and (package != "mjcourse" or importer == "numerics")
+        return package not in ("", "mjcourse", "mjbench")
     imported_part = part(tuple(rest.split(".")))
-    if importer == "numerics":
-        return imported_part in NUMERICS_NEEDS
     if importer in ASK_FEATURES and imported_part in ("core.features", "core.registry"):
         return True
     return imported_part in ("", importer, "__version__") or LEVEL[imported_part] < LEVEL[importer]
@@ -159,12 +155,15 @@ def test_features_import_those_alone_that_they_need() -> None:
     assert not violations, "\n".join(violations)
 
 
-def test_mjcourse_never_imports_coursebuild() -> None:
+def test_mjcourse_and_mjbench_import_nothing_of_coursebuild() -> None:
+    """Nor of each other; the tests of mjbench neither."""
+    own_packages = {"mjcourse": {"coursebuild", "mjbench"}, "mjbench": {"coursebuild", "mjcourse"}}
     violations = [
         f"{path.relative_to(ROOT)} imports {name}"
-        for path in sorted((ROOT / "mjcourse").rglob("*.py"))
+        for folder, foreign in own_packages.items()
+        for path in sorted((ROOT / folder).rglob("*.py"))
         for name in sorted(read(path).imports)
-        if name.split(".")[0] == "coursebuild"
+        if name.split(".")[0] in foreign | {"support"}
     ]
     assert not violations, "\n".join(violations)
 
@@ -182,7 +181,7 @@ def test_pure_parts_do_no_input_or_output() -> None:
 def test_files_stay_small_and_say_what_they_are_for() -> None:
     violations = [
         f"{path.relative_to(ROOT)} has {module.lines} lines and a docstring: {module.has_docstring}"
-        for path, module in ((path, read(path)) for path in FILES)
+        for path, module in ((path, read(path)) for path in (*FILES, *BENCH_FILES))
         if module.lines > 450 or not module.has_docstring
     ]
     assert not violations, "\n".join(violations)

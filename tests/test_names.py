@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+FOLDERS = "coursebuild mjbench mjcourse plugins tests benchmarks docs site".split()
 PARTICIPLES = (
     "added allowed applied asked begun built checked chosen claimed closed compiled copied counted "
     "cut declared decoded defined described drawn edited encoded ended escaped failed finished "
@@ -73,7 +74,7 @@ def assigned_names(node: ast.AST) -> Iterator[tuple[str, int]]:
 def test_names_are_nouns_and_verbs() -> None:
     riddles = [
         f"{path.relative_to(ROOT)}:{line}: {name}"
-        for folder in ("coursebuild", "mjcourse", "plugins", "tests", "benchmarks", "docs", "site")
+        for folder in FOLDERS
         for path in sorted((ROOT / folder).rglob("*.py"))
         if "node_modules" not in path.parts and "dist" not in path.parts
         if has_riddle(text := path.read_text(encoding="utf-8"))

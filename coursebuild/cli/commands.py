@@ -15,11 +15,9 @@ import argparse
 import contextlib
 import gc
 import importlib
-import os
 import re
 import resource
 import signal
-import sys
 import threading
 from typing import TYPE_CHECKING, NoReturn
 
@@ -163,26 +161,12 @@ def _choose_command(directory: str | None, words: list[str], *, alone: bool) -> 
             or "`coursebuild help` lists them"
         )
         raise UsageError(f"there is no command `{name}`", help=help)
-    if alone:
-        leave_to_apart(command)
     with contextlib.ExitStack() as resources:  # what has been started by the arguments ends here
         namespace = argparse.Namespace(
             root=directory, words=tuple(words), resources=resources, alone=alone
         )
         arguments = parser_of(command).parse_args(rest, namespace)
         return int(importlib.import_module(command.module).run(arguments))
-
-
-def leave_to_apart(command: Command) -> None:
-    """Let `apart` take the place of this process, before a command is imported that computes."""
-    if command.computes and "mujoco" not in sys.modules:
-        from coursebuild.core.run import gate
-
-        python_path = os.environ.get("PYTHONPATH", "")  # where the user has further packages
-        process = gate.module_command(
-            "coursebuild.cli.apart", *sys.argv[1:], python_path=python_path
-        )
-        gate.become(process, gate.environment(*gate.TOOL, *gate.COMPUTING))
 
 
 def known_commands(*, installed: bool = True) -> dict[str, Command]:

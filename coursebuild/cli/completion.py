@@ -10,7 +10,7 @@ import argparse
 import tomllib
 from pathlib import Path
 
-from coursebuild.cli.commands import known_commands, leave_to_apart, parser_of
+from coursebuild.cli.commands import known_commands, parser_of
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.cli.unchanged import split_directory
 from coursebuild.core.files.course_root import MAP, find_course_root, read_regular
@@ -64,8 +64,6 @@ def run(arguments: argparse.Namespace) -> int:
     if not before or before == ["help"]:
         candidates = [*commands, *([] if before else ["help", "--version", "-C"])]
     else:
-        if arguments.alone and before[0] in commands:
-            leave_to_apart(commands[before[0]])
         actions = parser_of(commands[before[0]])._actions if before[0] in commands else []
         takes_word = (a for a in actions if before[-1] in a.option_strings and a.nargs != 0)
         if last.startswith("-"):

@@ -35,6 +35,7 @@ from coursebuild.core.model import (
     local_file,
     walk_inlines,
 )
+from coursebuild.core.model.report_files import BENCH, ENGINES
 from coursebuild.core.registry import feature_trials, installed_features
 from coursebuild.core.run.dependencies import Kind, describe, is_there, sought_files, state_changes
 from coursebuild.core.run.mjcf import existing_files
@@ -42,7 +43,6 @@ from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.rules import RULES, Rule
-from coursebuild.numerics.reports.records import BENCH, ENGINES
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
 from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style, visible

@@ -245,8 +245,6 @@ class Command(Struct, frozen=True, kw_only=True):
     """The module with `declare(parser)`, which adds arguments, and `run(arguments)`, which returns
     the exit status. It is imported when the command is called, and may import all of coursebuild,
     since commands are a layer above features."""
-    computes: bool = False
-    """Whether it computes with MuJoCo, which the tool's own process does not import."""
 
 
 class Executor(Protocol):

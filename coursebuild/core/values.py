@@ -50,9 +50,7 @@ _PARTS: dict[type, Callable[[Any], Iterable[Any]]] = {
     Decimal: lambda value: (str(value),),
 }
 """What a value of each type consists of. The number of a type is its index; others come after."""
-_VALUE_PACKAGES = tuple(
-    f"coursebuild.{part}." for part in ("core.model", "core.pages", "features", "numerics")
-)
+_VALUE_PACKAGES = tuple(f"coursebuild.{part}." for part in ("core.model", "core.pages", "features"))
 """Packages with classes of values; `decode` imports their modules if need be."""
 DAMAGE = (
     ArithmeticError,

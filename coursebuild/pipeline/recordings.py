@@ -28,6 +28,7 @@ from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Course
 from coursebuild.core.model.addresses import RecordedFigure, recorded_figures
 from coursebuild.core.model.lesson_record import LessonRecord, shown_versions
+from coursebuild.core.model.report_files import FOLDER
 from coursebuild.core.model.results import Machine, Outcome, ScriptRun
 from coursebuild.core.run.dependencies import (
     Inputs,
@@ -45,7 +46,6 @@ from coursebuild.core.scripts.figure_data import read_figure_data
 from coursebuild.core.scripts.figures import SVG_HELP, figure_difference, prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.reports.records import FOLDER
 from coursebuild.pipeline.options import Options
 
 

@@ -28,7 +28,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import CourseFiles, read_bytes, read_course
 from coursebuild.core.model import Course, Declarations, Limits, MjcfModel
 from coursebuild.core.model.results import ModelFacts, Reports
-from coursebuild.core.model.scenarios import ScenarioTable
+from coursebuild.core.model.scenarios import ScenarioTable, exact_file
 from coursebuild.core.run.mjcf import compile_all, model_files, readable_error
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.syntax.coursemap import parse_course_map
@@ -42,15 +42,12 @@ from coursebuild.core.text.diagnostics import (
 )
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Source
-from coursebuild.numerics.reports.case_report import exact_file
 from coursebuild.pipeline.options import UsageError
 
 if TYPE_CHECKING:  # a course without reports needs none of it
-    from coursebuild.numerics.reports.case_report import CaseReport
-    from coursebuild.numerics.reports.diet_report import DietReport
-    from coursebuild.numerics.reports.engine_report import EngineReport
-    from coursebuild.numerics.reports.records import ReportFailure, ReportKind
-    from coursebuild.numerics.reports.scene_report import SceneReport
+    from coursebuild.core.model.diet_findings import DietReport
+    from coursebuild.core.model.measurements import CaseReport, EngineReport, SceneReport
+    from coursebuild.core.model.report_files import ReportFailure, ReportKind
 
     _Scene = TypeVar("_Scene", SceneReport, DietReport, EngineReport)
 
@@ -228,7 +225,7 @@ class _Collector:
         self._diagnostics: list[Diagnostic] = []
 
     def read(self, paths: Iterable[str]) -> Parsed[Reports]:
-        from coursebuild.numerics.reports.records import BENCH, DIET, ENGINES, STABILITY
+        from coursebuild.core.model.report_files import BENCH, DIET, ENGINES, STABILITY
 
         scenes: dict[str, SceneReport] = {}
         diets: dict[str, DietReport] = {}
@@ -276,7 +273,7 @@ class _Collector:
         return self._digests[model.name]
 
     def _read_record(self, kind: ReportKind[_T], model: str = "") -> _T | None:
-        from coursebuild.numerics.reports.records import ReportFailure
+        from coursebuild.core.model.report_files import ReportFailure
 
         report = read_record(self._root, kind, model)
         if isinstance(report, ReportFailure):
@@ -302,7 +299,7 @@ class _Collector:
 
 def read_record(root: Path, kind: ReportKind[_T], model: str = "") -> _T | ReportFailure:
     """Read the recorded report on a model (or on the hard cases), or why there is none."""
-    from coursebuild.numerics.reports.records import RecordError, ReportFailure
+    from coursebuild.core.model.report_files import RecordError, ReportFailure
 
     path, make = kind.path(model), kind.command(model)
     if not (root / path).exists() and not (root / path).is_symlink():

@@ -19,8 +19,9 @@ LESSONS = tomllib.loads(fixture_text("documents/extras.toml"))
     ("package", "lesson", "command", "message"),
     [
         ("scipy", "motion", "check", "a trial of a lab's equations needs the package scipy"),
-        ("scipy", "formula", "bench", "`coursebuild bench` needs the package scipy"),
-        ("scipy", "formula", "stability", "`coursebuild stability` needs the package scipy"),
+        ("mjbench", "formula", "bench", "`coursebuild bench` needs the package mjbench"),
+        ("mjbench", "formula", "stability", "`coursebuild stability` needs the package mjbench"),
+        ("mjbench", "formula", "diet", "`coursebuild diet` needs the package mjbench"),
         ("PIL", "picture", "update", "`dot.png` needs the package Pillow"),
     ],
 )
@@ -50,7 +51,7 @@ def test_lab_of_formulas_and_build_need_no_extra(
 ) -> None:
     folder = Folder(tmp_path / "course")
     folder.fill([LESSONS["formula"]], stores)
-    for package in ("scipy", "matplotlib", "PIL", "pygls", "fsspec"):
+    for package in ("mjbench", "scipy", "matplotlib", "PIL", "pygls", "fsspec"):
         monkeypatch.setitem(sys.modules, package, None)
     result = folder.main("build")
     assert result.status == 0, result.out + result.err

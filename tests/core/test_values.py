@@ -142,7 +142,7 @@ class Trap(enum.Enum):
         ("coursebuild.core.text.source:Source.span", [1]),
         ("coursebuild.core.values:decode", [b""]),
         ("coursebuild.features.__main__:x", []),
-        ("coursebuild.numerics.__init__:X", []),  # a module a second time
+        ("coursebuild.features.__init__:X", []),  # a module a second time
         ("coursebuild.cli.build:run", [1]),
         ("no.such.module:X", []),
         ("coursebuild.core.model.blocks:NoSuch", []),

@@ -3,6 +3,7 @@
 import importlib.metadata
 import json
 import re
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -34,8 +35,18 @@ def versions(root: Path, name: str) -> dict[str, str]:
     }
 
 
+def locked_requirements(root: Path, pyproject: dict) -> list[str]:
+    """What is declared here and by the packages of this repository, but for these packages."""
+    local = pyproject["tool"]["uv"]["sources"]
+    lines = declared_requirements(pyproject)
+    for name in local:
+        text = (root / name / "pyproject.toml").read_text(encoding="utf-8")
+        lines += declared_requirements(tomllib.loads(text))
+    return [line for line in lines if Requirement(line).name not in local]
+
+
 def declared_requirements(pyproject: dict) -> list[str]:
-    project, groups = pyproject["project"], pyproject["dependency-groups"]
+    project, groups = pyproject["project"], pyproject.get("dependency-groups", {})
     extras = project["optional-dependencies"].values()
     lines = [*project["dependencies"], *(line for extra in extras for line in extra)]
     return lines + [line for group in groups.values() for line in group if isinstance(line, str)]
@@ -60,7 +71,7 @@ def test_locks_hold_what_is_declared_and_what_is_installed(root: Path, pyproject
     all_versions = versions(root, "requirements-dev.txt")
     for name in LOCKS[:3]:
         assert versions(root, name).items() <= all_versions.items()
-    for requirement in map(Requirement, declared_requirements(pyproject)):
+    for requirement in map(Requirement, locked_requirements(root, pyproject)):
         version = all_versions[canonicalize_name(requirement.name)]
         assert requirement.specifier.contains(version), requirement
         assert importlib.metadata.version(requirement.name) == version
@@ -104,7 +115,8 @@ def test_lock_stays_without_addresses_when_npm_writes_it(root: Path) -> None:
 def test_what_each_package_is_for_is_said_once(root: Path, pyproject: dict) -> None:
     npm = manifest(root)
     names = {*npm["dependencies"], *npm["devDependencies"]}
-    names |= {Requirement(line).name for line in declared_requirements(pyproject)}
+    names |= {Requirement(line).name for line in locked_requirements(root, pyproject)}
+    names |= set(pyproject["tool"]["uv"]["sources"])
     page = (root / "docs/explanation/dependencies.md").read_text(encoding="utf-8")
     (packages,) = re.findall(r"^## Packages$(.*?)^## ", page, re.DOTALL | re.MULTILINE)
     table, _, list_for_work = packages.partition("### Only for work on coursebuild")

@@ -19,6 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PLACES = (
     "coursebuild/__init__.py",
     "pyproject.toml",
+    "mjbench/pyproject.toml",
     "CITATION.cff",
     "editors/vscode/package.json",
     "editors/vscode/package-lock.json",

@@ -15,11 +15,12 @@ from msgspec.structs import replace
 
 from coursebuild.cli import main
 from coursebuild.core.model import Declarations
+from coursebuild.core.model.measurements import SceneReport
+from coursebuild.core.model.report_files import BENCH, DIET, STABILITY
 from coursebuild.core.run.script_environment import engine_version
-from coursebuild.numerics.reports.records import BENCH, DIET, STABILITY
-from coursebuild.numerics.reports.scene_report import SceneReport
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.scenes import scene_digest
+from support.bench_reports import file_of
 from support.edited_course import drawn_pages
 from support.measured_course import TOML, write
 from support.model_reports import box, case, diet, finding
@@ -72,19 +73,19 @@ class Course:
         self.write_cases("it swings")
 
     def write_bench(self, report: SceneReport) -> None:
-        self.folder.write(BENCH.path(report.model), BENCH.encode(report))
+        self.folder.write(BENCH.path(report.model), file_of(BENCH, report))
 
     def write_diet(self, message: str) -> None:
         bench_report = self.bench()
         report = replace(
             diet(finding(message=message)), digest=bench_report.digest, machine=bench_report.machine
         )
-        self.folder.write(DIET.path("box"), DIET.encode(report))
+        self.folder.write(DIET.path("box"), file_of(DIET, report))
 
     def write_cases(self, note: str, engine: str = "") -> None:
         machine = replace(box().machine, engine=engine or engine_version())
         cases = (case("spring", 5, machine=machine, note=note),)
-        self.folder.write(STABILITY.path(), STABILITY.encode(cases))
+        self.folder.write(STABILITY.path(), file_of(STABILITY, cases))
 
     def build(self) -> str:
         result = self.folder.main("build", "-q")

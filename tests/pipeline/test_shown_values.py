@@ -19,6 +19,8 @@ from msgspec.structs import fields, replace
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Document
+from coursebuild.core.model.diet_findings import DietReport
+from coursebuild.core.model.measurements import CaseReport, SceneReport
 from coursebuild.core.model.results import Reports
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import PageHead
@@ -28,9 +30,6 @@ from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.text.source import Excerpt, Source, Span
-from coursebuild.numerics.reports.case_report import CaseReport
-from coursebuild.numerics.reports.diet_report import DietReport
-from coursebuild.numerics.reports.scene_report import SceneReport
 from coursebuild.pipeline.check import read_and_verify
 from coursebuild.pipeline.reader import PageRequest, Reader
 from coursebuild.pipeline.site import Site, page_request, text_of

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from coursebuild.core.engine.store import Store
-from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.features.bench.commands.measurement import CannotMeasureError
-from coursebuild.features.bench.commands.measuring import CompiledScene
-from coursebuild.numerics.reports.scene_report import ScenarioReport, SceneReport
+from coursebuild.features.bench.commands.measuring import Facts, FailedJobError, Failure, Mjbench
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene
-from support.bench_reports import swing
+from mjbench import jobs
+from mjbench.host import LocalHost
+from mjbench.reports.scene_report import ScenarioReport
+from samples.reports import swing
 
 BOX = """\
 <mujoco>
@@ -30,39 +31,44 @@ PATH = "content/reports/box.bench.json"
 TOML = '[[scenario]]\nname = "swing"\nduration = 0.2\nsample = 0.02\nqvel = [1.0]\n'
 
 
-class Fake:
-    """A bench that returns the outcomes it was given, and records its calls."""
+class Fake(Mjbench):
+    """A bench that returns the outcomes it was given, and records what it is asked to measure.
 
-    def __init__(self, *outcomes: ScenarioReport | Diagnostic | BaseException) -> None:
+    What measures nothing is done as ever.
+    """
+
+    def __init__(self, *outcomes: ScenarioReport | Failure | BaseException) -> None:
+        super().__init__(Path("/"), "a test")
         self.outcomes = list(outcomes) or [swing()]
         self.calls: list[tuple[str, int, bool, bool]] = []
 
-    def compile_scene(self, root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
-        assert root.is_absolute()
-        scenes: Any = tuple(self.outcomes)
-        return CompiledScene(scene, None, scenes)
+    def facts(self) -> Facts:
+        """Say what is here."""
+        facts = jobs.answer(jobs.About(), LocalHost(Path("/"), print))
+        return msgspec.convert(msgspec.to_builtins(facts), Facts)
 
-    def add_card(self, root: Path, scene: CourseScene, report: SceneReport) -> SceneReport:
-        """Add nothing: the card of a model has tests of its own."""
-        return report
+    def do(self, job: str, scene: CourseScene | None = None, **values: Any) -> bytes:
+        if scene is None:
+            request = msgspec.json.encode({"job": job, **values})
+            todo = msgspec.json.decode(request, type=jobs.Job)
+            return msgspec.json.encode(jobs.answer(todo, LocalHost(Path("/"), print)))
+        if job == "join":
+            parts = {"model": scene.name, "digest": scene.digest, "machine": self.facts().pinned}
+            values.pop("card")
+            return msgspec.json.encode({**parts, **values})
+        assert job == "scenario"
+        self.tell("swing: Euler")
+        return self.measure(scene, **values)
 
-    def run_scenario(
-        self,
-        compiled_scene: CompiledScene,
-        number: int,
-        *,
-        quick: bool,
-        timed: bool,
-        tell: Callable[[str], None],
-    ) -> ScenarioReport:
-        tell("swing: Euler")
-        self.calls.append((compiled_scene.scene.name, number, quick, timed))
+    def measure(self, scene: CourseScene, *, number: int, quick: bool, timed: bool) -> bytes:
+        """The prepared outcome."""
+        self.calls.append((scene.name, number, quick, timed))
         outcome = self.outcomes[number]
-        if isinstance(outcome, Diagnostic):
-            raise CannotMeasureError(outcome)
+        if isinstance(outcome, Failure):
+            raise FailedJobError(outcome)
         if isinstance(outcome, BaseException):
             raise outcome
-        return outcome
+        return msgspec.json.encode(outcome)
 
 
 def bench_course(tmp_path: Path) -> Path:

@@ -128,7 +128,7 @@ def step_key(name: str, *values: object) -> str:
 
 
 def code_digest(*parts: str, root: Path = Path(_CORE).parents[1]) -> str:
-    """A hash over packages and modules, such as `mjcourse/spatial` or `coursebuild/numerics`.
+    """A hash over packages and modules, such as `mjcourse/spatial`.
 
     Measurements that take minutes are kept as long as this stays the same, even when the tool is
     installed again.

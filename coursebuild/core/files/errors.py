@@ -48,7 +48,8 @@ class UsageError(Exception):
 
 def require(package: str, extra: str, purpose: str) -> None:
     """Raise an `EffectError`, unless a package of an extra is installed that `purpose` needs."""
-    if find_spec(package) is None:
+    spec = find_spec(package)
+    if spec is None or spec.origin is None:  # a folder of that name is no package
         help = f"run `pip install 'coursebuild[{extra}]'`"
         raise EffectError(f"{purpose} needs the package {package}", help=help)
 

@@ -29,6 +29,11 @@ def keyframe_scenarios(keyframes: Sequence[str]) -> tuple[str, ...]:
     return tuple(names) or ("start",)
 
 
+def exact_file(model: str) -> str:
+    """The file in which a course may give the exact motion of a model."""
+    return f"models/{model}.exact.py"
+
+
 def is_multiple(length: float, part: float) -> bool:
     """Whether `length` is a whole multiple of `part`, up to rounding."""
     count = round(length / part) if length / part < 1e15 else 0
@@ -231,7 +236,7 @@ class DeclaredSweep(SweepTable, frozen=True, kw_only=True):
 class KeepTable(Struct, frozen=True, forbid_unknown_fields=True):
     """A finding of the scene diet that is to stay as it is."""
 
-    finding: Annotated[fields.Text, describe("as `coursebuild diet` names it")]
+    finding: Annotated[fields.Text, describe("as `diet` names it")]
     reason: Annotated[fields.Text, describe("why it stays")]
 
 

@@ -29,7 +29,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, NoReturn, TypeAlias
+from typing import IO, TypeAlias
 
 from msgspec import Struct
 
@@ -214,13 +214,6 @@ def finish(
                     os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
     return Completed(process.returncode, output, errors or b"")
-
-
-def become(command: Sequence[str], environment: Mapping[str, str]) -> NoReturn:
-    """Let another program take the place of this process, which keeps its working folder."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os.execve(command[0], list(command), dict(environment))
 
 
 @functools.cache

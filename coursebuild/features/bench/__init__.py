@@ -35,13 +35,11 @@ FEATURE = Feature(
             name="bench",
             summary="measure speed against error for the course's models",
             module="coursebuild.features.bench.commands.bench",
-            computes=True,
         ),
         Command(
             name="diet",
             summary="find what models contain but their scenarios do not need",
             module="coursebuild.features.bench.commands.diet",
-            computes=True,
         ),
     ),
 )

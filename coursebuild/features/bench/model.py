@@ -97,7 +97,7 @@ def check_benches(course: Course, documents: Iterable[Document]) -> Iterator[Dia
     if not benches:
         return
     # Late: most courses do not need it.
-    from coursebuild.numerics.reports.records import BENCH, ENGINES
+    from coursebuild.core.model.report_files import BENCH, ENGINES
 
     models = [model.name for model in course.models]
     for bench in benches:

@@ -13,6 +13,14 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import MjcfModel, find_blocks, scenario_anchor
+from coursebuild.core.model.diet_findings import DietReport, Finding
+from coursebuild.core.model.measurements import (
+    EngineReport,
+    ScenarioReport,
+    SceneReport,
+    SweepReport,
+)
+from coursebuild.core.model.report_files import BENCH, DIET, ENGINES
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import escape_marks, guard_lines
@@ -26,10 +34,6 @@ from coursebuild.features.bench.scenario_view import (
     plots,
     scenario_view,
 )
-from coursebuild.numerics.reports.diet_report import DietReport, Finding
-from coursebuild.numerics.reports.engine_report import EngineReport
-from coursebuild.numerics.reports.records import BENCH, DIET, ENGINES
-from coursebuild.numerics.reports.scene_report import ScenarioReport, SceneReport, SweepReport
 
 if TYPE_CHECKING:
     from coursebuild.core.features import IndexReader, MarkdownWriter
@@ -133,7 +137,7 @@ def draw_bench(page: PageContext, block: Bench) -> Markup:
 
 def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     """Write the report without its plot, and what the plot shows."""
-    from coursebuild.numerics.reports.report_plots import work_precision
+    from coursebuild.features.bench.report_plots import work_precision
 
     view = _view(writer.page, block)
     html = writer.page.template("bench/bench.html", bench=view, plots=(), engine_plots=())

@@ -7,18 +7,12 @@ from collections.abc import Iterable, Sequence
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.pages.renderer import Strings
-from coursebuild.features.bench import grids
-from coursebuild.numerics.reports.engine_report import (
+from coursebuild.core.model.measurements import (
+    FLOORS,
     BatchCost,
     EngineReport,
     EngineRow,
     EngineScenario,
-    row_name,
-)
-from coursebuild.numerics.reports.scene_report import (
-    FIGURES,
-    FLOORS,
     FittedOrder,
     MeasuredRun,
     OrderRow,
@@ -27,12 +21,14 @@ from coursebuild.numerics.reports.scene_report import (
     SweepReport,
     SweepRow,
     WorkPrecisionRow,
-    cell,
-    shown_figures,
 )
-from coursebuild.numerics.reports.shown_errors import (
+from coursebuild.core.pages.renderer import Strings
+from coursebuild.features.bench import grids
+from coursebuild.features.bench.shown_errors import (
     FEWEST_STEPS,
+    FIGURES,
     Quantity,
+    cell,
     horizon_error_text,
     interval_text,
     is_cut_short,
@@ -40,8 +36,10 @@ from coursebuild.numerics.reports.shown_errors import (
     limit_text,
     map_text,
     quantities,
+    row_name,
     seconds_text,
     setting_text,
+    shown_figures,
     solving_parts,
     status_text,
     widest_gaps,
@@ -425,7 +423,7 @@ def plots(
     name: str, report: ScenarioReport | SweepReport | EngineScenario
 ) -> tuple[tuple[Markup, ...], ...]:
     """Draw the plots, each for wide and for narrow screens; `name` is unique on the page."""
-    from coursebuild.numerics.reports import report_plots  # late: few pages need it
+    from coursebuild.features.bench import report_plots  # late: few pages need it
 
     def draw(kind: str) -> tuple[str, ...]:
         key, narrow = f"{name}-{kind}", kind == "narrow"

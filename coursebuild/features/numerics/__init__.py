@@ -13,25 +13,20 @@ from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.core.features import Command, Feature, PageKind
+from coursebuild.core.model.measurements import CaseReport, FigureLine, SceneReport
+from coursebuild.core.model.report_files import STABILITY
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids, scenario_view
-from coursebuild.numerics.reports.case_report import (
-    CaseReport,
-    case_quantities,
-    case_svgs,
-    course_cases,
-)
-from coursebuild.numerics.reports.records import STABILITY
-from coursebuild.numerics.reports.scene_report import FigureLine, SceneReport
-from coursebuild.numerics.reports.shown_errors import (
+from coursebuild.features.bench.shown_errors import (
     INTEGRATORS,
     Quantity,
     limit_text,
     seconds_text,
     status_text,
 )
+from coursebuild.features.numerics.cases import case_quantities, case_svgs, cost_to, course_cases
 
 _RIGHT = 1e-3
 """m or rad: the error at which costs are compared."""
@@ -116,7 +111,7 @@ def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
         else:
             limits[line.integrator] = limit_text(line)
     orders = (fits.get(integrator) for integrator in INTEGRATORS)
-    costs = (report.cost_to(integrator, _RIGHT) for integrator in INTEGRATORS)
+    costs = (cost_to(report, integrator, _RIGHT) for integrator in INTEGRATORS)
     return (
         tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
         tuple(limits.get(integrator, "") for integrator in INTEGRATORS),
@@ -167,7 +162,7 @@ def _describe(words: Strings, report: CaseReport, quantities: Sequence[Quantity]
     costs = [
         (cost, integrator)
         for integrator in INTEGRATORS
-        if (cost := report.cost_to(integrator, _RIGHT)) is not None
+        if (cost := cost_to(report, integrator, _RIGHT)) is not None
     ]
     if costs:
         (least, best), (most, worst) = min(costs), max(costs)
@@ -242,7 +237,6 @@ FEATURE = Feature(
             name="stability",
             summary="measure MuJoCo on hard cases and compare with theory",
             module="coursebuild.features.numerics.commands",
-            computes=True,
         ),
     ),
 )

@@ -12,61 +12,50 @@
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
 from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
-from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import require
+from coursebuild.core.model.measurements import CaseReport, ErrorLine, SceneReport
+from coursebuild.core.model.report_files import STABILITY, ReportFailure
+from coursebuild.core.model.scenarios import exact_file
 from coursebuild.core.pages import urls
-from coursebuild.core.run.script_environment import engine_version, machine, one_processor
+from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.near import nearest
-from coursebuild.core.values import decode, encode
 from coursebuild.features.bench.commands import bench
 from coursebuild.features.bench.commands.measurement import (
+    Departure,
     Measurement,
     MeasuringRun,
+    RecordCheck,
     add_report_options,
     english,
+    file_of,
     grid_lines,
     measurement_json,
     plain_text,
     read_task,
+    recorded_value,
     run_measurement,
     write_records,
 )
+from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
+from coursebuild.features.bench.shown_errors import seconds_text, status_text
 from coursebuild.features.numerics import case_view
-from coursebuild.numerics.cases import DisagreementError, measure_case
-from coursebuild.numerics.problems import all_problems
-from coursebuild.numerics.reports.case_report import (
-    CaseReport,
-    ErrorLine,
-    case_quantities,
-    course_cases,
-    exact_file,
-)
-from coursebuild.numerics.reports.records import (
-    STABILITY,
-    RecordCheck,
-    ReportFailure,
-    case_departures,
-)
-from coursebuild.numerics.reports.scene_report import SceneReport
-from coursebuild.numerics.reports.shown_errors import seconds_text, status_text
+from coursebuild.features.numerics.cases import case_quantities, course_cases
 from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.scenes import find_scenes, read_record
 from coursebuild.report.text import BOLD, Column, Style, table
 from coursebuild.report.values import json_text
 
-_CODE = ("coursebuild/numerics", "mjcourse/spatial")
-"""The code that measurements depend on."""
 EXAMPLES = """\
 examples:
-  coursebuild stability impact           one family of hard cases
+  coursebuild stability damped-spring    one family of hard cases
   coursebuild stability falling_ball     a model of the course whose exact motion it gives
 """
 
@@ -88,18 +77,19 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, or check by measuring again."""
-    require("scipy", "measure", "`coursebuild stability`")
+    require("mjbench", "measure", "`coursebuild stability`")
     names = tuple(arguments.problems)
 
     def measure(options: Options) -> Measurement[Any]:
-        if arguments.check:
-            return check_stability(options, names)
-        return stability(options, names, record=arguments.record)
+        with Mjbench(options.root, "`coursebuild stability`") as mjbench:
+            if arguments.check:
+                return check_stability(options, mjbench, names)
+            return stability(options, mjbench, names, record=arguments.record)
 
     def as_json(measurement: Measurement[Any]) -> str:
         if measurement.ok and not (arguments.record or arguments.check):
-            return json_text(measurement.reports)
-        return measurement_json({"cases": measurement.reports}, measurement)
+            return json_text(measurement.values)
+        return measurement_json({"cases": measurement.values}, measurement)
 
     return run_measurement(
         arguments,
@@ -110,29 +100,40 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def stability(
-    options: Options, names: tuple[str, ...] = (), *, record: bool = False
+    options: Options, mjbench: Mjbench, names: tuple[str, ...] = (), *, record: bool = False
 ) -> Measurement[CaseReport]:
     """Measure the cases of these names, or all without names; `record` writes them down."""
     own_models, built_in = _split(options, names)
-    problems = _select_problems(options, built_in) if built_in or not own_models else []
     measurement: Measurement[CaseReport] = Measurement(())
-    if problems:
-        measurement = _CaseRun(options).all(problems)
+    if built_in or not own_models:
+        run = _CaseRun(options, mjbench)
+        problems = _select_problems(options, run.facts.problems, built_in)
+        measurement = run.measure_each(problems, run.measure)
         if record and not measurement.failures:
-            old: tuple[CaseReport, ...] | ReportFailure = ()
-            if names and (options.root / STABILITY.path()).exists():
-                old = read_record(options.root, STABILITY)
-            if isinstance(old, ReportFailure):
-                measurement = replace(measurement, failures=(old,))
-            else:
-                rest = [c for c in old if c.name in all_problems() and c.name not in problems]
-                cases = (*rest, *measurement.reports)
-                whole = tuple(sorted(cases, key=lambda case: (case.case, case.name)))
-                records = [(STABILITY.path(), STABILITY.encode(whole))]
-                measurement = write_records(options.root, measurement, records)
+            measurement = _record(options, mjbench, run.facts.problems, measurement, names)
     if not own_models:
         return measurement
-    return _join_reports(measurement, bench.bench(options, own_models, record=record))
+    return _join_reports(measurement, bench.bench(options, mjbench, own_models, record=record))
+
+
+def _record(
+    options: Options,
+    mjbench: Mjbench,
+    problems: Sequence[str],
+    measurement: Measurement[CaseReport],
+    names: tuple[str, ...],
+) -> Measurement[CaseReport]:
+    """Write the cases down; where some are named, the others stay as they are recorded."""
+    rest: list[Any] = []
+    if names and (options.root / STABILITY.path()).exists():
+        old = read_record(options.root, STABILITY)
+        if isinstance(old, ReportFailure):
+            return replace(measurement, failures=(old,))
+        kept_names = set(problems) - {report.name for report in measurement.reports}
+        values = recorded_value(options.root, STABILITY)
+        rest = [value for value in values if value["name"] in kept_names]
+    data = file_of(mjbench, cases=[*rest, *measurement.values])
+    return write_records(options.root, measurement, [(STABILITY.path(), data)])
 
 
 def _join_reports(
@@ -141,6 +142,7 @@ def _join_reports(
     course_reports = [case for scene in of_course.reports for case in course_cases(scene)]
     return Measurement(
         reports=(*measurement.reports, *course_reports),
+        values=(*measurement.values, *map(msgspec.to_builtins, course_reports)),
         diagnostics=of_course.diagnostics,
         failures=(*measurement.failures, *of_course.failures),
         checked=(*measurement.checked, *of_course.checked),
@@ -163,17 +165,20 @@ def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], t
     return models, tuple(name for name in names if name not in models)
 
 
-def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measurement[CaseReport]:
+def check_stability(
+    options: Options, mjbench: Mjbench, names: tuple[str, ...] = ()
+) -> Measurement[CaseReport]:
     """Measure again, and compare with the record; without a record nothing is measured."""
     own_models, built_in = _split(options, names)
     measurement: Measurement[CaseReport] = Measurement(())
     if built_in or not own_models:
-        problems = _select_problems(options, built_in)
+        run = _CaseRun(options, mjbench, use_store=False)
+        problems = _select_problems(options, run.facts.problems, built_in)
         recorded = read_record(options.root, STABILITY)
         if isinstance(recorded, ReportFailure):
             measurement = Measurement((), failures=(recorded,))
         else:
-            measurement = _CaseRun(options, use_store=False).all(problems)
+            measurement = run.measure_each(problems, run.measure)
             new = {case.name for case in measurement.reports}
             old = [case for case in recorded if not built_in or case.name in new]
             engine = engine_version()
@@ -181,65 +186,61 @@ def check_stability(options: Options, names: tuple[str, ...] = ()) -> Measuremen
             remarks = tuple(
                 f"recorded with MuJoCo {name}, measured with {engine}" for name in other_engines
             )
-            departures = case_departures(old, measurement.reports)
+            names_of_old = {case.name for case in old}
+            values = recorded_value(options.root, STABILITY)
+            old_values = [value for value in values if value["name"] in names_of_old]
+            data = mjbench.do(
+                "compare", recorded_cases=old_values, measured_cases=measurement.values
+            )
+            departures = msgspec.json.decode(data, type=tuple[Departure, ...])
             check = RecordCheck("stability", STABILITY.path(), departures, remarks)
             measurement = replace(measurement, checked=(check,))
     if not own_models:
         return measurement
-    return _join_reports(measurement, bench.check(options, own_models))
+    return _join_reports(measurement, bench.check(options, mjbench, own_models))
 
 
-class _CaseRun(MeasuringRun):
+class _CaseRun(MeasuringRun[CaseReport]):
     """Measures hard cases one after the other."""
 
+    report_type = CaseReport
     function = f"{__name__}:measure_part"
 
-    def all(self, problems: list[str]) -> Measurement[CaseReport]:
-        """Measure the problems of these names."""
-        self.machine, self.code = machine(pinned=True), code_digest(*_CODE)
-
-        def measure_once(name: str) -> CaseReport | None:
-            return self.load_or_measure(
-                name, "stability", self._parts(name), CaseReport, lambda: self._measure(name)
-            )
-
-        with one_processor():
-            return self.measure_each(problems, measure_once)
+    def measure(self, name: str) -> bytes | None:
+        """Report on a case; `None` where its references disagree."""
+        data = self.results.pop((name,), b"")
+        return self.load_or_measure(
+            name,
+            "stability",
+            self._parts(name),
+            lambda: data or self.mjbench.do("case", name=name),
+        )
 
     def _parts(self, name: str) -> tuple[object, ...]:
-        return name, self.code, self.machine
+        return name, self.code, self.facts.pinned
 
     def tasks(self, name: str) -> Iterator[tuple[Any, ...]]:
         """The case, if it is not stored."""
-        if self.load("stability", self._parts(name), CaseReport) is None:
+        if self.load("stability", self._parts(name), bytes) is None:
             yield (name,)
-
-    def _measure(self, name: str) -> CaseReport | None:
-        if (report := decode(self.results.pop((name,), b""), CaseReport)) is not None:
-            return report
-        try:
-            return measure_case(all_problems()[name], self.machine, time.thread_time_ns)
-        except DisagreementError as error:
-            help = "neither is known to be right, so errors against them mean nothing"
-            self.failures.append(ReportFailure(str(error), help))
-            return None
 
 
 def measure_part(root: Path, data: bytes) -> bytes:
     """Measure a hard case, as a task of `Executor.map`."""
-    if (request := read_task(data)) is None:
-        return b""
-    (name,), timed_machine = request
-    try:
-        with one_processor():
-            return encode(measure_case(all_problems()[name], timed_machine, time.thread_time_ns))
-    except DisagreementError:  # which is found and told where the command is
-        return b""
+    with Mjbench(root, "`coursebuild stability`") as mjbench:
+        task = read_task(data, mjbench)
+        if task is None:
+            return b""
+        try:
+            return mjbench.do("case", name=task[0])
+        except FailedJobError:  # which is found and told where the command is
+            return b""
 
 
-def _select_problems(options: Options, names: tuple[str, ...]) -> list[str]:
+def _select_problems(
+    options: Options, problem_names: tuple[str, ...], names: tuple[str, ...]
+) -> list[str]:
     """The names of all problems that these names mean; of all problems without names."""
-    problem_names = tuple(all_problems())
     selection = set() if names else set(problem_names)
     for name in names:
         matches = {p for p in problem_names if p == name or p.startswith(f"{name}-")}

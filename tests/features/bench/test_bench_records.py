@@ -10,11 +10,12 @@ from msgspec.structs import replace
 
 from coursebuild.features.bench.commands.bench import bench, check
 from coursebuild.features.bench.commands.measurement import Measurement
-from coursebuild.numerics.reports.records import BENCH
-from coursebuild.numerics.reports.scene_report import ScenarioReport, SceneReport
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.scenes import find_scenes
-from support.measured_course import BOX, PATH, TOML, Fake, bench_course, options, swing, write
+from mjbench.reports import records
+from mjbench.reports.scene_report import ScenarioReport, SceneReport
+from samples.reports import interval, swing
+from support.measured_course import BOX, PATH, TOML, Fake, bench_course, options, write
 
 pytestmark = pytest.mark.site
 
@@ -24,9 +25,13 @@ def course(tmp_path: Path) -> Path:
     return bench_course(tmp_path)
 
 
-def record(course: Path, *reports: ScenarioReport) -> Measurement[SceneReport]:
-    fake: Any = Fake(*reports)
-    return bench(options(course), record=True, measuring=fake)
+def record(course: Path, *reports: ScenarioReport) -> Measurement[Any]:
+    return bench(options(course), Fake(*reports), record=True)
+
+
+def recorded(course: Path) -> SceneReport:
+    """The recorded report, with all its fields."""
+    return records.BENCH.decode((course / PATH).read_bytes())
 
 
 def test_what_is_recorded_is_checked(course: Path) -> None:
@@ -35,11 +40,11 @@ def test_what_is_recorded_is_checked(course: Path) -> None:
     assert measurement.ok
     paths = ("content/reports/arms/left arm.bench.json", PATH)
     assert measurement.remarks == tuple(f"wrote {path}" for path in paths)
-    report = BENCH.decode((course / PATH).read_bytes())
+    report = recorded(course)
     assert report.model == "box" and report.scenarios == (swing(),)
     assert report.digest == find_scenes(course, ("box",)).value[0].digest
     fake = Fake()
-    check_again = check(options(course), measuring=fake)
+    check_again = check(options(course), fake)
     assert check_again.ok
     assert [comparison.departures for comparison in check_again.checked] == [(), ()]
     assert fake.calls == [("arms/left arm", 0, False, False), ("box", 0, False, False)]
@@ -56,9 +61,9 @@ def test_the_same_bytes_are_not_written_again(course: Path) -> None:
 def test_a_figure_that_left_its_band_fails(course: Path) -> None:
     record(course)
     rows = list(swing().rows)
-    rows[2] = replace(rows[2], velocity=(1.0, 1.0), cost=1000.0)
+    rows[2] = replace(rows[2], velocity=(1.0, 1.0), cost=interval(1000.0))
     fake = Fake(replace(swing(), rows=tuple(rows)))
-    measurement = check(options(course), measuring=fake)
+    measurement = check(options(course), fake)
     assert not measurement.ok
     (comparison,) = measurement.checked
     assert (comparison.name, comparison.path) == ("box", PATH)
@@ -66,7 +71,7 @@ def test_a_figure_that_left_its_band_fails(course: Path) -> None:
     assert figures == {"error of velocity", "error of velocity at the end"}
     write(course / "models" / "box.toml", f"[bench]\nband = 1.0\n{TOML}")
     rows[2] = replace(rows[2], velocity=tuple(1.9 * x for x in swing().rows[2].velocity or ()))  # type: ignore[arg-type]
-    wide = check(options(course), measuring=Fake(replace(swing(), rows=tuple(rows))))
+    wide = check(options(course), Fake(replace(swing(), rows=tuple(rows))))
     assert wide.ok
     remark = "the model or its scenarios have changed since it was recorded"
     assert wide.checked[0].remarks == (remark,)
@@ -75,7 +80,7 @@ def test_a_figure_that_left_its_band_fails(course: Path) -> None:
 def test_a_report_that_is_not_there_or_none_or_of_something_else(course: Path) -> None:
     write(course / "models" / "left arm.xml", BOX)
     fake = Fake()
-    measurement = check(options(course), measuring=fake)
+    measurement = check(options(course), fake)
     assert not measurement.ok and fake.calls == []
     arm_path = "content/reports/left arm.bench.json"
     assert [(failure.message, failure.help) for failure in measurement.failures] == [
@@ -83,17 +88,17 @@ def test_a_report_that_is_not_there_or_none_or_of_something_else(course: Path) -
         for path, name in ((PATH, "box"), (arm_path, "'left arm'"))
     ]
     record(course)
-    report = BENCH.decode((course / PATH).read_bytes())
+    report = recorded(course)
     for data, message in (
-        (b'{"holds": "coursebuild bench", "form": 1}', "was written by another version of this"),
-        (BENCH.encode(replace(report, model="arm")), "holds a report of the model `arm`"),
+        (b'{"holds": "mjbench bench", "version": 2}', "has version 2 of its format, and this tool"),
+        (records.BENCH.encode(replace(report, model="arm")), "holds a report of the model `arm`"),
         (
-            BENCH.encode(replace(report, quick=True)),
+            records.BENCH.encode(replace(report, quick=True)),
             "holds a report of `coursebuild bench --quick`, which measures only a part",
         ),
     ):
         (course / PATH).write_bytes(data)
-        (failure,) = check(options(course), ("box",), measuring=Fake()).failures
+        (failure,) = check(options(course), Fake(), ("box",)).failures
         assert failure.message.startswith(f"{PATH} {message}")
         assert failure.help == "make it again with `coursebuild bench box --record`"
 
@@ -101,9 +106,9 @@ def test_a_report_that_is_not_there_or_none_or_of_something_else(course: Path) -
 def test_a_part_is_not_recorded(course: Path) -> None:
     reason = " cannot be combined with --quick: recorded measurements are complete"
     with pytest.raises(UsageError, match=f"--record{reason}"):
-        bench(options(course), quick=True, record=True, measuring=Fake())
+        bench(options(course), Fake(), quick=True, record=True)
     with pytest.raises(UsageError, match=f"--check{reason}"):
-        check(options(course), quick=True, measuring=Fake())
+        check(options(course), Fake(), quick=True)
 
 
 def test_where_nothing_can_be_written(course: Path, tmp_path: Path) -> None:
@@ -120,9 +125,9 @@ def test_where_nothing_can_be_written(course: Path, tmp_path: Path) -> None:
 
 def test_another_engine_is_reported(course: Path) -> None:
     record(course)
-    report = BENCH.decode((course / PATH).read_bytes())
+    report = recorded(course)
     machine = replace(report.machine, engine="3.13.0", system="Plan 9 mips")
-    (course / PATH).write_bytes(BENCH.encode(replace(report, machine=machine)))
-    (comparison,) = check(options(course), measuring=Fake()).checked
+    (course / PATH).write_bytes(records.BENCH.encode(replace(report, machine=machine)))
+    (comparison,) = check(options(course), Fake()).checked
     assert comparison.remarks[0].startswith("recorded with MuJoCo 3.13.0, measured with ")
     assert comparison.remarks[1].startswith("recorded with Plan 9 mips, measured with ")

@@ -12,15 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from coursebuild.core.model.measurements import FigureLine, Interval, RowVerdict
 from coursebuild.features.bench.commands.bench import bench_text
 from coursebuild.features.bench.commands.measurement import (
+    Departure,
     Measurement,
+    RecordCheck,
     format_checks,
     measurement_json,
 )
-from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.records import Departure, RecordCheck
-from coursebuild.numerics.reports.scene_report import FigureLine, RowVerdict
 from coursebuild.report import Style
 from coursebuild.report.text import Column, cells, fit, table
 from support.bench_reports import awkward, row, scenario, scene
@@ -85,7 +85,7 @@ def test_colour_marks_the_own_setting_the_front_and_what_was_lost() -> None:
 def test_a_verdict_is_green_where_the_own_setting_is_as_good_as_any(
     on_front: bool, noticeable: bool | None, colour: str
 ) -> None:
-    verdict = RowVerdict(on_front, None, None, None, noticeable, "So it is.")
+    verdict = RowVerdict(on_front, None, noticeable, "So it is.")
     text = bench_text([scene(scenario([row()], verdict=verdict))], Style(colour=True, width=80))
     assert f"\x1b[{colour}m    So it is." in text
 
@@ -129,8 +129,8 @@ def test_what_a_table_has_no_room_for_comes_in_the_next() -> None:
 
 @given(value=st.floats())
 def test_json_has_no_number_that_is_none(value: float) -> None:
-    odd = replace(row(), position=(value, value), cost=Interval(value, value, value), growth=value)
+    odd = replace(row(), position=(value, value), cost=Interval(value, value, value))
     report = scene(scenario([odd], horizon=value, floor=value))
     text = measurement_json({"scenes": [report]}, Measurement((report,)))
     (row_value,) = json.loads(text)["scenes"][0]["scenarios"][0]["rows"]
-    assert row_value["growth"] == (value if math.isfinite(value) else None)
+    assert row_value["position"][0] == (value if math.isfinite(value) else None)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from coursebuild.cli import main
-from coursebuild.numerics.reports.records import DIET
+from coursebuild.core.model.report_files import DIET
 from support.scratch_course import ROOT, course_map
 
 Capture = pytest.CaptureFixture[str]

@@ -13,12 +13,13 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.features.bench.commands.bench import bench
-from coursebuild.numerics.reports.scene_report import ScenarioReport
+from coursebuild.features.bench.commands.measuring import Failure, Place
 from coursebuild.pipeline.options import Progress
-from coursebuild.pipeline.scenes import find_scenes
-from support.measured_course import BOX, TOML, Fake, bench_course, options, swing, take_calls, write
+from coursebuild.pipeline.scenes import CourseScene
+from samples.reports import swing
+from support.bench_reports import swing as shown_swing
+from support.measured_course import BOX, TOML, Fake, bench_course, options, take_calls, write
 
 pytestmark = pytest.mark.site
 
@@ -34,18 +35,18 @@ def test_bench_measures_every_model_that_is_no_part_of_another(course: Path) -> 
     write(course / "models" / "legs.xml", BOX)
     write(course / "models" / "walker.xml", '<mujoco><include file="legs.xml"/></mujoco>')
     fake = Fake()
-    measurement = bench(options(course), measuring=fake)
+    measurement = bench(options(course), fake)
     assert [scene.model for scene in measurement.reports] == ["arms/left arm", "box", "walker"]
     assert measurement.ok
     for name in ("arms/left arm", "models/arms/left arm.xml", "./models/arms/left arm.xml", "legs"):
-        (report,) = bench(options(course), (name,), measuring=fake).reports
+        (report,) = bench(options(course), fake, (name,)).reports
         assert report.model == ("legs" if name == "legs" else "arms/left arm")
 
 
 def test_model_that_does_not_compile_keeps_no_other_from_being_measured(course: Path) -> None:
     write(course / "models" / "bad.xml", BOX.replace('size="0.1"', 'size="-1"'))
     write(course / "models" / "worse.xml", "<mujoco>\n  <worldbody>\n")
-    measurement = bench(options(course), measuring=Fake())
+    measurement = bench(options(course), Fake())
     assert [scene.model for scene in measurement.reports] == ["box"]
     assert not measurement.ok
     first, second = measurement.diagnostics
@@ -58,10 +59,13 @@ def test_model_that_does_not_compile_keeps_no_other_from_being_measured(course: 
 
 def test_a_scenario_that_cannot_be_measured_is_reported(course: Path) -> None:
     write(course / "models" / "arm.xml", BOX)
-    scene = find_scenes(course, ("box",)).value[0]
-    diagnostic = diagnose("scenario-model", scene.model.source.span(0, 0), "no way")
-    measurement = bench(options(course), ("box",), measuring=Fake(swing(), diagnostic))
-    assert measurement.reports == () and [d.message for d in measurement.diagnostics] == ["no way"]
+    write(course / "models" / "box.toml", TOML)
+    place = Place("models/box.toml", ("scenario", 0, "qvel"))
+    measurement = bench(options(course), Fake(Failure("no way", "", place, "scenario")), ("box",))
+    assert measurement.reports == ()
+    (diagnostic,) = measurement.diagnostics
+    assert (diagnostic.rule, diagnostic.message) == ("scenario-model", "no way")
+    assert (diagnostic.span.path, diagnostic.span.text) == ("models/box.toml", "[")
 
 
 def test_model_is_measured_again_only_where_something_changed(course: Path) -> None:
@@ -69,8 +73,8 @@ def test_model_is_measured_again_only_where_something_changed(course: Path) -> N
     fake = Fake()
 
     def run(**settings: Any) -> list[str]:
-        measurement = bench(options(course, **settings), measuring=fake)
-        assert measurement.reports[0].scenarios == (swing(),)
+        measurement = bench(options(course, **settings), fake)
+        assert measurement.reports[0].scenarios == (shown_swing(),)
         return take_calls(fake)
 
     assert run() == ["box"]
@@ -83,17 +87,18 @@ def test_model_is_measured_again_only_where_something_changed(course: Path) -> N
     assert run() == ["box"]
     write(course / "models" / "box.xml", BOX + "<!-- -->")
     assert run() == ["box"]
-    bench(options(course), quick=True, measuring=fake)
+    bench(options(course), fake, quick=True)
     assert fake.calls == [("box", 0, True, True)]
 
 
 def test_scenarios_measured_before_an_interruption_are_kept(course: Path) -> None:
+    write(course / "models" / "box.toml", TOML + TOML.replace("swing", "other"))
     fake = Fake(swing(), KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
-        bench(options(course), measuring=fake)
+        bench(options(course), fake)
     assert [number for _, number, *_ in fake.calls] == [0, 1]
     fake = Fake(swing(), replace(swing(), name="other"))
-    measurement = bench(options(course), measuring=fake)
+    measurement = bench(options(course), fake)
     assert [number for _, number, *_ in fake.calls] == [1]
     assert [scenario.name for scenario in measurement.reports[0].scenarios] == ["swing", "other"]
 
@@ -103,18 +108,18 @@ def test_two_runs_at_once_measure_one_after_the_other(course: Path) -> None:
     most = 0
 
     class Slow(Fake):
-        def run_scenario(self, *args: Any, **settings: Any) -> ScenarioReport:
+        def measure(self, scene: CourseScene, **settings: Any) -> bytes:
             nonlocal most
             running.append(1)
             most = max(most, len(running))
             never.wait(0.2)
             running.pop()
-            return super().run_scenario(*args, **settings)
+            return super().measure(scene, **settings)
 
     never = threading.Event()
     fakes = [Slow(), Slow()]
     with ThreadPoolExecutor() as pool:
-        list(pool.map(lambda fake: bench(options(course), measuring=fake), fakes))
+        list(pool.map(lambda fake: bench(options(course), fake), fakes))
     assert most == 1
     assert sum(len(fake.calls) for fake in fakes) == 1
 

@@ -10,10 +10,9 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from coursebuild.core.model.measurements import Interval, StepCost
 from coursebuild.core.model.results import Reports
 from coursebuild.features.bench.grids import bounded, factor, percent, power, sentence, size
-from coursebuild.numerics.reports import Interval
-from coursebuild.numerics.reports.case_report import StepCost
 from support.bench_reports import awkward, swing
 from support.model_reports import box, case, diet, reports, row, run, scenario, scene
 from support.rendered_course import Make

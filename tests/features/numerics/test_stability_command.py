@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
 
 from coursebuild.cli import main
-from coursebuild.features.numerics.commands import stability_text
-from coursebuild.numerics.problems import all_problems, impact
-from coursebuild.numerics.reports.records import STABILITY
+from coursebuild.core.model.report_files import STABILITY
+from coursebuild.features.bench.commands.measuring import FailedJobError, Failure
+from coursebuild.features.numerics.commands import stability, stability_text
+from coursebuild.pipeline.scenes import CourseScene
 from coursebuild.report import Style
+from mjbench.reports import records
 from support.fixture_cases import check_text
+from support.measured_course import Fake, options
 from support.model_reports import case
 
 Capture = pytest.CaptureFixture[str]
@@ -29,6 +33,18 @@ def course(tmp_path: Path) -> Path:
 
 def run(course: Path, *arguments: str) -> int:
     return main(["-C", str(course), "stability", *arguments, "-q"])
+
+
+class Disagreeing(Fake):
+    """A bench whose references of every case differ, as with a constant that was mistyped."""
+
+    def do(self, job: str, scene: CourseScene | None = None, **values: Any) -> bytes:
+        if job == "case":
+            raise FailedJobError(DISAGREEMENT)
+        return super().do(job, scene, **values)
+
+
+DISAGREEMENT = Failure("the references of `projectile` differ by 3e-06 in position")
 
 
 def names(course: Path) -> list[str]:
@@ -106,20 +122,9 @@ def test_recorded_then_checked(course: Path, capsys: Capture) -> None:
     assert capsys.readouterr().out == f"stability  as recorded in {STABILITY.path()}\n"
 
 
-def test_references_that_differ_are_an_error_and_nothing_is_recorded(
-    course: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As of a constant that somebody mistyped: here the stone is thrown 1e-6 too fast."""
-    thrown = replace(impact.PARABOLA, launch=(3.000003, 0.0, 4.0))
-    monkeypatch.setattr(impact, "PARABOLA", thrown)
-    all_problems.cache_clear()
-    try:
-        for arguments in (["--record"], ["--format", "json"]):
-            assert run(course, "projectile", *arguments) == 1
-            out = capsys.readouterr().out
-            assert "the references of `projectile` differ by 3e-06 in position" in out
-    finally:
-        all_problems.cache_clear()
+def test_references_that_differ_are_an_error_and_nothing_is_recorded(course: Path) -> None:
+    measurement = stability(options(course), Disagreeing(), ("projectile",), record=True)
+    assert not measurement.ok and measurement.failures[0].message == DISAGREEMENT.message
     assert not (course / STABILITY.path()).exists()
 
 
@@ -129,8 +134,8 @@ def test_recording_some_cases_leaves_the_others(course: Path) -> None:
     assert run(course, "projectile", "--record") == 0
     assert names(course) == ["projectile", "flat-plate"]
     path = course / STABILITY.path()
-    old = replace(STABILITY.decode(before)[0], name="no-more")
-    path.write_bytes(STABILITY.encode((old,)))
+    old = replace(records.STABILITY.decode(before)[0], name="no-more")
+    path.write_bytes(records.STABILITY.encode((old,)))
     assert run(course, "projectile", "--record") == 0
     assert names(course) == ["projectile"]
 
@@ -138,13 +143,13 @@ def test_recording_some_cases_leaves_the_others(course: Path) -> None:
 def test_a_figure_that_left_its_band(course: Path, capsys: Capture) -> None:
     run(course, "projectile", "--record")
     path = course / STABILITY.path()
-    (case,) = STABILITY.decode(path.read_bytes())
+    (case,) = records.STABILITY.decode(path.read_bytes())
     figures = tuple(
         replace(line, measured=-0.06) if line.integrator == "Euler" else line
         for line in case.figures
     )
     changed_case = replace(case, machine=replace(case.machine, engine="3.7.0"), figures=figures)
-    path.write_bytes(STABILITY.encode((changed_case,)))
+    path.write_bytes(records.STABILITY.encode((changed_case,)))
     capsys.readouterr()
     assert run(course, "projectile", "--check") == 1
     head, remark, _, name, _, figure = capsys.readouterr().out.splitlines()

@@ -10,57 +10,49 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any
 
+import msgspec
+from msgspec import Raw
 from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
-from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import require
+from coursebuild.core.model.measurements import ScenarioReport, SceneReport
+from coursebuild.core.model.report_files import BENCH, ReportFailure
 from coursebuild.core.model.scenarios import DeclaredSweep, keyframe_scenarios
-from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.core.values import decode, encode
-from coursebuild.features.bench.commands import measuring
 from coursebuild.features.bench.commands.engines import run_engines
 from coursebuild.features.bench.commands.measurement import (
-    CannotMeasureError,
+    Departure,
     Measurement,
     MeasuringRun,
+    RecordCheck,
     add_report_options,
     english,
+    file_of,
     forbid_quick,
     grid_lines,
     measurement_json,
     plain_text,
     read_task,
+    recorded_value,
     run_measurement,
     write_records,
 )
+from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
 from coursebuild.features.bench.grids import Grid, machine_text, power
 from coursebuild.features.bench.scenario_view import scenario_view
-from coursebuild.numerics.reports.records import BENCH, RecordCheck, ReportFailure, scene_departures
-from coursebuild.numerics.reports.scene_report import (
-    ScenarioReport,
-    SceneReport,
-    SweepReport,
-)
-from coursebuild.numerics.reports.shown_errors import is_idle
-from coursebuild.numerics.sweep import THREADS
+from coursebuild.features.bench.shown_errors import is_idle
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes, read_record
 from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 
-_T = TypeVar("_T")
-_CODE = (
-    "coursebuild/numerics",
-    "coursebuild/features/bench/commands/measuring.py",
-    "mjcourse/spatial",
-)
-"""The code on which reports depend."""
 _INDENT = "  "
+THREADS = "threads"
+"""The parameter of a sweep that is measured on all processors."""
 _PIECE = 16
 """Settings of a sweep that are measured together."""
 EXAMPLES = """\
@@ -95,54 +87,51 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure models, or check their recorded reports."""
-    require("scipy", "measure", "`coursebuild bench`")
+    require("mjbench", "measure", "`coursebuild bench`")
     names, quick = tuple(arguments.scenes), arguments.quick
     if arguments.engines is not None:
         return run_engines(arguments)
 
     def measure(options: Options) -> Measurement[Any]:
-        if arguments.check:
-            return check(options, names, quick=quick)
-        return bench(options, names, quick=quick, record=arguments.record)
+        with Mjbench(options.root, "`coursebuild bench`") as mjbench:
+            if arguments.check:
+                return check(options, mjbench, names, quick=quick)
+            return bench(options, mjbench, names, quick=quick, record=arguments.record)
 
     return run_measurement(
         arguments,
         measure,
         lambda reports, style: "" if arguments.check else bench_text(reports, style),
-        lambda measurement: measurement_json({"scenes": measurement.reports}, measurement),
+        lambda measurement: measurement_json({"scenes": measurement.values}, measurement),
         empty="there is no model to measure\n",
     )
 
 
 def bench(
     options: Options,
+    mjbench: Mjbench,
     names: tuple[str, ...] = (),
     *,
     quick: bool = False,
     record: bool = False,
-    measuring: Any = measuring,
 ) -> Measurement[SceneReport]:
-    """Measure the models that the names mean, without names all; with `record` into the course.
-
-    `measuring` is the module that measures.
-    """
+    """Measure the models that the names mean, without names all; with `record` into the course."""
     if record:
         forbid_quick("--record", quick=quick)
     scenes = find_scenes(options.root, names)
-    run = SceneRun(options, scenes.diagnostics, measuring, quick=quick, cards=record)
+    run = SceneRun(options, mjbench, scenes.diagnostics, quick=quick, cards=record)
     measurement = run.measure_each(scenes.value, run.measure)
     if not record:
         return measurement
-    records = ((BENCH.path(report.model), BENCH.encode(report)) for report in measurement.reports)
+    records = [
+        (BENCH.path(report.model), file_of(mjbench, bench=value))
+        for report, value in zip(measurement.reports, measurement.values, strict=True)
+    ]
     return write_records(options.root, measurement, records)
 
 
 def check(
-    options: Options,
-    names: tuple[str, ...] = (),
-    *,
-    quick: bool = False,
-    measuring: Any = measuring,
+    options: Options, mjbench: Mjbench, names: tuple[str, ...] = (), *, quick: bool = False
 ) -> Measurement[SceneReport]:
     """Measure again, and compare with the recorded reports.
 
@@ -150,7 +139,7 @@ def check(
     """
     forbid_quick("--check", quick=quick)
     scenes = find_scenes(options.root, names)
-    run = SceneRun(options, scenes.diagnostics, measuring, use_store=False)
+    run = SceneRun(options, mjbench, scenes.diagnostics, use_store=False)
     recorded: dict[str, SceneReport] = {}
     for scene in scenes.value:
         report = read_record(options.root, BENCH, scene.name)
@@ -161,7 +150,7 @@ def check(
     by_name = {scene.name: scene for scene in scenes.value if scene.name in recorded}
     measurement = run.measure_each(tuple(by_name.values()), run.measure)
     checks = []
-    for report in measurement.reports:
+    for report, value in zip(measurement.reports, measurement.values, strict=True):
         record, remarks = recorded[report.model], []
         if record.digest != report.digest:
             remarks.append("the model or its scenarios have changed since it was recorded")
@@ -174,59 +163,56 @@ def check(
         ):
             if before != now:
                 remarks.append(f"recorded with {program}{before}, measured with {now}")
-        bench = by_name[report.model].declarations.bench
-        departures = scene_departures(record, report, bench)
         path = BENCH.path(report.model)
+        bands = by_name[report.model].declarations.bench
+        old_value = recorded_value(options.root, BENCH, report.model)
+        data = mjbench.do("compare", recorded=old_value, measured=value, bands=bands)
+        departures = msgspec.json.decode(data, type=tuple[Departure, ...])
         checks.append(RecordCheck(report.model, path, departures, tuple(remarks)))
     return replace(measurement, checked=tuple(checks))
 
 
-class SceneRun(MeasuringRun):
+class SceneRun(MeasuringRun[SceneReport]):
     """Measures scenes one after the other."""
 
     function = f"{__name__}:measure_part"
+    report_type = SceneReport
 
     def __init__(
         self,
         options: Options,
+        mjbench: Mjbench,
         diagnostics: Sequence[Diagnostic],
-        measuring: Any,
         *,
         quick: bool = False,
         use_store: bool = True,
         cards: bool = False,
     ) -> None:
-        super().__init__(options, diagnostics, use_store=use_store)
+        super().__init__(options, mjbench, diagnostics, use_store=use_store)
         self.quick = quick
         self.cards = cards
         """Whether reports also say what the models are made of."""
-        self.measuring = measuring
-        self.machine = machine(pinned=True)
-        self.code = code_digest(*_CODE)
 
-    def measure(self, scene: CourseScene) -> SceneReport | None:
+    def measure(self, scene: CourseScene) -> bytes | None:
         """Report on a scene; `None` if it cannot be measured."""
         parts = self._parts(scene)
-        all_parts = (*parts, self.cards)
         return self.load_or_measure(
-            scene.name, "bench", all_parts, SceneReport, lambda: self._report(scene, parts)
+            scene.name, "bench", (*parts, self.cards), lambda: self._report(scene, parts), scene
         )
 
     def _parts(self, scene: CourseScene) -> tuple[object, ...]:
-        return scene.name, scene.digest, self.quick, self.code, self.machine
+        return scene.name, scene.digest, self.quick, self.code, self.facts.pinned
 
     def tasks(self, scene: CourseScene) -> Iterator[tuple[Any, ...]]:
         """The scenarios of a scene, and its sweeps in pieces, that are not stored."""
         parts = self._parts(scene)
-        if self.load("bench", (*parts, self.cards), SceneReport) is not None:
+        if self.load("bench", (*parts, self.cards), bytes) is not None:
             return
-        for number in range(
-            len(scene.declarations.scenarios or keyframe_scenarios(scene.facts.keyframes))
-        ):
-            if self.load("bench-scenarios", (*parts, number), ScenarioReport) is None:
+        for number in range(_scenario_count(scene)):
+            if self.load("bench-scenarios", (*parts, number), tuple[bytes, ...]) is None:
                 yield self._task(scene, "", number, number + 1)
         for sweep in scene.declarations.sweeps:
-            if self.load("bench-sweeps", (*parts, sweep.name), SweepReport) is None:
+            if self.load("bench-sweeps", (*parts, sweep.name), tuple[bytes, ...]) is None:
                 yield from self._pieces(scene, sweep)
 
     def _pieces(self, scene: CourseScene, sweep: DeclaredSweep) -> Iterator[tuple[Any, ...]]:
@@ -237,108 +223,84 @@ class SceneRun(MeasuringRun):
     def _task(self, scene: CourseScene, sweep: str, first: int, end: int) -> tuple[Any, ...]:
         return scene.name, scene.digest, self.quick, self.use_store, sweep, first, end
 
-    def _report(self, scene: CourseScene, parts: tuple[object, ...]) -> SceneReport:
-        # A check compares no times, so it measures none.
-        root, timed, name = self.options.root, self.use_store, scene.name
-        compiled_scene = self.measuring.compile_scene(root, scene, quick=self.quick)
-
-        def tell(text: str) -> None:
-            self.progress.describe(name, text)
-
-        settings = {"quick": self.quick, "timed": timed, "tell": tell}
+    def _report(self, scene: CourseScene, parts: tuple[object, ...]) -> bytes:
         # First, since a value that the model cannot have is told at once.
-        sweeps = tuple(
-            self._load_or_measure_part(
+        sweeps = [
+            piece
+            for sweep in scene.declarations.sweeps
+            for piece in self._load_or_measure_part(
                 "bench-sweeps",
                 (*parts, sweep.name),
-                SweepReport,
-                partial(self._measure_sweep, scene, compiled_scene, sweep, settings),
+                partial(self._measure_sweep, scene, sweep),
             )
-            for sweep in scene.declarations.sweeps
-        )
-        report = SceneReport(
-            model=name,
-            digest=scene.digest,
-            quick=self.quick,
-            machine=self.machine,
-            scenarios=tuple(
-                self._load_or_measure_part(
-                    "bench-scenarios",
-                    (*parts, n),
-                    ScenarioReport,
-                    partial(self._measure_scenario, scene, compiled_scene, n, settings),
-                )
-                for n in range(len(compiled_scene.scenarios))
-            ),
-            sweeps=sweeps,
-        )
-        if self.cards and report.scenarios:
-            tell("what it is made of")
-            report = self.measuring.add_card(root, scene, report)
-        return report
-
-    def _measure_scenario(
-        self, scene: CourseScene, compiled_scene: Any, number: int, settings: dict[str, Any]
-    ) -> ScenarioReport:
-        task = self._task(scene, "", number, number + 1)
-        report = decode(self.results.pop(task, b""), ScenarioReport)
-        run = self.measuring.run_scenario
-        return report or cast("ScenarioReport", run(compiled_scene, number, **settings))
-
-    def _measure_sweep(
-        self,
-        scene: CourseScene,
-        compiled_scene: Any,
-        sweep: DeclaredSweep,
-        settings: dict[str, Any],
-    ) -> SweepReport:
-        reports = [
-            decode(self.results.pop(task, b""), SweepReport) for task in self._pieces(scene, sweep)
         ]
-        pieces = [report for report in reports if report is not None]
-        rest = replace(
-            sweep, variations=tuple(p for p in sweep.variations if p.parameter == THREADS)
-        )
-        if not pieces or len(pieces) < len(reports):
-            rest, pieces = sweep, []
-        if rest.variations:
-            pieces.append(self.measuring.run_sweep(compiled_scene, rest, **settings))
-        return replace(pieces[0], rows=tuple(row for piece in pieces for row in piece.rows))
+        scenarios = [
+            part
+            for n in range(_scenario_count(scene))
+            for part in self._load_or_measure_part(
+                "bench-scenarios", (*parts, n), partial(self._measure_scenario, scene, n)
+            )
+        ]
+        values = {
+            "scenarios": list(map(Raw, scenarios)),
+            "sweeps": list(map(Raw, sweeps)),
+            "quick": self.quick,
+        }
+        return self.mjbench.do("join", scene, **values, card=self.cards)
+
+    def _measure_scenario(self, scene: CourseScene, number: int) -> tuple[bytes, ...]:
+        task = self._task(scene, "", number, number + 1)
+        data = self.results.pop(task, b"")
+        return (data or self.mjbench.do("scenario", scene, number=number, **self._settings()),)
+
+    def _measure_sweep(self, scene: CourseScene, sweep: DeclaredSweep) -> tuple[bytes, ...]:
+        pieces = [self.results.pop(task, b"") for task in self._pieces(scene, sweep)]
+        settings = {"name": sweep.name, **self._settings()}
+        if not pieces or not all(pieces):
+            return (self.mjbench.do("sweep", scene, **settings),)
+        if any(part.parameter == THREADS for part in sweep.variations):
+            pieces.append(self.mjbench.do("sweep", scene, part="threads", **settings))
+        return tuple(pieces)
+
+    def _settings(self) -> dict[str, bool]:
+        # A check compares no times, so it measures none.
+        return {"quick": self.quick, "timed": self.use_store}
 
     def _load_or_measure_part(
-        self, kind: str, parts: tuple[object, ...], report_type: type[_T], measure: Callable[[], _T]
-    ) -> _T:
-        report = self.load(kind, parts, report_type)
-        if report is None:
-            report = measure()
-            self.save(kind, parts, report)
-        return report
+        self, kind: str, parts: tuple[object, ...], measure: Callable[[], tuple[bytes, ...]]
+    ) -> tuple[bytes, ...]:
+        pieces = self.load(kind, parts, tuple[bytes, ...])
+        if pieces is None:
+            pieces = measure()
+            self.save(kind, parts, pieces)
+        return pieces
+
+
+def _scenario_count(scene: CourseScene) -> int:
+    """How many scenarios are measured: none that nobody declared where nothing can move."""
+    scenarios = scene.declarations.scenarios
+    usual = keyframe_scenarios(scene.facts.keyframes) if scene.facts.nv else ()
+    return len(scenarios or usual)
 
 
 def measure_part(root: Path, data: bytes) -> bytes:
     """Measure a scenario, or a piece of a sweep, as a task of `Executor.map`."""
-    if (request := read_task(data, timed=False)) is None:
-        return b""
-    name, digest, quick, timed, sweep_name, first, end = request[0]
-    if timed and read_task(data) is None:
-        return b""
-    settings = {"quick": quick, "timed": timed, "tell": lambda text: None}
-    try:
-        compiled_scene = _compile(root, name, digest, quick=quick)
-        if not sweep_name:
-            return encode(measuring.run_scenario(compiled_scene, first, **settings))
-        sweeps = {sweep.name: sweep for sweep in compiled_scene.scene.declarations.sweeps}
-        run, piece = measuring.run_sweep, slice(first, end)
-        return encode(run(compiled_scene, sweeps[sweep_name], piece=piece, **settings))
-    except (CannotMeasureError, LookupError):  # which is found and told where the command is
-        return b""
-
-
-@lru_cache(maxsize=1)
-def _compile(root: Path, name: str, digest: str, *, quick: bool) -> measuring.CompiledScene:
-    """Compile a scene once for all its parts; a `LookupError` where its files were edited."""
-    by_digest = {scene.digest: scene for scene in find_scenes(root, (name,)).value}
-    return measuring.compile_scene(root, by_digest[digest], quick=quick)
+    with Mjbench(root, "`coursebuild bench`") as mjbench:
+        task = read_task(data, mjbench)
+        if task is None:
+            return b""
+        name, digest, quick, timed, sweep, first, end = task
+        by_digest = {scene.digest: scene for scene in find_scenes(root, (name,)).value}
+        if digest not in by_digest:  # its files were edited
+            return b""
+        settings = {"quick": quick, "timed": timed}
+        try:
+            if not sweep:
+                return mjbench.do("scenario", by_digest[digest], number=first, **settings)
+            piece = {"name": sweep, "part": "values", "first": first, "end": end}
+            return mjbench.do("sweep", by_digest[digest], **piece, **settings)
+        except FailedJobError:  # which is found and told where the command is
+            return b""
 
 
 _OWN_MARK, _FRONT_MARK = ">", "*"

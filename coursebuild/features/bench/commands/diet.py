@@ -7,63 +7,48 @@
 3. Reports are stored by all that they depend on, as those of `bench`.
 4. `fix` takes out what is proved, again and again, as what only a removed part needed may go as
    well. A file that was edited meanwhile is left as it is.
-5. A finding is shown with its label, what it saves, its place, and the change itself; what was
-   tried and is needed stands on one line.
+5. A finding is shown with its label, what it saves and the change; what is needed, in one line.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+import msgspec
+from msgspec import Raw, Struct
 from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.core.engine.store import Store
-from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.errors import EffectError, require
 from coursebuild.core.files.read import read_course
 from coursebuild.core.files.write import FileChange, change_files
-from coursebuild.core.run.mjcf import model_files
-from coursebuild.core.run.script_environment import machine
+from coursebuild.core.model.diet_findings import PROVED_LABEL, DietReport, Finding, Saving
+from coursebuild.core.model.report_files import DIET, ReportFailure
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.values import decode, encode
 from coursebuild.features.bench.commands.diet_model import DietModel, Reruns
 from coursebuild.features.bench.commands.measurement import (
-    CannotMeasureError,
     Measurement,
     MeasuringRun,
+    file_of,
     forbid_quick,
     measurement_json,
     read_task,
     run_measurement,
     write_records,
 )
-from coursebuild.numerics.pruning.survey import Survey
-from coursebuild.numerics.reports.diet_report import (
-    PROVED_LABEL,
-    DietReport,
-    Finding,
-    Saving,
-    name_list,
-)
-from coursebuild.numerics.reports.records import DIET, ReportFailure
-from coursebuild.numerics.simulation import silent
+from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
 from coursebuild.pipeline.load import load, package_files
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
-from coursebuild.report.values import plain, plural
+from coursebuild.report.values import plural
 
 _T = TypeVar("_T")
-_CODE = (
-    "coursebuild/numerics",
-    "coursebuild/features/bench/commands/diet_model.py",
-    "mjcourse/spatial",
-)
 EXAMPLES = """\
 examples:
   coursebuild diet pendulum              what it could do without
@@ -92,12 +77,14 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Look at models, and mend them or record what was found."""
+    require("mjbench", "measure", "`coursebuild diet`")
     settings = {name: getattr(arguments, name) for name in ("quick", "fix", "record")}
     names = tuple(arguments.models)
     quiet = arguments.quiet and arguments.format == "text"
 
     def measure(options: Options) -> Measurement[DietReport]:
-        measurement = diet(options, names, **settings)
+        with Mjbench(options.root, "`coursebuild diet`") as mjbench:
+            measurement = diet(options, mjbench, names, **settings)
         if not quiet:
             return measurement
         if measurement.ok:
@@ -109,13 +96,14 @@ def run(arguments: argparse.Namespace) -> int:
         arguments,
         measure,
         diet_text,
-        lambda measurement: measurement_json(diet_values(measurement.reports), measurement),
+        lambda measurement: measurement_json(diet_values(measurement), measurement),
         empty=empty,
     )
 
 
 def diet(
     options: Options,
+    mjbench: Mjbench,
     names: tuple[str, ...] = (),
     *,
     quick: bool = False,
@@ -133,148 +121,196 @@ def diet(
     if record:
         forbid_quick("--record", quick=quick)
     scenes = find_scenes(options.root, names)
-    run = _DietRun(options, scenes.diagnostics, quick=quick, fix=fix)
+    run = _DietRun(options, mjbench, scenes.diagnostics, quick=quick, fix=fix)
     measurement = run.measure_each(scenes.value, run.look_at)
     if not record:
         return measurement
-    records = ((DIET.path(report.model), DIET.encode(report)) for report in measurement.reports)
+    records = [
+        (DIET.path(report.model), file_of(mjbench, diet=value))
+        for report, value in zip(measurement.reports, measurement.values, strict=True)
+    ]
     return write_records(options.root, measurement, records)
 
 
-class _DietRun(MeasuringRun):
+class _Change(Struct, frozen=True):
+    path: str
+    before: bytes
+    after: bytes
+
+
+class _Result(Struct, frozen=True):
+    """What mjbench has found, and what `--fix` changes."""
+
+    report: Raw
+    changes: tuple[_Change, ...]
+
+
+class _DietRun(MeasuringRun[DietReport]):
     """Looks at models one after the other."""
 
     stage, success = "looking at models", "looked at"
     function = f"{__name__}:measure_part"
+    report_type = DietReport
 
     def __init__(
-        self, options: Options, diagnostics: Sequence[Diagnostic], *, quick: bool, fix: bool
+        self,
+        options: Options,
+        mjbench: Mjbench,
+        diagnostics: Sequence[Diagnostic],
+        *,
+        quick: bool,
+        fix: bool,
     ) -> None:
-        super().__init__(options, diagnostics)
+        super().__init__(options, mjbench, diagnostics)
         self.quick = quick
         self.fix = fix
         self.files = read_course(options.root).value
         self.course = load(options.root).value
-        self.machine = machine()
-        self.code = code_digest(*_CODE)
 
-    def look_at(self, scene: CourseScene) -> DietReport | None:
+    def look_at(self, scene: CourseScene) -> bytes | None:
         """Report on a model; `None` if it cannot be looked at, or cannot be changed."""
         model = DietModel(self.options.root, self.files, self.course, scene)
         return self.load_or_measure(
-            scene.name, "diet", self._parts(model), DietReport, lambda: self._report(model)
+            scene.name, "diet", self._parts(model), lambda: self._report(model), scene
         )
 
     def tasks(self, scene: CourseScene) -> Iterator[tuple[Any, ...]]:
         """The model, if no report on it is stored."""
         model = DietModel(self.options.root, self.files, self.course, scene)
-        if self.load("diet", self._parts(model), DietReport) is None:
+        if self.load("diet", self._parts(model), bytes) is None:
             yield self._task(scene)
 
     def _task(self, scene: CourseScene) -> tuple[Any, ...]:
         return scene.name, scene.digest, self.quick, self.fix
 
-    def _report(self, model: DietModel) -> DietReport | None:
+    def _report(self, model: DietModel) -> bytes | None:
         """Look at a model here, or take what another process has found and changed."""
-        result = decode(
-            self.results.pop(self._task(model.scene), b""), cast("type[_Result]", _Result)
-        )
+        data = self.results.pop(self._task(model.scene), b"")
+        result = decode(data, cast("type[_Elsewhere]", _Elsewhere))
         if result is None:
             return self.report_here(model)
         report, changes, remarks = result
-        try:
-            change_files(self.options.root, [FileChange(*change) for change in changes])
-        except EffectError as error:
-            self.failures.append(ReportFailure(error.message, error.help))
+        if not self._write([FileChange(*change) for change in changes]):
             return None
         self.remarks += remarks
         return report
 
-    def report_here(self, model: DietModel) -> DietReport | None:
-        """Look at a model in this process."""
-        with silent():  # MuJoCo would write its warnings into the working directory
-            report = self._fix(model) if self.fix else self._survey(model).report
-        return None if report is None else replace(report, digest=model.digest())
+    def _write(self, changes: Sequence[FileChange]) -> bool:
+        try:
+            change_files(self.options.root, changes)
+        except EffectError as error:
+            self.failures.append(ReportFailure(error.message, error.help))
+            return False
+        return True
 
-    def _survey(self, model: DietModel) -> Survey:
-        tell, rerun = partial(self.progress.describe, model.scene.name), None
-        if not self.quick and self.course is not None:
-            rerun = Reruns(self.options, self.course, model.scene).first_difference
-        return model.survey(self.machine, quick=self.quick, tell=tell, rerun=rerun)
-
-    def _fix(self, model: DietModel) -> DietReport | None:
-        """Change the model and look again until nothing is left to change.
+    def report_here(self, model: DietModel) -> bytes | None:
+        """Look at a model; with `fix`, change it and look again until nothing is left to change.
 
         `None` if a change could not be written, which is reported as a failure.
         """
         kinds: dict[str, dict[str, None]] = {}
-        survey = self._survey(model)
-        while survey.edits:
-            try:
-                model.write(survey)
-            except EffectError as error:
-                self.failures.append(ReportFailure(error.message, error.help))
+        result = self._survey(model)
+        while self.fix and result.changes:
+            changes = [FileChange(c.path, c.before, c.after) for c in result.changes]
+            if not self._write(changes):
                 return None
-            for finding in survey.report.findings:
+            report = msgspec.json.decode(result.report, type=DietReport)
+            for finding in report.findings:
                 for edit in finding.edits if finding.fixable else ():
                     kinds.setdefault(edit.path, {})[finding.kind] = None
-            survey = self._survey(model)
+            changed = self._read_again(model.scene.name)
+            if changed is None:
+                return None
+            model = changed
+            result = self._survey(model)
         self.remarks += [f"changed {path}: {', '.join(kinds[path])}" for path in sorted(kinds)]
-        return survey.report
+        return bytes(result.report)
+
+    def _read_again(self, name: str) -> DietModel | None:
+        """The model as it is on the disk now; `None` where it cannot be looked at any more."""
+        scenes = find_scenes(self.options.root, (name,))
+        self.files = read_course(self.options.root).value
+        self.course = load(self.options.root).value
+        for scene in scenes.value:
+            return DietModel(self.options.root, self.files, self.course, scene)
+        self.diagnostics += scenes.diagnostics
+        return None
+
+    def _survey(self, model: DietModel) -> _Result:
+        with_course = not self.quick and self.course is not None
+        if with_course and self.course is not None:
+            reruns = Reruns(self.options, self.course, model.scene)
+            self.mjbench.rerun = reruns.first_difference
+        data = self.mjbench.do(
+            "diet",
+            model.scene,
+            readers=model.readers.sources,
+            modules=sorted(model.readers.modules),
+            keeps=model.keeps,
+            locked=model.locked,
+            quick=self.quick,
+            rerun=with_course,
+        )
+        return msgspec.json.decode(data, type=_Result)
 
     def _parts(self, model: DietModel) -> tuple[object, ...]:
         """Return all that a report depends on; first the digest of the model."""
-        scene = model.scene
-        parts: list[object] = [scene.digest, scene.name, self.quick, self.code, self.machine]
+        scene, machine = model.scene, self.facts.machine
+        parts: list[object] = [scene.digest, scene.name, self.quick, self.code, machine]
         for keep in scene.declarations.keep:
             place = keep.finding_span
             parts.append((keep.finding, keep.reason, place.line, place.column))
-        parts += model.locked.items()
-        if model.readers and self.course is not None:
+        parts += [*model.locked.items(), model.readers]
+        if model.readers.sources and self.course is not None:
             parts += [(d.source.path, d.source.text) for d in self.course.documents]
             paths = (*self.files.files, *package_files(self.options.root, self.course))
             states = [(path, (self.options.root / path).stat()) for path in paths]
             parts += [(path, state.st_size, state.st_mtime_ns) for path, state in states]
         return tuple(parts)
 
-    def load(self, kind: str, parts: tuple[object, ...], report_type: type[_T]) -> _T | None:
+    def load(self, kind: str, parts: tuple[object, ...], form: type[_T]) -> _T | None:
         """Load the stored report, unless this run is to fix something in it."""
-        report = super().load(kind, parts, report_type)
-        if self.fix and isinstance(report, DietReport) and any(f.fixable for f in report.findings):
-            return None
-        return report
+        value = super().load(kind, parts, form)
+        if self.fix and isinstance(value, bytes):
+            report = msgspec.json.decode(value, type=DietReport)
+            if any(finding.fixable for finding in report.findings):
+                return None
+        return value
 
     def save(self, kind: str, parts: tuple[object, ...], value: object) -> None:
         """Store a report, unless this run or somebody else has changed the files meanwhile."""
-        if isinstance(value, DietReport) and value.digest == parts[0]:
-            super().save(kind, parts, value)
+        if isinstance(value, bytes):
+            report = msgspec.json.decode(value, type=DietReport)
+            if report.digest == parts[0]:
+                super().save(kind, parts, value)
 
 
-_Result = tuple[DietReport, tuple[tuple[str, bytes, bytes], ...], tuple[str, ...]]
+_Elsewhere = tuple[bytes, tuple[tuple[str, bytes, bytes], ...], tuple[str, ...]]
 """A report, the files that `--fix` has changed, before and after, and what is said of that."""
 
 
 def measure_part(root: Path, data: bytes) -> bytes:
     """Look at a model, as a task of `Executor.map`."""
-    if (request := read_task(data)) is None:
-        return b""
-    (name, digest, quick, fix), timed_machine = request
-    run = _DietRun(Options(root, 1, Store(root, fresh=True)), (), quick=quick, fix=fix)
-    run.machine = timed_machine
-    for scene in find_scenes(root, (name,)).value:
-        if scene.digest != digest:  # its files have been edited meanwhile
+    with Mjbench(root, "`coursebuild diet`") as mjbench:
+        task = read_task(data, mjbench)
+        if task is None:
             return b""
-        model = DietModel(root, run.files, run.course, scene)
-        source = scene.model.source
-        paths = [source.path, *model_files(root, source.path, source.text)]
-        before = {path: (root / path).read_bytes() for path in paths if (root / path).is_file()}
-        try:
-            report = run.report_here(model)
-        except CannotMeasureError:  # which is found and told where the command is
-            return b""
-        after = {path: (root / path).read_bytes() for path in before}
-        changes = tuple((p, before[p], after[p]) for p in before if before[p] != after[p])
-        return b"" if report is None else encode((report, changes, tuple(run.remarks)))
+        name, digest, quick, fix = task
+        options = Options(root, 1, Store(root, fresh=True))
+        run = _DietRun(options, mjbench, (), quick=quick, fix=fix)
+        for scene in find_scenes(root, (name,)).value:
+            if scene.digest != digest:  # its files have been edited meanwhile
+                return b""
+            model = DietModel(root, run.files, run.course, scene)
+            files = {path: root / path for path in model.paths}
+            before = {path: file.read_bytes() for path, file in files.items() if file.is_file()}
+            try:
+                report = run.report_here(model)
+            except FailedJobError:  # which is found and told where the command is
+                return b""
+            after = {path: files[path].read_bytes() for path in before}
+            changes = tuple((p, before[p], after[p]) for p in before if before[p] != after[p])
+            return b"" if report is None else encode((report, changes, tuple(run.remarks)))
     return b""
 
 
@@ -288,9 +324,20 @@ _FOOTNOTE = (
 )
 
 
-def diet_values(reports: Sequence[DietReport]) -> dict[str, object]:
+def diet_values(measurement: Measurement[DietReport]) -> dict[str, object]:
     """Return the reports as plain values, each with whether nothing is left to be done."""
-    return {"models": [plain(report) | {"ok": report.ok} for report in reports]}
+    pairs = zip(measurement.values, measurement.reports, strict=True)
+    return {"models": [value | {"ok": report.ok} for value, report in pairs]}
+
+
+_NAMES = 6
+"""The most names that are listed."""
+
+
+def name_list(names: Sequence[str]) -> str:
+    """Names in a message, and how many more there are."""
+    extra = len(names) - _NAMES
+    return ", ".join(names[:_NAMES]) + (f" and {extra} more" if extra > 0 else "")
 
 
 def diet_text(reports: Sequence[DietReport], style: Style) -> str:

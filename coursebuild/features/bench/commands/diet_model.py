@@ -7,8 +7,6 @@
 2. Scripts and labs run in a copy of the course with the changed files, and their output is compared
    with that in the course itself. The files that they read show which of them use the model.
 3. A file that another model uses too, or that is not in `models/`, is not changed.
-4. Changed files are read again, compiled and compared with the model that was run; only then are
-   they written, all of them or none.
 """
 
 from __future__ import annotations
@@ -16,12 +14,10 @@ from __future__ import annotations
 import contextlib
 import re
 import shutil
-import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
-import mujoco
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import mjcf_texts
@@ -29,42 +25,50 @@ from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.files.read import CourseFiles, read_bytes
-from coursebuild.core.files.write import FileChange, change_files
-from coursebuild.core.model import Course, FeatureBlock, MjcfModel, find_blocks
-from coursebuild.core.model.results import Machine
-from coursebuild.core.model.scenarios import Declarations
+from coursebuild.core.model import Course, FeatureBlock, find_blocks
+from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.run.mjcf import TEXT_PATH, model_files
 from coursebuild.core.scripts.extract import extract
-from coursebuild.core.syntax.declarations import parse_declarations
-from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.features.bench.commands.measurement import CannotMeasureError
-from coursebuild.features.bench.commands.measuring import report_errors
 from coursebuild.features.lab.model import Lab
-from coursebuild.numerics.pruning.comparison import pruning_scenes
-from coursebuild.numerics.pruning.model_text import ModelTextError, model_bytes, open_model
-from coursebuild.numerics.pruning.readers import VIEWS, ModelReader, imported_modules, read_code
-from coursebuild.numerics.pruning.survey import Rerun, Survey, Surveyor
-from coursebuild.numerics.pruning.xml_edits import MarkupError
 from coursebuild.pipeline.load import load, package_files
 from coursebuild.pipeline.options import Options, Progress
-from coursebuild.pipeline.scenes import CourseScene, scene_digest
+from coursebuild.pipeline.scenes import CourseScene
 from coursebuild.pipeline.verify import verify
 
 _CODE = (".py", ".js", ".mjs", ".ts")
-_NOT_DRAWN = frozenset(("Sensor", "Actuator", "Keyframe", "Numeric", "Tuple"))
-"""Kinds that the picture of a lab does not show."""
-_SHAPES = ("alt", "fromto", "scale")
-"""Fields of a specification that give places or sizes, and that a model does not have."""
 _COPIED_FOLDERS = ("content", "models")
 
 
-def readers_of(
-    course: Course | None, root: Path, files: CourseFiles, model: str
-) -> tuple[ModelReader, ...]:
+class ReaderSource(Struct, frozen=True):
+    """Something that may read a model, as mjbench is told of it."""
+
+    path: str
+    text: str | None = None
+    """Code."""
+    declarations: str | None = None
+    """The text of a file of declarations."""
+    names: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
+    drawn: bool = False
+    """Whether it shows a picture of the model."""
+    opaque: str = ""
+    """Why it may use everything; empty where it does not."""
+
+
+class ModelReaders(Struct, frozen=True):
+    """Everything that may read a model."""
+
+    sources: tuple[ReaderSource, ...] = ()
+    modules: frozenset[str] = frozenset()
+    """Names of modules that are among them."""
+
+
+def readers_of(course: Course | None, root: Path, files: CourseFiles, model: str) -> ModelReaders:
     """List all code in the course that may use a model."""
     if course is None:
-        return (ModelReader("content/course.toml", opaque="the course cannot be read"),)
+        opaque = ReaderSource("content/course.toml", opaque="the course cannot be read")
+        return ModelReaders((opaque,))
     paths = [path for path in files.files if path.endswith(_CODE)]
     texts: dict[str, str | None] = {}
     for path in (*paths, *package_files(root, course)):
@@ -72,18 +76,17 @@ def readers_of(
         with contextlib.suppress(EffectError):
             texts[path] = read_bytes(root, path).decode("utf-8", "replace")
     texts |= {script.path: script.text for script in extract(course).value}
-    modules = {name for path in texts for name in _module_names(path)}
+    modules = frozenset(name for path in texts for name in _module_names(path))
     users = _find_users({path: text or "" for path, text in texts.items()}, model)
     blocks = tuple(_block_readers(course, model))
     if not users and not blocks:
-        return ()
-    return blocks + tuple(
-        ModelReader(path, opaque="it cannot be read")
-        if text is None
-        else read_code(path, text, modules)
+        return ModelReaders((), modules)
+    code = tuple(
+        ReaderSource(path, text, opaque="it cannot be read" if text is None else "")
         for path, text in texts.items()
         if path in users or path in files.files
     )
+    return ModelReaders(blocks + code, modules)
 
 
 def _module_names(path: str) -> frozenset[str]:
@@ -95,7 +98,7 @@ def _module_names(path: str) -> frozenset[str]:
 def _find_users(texts: Mapping[str, str], model: str) -> frozenset[str]:
     """Find the Python that may use a model, what imports that, and what all of it imports."""
     names = {path: _module_names(path) for path in texts if path.endswith(".py")}
-    imports = {path: frozenset(imported_modules(texts[path])) for path in names}
+    imports = {path: find_imports(texts[path]) for path in names}
     users = {path for path in names if _may_use(texts[path], model)}
     for words, targets in ((imports, names), (names, imports)):
         count = -1
@@ -114,22 +117,24 @@ def _may_use(text: str, model: str) -> bool:
     return name in text or uses != len(literals) or (not literals and loader is not None)
 
 
-def _block_readers(course: Course, model: str) -> Iterator[ModelReader]:
+def _block_readers(course: Course, model: str) -> Iterator[ReaderSource]:
     """Yield the labs and other blocks that show a model."""
     for document in course.documents:
         for block in find_blocks(document, FeatureBlock):
             if model not in block.models():
                 continue
-            place = f"{block.span.path}:{block.span.line}"
-            kinds = frozenset(VIEWS.values()) - _NOT_DRAWN
+            reader = ReaderSource(f"{block.span.path}:{block.span.line}", drawn=True)
             if not isinstance(block, Lab):
-                yield ModelReader(place, kinds=kinds)
+                yield reader
                 continue
-            code = read_code(place, "\n".join(piece.text for _, piece in block.code))
-            names = frozenset(re.findall(r"\"((?:[^\"\\]|\\.)*)\"", block.config))
-            if re.search(r"\"key(frame)?\"\s*:\s*\d", block.config):
-                kinds |= {"Keyframe"}
-            yield replace(code, names=code.names | names, kinds=code.kinds | kinds)
+            names = re.findall(r"\"((?:[^\"\\]|\\.)*)\"", block.config)
+            has_numbers = re.search(r"\"key(frame)?\"\s*:\s*\d", block.config)
+            yield replace(
+                reader,
+                text="\n".join(piece.text for _, piece in block.code),
+                names=tuple(names),
+                kinds=("Keyframe",) if has_numbers else (),
+            )
 
 
 class Reruns:
@@ -211,28 +216,34 @@ class Reruns:
                 (root / entry.name).symlink_to(entry)
 
 
-_TEXT = Path(TEXT_PATH).name
-"""No file has this name: MuJoCo reads the text in its place."""
-
-
 class DietModel:
     """A model of the course, its files and its readers."""
 
     def __init__(
         self, root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
     ) -> None:
-        self.root = root
         self.scene = scene
-        self.path = scene.model.source.path
-        self.keeps = {" ".join(keep.finding.split()): keep for keep in scene.declarations.keep}
-        parts = model_files(root, self.path, scene.model.source.text)
+        path = scene.model.source.path
+        self.keeps = [
+            {
+                "finding": keep.finding,
+                "reason": keep.reason,
+                "path": keep.finding_span.path,
+                "line": keep.finding_span.line,
+                "column": keep.finding_span.column,
+            }
+            for keep in scene.declarations.keep
+        ]
+        parts = model_files(root, path, scene.model.source.text)
         self.locked = {
             part: f"{part} is not in models/"
             for part in parts
             if not (part.startswith("models/") and part.endswith(".xml"))
         }
         """The files of the model that must not be changed, with the reason."""
-        own_files = {self.path, *parts}
+        self.paths = (path, *parts)
+        """All files of the model, whether or not they are there."""
+        own_files = {*self.paths}
         for model in files.models:
             user = model.source.path
             if user not in own_files:
@@ -240,127 +251,35 @@ class DietModel:
                 for part in sorted(own_files.intersection(used_files)):
                     self.locked.setdefault(part, f"{user} uses {part} too")
         self.readers = _find_readers(root, files, course, scene)
-        self._files: dict[str, bytes | None] = {}
-
-    def read(self, path: str) -> bytes | None:
-        """Return the bytes of a file as first read; `None` if it cannot be read."""
-        if path not in self._files:
-            try:
-                is_file = (self.root / path).is_file()
-                self._files[path] = read_bytes(self.root, path) if is_file else None
-            except EffectError:
-                self._files[path] = None
-        return self._files[path]
-
-    def compile(self, text: bytes) -> Any:
-        """Compile a text as if it stood in the model's place."""
-        place = str((self.root / self.path).parent / _TEXT)
-        try:
-            return mujoco.MjModel.from_xml_path(place, assets={place: text})
-        except (ValueError, mujoco.FatalError) as error:
-            message = str(error).replace(f"{self.root}/", "").replace(_TEXT, Path(self.path).name)
-            raise ValueError(message) from None
-
-    def survey(
-        self, machine: Machine, *, quick: bool, tell: Callable[[str], None], rerun: Rerun | None
-    ) -> Survey:
-        """Try every change; `rerun` says which of the course's scripts and labs then differ.
-
-        Raises:
-            CannotMeasureError: the model cannot be looked at.
-        """
-        scene, declarations = self.scene, self.scene.declarations
-        # The kinds of findings about things that scenarios give by number.
-        numbered_kinds: set[str] = set()
-        for scenario in declarations.scenarios:
-            if scenario.controls:
-                numbered_kinds.add("actuator-idle")
-            if isinstance(scenario.keyframe, int):
-                numbered_kinds.add("unused-keyframe")
-        failure = "the diet cannot look at the model `{}`"
-        with report_errors(scene, failure, ModelTextError, ValueError):
-            try:
-                text = open_model(self.path, self.read, self.compile)
-            except MarkupError as error:
-                message = f"{error.path}:{error.line}:{error.column} is not XML: {error.message}"
-                help = "MuJoCo reads it all the same; other tools do not"
-                place = scene.model.source.span(0, 0)
-                diagnostic = diagnose("model-error", place, message, help=help)
-                raise CannotMeasureError(diagnostic) from None
-            return Surveyor(
-                model=scene.name,
-                digest=scene.digest,
-                machine=machine,
-                text=text,
-                scenes=pruning_scenes(text.model, declarations, quick=quick),
-                readers=self.readers,
-                keeps=self.keeps,
-                locked=self.locked,
-                numbered_kinds=frozenset(numbered_kinds),
-                clock=time.thread_time_ns,
-                quick=quick,
-                tell=tell,
-                rerun=rerun,
-            ).survey()
-
-    def write(self, survey: Survey) -> None:
-        """Write the changes that were found; all of them, or none.
-
-        Raises:
-            EffectError: a file cannot be written, or somebody changed it.
-            CannotMeasureError: the files would make another model than the one that was run.
-        """
-        new_files = survey.text.files(survey.edits)
-
-        def read(path: str) -> bytes | None:
-            return new_files.get(path) or self.read(path)
-
-        new_model = open_model(self.path, read, self.compile, check=False).model
-        if model_bytes(new_model) != model_bytes(survey.text.compile(survey.edits)):
-            message = f"the changed model `{self.scene.name}` is not the one that was run"
-            place = self.scene.model.source.span(0, 0)
-            raise CannotMeasureError(diagnose("model-error", place, message))
-        changes = [FileChange(path, self.read(path), data) for path, data in new_files.items()]
-        change_files(self.root, sorted(changes, key=lambda change: change.path))
-        self._files.clear()
-
-    def digest(self) -> str:
-        """Return the digest of the model as it is on the disk now."""
-        text = (self.read(self.path) or b"").decode("utf-8")
-        model = MjcfModel(self.scene.name, Source(self.path, text))
-        return scene_digest(self.root, model, self.scene.declarations)
 
 
 def _find_readers(
     root: Path, files: CourseFiles, course: Course | None, scene: CourseScene
-) -> tuple[ModelReader, ...]:
+) -> ModelReaders:
     """List everything in the course that may read a model, or a file of it in another model."""
     own_files = _included_files(files, scene.model.source)
-    readers = [*readers_of(course, root, files, scene.name)]
-    readers += _declared_readers(scene.declarations)
+    own_readers = readers_of(course, root, files, scene.name)
+    sources, modules = [*own_readers.sources], own_readers.modules
     tables = {table.path: table for table in files.declarations}
     for model in files.models:
         source = model.source
         shared = own_files.intersection((source.path, *model_files(root, source.path, source.text)))
         if not shared or source.path == scene.model.source.path:
             continue
-        readers += readers_of(course, root, files, model.name)
+        model_readers = readers_of(course, root, files, model.name)
+        sources += model_readers.sources
+        modules |= model_readers.modules
         if source.path not in own_files:
-            readers.append(_reference_reader(files, source, source.path, shared))
+            sources.append(_reference_reader(files, source, source.path, shared))
         table = tables.get(f"{source.path.removesuffix('.xml')}.toml")
-        declarations = None if table is None else parse_declarations(table).value
-        if declarations is not None:
-            readers += _declared_readers(declarations)
-            keys = {scenario.keyframe for scenario in declarations.scenarios} - {None}
-            names = frozenset(key for key in keys if isinstance(key, str))
-            kinds = frozenset(["Keyframe"] if keys - names else [])
-            readers.append(ModelReader(declarations.source.path, names, kinds=kinds))
+        if table is not None:
+            sources.append(ReaderSource(table.path, declarations=table.text))
     for mjcf in () if course is None else mjcf_texts(course):
         if shared := own_files.intersection(model_files(root, TEXT_PATH, mjcf.text)):
             place = f"{mjcf.place.path}:{mjcf.place.line}"
             source = Source(TEXT_PATH, mjcf.text)
-            readers.append(_reference_reader(files, source, place, shared))
-    return tuple(readers)
+            sources.append(_reference_reader(files, source, place, shared))
+    return ModelReaders(tuple(sources), modules)
 
 
 _INCLUDED = re.compile(r"<include\s[^>]*?\bfile\s*=\s*[\"']([^\"']+)")
@@ -381,28 +300,9 @@ def _included_files(files: CourseFiles, source: Source) -> frozenset[str]:
 
 def _reference_reader(
     files: CourseFiles, source: Source, place: str, shared: frozenset[str]
-) -> ModelReader:
+) -> ReaderSource:
     """What a model, or a text in a lesson, needs of the files that it shares with another one."""
     attached = shared - _included_files(files, source)  # where names get a prefix
     ranking = sorted(attached, key=lambda path: (Path(path).name not in source.text, path))
     opaque = f"it attaches {ranking[0]}" if ranking else ""
-    return ModelReader(place, frozenset(_REFERENCE.findall(source.text)), opaque=opaque)
-
-
-def _declared_readers(declarations: Declarations) -> list[ModelReader]:
-    """What the file beside a model asks of it."""
-    scenarios = declarations.scenarios
-    names = {s.observable.name for s in scenarios if s.observable is not None}
-    fields = {"energy"} if any("energy" in (s.conserved or ()) for s in scenarios) else set()
-    kinds: set[str] = set()
-    for part in (part for sweep in declarations.sweeps for part in sweep.variations):
-        things, _, field = part.parameter.rpartition(".")
-        kind, _, name = things.partition(":")
-        names |= {name} - {""}
-        kinds |= set() if name else {VIEWS.get(kind, kind)}
-        field = field.partition("[")[0]
-        fields |= {field, "pos"} if field in _SHAPES else {field}
-    words = frozenset(fields)
-    path = declarations.source.path
-    reader = ModelReader(path, frozenset(names), words, words, kinds=frozenset(kinds))
-    return [reader] if names or fields else []
+    return ReaderSource(place, names=tuple(_REFERENCE.findall(source.text)), opaque=opaque)

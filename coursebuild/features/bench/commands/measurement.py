@@ -11,27 +11,36 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+import msgspec
 from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.cli.arguments import options_of, style_of
 from coursebuild.cli.output import CLEAN, FAILURE, write
+from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.features import Executor
 from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.locks import project_lock
+from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.files.write import resolve_inside, write_atomic
+from coursebuild.core.model.report_files import ReportFailure, ReportKind
 from coursebuild.core.model.results import Machine
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.pages.renderer import Strings
-from coursebuild.core.run.script_environment import machine
 from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.core.values import decode, encode, fingerprint
+from coursebuild.features.bench.commands.measuring import (
+    Facts,
+    FailedJobError,
+    Mjbench,
+    diagnostic_of,
+)
 from coursebuild.features.bench.grids import Grid
-from coursebuild.numerics.reports.records import RecordCheck, ReportFailure
 from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.scenes import CourseScene
 from coursebuild.report.text import (
     BOLD,
     FAINT,
@@ -51,11 +60,36 @@ _A = TypeVar("_A")
 _T = TypeVar("_T")
 
 
+class Departure(Struct, frozen=True):
+    """A figure that is not what was recorded, in words."""
+
+    where: str
+    setting: str
+    figure: str
+    recorded: str
+    measured: str
+    band: str
+
+
+class RecordCheck(Struct, frozen=True):
+    """A recorded report compared with a new measurement."""
+
+    name: str
+    """The model, or `stability`."""
+    path: str
+    """The file of the recorded report."""
+    departures: tuple[Departure, ...]
+    remarks: tuple[str, ...] = ()
+    """Other differences, which are no mistake by themselves."""
+
+
 class Measurement(Struct, Generic[_T], frozen=True):
     """The result of a command that measures."""
 
     reports: tuple[_T, ...]
     """Reports on models, by name, or on hard cases, by number."""
+    values: tuple[Any, ...] = ()
+    """The same as mjbench gives them, with all fields: values of JSON."""
     diagnostics: tuple[Diagnostic, ...] = ()
     """Diagnostics of models and of what is declared for them."""
     failures: tuple[ReportFailure, ...] = ()
@@ -73,7 +107,7 @@ class Measurement(Struct, Generic[_T], frozen=True):
 
 def measurement_json(reports: Mapping[str, object], measurement: Measurement[_T]) -> str:
     """Write the same as one JSON object."""
-    rest = {name: getattr(measurement, name) for name in Measurement.__struct_fields__[1:]}
+    rest = {name: getattr(measurement, name) for name in Measurement.__struct_fields__[2:]}
     return json_text({**reports, **rest})
 
 
@@ -154,15 +188,7 @@ def run_measurement(
     return write("\n".join(part for part in parts if part) or empty, status)
 
 
-class CannotMeasureError(Exception):
-    """A model cannot be measured, or looked at; the diagnostic says why."""
-
-    def __init__(self, diagnostic: Diagnostic) -> None:
-        super().__init__(diagnostic.message)
-        self.diagnostic = diagnostic
-
-
-class MeasuringRun:
+class MeasuringRun(Generic[_T]):
     """Measures one thing after the other, or takes the result from the store.
 
     Only one run of a course measures at a time, since two would disturb each other's times; the
@@ -173,12 +199,18 @@ class MeasuringRun:
     """Words of the progress display: for the stage, and for a thing that was measured."""
     function = ""
     """Measures a task in another process: `module:name`, as in `Executor.map`."""
-    machine: Machine
+    report_type: type[_T]
 
     def __init__(
-        self, options: Options, diagnostics: Iterable[Diagnostic] = (), *, use_store: bool = True
+        self,
+        options: Options,
+        mjbench: Mjbench,
+        diagnostics: Iterable[Diagnostic] = (),
+        *,
+        use_store: bool = True,
     ) -> None:
         self.options = options
+        self.mjbench = mjbench
         self.use_store = use_store
         """Whether results are taken from the store, and put into it."""
         self.diagnostics = list(diagnostics)
@@ -189,18 +221,30 @@ class MeasuringRun:
         self.progress = options.progress
         options.store.listen(self.progress.say)
 
+    @functools.cached_property
+    def facts(self) -> Facts:
+        """What mjbench is here."""
+        return self.mjbench.facts()
+
+    @functools.cached_property
+    def code(self) -> tuple[str, str]:
+        """The code on which reports depend: mjbench's, and what exact motions may import."""
+        return self.facts.code, code_digest("mjcourse/spatial")
+
     def measure_each(
-        self, things: Sequence[_A], measure: Callable[[_A], _T | None]
+        self, things: Sequence[_A], measure: Callable[[_A], bytes | None]
     ) -> Measurement[_T]:
         """Measure each thing, and collect the reports."""
-        reports: list[_T | None] = []
+        reports: list[bytes | None] = []
         if things:
             with self.progress.stage(self.stage, len(things)):
                 if self.options.executor is not None:
                     self._measure_elsewhere(self.options.executor, things)
                 reports = [measure(thing) for thing in things]
+        present = [report for report in reports if report is not None]
         return Measurement(
-            tuple(report for report in reports if report is not None),
+            tuple(msgspec.json.decode(report, type=self.report_type) for report in present),
+            tuple(msgspec.json.decode(report) for report in present),
             sort_diagnostics(self.diagnostics),
             failures=tuple(self.failures),
             remarks=tuple(self.remarks),
@@ -209,7 +253,7 @@ class MeasuringRun:
     def _measure_elsewhere(self, executor: Executor, things: Sequence[Any]) -> None:
         """Have other processes measure what nobody has measured, so far as they can."""
         tasks = [task for thing in things for task in self.tasks(thing)]
-        data = [encode((task, self.machine)) for task in tasks]
+        data = [encode((task, self.facts.machine)) for task in tasks]
         for task, result in zip(
             tasks, executor.map(self.function, self.options.root, data), strict=True
         ):
@@ -226,54 +270,60 @@ class MeasuringRun:
         name: str,
         kind: str,
         parts: tuple[object, ...],
-        report_type: type[_T],
-        measure: Callable[[], _T | None],
-    ) -> _T | None:
+        measure: Callable[[], bytes | None],
+        scene: CourseScene | None = None,
+    ) -> bytes | None:
         """Load the report on a thing by all that it depends on, or measure the thing now."""
-        report = self.load(kind, parts, report_type)
+        report = self.load(kind, parts, bytes)
         if report is None:
             with project_lock(self.options.root, self.progress.say, name="bench-lock"):
                 # The run that held the lock may have measured it.
-                report = self.load(kind, parts, report_type)
+                report = self.load(kind, parts, bytes)
                 if report is None:
-                    self.progress.start(name)
-                    start = time.monotonic()
-                    try:
-                        report = measure()
-                    except CannotMeasureError as error:
-                        self.diagnostics.append(error.diagnostic)
-                    verdict = f"not {self.success}" if report is None else self.success
-                    self.progress.finish(name, verdict, time.monotonic() - start)
+                    report = self._measure(name, measure, scene)
                     if report is not None:
                         self.save(kind, parts, report)
                     return report
         self.progress.skip()
         return report
 
-    def load(self, kind: str, parts: tuple[object, ...], report_type: type[_T]) -> _T | None:
-        """Load the stored report that depends on these parts, if there is one."""
+    def _measure(
+        self, name: str, measure: Callable[[], bytes | None], scene: CourseScene | None
+    ) -> bytes | None:
+        report = None
+        self.progress.start(name)
+        self.mjbench.tell = functools.partial(self.progress.describe, name)
+        start = time.monotonic()
+        try:
+            report = measure()
+        except FailedJobError as error:
+            if scene is None:
+                self.failures.append(ReportFailure(str(error), error.failure.help))
+            else:
+                self.diagnostics.append(diagnostic_of(error.failure, scene))
+        verdict = f"not {self.success}" if report is None else self.success
+        self.progress.finish(name, verdict, time.monotonic() - start)
+        return report
+
+    def load(self, kind: str, parts: tuple[object, ...], form: type[_A]) -> _A | None:
+        """Load the stored value that depends on these parts, if there is one."""
         if not self.use_store:
             return None
-        return self.options.store.get_value(kind, fingerprint(parts), report_type)
+        return self.options.store.get_value(kind, fingerprint(parts), form)
 
     def save(self, kind: str, parts: tuple[object, ...], value: object) -> None:
-        """Store a report under the parts on which it depends."""
+        """Store a value under the parts on which it depends."""
         if self.use_store:
             self.options.store.put_value(kind, fingerprint(parts), value)
 
 
-def read_task(data: bytes, *, timed: bool = True) -> tuple[tuple[Any, ...], Machine] | None:
-    """The task that another process has sent, and its machine.
-
-    `None` if it is to be timed, and this is another machine than that.
-    """
-    task, timed_machine = decode(data, tuple[tuple[object, ...], Machine]) or ((), None)
-    if timed_machine is None:
+def read_task(data: bytes, mjbench: Mjbench) -> tuple[Any, ...] | None:
+    """The task that another process has sent; `None` if this is another machine than its own."""
+    task, machine = decode(data, tuple[tuple[object, ...], Machine]) or ((), None)
+    if machine is None:
         return None
-    own_machine = replace(
-        machine(), processors=timed_machine.processors, pinned=timed_machine.pinned
-    )
-    return None if timed and own_machine != timed_machine else (task, timed_machine)
+    own_machine = replace(mjbench.facts().machine, processors=machine.processors)
+    return task if own_machine == machine else None
 
 
 def forbid_quick(option: str, *, quick: bool) -> None:
@@ -301,6 +351,16 @@ def write_records(
         except OSError as error:
             failures.append(ReportFailure(f"{path} cannot be written: {reason(error)}"))
     return replace(measurement, failures=tuple(failures), remarks=tuple(remarks))
+
+
+def file_of(mjbench: Mjbench, **report: object) -> bytes:
+    """The file of a report, which mjbench writes."""
+    return msgspec.json.decode(mjbench.do("write", None, **report), type=str).encode()
+
+
+def recorded_value(root: Path, kind: ReportKind[Any], model: str = "") -> Any:
+    """A recorded report with all its fields; it has been read before."""
+    return msgspec.json.decode(read_bytes(root, kind.path(model)))[kind.field]
 
 
 _SUPERSCRIPTS = str.maketrans("-\u22120123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

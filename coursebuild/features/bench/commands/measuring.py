@@ -1,218 +1,236 @@
-"""Measures the scenarios of a scene, with its compiled model and a clock.
+"""Measures through mjbench, a program of its own, in a process that ends with its user.
 
-The clock is the processor time of this thread: it stands still while others run.
+It answers jobs as lines of JSON, see `mjbench/jobs.py`. On the way it asks what only a course
+knows: what the file of an exact motion prints, how fast a model runs in the browser's engine, which
+of the course's scripts and labs print something else with changed files.
 """
 
 from __future__ import annotations
 
-import json
+import contextlib
 import os
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+import tempfile
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Literal, Self
 
 import msgspec
-import mujoco
-import numpy as np
-from msgspec import Struct
-from msgspec.structs import replace
+from msgspec import Raw, Struct
 
-from coursebuild.core.model.results import Outcome, ScriptJob
-from coursebuild.core.model.scenarios import DeclaredSweep
-from coursebuild.core.run.script_environment import one_processor
+from coursebuild.core.files.errors import EffectError, require
+from coursebuild.core.model.results import Machine, Outcome, ScriptJob
+from coursebuild.core.model.scenarios import exact_file
+from coursebuild.core.run import gate
+from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.run.script_server import ScriptServer
-from coursebuild.core.text.diagnostics import diagnose
-from coursebuild.core.text.source import Source
-from coursebuild.features.bench.commands.measurement import CannotMeasureError
-from coursebuild.numerics.problem import Array
-from coursebuild.numerics.pruning.comparison import watch
-from coursebuild.numerics.pruning.reachability import possible_pairs
-from coursebuild.numerics.reports.case_report import exact_file
-from coursebuild.numerics.reports.scene_report import (
-    ScenarioReport,
-    SceneCard,
-    SceneReport,
-    SweepReport,
-)
-from coursebuild.numerics.scene import (
-    EXACT_SCRIPT,
-    ExactMotion,
-    ExactStates,
-    SceneError,
-    scenes,
-)
-from coursebuild.numerics.scene import Scene as PhysicsScene
-from coursebuild.numerics.simulation import silent
-from coursebuild.numerics.sweep import THREADS, measure_sweep
-from coursebuild.numerics.work_precision import measure_scenario
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.source import Source, Span
 from coursebuild.pipeline.scenes import CourseScene
 
 _SECONDS = 20.0
-"""Limit of a run, in seconds of processor time."""
+"""Limit of a run in the browser's engine, in seconds of processor time."""
 
 
-class CompiledScene(Struct, frozen=True):
-    """A scene, compiled in this process."""
+class Facts(Struct, frozen=True):
+    """What mjbench is here: all that its figures depend on beside the models."""
 
-    scene: CourseScene
-    model: Any
-    """An `mjModel`."""
-    scenarios: tuple[PhysicsScene, ...]
-    spec: Any = None
-    """Its `mjSpec`, from which it can be compiled with other parameters."""
+    code: str
+    machine: Machine
+    pinned: Machine
+    problems: tuple[str, ...]
 
 
-def compile_scene(root: Path, scene: CourseScene, *, quick: bool) -> CompiledScene:
-    """Compile a scene and find its scenarios; a `CannotMeasureError` where it cannot be done."""
-    with report_errors(scene):
-        model = _compile_model(root, scene)
-        exact = _exact_motion(root, scene)
-        scenarios = scenes(model, scene.declarations, quick=quick)
-        scenarios = tuple(replace(scenario, exact=exact) for scenario in scenarios)
-        spec = mujoco.MjSpec.from_file(str(root / scene.model.source.path))
-        return CompiledScene(scene, model, scenarios, spec)
+class Place(Struct, frozen=True):
+    """A file, and in TOML the keys that lead to a value."""
+
+    path: str
+    keys: tuple[str | int, ...] = ()
 
 
-def run_scenario(
-    compiled_scene: CompiledScene,
-    number: int,
-    *,
-    quick: bool,
-    timed: bool,
-    tell: Callable[[str], None],
-) -> ScenarioReport:
-    """Measure a scenario, given by its number; a `CannotMeasureError` where it cannot be done."""
-    clock = time.thread_time_ns if timed else None
-    with report_errors(compiled_scene.scene), one_processor():
-        scenario = compiled_scene.scenarios[number]
-        return measure_scenario(compiled_scene.model, scenario, quick=quick, clock=clock, tell=tell)
+class Failure(Struct, frozen=True):
+    """Why there is no result."""
+
+    message: str
+    help: str = ""
+    place: Place | None = None
+    """`None` where it is not about a model's files."""
+    cause: Literal["scenario", "model", ""] = ""
+    """What is wrong: the model, or what is declared beside it."""
 
 
-def run_sweep(
-    compiled_scene: CompiledScene,
-    sweep: DeclaredSweep,
-    *,
-    quick: bool,
-    timed: bool,
-    tell: Callable[[str], None],
-    piece: slice | None = None,
-) -> SweepReport:
-    """Measure a sweep, or a piece without threads; a `CannotMeasureError` if it cannot be done."""
-    tell(sweep.name)
-    clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
-    scenario = next(s for s in compiled_scene.scenarios if sweep.scenario in (None, s.name))
-    threads = tuple(part for part in sweep.variations if part.parameter == THREADS)
-    single_thread = tuple(part for part in sweep.variations if part.parameter != THREADS)
-    reports = []
-    with report_errors(compiled_scene.scene):
-        for variations in filter(None, (single_thread, threads if piece is None else ())):
-            part = replace(sweep, variations=variations)
-            # One processor, unless what is measured is how it goes on several.
-            with one_processor() if variations is single_thread else nullcontext():
-                report = measure_sweep(
-                    compiled_scene.spec, scenario, part, clocks, quick=quick, piece=piece
-                )
-            reports.append(report)
-    return replace(reports[0], rows=tuple(row for report in reports for row in report.rows))
+class FailedJobError(Exception):
+    """mjbench gives no result."""
+
+    def __init__(self, failure: Failure) -> None:
+        super().__init__(failure.message)
+        self.failure = failure
 
 
-@contextmanager
-def report_errors(
-    scene: CourseScene, failure: str = "the model `{}` cannot be measured", *errors: type[Exception]
-) -> Iterator[None]:
-    """Turn errors into a `CannotMeasureError` with their places, and silence MuJoCo's warnings.
-
-    `failure` says what is not possible because of one of `errors`, or of what MuJoCo refuses to
-    run, such as a model that asks for less memory than it needs.
-    """
-    try:
-        with silent():
-            yield
-    except SceneError as error:
-        place = error.span or scene.declarations.source.span(0, 0)
-        diagnostic = diagnose("scenario-model", place, error.message, help=error.help)
-        raise CannotMeasureError(diagnostic) from None
-    except (mujoco.FatalError, *errors) as error:
-        message = f"{failure.format(scene.name)}: {' '.join(str(error).split())}"
-        place = scene.model.source.span(0, 0)
-        raise CannotMeasureError(diagnose("model-error", place, message)) from None
+class _Question(Struct, frozen=True):
+    exact: tuple[str, ...] = ()
+    seconds: float = 0.0
+    browser: tuple[int | None, float] | None = None
+    rerun: Mapping[str, bytes] | None = None
 
 
-def _compile_model(root: Path, scene: CourseScene) -> Any:
-    path = str(root / scene.model.source.path)
-    return mujoco.MjModel.from_xml_path(path, assets={path: scene.model.source.text.encode()})
+class _Line(Struct, frozen=True):
+    tell: str | None = None
+    ask: _Question | None = None
+    failure: Failure | None = None
+    result: Raw = Raw(b"")
 
 
-def _exact_motion(root: Path, scene: CourseScene) -> ExactMotion | None:
-    """Return the exact motion, if the course has code for it, which runs in a child."""
-    path = exact_file(scene.name)
-    if not (root / path).is_file():
-        return None
-    span = Source(path, "").span(0, 0)
+class Mjbench:
+    """The process, started with the first job."""
 
-    def states(times: Array, qpos: Array, qvel: Array) -> ExactStates:
-        request = {"times": times.tolist(), "qpos": qpos.tolist(), "qvel": qvel.tolist()}
-        script = os.path.relpath(EXACT_SCRIPT, root)
-        job = ScriptJob(script, (path, json.dumps(request)), _SECONDS, ())
-        with ScriptServer() as server:
-            (run,) = server.run(root, (job,), parallel=1)
+    def __init__(
+        self,
+        root: Path,
+        purpose: str,
+        *,
+        tell: Callable[[str], None] = lambda text: None,
+        rerun: Callable[[Mapping[str, bytes]], str] = lambda files: "",
+    ) -> None:
+        """`purpose`: the command that needs it; `rerun`: names what prints something else."""
+        self.tell = tell
+        self.rerun = rerun
+        self._root = root
+        self._purpose = purpose
+        self._scene: CourseScene | None = None
+        self._process: gate.Process | None = None
+        self._errors: IO[bytes] | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        process, self._process = self._process, None
+        if process is None:
+            return
+        process.kill()
+        process.wait()
+        for file in (process.stdin, process.stdout, self._errors):
+            if file is not None:
+                with contextlib.suppress(BrokenPipeError):
+                    file.close()
+
+    def facts(self) -> Facts:
+        """Say what is here."""
+        return msgspec.json.decode(self.do("about"), type=Facts)
+
+    def do(self, job: str, scene: CourseScene | None = None, **values: object) -> bytes:
+        """Do a job, about a scene if it is about one; return the JSON of its result.
+
+        Raises:
+            FailedJobError: it says why there is none.
+            EffectError: mjbench is not installed, or it ended.
+        """
+        self._scene = scene
+        subject = {} if scene is None else {"subject": subject_of(self._root, scene)}
+        process = self._process or self._start()
+        self._send(process, {"job": job, **subject, **values})
+        assert process.stdout is not None
+        while text := process.stdout.readline():
+            line = msgspec.json.decode(text, type=_Line)
+            if line.tell is not None:
+                self.tell(line.tell)
+            elif line.ask is not None:
+                self._send(process, self._answer(line.ask))
+            elif line.failure is not None:
+                raise FailedJobError(line.failure)
+            else:
+                return bytes(line.result)
+        raise EffectError(f"the process of mjbench ended: {self._last_words(process)}")
+
+    def _last_words(self, process: gate.Process) -> str:
+        status = process.wait()
+        assert self._errors is not None
+        self._errors.seek(0)
+        lines = self._errors.read().decode("utf-8", "replace").strip().splitlines()
+        self.__exit__()
+        return lines[-1] if lines else f"with status {status}"
+
+    def _start(self) -> gate.Process:
+        require("mjbench", "measure", self._purpose)
+        python_path = os.environ.get("PYTHONPATH", "")  # where the user has further packages
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115  # it is closed with the process
+        self._process = gate.start(
+            gate.module_command("mjbench", "jobs", python_path=python_path),
+            gate.environment(*gate.COMPUTING),
+            stdin=gate.PIPE,
+            stdout=gate.PIPE,
+            stderr=self._errors,
+        )
+        return self._process
+
+    def _send(self, process: gate.Process, value: object) -> None:
+        assert process.stdin is not None
         try:
-            answer = msgspec.json.decode(run.stdout, type=_Answer)
-            motions = {}
-            for name in ("motion", "acceleration"):
-                if (rows := getattr(answer, name)) is not None:
-                    qpos, *rest = (np.array(part) for part in zip(*rows, strict=True))
-                    motions[name] = (qpos, rest[0] if rest else None)
-        except (msgspec.DecodeError, ValueError):
-            last = run.stderr.strip().splitlines()[-1:] or [run.outcome.value]
-            reasons = {
-                Outcome.OK: "its numbers of coordinates change" if run.stdout else "it exits",
-                Outcome.TIMEOUT: f"it takes longer than {_SECONDS:g} s",
-            }
-            message = f"`{path}` gives no motion: {reasons.get(run.outcome, last[0])}"
-            help = "define `motion(time, qpos, qvel)` there, for the positions at a time in s"
-            raise SceneError(message, span, help) from None
-        return ExactStates(motions, answer.expected)
+            process.stdin.write(msgspec.json.encode(value) + b"\n")
+            process.stdin.flush()
+        except BrokenPipeError:
+            pass  # it ended, which reading will show
 
-    return ExactMotion(span, states)
+    def _answer(self, question: _Question) -> object:
+        if question.rerun is not None:
+            return self.rerun(question.rerun)
+        if question.browser is not None:
+            return self._browser_speed(*question.browser)
+        script, *arguments = question.exact
+        job = ScriptJob(os.path.relpath(script, self._root), tuple(arguments), question.seconds, ())
+        with ScriptServer() as server:
+            (run,) = server.run(self._root, (job,), parallel=1)
+        failure = ""
+        if run.outcome is Outcome.TIMEOUT:
+            failure = f"it takes longer than {question.seconds:g} s"
+        elif run.outcome is not Outcome.OK:
+            lines = run.stderr.strip().splitlines()
+            failure = lines[-1] if lines else run.outcome.value
+        return {"output": run.stdout, "failure": failure}
+
+    def _browser_speed(self, key: int | None, duration: float) -> float | None:
+        from coursebuild.features.lab.engines.browser import real_time_factor
+
+        assert self._scene is not None
+        run = duration, self._scene.facts.timestep
+        return real_time_factor(self._root, self._scene.model.source, key, run, _SECONDS)
 
 
-class _Answer(Struct, frozen=True):
-    """What the script that evaluates an exact motion says; each part where its file has it."""
-
-    motion: list[list[list[float]]] | None = None
-    acceleration: list[list[list[float]]] | None = None
-    expected: dict[str, float] = {}
-
-
-def add_card(
-    root: Path, scene: CourseScene, report: SceneReport, seconds: float = _SECONDS
-) -> SceneReport:
-    """Add the model's card to its report; a run in the browser's engine may take `seconds`."""
-    from coursebuild.core.run.mjcf import existing_files
-    from coursebuild.features.lab.engines.browser import real_time_factor
-
-    source = scene.model.source
-    with silent():  # MuJoCo would write its warnings into the working directory
-        model = _compile_model(root, scene)
-        scenarios = scenes(model, scene.declarations)
-        touching_pairs = {
-            pair for scenario in scenarios for pair in watch(model, scenario).touching_pairs
-        }
+def subject_of(root: Path, scene: CourseScene) -> dict[str, object]:
+    """A scene as mjbench is told of it: texts as they were read, so that all fits its digest."""
+    source, table = scene.model.source, scene.declarations.source
+    exact, is_declared = exact_file(scene.name), table.path != source.path
     files = (root / path for path in existing_files(root, source.path, source.text))
-    first = scenarios[0].scenario
-    key = None if first.keyframe < 0 else first.keyframe
-    run = first.duration, scene.facts.timestep
-    card = SceneCard(
-        bodies=int(model.nbody) - 1,
-        geoms=int(model.ngeom),
-        freedom=int(model.nv),
-        possible=len(possible_pairs(model)),
-        touched=len(touching_pairs),
-        mjcf=len(source.text.encode()) + sum(path.stat().st_size for path in files),
-        mjb=int(mujoco.mj_sizeModel(model)),
-        browser=real_time_factor(root, source, key, run, seconds),
-    )
-    return replace(report, card=card)
+    return {
+        "folder": str(root),
+        "path": source.path,
+        "mjcf": source.text,
+        "name": scene.name,
+        "digest": scene.digest,
+        "declarations_path": table.path if is_declared else "",
+        "declarations": table.text if is_declared else "",
+        "exact": exact if (root / exact).is_file() else "",
+        "parts": sum(path.stat().st_size for path in files),
+    }
+
+
+def diagnostic_of(failure: Failure, scene: CourseScene) -> Diagnostic:
+    """What mjbench says of a model, at its place in the course."""
+    place = failure.place or Place(scene.model.source.path)
+    rule = "model-error" if failure.cause == "model" else "scenario-model"
+    return diagnose(rule, _span(place, scene), failure.message, help=failure.help)
+
+
+def _span(place: Place, scene: CourseScene) -> Span:
+    declarations, model = scene.declarations, scene.model.source
+    sources = {source.path: source for source in (model, declarations.source)}
+    match place.keys:
+        case ("scenario", int(number)):
+            return declarations.scenarios[number].span
+        case ("scenario", int(number), str(field)):
+            return declarations.scenarios[number].place(field)
+        case ("sweep", int(number), _, str(parameter)):
+            variations = declarations.sweeps[number].variations
+            return next(part.span for part in variations if part.parameter == parameter)
+        case _:
+            return sources.get(place.path, Source(place.path, "")).span(0, 0)

@@ -1,0 +1,362 @@
+"""Reports of mjbench as files of the course, `content/reports/…`: what of them is shown.
+
+mjbench's `schemas/` say what each field means, and in which unit. A field that is not here is not
+shown; one that is here and is missing in a file makes it a damaged one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from msgspec import Struct
+
+from coursebuild.core.model.results import Machine
+
+FLOORS = 10.0
+"""Errors below this many floors of the reference are not given."""
+
+
+class Interval(Struct, frozen=True):
+    """A figure that varies between measurements, with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def scale(self, factor: float) -> Interval:
+        """The interval in another unit."""
+        return Interval(factor * self.value, factor * self.low, factor * self.high)
+
+    @property
+    def half_width(self) -> float:
+        """Relative to the value; infinite where that is 0."""
+        return (self.high - self.low) / (2 * self.value) if self.value else math.inf
+
+
+class SweepRow(Struct, frozen=True):
+    """A model with one parameter at one value."""
+
+    parameter: str
+    value: str
+    own: bool
+    status: str
+    reasons: tuple[str, ...] = ()
+    change: float | None = None
+    parted: float | None = None
+    figure: float | None = None
+    penetration: float | None = None
+    slip: float | None = None
+    restitution: float | None = None
+    residual: float | None = None
+    iterations: float | None = None
+    cost: Interval | None = None
+    throughput: Interval | None = None
+
+
+class SweepReport(Struct, frozen=True):
+    """All values of the parameters of a sweep."""
+
+    name: str
+    title: str
+    scenario: str
+    show: tuple[str, ...]
+    rows: tuple[SweepRow, ...]
+
+
+class MeasuredSetting(Struct, frozen=True):
+    """What can be chosen without changing the scene."""
+
+    integrator: str
+    timestep: float
+    solver: str
+    iterations: int
+    cone: str
+    options: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def solver_settings(self) -> tuple[str, int, str, tuple[tuple[str, str], ...]]:
+        """All but integrator and timestep."""
+        return self.solver, self.iterations, self.cone, self.options
+
+
+class Errors(Struct, frozen=True):
+    """How far a motion is from its reference: at its largest, and at its end."""
+
+    position: tuple[float, float] | None
+    attitude: tuple[float, float] | None
+    velocity: tuple[float, float] | None
+
+
+class MeasuredRun(Errors, frozen=True):
+    """One run against its reference."""
+
+    status: str
+    reasons: tuple[str, ...]
+    energy_drift: float | None
+    momentum_drift: float | None
+    penetration: float
+    refsafe: bool
+
+
+def step_evaluations(integrator: str) -> int:
+    """How often a step computes the forward dynamics."""
+    return 4 if integrator == "RK4" else 1
+
+
+class WorkPrecisionRow(MeasuredRun, frozen=True):
+    """One setting in one scenario."""
+
+    setting: MeasuredSetting
+    figure: tuple[float, float] | None
+    slip: float | None
+    model_error: float | None
+    steps: int
+    cost: Interval | None
+    seconds: Interval | None
+    own: bool
+    front: bool
+    dominated_by: int | None
+    seen: float | None = None
+    parted: float | None = None
+    evaluations: int = 0
+    iterations: float | None = None
+    lucky: str = ""
+    same: bool = False
+
+    @property
+    def realtime(self) -> float | None:
+        """Simulated time over processor time."""
+        return 1 / self.seconds.value if self.seconds and self.seconds.value else None
+
+    @property
+    def work(self) -> int:
+        """`evaluations`, also where they were not recorded."""
+        return self.evaluations or max(self.steps, 1) * step_evaluations(self.setting.integrator)
+
+
+class FittedOrder(Struct, frozen=True):
+    """The power of the timestep that errors are proportional to."""
+
+    value: float
+    uncertainty: float
+    bend: float
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return f"{self.value:.2f} ± {self.uncertainty:.2f}, bend {self.bend:.2f}"
+
+
+class OrderRow(Struct, frozen=True):
+    """Orders of an integrator; `None` where errors are too few, or follow no one power."""
+
+    integrator: str
+    position: FittedOrder | None
+    attitude: FittedOrder | None
+    velocity: FittedOrder | None
+
+    @property
+    def has_orders(self) -> bool:
+        """Whether an order is known for any of the errors."""
+        return any(order is not None for order in (self.position, self.attitude, self.velocity))
+
+
+class StableRow(Struct, frozen=True):
+    """The largest stable timestep of an integrator in a scenario."""
+
+    integrator: str
+    largest: float | None
+    searched: tuple[float, float]
+    islands: tuple[float, float] | None
+    duration: float
+    steps: int
+    tried: int
+    energy: float | None
+    bracket: tuple[float, float] | None = None
+    theory: float | None = None
+    formula: str = ""
+    orbital: float | None = None
+    periodic: bool = False
+    gain: tuple[float, float] | None = None
+    tries: tuple[tuple[float, int, int], ...] = ()
+
+
+class FigureLine(Struct, frozen=True):
+    """A quantity that was measured and is known."""
+
+    name: str
+    unit: str
+    integrator: str
+    measured: float | None
+    exact: float | None
+    source: str
+    spread: tuple[float, float] | None = None
+
+
+class RowVerdict(Struct, frozen=True):
+    """What is said of the scene's own setting."""
+
+    on_front: bool
+    better: int | None
+    noticeable: bool | None
+    text: str
+
+
+class ScenarioReport(Struct, frozen=True):
+    """Everything that was measured in a scenario."""
+
+    name: str
+    title: str
+    duration: float
+    horizon: float
+    hold: float
+    reference: str
+    source: str
+    floor: float
+    second: str
+    agreement: float | None
+    lyapunov: float | None
+    figure: str
+    rows: tuple[WorkPrecisionRow, ...]
+    orders: tuple[OrderRow, ...]
+    stable: tuple[StableRow, ...]
+    verdict: RowVerdict
+    velocity_floor: float = 0.0
+    notes: tuple[str, ...] = ()
+    figures: tuple[FigureLine, ...] = ()
+    horizons: tuple[float, float] | None = None
+    least_seen: float = 0.0
+    least_figure: float = 0.0
+    cost_of: MeasuredSetting | None = None
+    horizon_error: Mapping[str, float] = {}
+
+    @property
+    def own_setting(self) -> MeasuredSetting | None:
+        """The scene's own setting; `None` where there are no rows."""
+        return next((row.setting for row in self.rows if row.own), None)
+
+
+class SceneCard(Struct, frozen=True):
+    """The size of a model, and how fast the browser's engine runs it."""
+
+    possible: int
+    touched: int
+    mjcf: int
+    mjb: int
+    browser: float | None
+
+
+class SceneReport(Struct, frozen=True):
+    """Everything that was measured on a model."""
+
+    model: str
+    digest: str
+    quick: bool
+    machine: Machine
+    scenarios: tuple[ScenarioReport, ...]
+    card: SceneCard | None = None
+    sweeps: tuple[SweepReport, ...] = ()
+
+
+class BoundaryLine(StableRow, frozen=True):
+    """The largest stable timestep of an integrator, compared with theory."""
+
+    difference: float | None = None
+    beyond: str = ""
+    growth: float | None = None
+
+
+class StepCost(Struct, frozen=True):
+    """The time of a step of an integrator."""
+
+    integrator: str
+    seconds: Interval
+
+
+class ErrorLine(MeasuredRun, frozen=True):
+    """An integrator at a timestep."""
+
+    integrator: str
+    timestep: float
+
+
+class ReferenceLine(Struct, frozen=True):
+    """The reference that errors were measured against, and how well it is known."""
+
+    kind: str
+    source: str
+    second: str
+    position: float
+    attitude: float
+    velocity: float
+
+
+class CaseReport(Struct, frozen=True):
+    """Everything that was measured on a hard case."""
+
+    name: str
+    title: str
+    case: int
+    machine: Machine
+    note: str
+    reference: ReferenceLine
+    boundaries: tuple[BoundaryLine, ...]
+    figures: tuple[FigureLine, ...]
+    orders: tuple[OrderRow, ...]
+    errors: tuple[ErrorLine, ...]
+    costs: tuple[StepCost, ...]
+
+
+class BatchCost(Struct, frozen=True):
+    """What a step costs among so many worlds."""
+
+    worlds: int
+    seconds: Interval | None = None
+    ratio: Interval | None = None
+    compile_seconds: float | None = None
+    remark: str = ""
+
+
+class EngineRow(Errors, frozen=True):
+    """An engine on a device, in one precision."""
+
+    engine: str
+    title: str
+    versions: tuple[tuple[str, str], ...]
+    status: str
+    message: str = ""
+    device: str = ""
+    label: str = ""
+    bits: int = 0
+    threads: int = 0
+    compile_seconds: float | None = None
+    apart: float | None = None
+    energy_drift: float | None = None
+    costs: tuple[BatchCost, ...] = ()
+
+
+class EngineScenario(Struct, frozen=True):
+    """All engines in a scenario."""
+
+    name: str
+    title: str
+    duration: float
+    horizon: float
+    reference: str
+    source: str
+    floor: float
+    velocity_floor: float
+    setting: MeasuredSetting
+    rows: tuple[EngineRow, ...]
+
+
+class EngineReport(Struct, frozen=True):
+    """Everything that was measured on a model in other engines."""
+
+    model: str
+    digest: str
+    quick: bool
+    machine: Machine
+    load: float
+    scenarios: tuple[EngineScenario, ...]

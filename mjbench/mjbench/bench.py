@@ -1,0 +1,279 @@
+"""Measures a model file: its scenarios, its sweeps, and what it is made of.
+
+The clock is the processor time of this thread: it stands still while others run.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import msgspec
+import mujoco
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from mjbench.declarations import (
+    DeclarationError,
+    Declarations,
+    Place,
+    parse_declarations,
+)
+from mjbench.host import Host
+from mjbench.machine import one_processor, this_machine
+from mjbench.problem import Array
+from mjbench.pruning.comparison import watch
+from mjbench.pruning.reachability import possible_pairs
+from mjbench.reports.scene_report import (
+    ScenarioReport,
+    SceneCard,
+    SceneReport,
+    SweepReport,
+)
+from mjbench.scene import ExactMotion, ExactStates, Scene, SceneError, scenes
+from mjbench.simulation import silent
+from mjbench.sweep import THREADS, measure_sweep
+from mjbench.work_precision import measure_scenario
+
+EXACT_SECONDS = 20.0
+"""Processor time that the file of an exact motion may take for one answer."""
+
+
+SweepPart: TypeAlias = Literal["all", "values", "threads"]
+
+
+class CannotMeasureError(Exception):
+    """A model cannot be measured, or looked at; `place` is where the reason is."""
+
+    def __init__(
+        self,
+        message: str,
+        place: Place,
+        help: str = "",
+        cause: Literal["scenario", "model"] = "model",
+    ) -> None:
+        """`cause` says what is wrong: the model, or what is declared beside it."""
+        super().__init__(message)
+        self.cause = cause
+        self.message = message
+        self.place = place
+        self.help = help
+
+
+class Subject(Struct, frozen=True):
+    """A model file with what lies beside it, as it is to be measured."""
+
+    folder: str
+    """Where all paths begin."""
+    path: str
+    """The model's file, POSIX."""
+    mjcf: str
+    """Its text."""
+    name: str
+    """What reports call the model."""
+    digest: str
+    """A hash of all that its figures depend on, for reports."""
+    declarations_path: str = ""
+    """The file of its declarations; empty without one."""
+    declarations: str = ""
+    """The text of that."""
+    exact: str = ""
+    """The file of its exact motion; empty without one."""
+    parts: int = 0
+    """The size of the files that the model pulls in, bytes."""
+
+    @property
+    def place(self) -> Place:
+        """The model's file."""
+        return Place(self.path)
+
+    def read_declarations(self) -> Declarations:
+        """The declarations; a `CannotMeasureError` where they cannot be read."""
+        if not self.declarations_path:
+            return Declarations(self.path)
+        try:
+            return parse_declarations(self.declarations_path, self.declarations)
+        except DeclarationError as error:
+            raise CannotMeasureError(
+                str(error), Place(self.declarations_path), cause="scenario"
+            ) from None
+
+    def compile(self) -> Any:
+        """Its `mjModel`."""
+        path = str(Path(self.folder, self.path))
+        return mujoco.MjModel.from_xml_path(path, assets={path: self.mjcf.encode()})
+
+
+class CompiledModel(Struct, frozen=True):
+    """A model, compiled in this process, with its scenarios."""
+
+    subject: Subject
+    model: Any
+    """An `mjModel`."""
+    declarations: Declarations
+    scenarios: tuple[Scene, ...]
+    spec: Any
+    """Its `mjSpec`, from which it can be compiled_model with other parameters."""
+
+
+def compile_subject(subject: Subject, host: Host, *, quick: bool) -> CompiledModel:
+    """Compile a model and find its scenarios; a `CannotMeasureError` where it cannot be done."""
+    declarations = subject.read_declarations()
+    with report_errors(subject):
+        model = subject.compile()
+        exact = _exact_motion(subject, host)
+        found_scenes = scenes(model, declarations, quick=quick)
+        found_scenes = tuple(replace(scene, exact=exact) for scene in found_scenes)
+        spec = mujoco.MjSpec.from_file(str(Path(subject.folder, subject.path)))
+        return CompiledModel(subject, model, declarations, found_scenes, spec)
+
+
+def run_scenario(
+    compiled_model: CompiledModel, number: int, host: Host, *, quick: bool, timed: bool
+) -> ScenarioReport:
+    """Measure a scenario, given by its number; a `CannotMeasureError` where it cannot be done."""
+    clock = time.thread_time_ns if timed else None
+    with report_errors(compiled_model.subject), one_processor():
+        scenario = compiled_model.scenarios[number]
+        return measure_scenario(
+            compiled_model.model, scenario, quick=quick, clock=clock, tell=host.tell
+        )
+
+
+def run_sweep(
+    compiled_model: CompiledModel,
+    name: str,
+    host: Host,
+    *,
+    quick: bool,
+    timed: bool,
+    part: SweepPart = "all",
+    piece: slice | None = None,
+) -> SweepReport:
+    """Measure a sweep, or a part of it; a `CannotMeasureError` if it cannot be done.
+
+    `part`: all, or only the number of threads, or only the other values; `piece`: which of these.
+    """
+    host.tell(name)
+    sweep = next(sweep for sweep in compiled_model.declarations.sweeps if sweep.name == name)
+    clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
+    scenario = next(s for s in compiled_model.scenarios if sweep.scenario in (None, s.name))
+    of_threads = tuple(v for v in sweep.variations if v.parameter == THREADS)
+    of_values = tuple(v for v in sweep.variations if v.parameter != THREADS)
+    groups = {"all": (of_values, of_threads), "values": (of_values,), "threads": (of_threads,)}
+    reports = []
+    with report_errors(compiled_model.subject):
+        for variations in filter(None, groups[part]):
+            part_sweep = replace(sweep, variations=variations)
+            # One processor, unless what is measured is how it goes on several.
+            with one_processor() if variations is of_values else nullcontext():
+                report = measure_sweep(
+                    compiled_model.spec, scenario, part_sweep, clocks, quick=quick, piece=piece
+                )
+            reports.append(report)
+    return replace(reports[0], rows=tuple(row for report in reports for row in report.rows))
+
+
+def join_parts(
+    compiled_model: CompiledModel,
+    scenarios: Sequence[ScenarioReport],
+    sweeps: Sequence[SweepReport],
+    host: Host,
+    *,
+    quick: bool,
+    card: bool,
+) -> SceneReport:
+    """The report on a model of what was measured of it; with `card`, also what it is made of."""
+    report = SceneReport(
+        model=compiled_model.subject.name,
+        digest=compiled_model.subject.digest,
+        quick=quick,
+        machine=this_machine(pinned=True),
+        scenarios=tuple(scenarios),
+        sweeps=tuple(sweeps),
+    )
+    return replace(report, card=_card(compiled_model, host)) if card and scenarios else report
+
+
+@contextmanager
+def report_errors(
+    subject: Subject, failure: str = "the model `{}` cannot be measured", *errors: type[Exception]
+) -> Iterator[None]:
+    """Turn errors into a `CannotMeasureError` with their places, and silence MuJoCo's warnings.
+
+    `failure` says what is not possible because of one of `errors`, or of what MuJoCo refuses to
+    run, such as a model that asks for less memory than it needs.
+    """
+    try:
+        with silent():
+            yield
+    except SceneError as error:
+        place = error.place or Place(subject.declarations_path or subject.path)
+        raise CannotMeasureError(error.message, place, error.help, "scenario") from None
+    except (mujoco.FatalError, *errors) as error:
+        message = f"{failure.format(subject.name)}: {' '.join(str(error).split())}"
+        raise CannotMeasureError(message, subject.place) from None
+
+
+def _exact_motion(subject: Subject, host: Host) -> ExactMotion | None:
+    """The exact motion, if there is code for it, which runs in a process of its own."""
+    path = subject.exact
+    if not path:
+        return None
+
+    def states(times: Array, qpos: Array, qvel: Array) -> ExactStates:
+        query = {"times": times.tolist(), "qpos": qpos.tolist(), "qvel": qvel.tolist()}
+        run = host.run_exact(path, json.dumps(query), EXACT_SECONDS)
+        try:
+            answer = msgspec.json.decode(run.output, type=_Answer)
+            motions = {}
+            for name in ("motion", "acceleration"):
+                if (rows := getattr(answer, name)) is not None:
+                    qpos, *rest = (np.array(part) for part in zip(*rows, strict=True))
+                    motions[name] = (qpos, rest[0] if rest else None)
+        except (msgspec.DecodeError, ValueError):
+            reason = run.failure
+            if not reason:
+                reason = "its numbers of coordinates change" if run.output else "it exits"
+            message = f"`{path}` gives no motion: {reason}"
+            help = "define `motion(time, qpos, qvel)` there, for the positions at a time in s"
+            raise SceneError(message, Place(path), help) from None
+        return ExactStates(motions, answer.expected)
+
+    return ExactMotion(path, states)
+
+
+class _Answer(Struct, frozen=True):
+    """What the script that evaluates an exact motion says; each part where its file has it."""
+
+    motion: list[list[list[float]]] | None = None
+    acceleration: list[list[list[float]]] | None = None
+    expected: dict[str, float] = {}
+
+
+def _card(compiled_model: CompiledModel, host: Host) -> SceneCard:
+    """What a model is made of; how fast it runs in a browser is for the host to say."""
+    subject, model = compiled_model.subject, compiled_model.model
+    with silent():  # MuJoCo would write its warnings into the working directory
+        touching_pairs = {
+            pair
+            for scene in scenes(model, compiled_model.declarations)
+            for pair in watch(model, scene).touching_pairs
+        }
+    first = compiled_model.scenarios[0].scenario
+    key = None if first.keyframe < 0 else first.keyframe
+    return SceneCard(
+        bodies=int(model.nbody) - 1,
+        geoms=int(model.ngeom),
+        freedom=int(model.nv),
+        possible=len(possible_pairs(model)),
+        touched=len(touching_pairs),
+        mjcf=len(subject.mjcf.encode()) + subject.parts,
+        mjb=int(mujoco.mj_sizeModel(model)),
+        browser=host.browser_speed(key, first.duration),
+    )

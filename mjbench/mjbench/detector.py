@@ -1,0 +1,239 @@
+"""Whether a simulation went well: divergence never passes as success.
+
+1. MuJoCo resets a state that has become huge or no number, and carries on: a run that blew up can
+   end in its initial state, with no error at all. Only the warning counters and the clock tell.
+2. A slow growth raises no warning for a long time: the state is compared with what can be.
+3. A state may shoot up and come back: the peaks on the way count, not only the end.
+4. Bodies that were pushed deep into each other raise no warning either.
+5. Where nothing drives the motion, potential and kinetic energy together are conserved or fall: a
+   run that has many times as much is lost, however finite it stays.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+
+from mjbench.problem import Array, Scenario, Setup
+
+BAD_STATES = {
+    int(mujoco.mjtWarning.mjWARN_BADQPOS): "positions",
+    int(mujoco.mjtWarning.mjWARN_BADQVEL): "velocities",
+    int(mujoco.mjtWarning.mjWARN_BADQACC): "accelerations",
+}
+"""The warnings of a simulation that is lost."""
+
+
+def has_bad_state(data: Any) -> bool:
+    """Whether MuJoCo has warned of a state that is lost."""
+    numbers = data.warning.number.tolist()  # seven times as fast as to look up single warnings
+    return any(numbers[kind] for kind in BAD_STATES)
+
+
+class RunStatus(enum.Enum):
+    """How a run went, the worst last."""
+
+    OK = "ok"
+    SLOW_GROWTH = "slow-growth"
+    """No warning, but the state left the range of what can be."""
+    DIVERGED = "diverged"
+    """MuJoCo warned of a huge acceleration, velocity or position, or the state is no number."""
+    RESET = "reset"
+    """MuJoCo put the state back to its beginning on the way: the end says nothing."""
+
+
+class RunJudgement(Struct, frozen=True):
+    """How a run went, and the reasons in words."""
+
+    status: RunStatus
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run may be used."""
+        return self.status is RunStatus.OK
+
+
+class Peaks(Struct, frozen=True):
+    """The largest values of a run so far."""
+
+    position: float = 0.0
+    """Largest |qpos|, m or rad; NaN once one was NaN."""
+    velocity: float = 0.0
+    """Largest |qvel|, m/s or rad/s; NaN once one was NaN."""
+    penetration: float = 0.0
+    """Deepest contact, m."""
+    sunk: float = 0.0
+    """The same relative to the half thickness of the thinner body, where thicknesses are known: at
+    1 its middle is at the other's surface."""
+    overlap: tuple[int, int, float] = (-1, -1, 0.0)
+    """Two geoms that lie deepest in each other, by number, and when, s."""
+    energy: float = -math.inf
+    """Potential and kinetic, J: under RK4 of the state, else of that before the last step, where
+    MuJoCo computes it."""
+    kinetic: float = 0.0
+    """J."""
+
+    @property
+    def finite(self) -> bool:
+        """Whether all positions and velocities were numbers."""
+        return math.isfinite(self.position) and math.isfinite(self.velocity)
+
+    def is_within(self, setup: Setup) -> bool:
+        """Whether all peaks are within the bounds of a setup."""
+        return (
+            self.finite
+            and self.position <= setup.position_bound
+            and self.velocity <= setup.velocity_bound
+            and self.energy <= setup.energy_bound
+            and self.penetration <= setup.penetration_bound
+            and self.sunk <= setup.sunk_bound
+        )
+
+
+_UNBOUNDED = Setup(scenario=Scenario(0.0, 0.0))
+
+
+def update_peaks(data: Any, before: Peaks, thickness: Array | None = None) -> Peaks:
+    """The peaks before, raised by the state in `data`.
+
+    `thickness`: half the thickness of every geom (ngeom + 1,), m; the last is for index -1, which
+    stands for no geom.
+    """
+    if data.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        # Contacts and energy are those of the last stage of a step, which is no state.
+        for compute in (
+            mujoco.mj_fwdPosition,
+            mujoco.mj_fwdVelocity,
+            mujoco.mj_energyPos,
+            mujoco.mj_energyVel,
+        ):
+            compute(data.model, data)
+    penetration, sunk, overlap = before.penetration, before.sunk, before.overlap
+    if data.ncon:
+        geoms, depths = data.contact.geom, -data.contact.dist
+        shares = depths if thickness is None else depths / thickness[geoms].min(axis=1)
+        worst, largest = int(shares.argmax()), float(shares.max())
+        if largest > (penetration if thickness is None else sunk):
+            overlap = (int(geoms[worst][0]), int(geoms[worst][1]), float(data.time))
+        penetration = max(penetration, float(depths.max()))
+        sunk = sunk if thickness is None else max(sunk, largest)
+    return Peaks(
+        _larger(before.position, data.qpos),
+        _larger(before.velocity, data.qvel),
+        penetration,
+        sunk,
+        overlap,
+        max(before.energy, float(data.energy[0] + data.energy[1])),
+        max(before.kinetic, float(data.energy[1])),
+    )
+
+
+def _larger(before: float, values: Array) -> float:
+    now = float(np.abs(values).max(initial=0.0))
+    return before if before >= now or math.isnan(before) else now
+
+
+def judge(
+    model: Any, data: Any, elapsed: float, before: Peaks | None = None, setup: Setup = _UNBOUNDED
+) -> RunJudgement:
+    """The worst status of a run that has ended after `elapsed` s, with every reason for it.
+
+    `before` holds the peaks on the way, `setup` the bounds.
+    """
+    peaks = update_peaks(data, Peaks() if before is None else before)
+    symptoms: list[tuple[RunStatus, str]] = []
+    if not peaks.finite:
+        symptoms.append((RunStatus.DIVERGED, "the state is not finite"))
+    for kind, subject in BAD_STATES.items():
+        if data.warning[kind].number:
+            symptoms.append((RunStatus.DIVERGED, f"MuJoCo warned of bad {subject}"))
+    if not abs(data.time - elapsed) <= model.opt.timestep / 2:
+        text = f"the clock says {data.time:.6g} s after {elapsed:.6g} s: the state was reset"
+        symptoms.append((RunStatus.RESET, text))
+    for size, bound, subject in (
+        (peaks.position, setup.position_bound, "positions"),
+        (peaks.velocity, setup.velocity_bound, "velocities"),
+    ):
+        if peaks.finite and not size <= bound:
+            text = f"{subject} reached {size / bound:.3g} times what can be"
+            symptoms.append((RunStatus.SLOW_GROWTH, text))
+    if peaks.finite and not peaks.energy <= setup.energy_bound:
+        text = f"energy reached {peaks.energy:.3g} J, where {setup.energy_bound:.3g} J can be"
+        symptoms.append((RunStatus.SLOW_GROWTH, text))
+    depth_ratio = max(peaks.penetration / setup.penetration_bound, peaks.sunk / setup.sunk_bound)
+    if not depth_ratio <= 1.0:
+        names, time = overlap_names(model, peaks), peaks.overlap[2]
+        share = f"{depth_ratio:.3g}" if depth_ratio >= 1.005 else "just over 1"
+        text = f"{names} lie {share} times as deep in each other as they may, at {time:.3g} s"
+        symptoms.append((RunStatus.DIVERGED, text))
+    worst = max((status for status, _ in symptoms), key=list(RunStatus).index, default=RunStatus.OK)
+    return RunJudgement(worst, tuple(text for _, text in symptoms))
+
+
+def overlap_names(model: Any, peaks: Peaks) -> str:
+    """What the two bodies are called that lie deepest in each other."""
+    geoms = peaks.overlap[:2]
+    return " and ".join(_body_of(model, geom) for geom in geoms) if max(geoms) >= 0 else "bodies"
+
+
+def _body_of(model: Any, geom: int) -> str:
+    """What the body of a geom is called; of one without a name, its nearest ancestor's."""
+    body = int(model.geom_bodyid[geom]) if geom >= 0 else 0
+    inner = ""
+    while body and not model.body(body).name:
+        body, inner = int(model.body_parentid[body]), "a part of "
+    if body:
+        return f"{inner}{model.body(body).name}"
+    return "a body without a name" if inner else "the world"
+
+
+def deepest_contact(data: Any) -> float:
+    """How deep bodies lie in each other now, m; 0 where nothing touches."""
+    if data.ncon == 0:
+        return 0.0
+    return max(0.0, -float(np.min(data.contact.dist[: data.ncon])))
+
+
+def driving_force(model: Any, scenario: Scenario) -> str:
+    """What may raise the energy of a motion, or store some that is not counted; "" for nothing."""
+    has_commands = np.any(scenario.controls) or (
+        scenario.keyframe >= 0 and np.any(model.key_ctrl[scenario.keyframe])
+    )
+    has_actuators = model.nu and not model.opt.disableflags & int(
+        mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    )
+    is_pushing = any(  # without a command too, as the range leaves 0 out
+        np.any((limited != 0) & ((ranges[:, 0] > 0) | (ranges[:, 1] < 0)))
+        for limited, ranges in (
+            (model.actuator_ctrllimited, model.actuator_ctrlrange),
+            (model.actuator_forcelimited, model.actuator_forcerange),
+        )
+    )
+    damping = [
+        getattr(model, f"{owner}_{name}")
+        for owner in ("dof", "tendon", "actuator")
+        for name in ("damping", "dampingpoly")
+    ]
+    has_fluid = model.opt.density > 0 or model.opt.viscosity > 0
+    causes = (
+        (
+            has_actuators
+            and (has_commands or is_pushing or model.na or np.any(model.actuator_biastype)),
+            "actuators act",
+        ),
+        (np.any(model.geom_surfacevel), "a surface moves"),
+        (np.any(model.geom_adhesion) or np.any(model.pair_adhesion), "contacts adhere"),
+        (has_fluid and np.any(model.geom_fluid[:, 0]), "a fluid stores energy"),
+        (has_fluid and np.any(model.opt.wind), "wind blows"),
+        (np.any(model.body_gravcomp), "gravity is compensated"),
+        (min(np.min(values, initial=0) for values in damping) < 0, "damping is negative"),
+        (model.nflex, "a flex stores energy"),
+        (model.nplugin, "a plugin acts"),
+    )
+    return ", ".join(words for applies, words in causes if applies)

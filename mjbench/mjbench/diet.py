@@ -1,0 +1,227 @@
+"""Looks for what a model file holds that its scenarios do not need, and writes it without that.
+
+1. Whoever starts it says who reads the model: texts of code, names that others ask for, files of
+   declarations that share a part of it.
+2. Changed files are read again, compiled and compared with the model that was run before anybody
+   gets them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import mujoco
+from msgspec import Struct
+from msgspec.structs import replace
+
+from mjbench.bench import CannotMeasureError, Subject, report_errors
+from mjbench.declarations import DeclarationError, Declarations, parse_declarations
+from mjbench.host import Host
+from mjbench.machine import this_machine
+from mjbench.pruning.comparison import pruning_scenes
+from mjbench.pruning.model_text import ModelText, ModelTextError, model_bytes, open_model
+from mjbench.pruning.readers import VIEWS, ModelReader, read_code
+from mjbench.pruning.survey import Survey, Surveyor
+from mjbench.pruning.xml_edits import MarkupError
+from mjbench.reports.diet_report import DietReport, Keep
+
+_NOT_DRAWN = frozenset(("Sensor", "Actuator", "Keyframe", "Numeric", "Tuple"))
+"""Kinds that a picture of the model does not show."""
+_SHAPES = ("alt", "fromto", "scale")
+"""Fields of a specification that give places or sizes, and that a model does not have."""
+
+
+class ReaderSource(Struct, frozen=True):
+    """Something that may read a model."""
+
+    path: str
+    """What messages call it."""
+    text: str | None = None
+    """Code: Python where the path ends so, else JavaScript."""
+    declarations: str | None = None
+    """A file of declarations, of this or another model that shares a file with it."""
+    names: tuple[str, ...] = ()
+    """Things that it asks for by name."""
+    kinds: tuple[str, ...] = ()
+    """Kinds of which it may read any thing."""
+    drawn: bool = False
+    """Whether it shows a picture of the model."""
+    opaque: str = ""
+    """Why it may use everything; empty where it does not."""
+
+
+class FileChange(Struct, frozen=True):
+    """A file before and after what is proved was taken out."""
+
+    path: str
+    before: bytes
+    after: bytes
+
+
+class DietResult(Struct, frozen=True):
+    """A report, and the files without what is proved."""
+
+    report: DietReport
+    changes: tuple[FileChange, ...]
+
+
+def look_at(
+    subject: Subject,
+    host: Host,
+    sources: Sequence[ReaderSource] = (),
+    *,
+    modules: frozenset[str] = frozenset(),
+    keeps: Sequence[Keep] = (),
+    locked: Mapping[str, str] | None = None,
+    quick: bool,
+    rerun: bool = False,
+) -> DietResult:
+    """Look at a model; a `CannotMeasureError` where it cannot be done.
+
+    `modules`: those of Python that are among the readers; `locked`: files that must not be changed,
+    with the reason; `rerun`: whether the host runs programs with what is left.
+    """
+    files: dict[str, bytes | None] = {}
+    declarations = subject.read_declarations()
+
+    def read(path: str) -> bytes | None:
+        if path not in files:
+            file = Path(subject.folder, path)
+            try:
+                files[path] = file.read_bytes() if file.is_file() else None
+            except OSError:
+                files[path] = None
+        return files[path]
+
+    files[subject.path] = subject.mjcf.encode("utf-8", "surrogatepass")
+    text = _open_text(subject, read)
+    readers = [reader for source in sources for reader in _read(source, modules)]
+    readers += _declared_readers(declarations)
+    with report_errors(subject, _FAILURE, ModelTextError, ValueError):
+        survey = Surveyor(
+            model=subject.name,
+            digest=subject.digest,
+            machine=this_machine(),
+            text=text,
+            scenes=pruning_scenes(text.model, declarations, quick=quick),
+            readers=tuple(readers),
+            keeps={" ".join(keep.finding.split()): keep for keep in keeps},
+            locked=locked or {},
+            numbered_kinds=frozenset(_numbered_kinds(declarations)),
+            clock=time.thread_time_ns,
+            quick=quick,
+            tell=host.tell,
+            rerun=host.rerun if rerun else None,
+        ).survey()
+    return DietResult(survey.report, _changes(subject, survey, read))
+
+
+_FAILURE = "the diet cannot look at the model `{}`"
+
+
+def _open_text(subject: Subject, read: Callable[[str], bytes | None]) -> ModelText:
+    with report_errors(subject, _FAILURE, ModelTextError, ValueError):
+        try:
+            return open_model(subject.path, read, partial(_compile, subject))
+        except MarkupError as error:
+            message = f"{error.path}:{error.line}:{error.column} is not XML: {error.message}"
+            help = "MuJoCo reads it all the same; other tools do not"
+            raise CannotMeasureError(message, subject.place, help) from None
+
+
+def _compile(subject: Subject, text: bytes) -> Any:
+    """Compile a text as if it stood in the model's place."""
+    own_file = Path(subject.folder, subject.path)
+    place = str(own_file.with_name(_TEXT))
+    try:
+        return mujoco.MjModel.from_xml_path(place, assets={place: text})
+    except (ValueError, mujoco.FatalError) as error:
+        message = str(error).replace(f"{subject.folder}/", "").replace(_TEXT, own_file.name)
+        raise ValueError(message) from None
+
+
+_TEXT = ".mjbench-text.xml"
+"""No file has this name: MuJoCo reads the text in its place."""
+
+
+def _changes(
+    subject: Subject, survey: Survey, read: Callable[[str], bytes | None]
+) -> tuple[FileChange, ...]:
+    """The files that `--fix` changes; a `CannotMeasureError` where they make another model."""
+    if not survey.edits:
+        return ()
+    new_files = survey.text.files(survey.edits)
+
+    def read_new(path: str) -> bytes | None:
+        return new_files.get(path) or read(path)
+
+    new_model = open_model(subject.path, read_new, partial(_compile, subject), check=False).model
+    if model_bytes(new_model) != model_bytes(survey.text.compile(survey.edits)):
+        message = f"the changed model `{subject.name}` is not the one that was run"
+        raise CannotMeasureError(message, subject.place)
+    return tuple(
+        FileChange(path, read(path) or b"", data) for path, data in sorted(new_files.items())
+    )
+
+
+def _numbered_kinds(declarations: Declarations) -> Iterator[str]:
+    """The kinds of findings about things that scenarios give by number."""
+    for scenario in declarations.scenarios:
+        if scenario.controls:
+            yield "actuator-idle"
+        if isinstance(scenario.keyframe, int):
+            yield "unused-keyframe"
+
+
+def _read(source: ReaderSource, modules: frozenset[str]) -> Iterator[ModelReader]:
+    if source.declarations is not None:
+        yield from _foreign_declarations(source)
+        return
+    kinds = frozenset(source.kinds)
+    if source.drawn:
+        kinds |= frozenset(VIEWS.values()) - _NOT_DRAWN
+    reader = ModelReader(source.path)
+    if source.text is not None:
+        reader = read_code(source.path, source.text, modules)
+    yield replace(
+        reader,
+        names=reader.names | frozenset(source.names),
+        kinds=reader.kinds | kinds,
+        opaque=source.opaque or reader.opaque,
+    )
+
+
+def _foreign_declarations(source: ReaderSource) -> Iterator[ModelReader]:
+    """What the declarations of another model ask of the files that both share."""
+    try:
+        declarations = parse_declarations(source.path, source.declarations or "")
+    except DeclarationError:
+        yield ModelReader(source.path, opaque="it cannot be read")
+        return
+    yield from _declared_readers(declarations)
+    keys = {scenario.keyframe for scenario in declarations.scenarios} - {None}
+    names = frozenset(key for key in keys if isinstance(key, str))
+    yield ModelReader(source.path, names, kinds=frozenset(["Keyframe"] if keys - names else []))
+
+
+def _declared_readers(declarations: Declarations) -> list[ModelReader]:
+    """What a file of declarations asks of a model."""
+    scenarios = declarations.scenarios
+    names = {s.observable.name for s in scenarios if s.observable is not None}
+    fields = {"energy"} if any("energy" in (s.conserved or ()) for s in scenarios) else set()
+    kinds: set[str] = set()
+    for part in (part for sweep in declarations.sweeps for part in sweep.variations):
+        things, _, field = part.parameter.rpartition(".")
+        kind, _, name = things.partition(":")
+        names |= {name} - {""}
+        kinds |= set() if name else {VIEWS.get(kind, kind)}
+        field = field.partition("[")[0]
+        fields |= {field, "pos"} if field in _SHAPES else {field}
+    words = frozenset(fields)
+    path = declarations.path
+    reader = ModelReader(path, frozenset(names), words, words, kinds=frozenset(kinds))
+    return [reader] if names or fields else []

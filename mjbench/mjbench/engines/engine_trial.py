@@ -1,0 +1,298 @@
+"""What an engine is asked in a child process, and its answer beside a scene's reference.
+
+It is asked for one motion, and for what a step of many worlds costs.
+
+1. The worlds of a batch begin a little apart, so that they do not all take the same branches.
+2. Steps are timed beside MuJoCo's own, in the same process and in turn: what slows the machine for
+   a while slows both, and their ratio holds. Time is that of the wall, since engines use threads or
+   another device.
+3. The first step compiles; how much longer it takes than the second one is told apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Literal, Protocol, TypeAlias
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import asdict, replace
+
+from mjbench.costs import Clock, time_jobs
+from mjbench.known_motion import KnownMotion, find_references
+from mjbench.measure import energy_drift, errors
+from mjbench.pilot import Pilot, nudges, own_setting, position_distances, run_pilot
+from mjbench.problem import Array, Scenario
+from mjbench.reports import Interval
+from mjbench.reports.engine_report import EngineRow, EngineScenario
+from mjbench.scene import Scene
+from mjbench.simulation import (
+    STATE,
+    EngineStates,
+    full_state,
+    initial_data,
+    integrator_of,
+    invariants,
+    motion_of,
+    silent,
+    simulate,
+    with_integrator,
+)
+from mjbench.work_precision import find_conserved
+
+
+class Variant(Struct, frozen=True):
+    """One way to run an engine."""
+
+    device: str
+    """As the engine's own library names it, such as `cpu` or `cuda:0`."""
+    label: str
+    """What the device calls itself; empty for the processor, which the report names."""
+    bits: Literal[32, 64]
+    """Of its floating-point numbers."""
+    threads: int = 0
+    """How many it is told to use; 0 where it decides itself."""
+
+
+class Worlds(Protocol):
+    """Copies of a model that an engine simulates."""
+
+    def advance(self, steps: int) -> None:
+        """Make so many steps in every world, and wait until they are made."""
+
+    def command(self, control: tuple[float, ...]) -> None:
+        """Give this command to all worlds."""
+
+    def reset(self) -> None:
+        """Go back to the beginning."""
+
+    def state(self) -> tuple[Array, Array]:
+        """The `qpos` and `qvel` of the first world, in double precision."""
+
+
+Start: TypeAlias = Callable[[Any, Any, Array, Variant], Worlds]
+"""`mjModel`, `mjData` at the beginning, and `qvel` (worlds, nv) of each world → the worlds."""
+
+
+class Engine(Struct, frozen=True):
+    """An engine, as a table of functions."""
+
+    title: str
+    module: str
+    """The module that is there where the engine is installed."""
+    packages: tuple[str, ...]
+    """Those that its figures depend on; the first brings the module."""
+    variants: Callable[[int], list[Variant]]
+    """The ways to run it here; the argument is the number of usable processors."""
+    start: Start
+    batched: bool = True
+    """Whether it can simulate more than one world at a time."""
+
+
+class RefusalError(Exception):
+    """An engine does not do what it is asked, in words of this module: it takes too long."""
+
+
+class EngineTrial(Struct, frozen=True):
+    """What an engine is to simulate."""
+
+    model: str
+    """A file with the compiled model (MJB)."""
+    scenario: Scenario
+    count: int
+    """The number of samples up to which the motion is compared."""
+
+
+class EngineMotion(Struct, frozen=True):
+    """The motion of one world, at each sample."""
+
+    qpos: list[list[float | None]]
+    """`None` for what is not finite, which JSON cannot say."""
+    qvel: list[list[float | None]]
+    compile_seconds: float
+
+
+class EngineCost(Struct, frozen=True):
+    """What a step of one world costs, among so many."""
+
+    seconds: Interval
+    ratio: Interval
+    """To a step of MuJoCo itself in one world, timed in turn."""
+    compile_seconds: float
+    steps: int
+    """Steps of a repeat, from the beginning of the scenario."""
+
+
+_SPREAD = 1e-3
+"""How far apart the worlds of a batch begin, as `pilot.nudges` has it."""
+_REPEAT, _SLOWEST = 0.004, 20.0
+"""Seconds that a repeat takes at least, unless that is the whole scenario: as short as a turn that
+a busy system gives to one program. Seconds of a step beyond which an engine is not timed."""
+
+
+class Batch(Struct, frozen=True, eq=False):
+    """Worlds that are ready to be advanced."""
+
+    model: Any
+    worlds: Worlds
+    count: int
+    compile_seconds: float
+
+
+def begin(engine: Engine, variant: Variant, trial: EngineTrial, count: int, clock: Clock) -> Batch:
+    """Start an engine, and let it compile what it needs for so many worlds."""
+    model = mujoco.MjModel.from_binary_path(trial.model)
+    data = initial_data(trial.scenario, model)
+    velocities = np.tile(data.qvel, (count, 1))
+    # The first world begins as the scenario does.
+    velocities[1:] += nudges(model, 2 * count, _SPREAD)[: count - 1, 1]
+    instances: list[Worlds] = []
+
+    def first() -> None:
+        instances.append(engine.start(model, data, velocities, variant))
+        instances[0].advance(1)
+
+    with silent():
+        took = _time(first, clock)
+        took -= _time(partial(instances[0].advance, 1), clock)
+    return Batch(model, instances[0], count, max(0.0, took))
+
+
+def run_motion(batch: Batch, trial: EngineTrial) -> EngineMotion:
+    """The motion of a trial in one world."""
+    scenario, worlds, states = trial.scenario, batch.worlds, []
+    steps = scenario.steps(float(batch.model.opt.timestep))
+    with silent():
+        worlds.reset()
+        for _, command in zip(range(trial.count), scenario.commands(scenario.sample), strict=False):
+            if command:
+                worlds.command(command)
+            worlds.advance(steps)
+            states.append(worlds.state())
+    qpos, qvel = (np.array(part) for part in zip(*states, strict=True))
+    return EngineMotion(_finite(qpos), _finite(qvel), batch.compile_seconds)
+
+
+def _finite(table: Array) -> list[list[float | None]]:
+    rows: list[list[float]] = table.tolist()
+    return [[value if math.isfinite(value) else None for value in row] for row in rows]
+
+
+def run_costs(batch: Batch, trial: EngineTrial, clock: Clock) -> EngineCost:
+    """What a step of one world costs among a batch; a `RefusalError` where it takes too long."""
+    model, worlds, count = batch.model, batch.worlds, batch.count
+    until = trial.scenario.holds()[0][1]  # until the command changes
+    most = round(until / float(model.opt.timestep))
+    with silent():
+        worlds.reset()
+        steps = 1
+        while True:
+            seconds = _time(partial(worlds.advance, steps), clock)
+            if seconds > _SLOWEST:
+                raise RefusalError(f"a step of {count:,} worlds takes {seconds:.0f} s")
+            if seconds >= _REPEAT or steps == most:
+                break
+            steps = min(most, steps * (2 if seconds > _REPEAT / 10 else 8))
+
+        def work() -> None:
+            worlds.reset()
+            worlds.advance(steps)
+
+        data = initial_data(trial.scenario, model)
+        beginning = full_state(model, data)
+
+        def own_steps(repeats: int) -> None:
+            for _ in range(repeats):
+                mujoco.mj_setState(model, data, beginning, STATE)
+                mujoco.mj_step(model, data, steps)
+
+        # What takes as long is disturbed as often.
+        repeats = max(1, round(_REPEAT / _time(partial(own_steps, 1), clock)))
+
+        _, timing = time_jobs([partial(own_steps, repeats), work], 0, clock, quick=True)
+    share = repeats / count
+    return EngineCost(
+        timing.nanoseconds.scale(1e-9 / (steps * count)),
+        timing.ratio.scale(share),
+        batch.compile_seconds,
+        steps,
+    )
+
+
+def _time(work: Callable[[], None], clock: Clock) -> float:
+    before = clock()
+    work()
+    return (clock() - before) * 1e-9
+
+
+class EngineBasis(Struct, frozen=True, eq=False):
+    """What is known of a scene before any engine is asked."""
+
+    model: Any
+    pilot: Pilot
+    reference: KnownMotion
+    energy: float | None
+    """The scale for changes of energy, J; `None` where energy is not conserved."""
+    baseline: EngineStates
+    """The motion in MuJoCo itself, at the model's own setting."""
+
+    @property
+    def report(self) -> EngineScenario:
+        """The report, without rows."""
+        scene, reference = self.pilot.scene, self.reference
+        return EngineScenario(
+            name=scene.name,
+            title=scene.title,
+            duration=scene.scenario.duration,
+            horizon=reference.horizon,
+            reference=reference.kind,
+            source=reference.source,
+            floor=reference.floor.place,
+            velocity_floor=reference.floor.velocity,
+            setting=own_setting(self.model, self.pilot),
+            rows=(),
+        )
+
+
+def engine_basis(model: Any, scene: Scene, *, quick: bool = False) -> EngineBasis:
+    """Find the reference of a scene, and how MuJoCo itself moves."""
+    pilot = run_pilot(model, scene)
+    setting = own_setting(model, pilot)
+    reference = find_references(model, pilot, quick=quick)[setting.cone].reference
+    energy, _ = find_conserved(model, pilot, reference)
+    own_model = with_integrator(model, integrator_of(model), scene.timestep)
+    return EngineBasis(model, pilot, reference, energy, simulate(pilot.setup, own_model).states)
+
+
+def judge_motion(basis: EngineBasis, row: EngineRow, motion: EngineMotion) -> EngineRow:
+    """Add to a row how far a motion is from the reference, and what it does to energy."""
+    model, scenario, reference = basis.model, basis.pilot.scene.scenario, basis.reference
+    row = replace(row, compile_seconds=motion.compile_seconds)
+    times = scenario.times[: len(motion.qpos)]
+    qpos, qvel = (np.array(part, dtype=np.float64) for part in (motion.qpos, motion.qvel))
+    states = EngineStates(times, qpos, qvel, np.zeros((len(times), int(model.na))))
+    if not (np.isfinite(qpos).all() and np.isfinite(qvel).all()):
+        lost = int(np.argmin(np.isfinite(np.hstack([qpos, qvel])).all(axis=1)))
+        message = f"the state is not finite at {times[lost]:.6g} s"
+        return replace(row, status="diverged", message=message)
+    beginning, scratch = initial_data(scenario, model), initial_data(scenario, model)
+    moments = [(beginning.qpos, beginning.qvel), *zip(qpos, qvel, strict=True)]
+    table = np.array([invariants(model, scratch, *moment) for moment in moments])
+    energies, setup = table[:, :2], basis.pilot.setup
+    bounds = (
+        ("position", np.abs(qpos).max(), setup.position_bound),
+        ("velocity", np.abs(qvel).max(), setup.velocity_bound),
+        ("energy", energies.sum(axis=1).max(), setup.energy_bound),
+    )
+    for name, size, bound in bounds:
+        if size > bound:
+            message = f"its {name} reaches {size:.3g}, over {bound:.3g}"
+            return replace(row, status="diverged", message=message)
+    exact, count = motion_of(model, reference.states), len(reference.states.times)
+    near = errors(motion_of(model, states.head(count)), exact, reference.floor)
+    apart = position_distances(model, states.qpos[:count], basis.baseline.qpos[:count])
+    drift = None if basis.energy is None else energy_drift(energies, basis.energy)
+    return replace(row, **asdict(near), apart=float(apart.max()), energy_drift=drift)

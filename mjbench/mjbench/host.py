@@ -1,0 +1,79 @@
+"""What measuring asks of whoever started it: progress, code to run, files that others know."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Protocol
+
+from msgspec import Struct
+
+EXACT_SCRIPT = str(Path(__file__).with_name("exact.py"))
+"""The script that evaluates an exact motion."""
+
+
+class ExactRun(Struct, frozen=True):
+    """What running the file of an exact motion gave."""
+
+    output: str
+    failure: str = ""
+    """Why it did not run to its end, in words; empty where it did."""
+
+
+class Host(Protocol):
+    """Whoever started a measurement."""
+
+    def tell(self, text: str) -> None:
+        """Say what is measured now."""
+
+    def run_exact(self, path: str, query: str, seconds: float) -> ExactRun:
+        """Run `exact.py` on a file with a query, for so many seconds of processor time."""
+
+    def browser_speed(self, keyframe: int | None, duration: float) -> float | None:
+        """Simulated time over the time that it takes in a browser; `None` where not known."""
+
+    def rerun(self, files: Mapping[str, bytes]) -> str:
+        """The name of a program whose output changes with these files; empty if none does."""
+
+
+class LocalHost:
+    """This process: what code prints is looked at here, and there is no browser."""
+
+    def __init__(self, folder: Path, tell: Callable[[str], None]) -> None:
+        self.folder = folder
+        self.say = tell
+
+    def tell(self, text: str) -> None:
+        """Say what is measured now."""
+        self.say(text)
+
+    def run_exact(self, path: str, query: str, seconds: float) -> ExactRun:
+        """Run `exact.py` in a process of its own, in the folder of the model."""
+
+        def limit() -> None:
+            most = int(seconds) + 1
+            resource.setrlimit(resource.RLIMIT_CPU, (most, most))
+
+        command = [sys.executable, "-P", EXACT_SCRIPT, path, query]
+        try:
+            run = subprocess.run(
+                command, cwd=self.folder, capture_output=True, text=True, check=False,
+                preexec_fn=limit, timeout=10 * seconds,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            return ExactRun("", f"it takes longer than {seconds:g} s")
+        if run.returncode < 0:
+            return ExactRun("", f"it takes longer than {seconds:g} s, or crashed")
+        last = run.stderr.strip().splitlines()[-1:] if run.returncode else []
+        return ExactRun(run.stdout, last[0] if last else "")
+
+    def browser_speed(self, keyframe: int | None, duration: float) -> float | None:
+        """Nothing is known of browsers here."""
+        return None
+
+    def rerun(self, files: Mapping[str, bytes]) -> str:
+        """No program is known."""
+        return ""

@@ -1,0 +1,451 @@
+"""The references that a scene's motion is measured against, and how well they are known.
+
+1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; DOP853 does it again. Their
+   difference bounds the error of the reference. Both take the same accelerations, so the engine in
+   ever smaller steps must tend to the same motion.
+2. A closed form that the scenario names, or that the course has, comes first, and that integration
+   second. A course's own is believed after it was checked only: in a smooth scene two integrations
+   that agree, and the engine that tends to them, outvote it; elsewhere the model must come nearer
+   to it the stiffer its contacts and the shorter its timesteps are.
+3. Where accelerations jump, the engine tends elsewhere, or the scene is too stiff for an
+   integration in reasonable time, only the engine itself is left: in small steps, and again in
+   steps twice as long under another integrator. This reference is called `self`.
+4. A motion counts only as long as it is known: where two integrations part, the horizon ends.
+5. Errors under a cone are those of the timestep and the solver: they are measured against what the
+   engine tends to under that cone in small steps. What remains then is the model's own error:
+   against the closed form where the scenario names one, else of a pyramid against the cone that it
+   stands for.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from functools import partial
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from mjbench import integrate
+from mjbench.cases import closed_motion, floor
+from mjbench.declarations import DeclaredScenario, Place
+from mjbench.measure import (
+    Sticks,
+    errors,
+    find_sticks,
+    friction_holds,
+    largest_errors,
+    quantity_errors,
+    quantity_name,
+    visible_error,
+)
+from mjbench.pilot import CONES, NUDGE, Pilot, horizon_errors, position_distances
+from mjbench.problem import ROUNDING, Integrator, Setup, Sizes
+from mjbench.reports.scene_report import FLOORS
+from mjbench.scene import ExactMotion, Scene, SceneError
+from mjbench.simulation import (
+    EngineStates,
+    initial_data,
+    motion_of,
+    simulate,
+    states_of,
+    stiffened,
+    with_integrator,
+    without_sleep,
+)
+
+EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
+"""Accelerations that a reference may take."""
+FINER, QUICK_FINER = 16, 8
+"""How many times shorter the steps of a `self` reference are than the shortest measured."""
+PARTING_DISTANCE, _PARTING_SHARE = 0.01, 0.1
+"""The difference from which on motions have nothing in common, rad or relative to the extent; the
+same of two that are to be a reference, relative to the error to be told."""
+FOREIGN = 1e-3
+"""The difference from which on a closed form is that of another scene, in the same units."""
+PRECISION, _VOTES = 1e-8, 100.0
+"""How far a course's exact motion may be off, relative to the largest number in it where this is
+over 1, unless its scenario says; and floors of the integration within which it always may."""
+_STIFFER, _NEEDED = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0), 3
+"""How many times shorter time constants of contacts are when an exact motion is checked; how many
+of them must each come nearer to it than the one before."""
+_APPROACH, _NEAR, _ELSEWHERE = 0.8, 3.0, 5.0
+"""The part of a difference that twice the stiffness may leave; within how many floors of the engine
+an exact motion is the engine's; how many times farther it is from stiff contacts than these moved
+at last, and can be known, where it is another one."""
+_NEARBY_GAP = 2.0
+"""How many times farther from the engine an exact motion may be from starts nearby."""
+_STEP = 1e-6
+"""s, of the model whose accelerations are integrated: `refsafe` softens nothing then."""
+_TENDS_ELSEWHERE = "the engine with small steps converges to something else"
+
+
+class KnownMotion(Struct, frozen=True):
+    """The reference of a scene, from the first sample to the horizon."""
+
+    kind: str
+    """`closed`, `ode` or `self`."""
+    source: str
+    states: EngineStates
+    second_states: EngineStates
+    """The same motion by the second reference."""
+    floor: Sizes
+    """How far it may be off."""
+    second: str
+    """The source of the second reference."""
+    agreement: float
+    """The largest difference of the two, in m, rad, m/s and rad/s."""
+    horizon: float
+    """s."""
+    note: str = ""
+    """Why there is no better reference; empty where this is the best kind."""
+
+
+def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMotion:
+    """The reference of a scene; a `SceneError` where a closed form is not this scene's."""
+    reference = _find_computed(model, pilot, quick=quick)
+    declaration = pilot.scene.declaration
+    if declaration.closed_form:
+        problem, motion = closed_motion(model, pilot.scene, declaration, reference.states.times)
+        states = states_of(model, motion, reference.states)
+        subject = f"the closed form of `{declaration.closed_form}`"
+        place, source = declaration.place("reference"), problem.reference.source
+        return _with_closed_form(model, reference, states, source, floor(problem), subject, place)
+    exact = None if declaration.reference else pilot.scene.exact
+    scenario, computed = pilot.scene.scenario, reference.states
+    motions = {} if exact is None else exact.engine_states(model, scenario, computed)
+    if exact is None or not motions:
+        return reference
+    least, gaps = ROUNDING, []
+    for name, states in motions.items():
+        subject = f"`{exact.path}`, `{name}`," if len(motions) > 1 else f"`{exact.path}`"
+        precision = _check_exact(model, pilot, (exact, subject), states, reference, quick=quick)
+        least = least.at_least(precision)
+        gaps.append(_gap(model, states, next(iter(motions.values()))))
+    # The formula comes first, and the equations bound it, where there are both.
+    states, source = next(iter(motions.values())), exact.path
+    least = least.at_least(gaps[-1])
+    return _with_closed_form(
+        model, reference, states, source, least, f"`{source}`", Place(exact.path)
+    )
+
+
+def find_nearby(
+    model: Any, pilot: Pilot, declared_reference: KnownMotion, *, quick: bool
+) -> EngineStates | None:
+    """The states of a scene's reference from another start; `None` where nobody knows them.
+
+    `declared_reference`: the reference from the start that is declared, which was checked. A
+    course's own exact motion may hold from there only, so it counts where nothing is integrated,
+    and as long as it stays about as near to the engine as it does there.
+    """
+    if pilot.scene.declaration.closed_form:
+        return None
+    model = without_sleep(model)
+    try:
+        reference = _find_computed(model, pilot, quick=quick)
+    except SceneError:
+        return None
+    exact = pilot.scene.exact if declared_reference.kind == "closed" else None
+    if exact is None or reference.kind == "ode":
+        return reference.states
+    motions = exact.engine_states(model, pilot.scene.scenario, reference.states)
+    states = next(iter(motions.values()))
+    gap = _gap(model, states, reference.states).place
+    usual_gap = _gap(model, declared_reference.states, declared_reference.second_states).place
+    is_usual = gap <= _NEARBY_GAP * max(usual_gap, reference.floor.place)
+    return states if is_usual else reference.states
+
+
+def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
+    """The reference without closed forms: an integration, or the engine in small steps."""
+    declaration = pilot.scene.declaration
+    reference, note = None, ""
+    if pilot.smooth and declaration.reference != "self":
+        try:
+            reference = _integrate(model, pilot, quick)
+        except integrate.NoConvergenceError as error:
+            note = f"no integration: {error}"
+        if reference is not None:
+            setup = _with_duration(pilot.setup, float(reference.states.times[-1]))
+            states, step = reference.states, min(pilot.scene.timesteps)
+            near = NUDGE * np.exp((pilot.lyapunov or 0.0) * states.times)
+            if not integrate.tends_to(model, setup, states, step, PARTING_DISTANCE, near):
+                reference, note = None, f"no integration: {_TENDS_ELSEWHERE}"
+        if reference is None and note.endswith(_TENDS_ELSEWHERE) and declaration.reference == "ode":
+            raise _no_integration(_TENDS_ELSEWHERE, declaration)
+    elif declaration.reference == "ode":
+        raise _no_integration(f"there is {' and '.join(pilot.jumps)}", declaration)
+    if reference is None:
+        reference = replace(self_reference(model, pilot, quick=quick), note=note)
+    return reference
+
+
+def _check_exact(
+    model: Any,
+    pilot: Pilot,
+    named_exact: tuple[ExactMotion, str],
+    states: EngineStates,
+    second: KnownMotion,
+    *,
+    quick: bool,
+) -> Sizes:
+    """How well a course's exact motion, with its name, is known where no integration says it."""
+    exact, name = named_exact
+    subject, gap = f"{name} is not this scene's motion", _gap(model, states, second.states)
+    clause = f"in the scenario `{pilot.scene.name}` it"
+    precision = pilot.scene.declaration.precision or PRECISION
+    if second.kind == "ode":
+        for part in ("position", "attitude", "velocity"):
+            column = {"position": second.states.qpos, "velocity": second.states.qvel}.get(part)
+            size = 1.0 if column is None else max(1.0, float(np.abs(column).max(initial=0.0)))
+            error, floor = getattr(gap, part), getattr(second.floor, part)
+            if not error <= max(precision * size, _VOTES * floor):
+                help = (
+                    f"{clause} errs by {error:.2g} in {part}: two integrations of the model agree "
+                    f"with each other to {floor:.1g}, and the engine tends to them; `precision` "
+                    "says how far a formula that is meant to be no more than near may be off"
+                )
+                raise SceneError(subject, Place(exact.path), help)
+        return ROUNDING
+    data = initial_data(pilot.scene.scenario, model)
+    exact.check_velocities(model, states.times, (data.qpos.copy(), data.qvel.copy()))
+    gaps, rest = _stiff_gaps(model, pilot, states, precision, quick=quick)
+    if rest is None:
+        far = ", ".join(f"{number:.2g}" for number in gaps)
+        help = (
+            f"{clause} is {far} (m or rad) from the engine in small steps with contacts as they "
+            f"are, and {', '.join(f'{times:g}' for times in _STIFFER[1 : len(gaps)])} times as "
+            "stiff: an exact motion is what that tends to; `precision` says how far it may be off"
+        )
+        raise SceneError(subject, Place(exact.path), help)
+    return Sizes(rest, rest, second.floor.velocity).at_least(ROUNDING)
+
+
+def _stiff_gaps(
+    model: Any, pilot: Pilot, states: EngineStates, precision: float, *, quick: bool
+) -> tuple[list[float], float | None]:
+    """How far a motion is from the engine with what is soft stiffer and stiffer, m or rad.
+
+    And how far it may be off, which is as much as it is from the engine; `None` where the engine
+    tends to something else.
+    """
+    gaps: list[float] = []
+    shifts: list[float] = []
+    rest, stiff_states = np.inf, states
+    for times in _STIFFER:
+        try:
+            stiff = _stiff_limit(model, pilot, times, quick=quick)
+        except SceneError:
+            if len(gaps) < _NEEDED:  # nothing would be checked
+                raise
+            break  # too stiff for steps of this length
+        count = min(len(stiff_states.times), len(stiff.states.times))
+        shifts.append(_gap(model, stiff_states.head(count), stiff.states.head(count)).place)
+        stiff_states, least = stiff.states, stiff.floor.place
+        gaps.append(_gap(model, states.head(count), stiff_states.head(count)).place)
+        rest = min(rest, max(gaps[-1], least))
+        if gaps[-1] <= max(precision, _NEAR * least):
+            break
+        if len(gaps) > _NEEDED:
+            if gaps[-1] > _ELSEWHERE * max(shifts[-1], least):
+                return gaps, None
+            if shifts[-1] > _APPROACH * shifts[-2]:
+                break  # luck, as of the phase of hits: there is no more to learn
+        elif len(gaps) > 1 and gaps[-1] > _APPROACH * gaps[-2]:
+            return gaps, None
+    return gaps, rest
+
+
+def _stiff_limit(model: Any, pilot: Pilot, times: float, *, quick: bool) -> KnownMotion:
+    """What the engine tends to in small steps with what is soft so many times as stiff."""
+    stiffer = stiffened(model, times)
+    stiffer.opt.cone = CONES["elliptic"]
+    limits = [self_reference(stiffer, pilot, quick=quick)]
+    with contextlib.suppress(SceneError):
+        limits.append(self_reference(stiffer, pilot, (Integrator.RK4,) * 3, quick=quick))
+    return min(limits, key=lambda limit: limit.floor.place)
+
+
+def _no_integration(reason: str, declaration: DeclaredScenario) -> SceneError:
+    help = "leave `reference` out: the engine itself in small steps is the reference then"
+    place = declaration.place("reference")
+    return SceneError(f"no integration can be the reference: {reason}", place, help)
+
+
+def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
+    times = pilot.setup.scenario.times
+    times = times[times <= pilot.horizon * (1 + 1e-9)]
+    variant = with_integrator(model, Integrator.EULER, _STEP)
+    variant.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    variant.opt.iterations, variant.opt.tolerance = max(100, int(variant.opt.iterations)), 0.0
+    variant.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_WARMSTART)
+    variant.actuator_actearly[:] = 0  # it looks ahead by a timestep, which tends to nothing
+    most = QUICK_EVALUATIONS if quick else EVALUATIONS
+
+    def run(method: integrate.Method) -> EngineStates:
+        return integrate.forward_states(
+            variant, pilot.scene.scenario, times, method, evaluations=most
+        )
+
+    states = run(partial(integrate.bulirsch_stoer, tolerance=1e-13))
+    source = "Bulirsch–Stoer over mj_forward"
+    second_states, second = run(integrate.dop853), "DOP853 over mj_forward"
+    return _combine(model, pilot, "ode", source, states, second, second_states)
+
+
+def self_reference(
+    model: Any,
+    pilot: Pilot,
+    integrators: tuple[Integrator, ...] = (Integrator.IMPLICITFAST, Integrator.EULER),
+    *,
+    quick: bool = False,
+) -> KnownMotion:
+    """Run the engine in small steps, and in steps twice as long under another integrator.
+
+    A third one runs in steps four times as long: two that agree by luck do not with it.
+    """
+    step = min(pilot.scene.timesteps) / (QUICK_FINER if quick else FINER)
+    runs = []
+    for doublings, integrator in enumerate(integrators):
+        fine = with_integrator(model, integrator, step * 2**doublings)
+        fine.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        fine.opt.iterations = max(100, int(fine.opt.iterations))
+        fine.opt.tolerance = min(1e-10, float(fine.opt.tolerance))
+        run = simulate(_with_duration(pilot.setup, pilot.horizon), fine)
+        if not np.isfinite(run.states.qpos).all():
+            raise SceneError(f"it diverges even at {step:g} s a step")
+        runs.append(run.states)
+    names = [integrator.value for integrator in integrators]
+    source = f"the engine itself: {names[0]} at {1e6 * step:.6g} µs, Newton's solver"
+    second = f"the same under {names[1]} at {2e6 * step:.6g} µs"
+    reference = _combine(model, pilot, "self", source, runs[0], second, runs[1])
+    count, floor = len(reference.states.times), reference.floor
+    for states in runs[2:]:
+        floor = floor.at_least(_gap(model, reference.states, states.head(count)))
+    return replace(reference, floor=floor)
+
+
+def _with_duration(setup: Setup, duration: float) -> Setup:
+    return replace(setup, scenario=replace(setup.scenario, duration=duration))
+
+
+def _combine(
+    model: Any,
+    pilot: Pilot,
+    kind: str,
+    source: str,
+    states: EngineStates,
+    second: str,
+    second_states: EngineStates,
+) -> KnownMotion:
+    unit = horizon_errors(model, pilot.scene)
+    gaps = position_distances(model, states.qpos, second_states.qpos, unit)
+    parted = np.flatnonzero(gaps > _PARTING_SHARE)
+    good = max(1, int(parted[0])) if parted.size else len(gaps)
+    states, second_states = states.head(good), second_states.head(good)
+    gap, horizon = _gap(model, states, second_states), float(states.times[-1])
+    floor = gap.at_least(ROUNDING)
+    return KnownMotion(kind, source, states, second_states, floor, second, gap.largest, horizon)
+
+
+def _gap(model: Any, states: EngineStates, second_states: EngineStates) -> Sizes:
+    return largest_errors(errors(motion_of(model, states), motion_of(model, second_states)))
+
+
+def _with_closed_form(
+    model: Any,
+    second: KnownMotion,
+    states: EngineStates,
+    source: str,
+    least: Sizes,
+    subject: str,
+    place: Place,
+) -> KnownMotion:
+    """Put a closed form first, and what was integrated second."""
+    count = min(len(states.times), len(second.states.times))
+    states = states.head(count)
+    gap = _gap(model, states, second.states)
+    distance = float(position_distances(model, states.qpos, second.states.qpos).max(initial=0.0))
+    floor = least
+    if second.kind == "ode":
+        if not distance <= FOREIGN:
+            message = f"{subject} is not this scene's motion"
+            help = f"the two are {distance:.2g} apart (rad, or relative to the extent)"
+            raise SceneError(message, place, help)
+        floor = least.at_least(gap)
+    return replace(
+        second,
+        kind="closed",
+        source=source,
+        states=states,
+        second_states=second.states,
+        floor=floor,
+        second=second.source,
+        agreement=gap.largest,
+        note="",
+    )
+
+
+def least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[float, float]:
+    """Below which a reference knows nothing of what is seen, and of the declared quantity.
+
+    It is as much of what its two motions differ by there as it may be off in itself: a formula that
+    was checked is far nearer to the truth than to the engine, whose friction and contacts are soft.
+    """
+    states, second_states, floor = reference.states, reference.second_states, reference.floor
+    gap = _gap(model, states, second_states)
+    share = min(1.0, floor.place / (gap.place or 1.0))
+    least_seen = FLOORS * share * visible_error(model, scene, states, second_states)
+    if not quantity_name(model, scene):
+        return least_seen, 0.0
+    share = max(share, min(1.0, floor.velocity / (gap.velocity or 1.0)))
+    distances = quantity_errors(model, scene, states, second_states)
+    return least_seen, FLOORS * share * float(distances.max())
+
+
+class Cone(Struct, frozen=True):
+    """The reference for errors under a cone."""
+
+    reference: KnownMotion
+    model_error: float | None
+    """What remains of the error however small the timestep, m or rad."""
+    visible_model_error: float
+    """The same as a visible error; 0 where the errors contain it already."""
+    sticks: Sticks | None = None
+    """What sticks in the reference; `None` where nothing touches."""
+    is_held: bool = False
+    """Whether friction is below its limit there, so that what moves is creep."""
+
+
+def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[str, Cone]:
+    """The references of a scene by cone; under "" where nothing touches."""
+    model, scene = without_sleep(model), pilot.scene
+    reference = find_reference(model, pilot, quick=quick)
+    if not pilot.contact:
+        return {"": Cone(reference, None, 0.0)}
+    limits = {}
+    for cone, number in CONES.items():
+        variant = with_integrator(model, Integrator.EULER, scene.timestep)
+        variant.opt.cone = number
+        limits[cone] = self_reference(variant, pilot, quick=quick)
+    cones = {}
+    for cone, limit in limits.items():
+        truth = reference if reference.kind == "closed" else limits["elliptic"]
+        sticks = find_sticks(model, scene, limit.states)
+        is_held = friction_holds(model, scene, limit.states, sticks)
+        if cone == "elliptic" and truth is limit:
+            cones[cone] = Cone(limit, None, 0.0, sticks, is_held)
+            continue
+        count = min(len(limit.states.times), len(truth.states.times))
+        limit_states, true_states = limit.states.head(count), truth.states.head(count)
+        gap = _gap(model, limit_states, true_states).place
+        least = FLOORS * max(limit.floor.place, truth.floor.place)
+        if truth is reference:
+            cones[cone] = Cone(reference, max(gap, least), 0.0, sticks, is_held)
+        else:
+            visible = visible_error(model, scene, limit_states, true_states) if gap > least else 0.0
+            cones[cone] = Cone(limit, max(gap, least), visible, sticks, is_held)
+    return cones

@@ -1,0 +1,408 @@
+"""A first run of a scene in small steps: what acts in it, its bounds, and the settings to measure.
+
+1. Every step is observed: a contact, a limit that is reached or dry friction makes accelerations
+   jump, so that errors follow no power of the timestep and no smooth integration applies.
+2. Eight twins begin 1e-10 away, in four directions, to both sides. Where the first of them is off
+   by what the scenario states, or a tenth, errors of trajectories mean nothing any more: that is
+   the horizon. The growth until there gives about the largest Lyapunov exponent.
+3. The largest positions, and the largest energy where nothing drives the motion, else velocity,
+   give the bounds, with room for coarse timesteps.
+4. A setting is what can be chosen without changing the scene: every integrator at every timestep;
+   where a solver runs, also other solvers, fewer iterations and other options; where something
+   touches, also the other cone. These vary one at a time about the model's own, at its timestep and
+   at those beside it: the full product would take hours and say little more.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from mjbench import simulation
+from mjbench.detector import Peaks, driving_force, update_peaks
+from mjbench.problem import STANDARD, Array, Integrator, Setup
+from mjbench.reports.scene_report import MeasuredSetting
+from mjbench.scene import Scene, SceneError, thickness
+
+NUDGE = 1e-10
+"""How far a twin's beginning is off: rad, or relative to the model's extent; velocities per s."""
+_DIRECTIONS = 4
+"""How many directions beginnings are nudged in, each to both sides."""
+_PARTING_DISTANCE = 0.1
+"""The error at which predictions end where the scenario states none: rad, or relative to the
+model's extent."""
+_REST_SPEED = 0.01
+"""A body is at rest below this part of the speed of a fall through the model's extent."""
+_SETTLED = 1e-6
+"""A motion has come to rest below this part of its largest kinetic energy."""
+_EXCESS = 0.1
+"""The share of the largest kinetic energy above what there can be, from which it is nonsense."""
+DEEPER = 1.25
+"""How many times deeper than in small steps bodies may lie in each other."""
+_PEAK_INTERVAL = 8
+"""Steps from one look at how large the state is to the next."""
+
+
+class Pilot(Struct, frozen=True):
+    """The results of a scene's first run."""
+
+    scene: Scene
+    peaks: Peaks
+    setup: Setup
+    """The scenario, with bounds of its states."""
+    contact: bool
+    """Whether anything touched."""
+    constrained: bool
+    """Whether a solver had anything to do."""
+    jumps: tuple[str, ...]
+    """The causes for jumps of accelerations, in words; empty where the scene is smooth."""
+    horizons: tuple[float, float]
+    """s, multiples of the sample: how long the first and the last twin stay near; the duration for
+    one that stays near to the end."""
+    lyapunov: float | None
+    """1/s, of the middle one of the twins that part; `None` where all stay near."""
+    settles: bool = False
+    """Whether it comes to rest."""
+
+    @property
+    def horizon(self) -> float:
+        """s: how long all twins stay near."""
+        return self.horizons[0]
+
+    @property
+    def smooth(self) -> bool:
+        """Whether accelerations are a smooth function of the state."""
+        return not self.jumps
+
+
+def run_pilot(model: Any, scene: Scene) -> Pilot:
+    """Run a scene at its shortest timestep; a `SceneError` says that it diverges even there."""
+    step, scenario = min(scene.timesteps), scene.scenario
+    variant = simulation.without_sleep(
+        simulation.with_integrator(model, simulation.integrator_of(model), step)
+    )
+    variant.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    data, errors = simulation.initial_data(scenario, variant), horizon_errors(variant, scene)
+    twins, nudge_sizes = [], []
+    for position, velocity in nudges(variant, 2 * _DIRECTIONS, NUDGE):
+        twin = simulation.initial_data(scenario, variant)
+        mujoco.mj_integratePos(variant, twin.qpos, position, 1.0)
+        twin.qvel[:] += velocity
+        twins.append(twin)
+        nudge_sizes.append(float(np.max(np.abs(position / errors), initial=0.0)))
+    look = _Observer(variant)
+    peaks, half_thickness = Peaks(), thickness(variant)
+    times, steps_per_sample = scenario.times, scenario.steps(step)
+    gaps = np.full((len(twins), len(times)), np.nan)
+    for index, command in enumerate(scenario.commands(scenario.sample)):
+        for copy in (data, *twins) if command else ():
+            copy.ctrl[:] = command
+        for number in range(steps_per_sample):
+            simulation.advance(variant, data)
+            look(data)
+            if number % _PEAK_INTERVAL == 0 or number == steps_per_sample - 1:
+                peaks = update_peaks(data, peaks, half_thickness)
+        if not peaks.finite:
+            raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
+        for twin, gap in zip(twins, gaps, strict=True):
+            if index == 0 or gap[index - 1] < 1:
+                simulation.advance(variant, twin, steps_per_sample)
+                gap[index] = position_distance(variant, data.qpos, twin.qpos, errors)
+    first = simulation.initial_data(scenario, variant)
+    energy = float(simulation.invariants(variant, first, first.qpos, first.qvel)[:2].sum())
+    if not (look.constrained or driving_force(model, scenario)):  # most is at the beginning
+        kinetic = peaks.kinetic
+        if peaks.energy > energy + _EXCESS * kinetic:  # the integrator itself is lost
+            fine = simulation.with_integrator(variant, Integrator.RK4, step)
+            kinetic = simulation.simulate(Setup(scenario=scenario), fine).energy[:, 1].max()
+        peaks = replace(peaks, energy=energy, kinetic=float(np.fmin(kinetic, peaks.kinetic)))
+    setup = _bounds(variant, scene, peaks)
+    if peaks.energy > energy + _EXCESS * peaks.kinetic:  # as of what a soft weld pulls
+        setup = replace(setup, energy=math.inf)
+    horizons, growth_rates = [], []
+    for gap, size in zip(gaps, nudge_sizes, strict=True):
+        parted = np.flatnonzero(gap >= 1)
+        end = int(parted[0]) if parted.size else len(times)
+        horizons.append(float(times[max(0, end - 1)]))
+        if parted.size:
+            growth_rates.append(math.log(float(gap[end]) / size) / float(times[end]))
+    return Pilot(
+        scene=scene,
+        peaks=peaks,
+        setup=setup,
+        contact=look.contact,
+        constrained=look.constrained,
+        jumps=look.jumps(variant),
+        horizons=(min(horizons), max(horizons)),
+        lyapunov=float(np.median(growth_rates)) if growth_rates else None,
+        settles=float(data.energy[1]) < _SETTLED * peaks.kinetic,
+    )
+
+
+def position_distance(model: Any, first: Array, second: Array, units: Array | None = None) -> float:
+    """The distance of two positions (nq,), at the joint where they differ most.
+
+    `units`: what counts as 1 in each degree of freedom (nv,), else `scales`.
+    """
+    difference = np.zeros(int(model.nv))
+    mujoco.mj_differentiatePos(model, difference, 1.0, first, second)
+    sizes = np.abs(difference / (scales(model) if units is None else units))
+    return float(np.max(sizes, initial=0.0))
+
+
+def position_distances(
+    model: Any, first: Array, second: Array, units: Array | None = None
+) -> Array:
+    """The distances of two motions (n, nq) at each time: (n,)."""
+    pairs = zip(first, second, strict=True)
+    return np.array([position_distance(model, a, b, units) for a, b in pairs])
+
+
+def scales(model: Any, angle: float = 1.0, length: float | None = None) -> Array:
+    """The size of a difference in each degree of freedom: rad, or m.
+
+    `angle`: of hinges and attitudes; `length`: of slides and places, else the model's extent.
+    """
+    sizes = np.full(int(model.nv), angle)
+    if length is None:
+        length = max(float(model.stat.extent), mujoco.mjMINVAL)
+    for kind, dof in zip(model.jnt_type, model.jnt_dofadr, strict=True):
+        if kind == mujoco.mjtJoint.mjJNT_FREE:
+            sizes[dof : dof + 3] = length
+        elif kind == mujoco.mjtJoint.mjJNT_SLIDE:
+            sizes[dof] = length
+    return sizes
+
+
+def horizon_error(model: Any, scene: Scene) -> dict[str, float]:
+    """The errors at which predictions of a scene end, by unit: those that it states, or a tenth."""
+    if scene.declaration.horizon_error:
+        return {str(unit): error for unit, error in scene.declaration.horizon_error.items()}
+    tenth = _PARTING_DISTANCE * scales(model)
+    is_length = scales(model, 0.0, 1.0) > 0
+    parts = {"rad": tenth[~is_length], "m": tenth[is_length]}
+    return {unit: float(errors[0]) for unit, errors in parts.items() if errors.size}
+
+
+def horizon_errors(model: Any, scene: Scene) -> Array:
+    """The same for each degree of freedom (nv,); infinite where none is stated of its unit."""
+    errors = horizon_error(model, scene)
+    return scales(model, errors.get("rad", math.inf), errors.get("m", math.inf))
+
+
+class _Observer:
+    """Looks at every state, and remembers what acted."""
+
+    def __init__(self, model: Any) -> None:
+        self.contact = self.limit = self.constrained = False
+        self.friction = self.full = False
+        clamped = [
+            (int(model.actuator_actadr[i]) + k, model.actuator_actrange[i])
+            for i in np.flatnonzero(model.actuator_actlimited)
+            for k in range(int(model.actuator_actnum[i]))
+        ]
+        self._limited = np.array([number for number, _ in clamped], dtype=np.intp)
+        self._range = np.array([limits for _, limits in clamped]).reshape(-1, 2)
+
+    def __call__(self, data: Any) -> None:
+        if data.nefc:
+            self.constrained = True
+            self.limit = self.limit or data.nl > 0
+            self.friction = self.friction or data.nf > 0
+        self.contact = self.contact or data.ncon > 0
+        if self._limited.size and not self.full:
+            act = data.act[self._limited]
+            self.full = bool(np.any((act <= self._range[:, 0]) | (act >= self._range[:, 1])))
+
+    def jumps(self, model: Any) -> tuple[str, ...]:
+        """The causes for jumps of accelerations, in words."""
+        causes = (
+            (self.contact, "contact"),
+            (self.limit, "a limit that is reached"),
+            (self.friction, "dry friction"),
+            (self.full, "an activation at its limit"),
+            (bool(model.nplugin), "a plugin"),
+            (bool(np.any(model.actuator_history[:, 0] > 0)), "a delayed actuator")
+            if hasattr(model, "actuator_history")
+            else (False, ""),
+        )
+        return tuple(words for is_present, words in causes if is_present)
+
+
+def nudges(model: Any, count: int, size: float) -> Array:
+    """Changes of positions and velocities, to both sides of random directions: (count, 2, nv)."""
+    directions = np.random.default_rng(1).normal(size=(count // 2, 2, int(model.nv)))
+    largest = np.abs(directions).max(axis=2, initial=mujoco.mjMINVAL)[:, :1, None]
+    directions = directions / largest * size * scales(model)
+    return np.concatenate([directions, -directions])
+
+
+def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
+    scenario, room = scene.scenario, scene.declaration.room
+    extent = float(model.stat.extent)
+    fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * extent)
+    # A hinge without limits may go round the other way.
+    has_hinges = bool(np.any(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE))
+    round_and_round = 2 * peaks.velocity * scenario.duration if has_hinges else 0.0
+    setup = Setup(
+        scenario=scenario,
+        position_bound=2 * peaks.position + room * max(extent, 1.0) + round_and_round,
+        sunk_bound=max(1.0, DEEPER * peaks.sunk),
+    )
+    if (bound := scene.declaration.energy_bound) is not None:
+        return replace(setup, energy_bound=bound, energy=peaks.energy, kinetic=peaks.kinetic)
+    if driving_force(model, scenario):
+        return replace(setup, velocity_bound=room * max(peaks.velocity, fall, 1e-3))
+    rest_energy = float(model.body_mass.sum()) * max(_REST_SPEED * fall, 1e-3) ** 2
+    kinetic = max(peaks.kinetic, rest_energy)
+    return replace(
+        setup, energy_bound=peaks.energy + room * kinetic, energy=peaks.energy, kinetic=kinetic
+    )
+
+
+def longer_setup(model: Any, pilot: Pilot, span: float) -> Setup:
+    """The setup for a longer span (s), where a motion may fall farther, go on to grow, or hit."""
+    scene = pilot.scene
+    duration = math.ceil(span / scene.scenario.sample * (1 - 1e-12)) * scene.scenario.sample
+    longer_scene = replace(scene, scenario=replace(scene.scenario, duration=duration))
+    for integrator in (Integrator.RK4, simulation.integrator_of(model)):
+        variant = simulation.with_integrator(model, integrator, min(scene.timesteps))
+        run = simulation.simulate(Setup(scenario=longer_scene.scenario), variant, thickness(model))
+        position, velocity, kinetic = (
+            float(np.abs(values).max(initial=0.0))
+            for values in (run.states.qpos, run.states.qvel, run.energy[:, 1])
+        )
+        if math.isfinite(position + velocity + kinetic):
+            peaks = replace(
+                pilot.peaks,
+                position=max(position, pilot.peaks.position),
+                velocity=max(velocity, pilot.peaks.velocity),
+                kinetic=max(kinetic, pilot.peaks.kinetic),
+                sunk=max(run.sunk, pilot.peaks.sunk),
+            )
+            return _bounds(model, longer_scene, peaks)
+    return pilot.setup
+
+
+_SOLVERS = {
+    "PGS": int(mujoco.mjtSolver.mjSOL_PGS),
+    "CG": int(mujoco.mjtSolver.mjSOL_CG),
+    "Newton": int(mujoco.mjtSolver.mjSOL_NEWTON),
+}
+CONES = {
+    "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
+    "elliptic": int(mujoco.mjtCone.mjCONE_ELLIPTIC),
+}
+_ITERATIONS, _QUICK_ITERATIONS = (1, 2, 4, 10, 30), (1, 4)
+_OPTIONS: dict[str, dict[str, float]] = {
+    "tolerance": {"0.01": 1e-2, "1e-4": 1e-4, "1e-6": 1e-6},
+    "noslip_iterations": {"0": 0, "4": 4},
+    "impratio": {"1": 1, "10": 10},
+    "jacobian": {
+        "dense": int(mujoco.mjtJacobian.mjJAC_DENSE),
+        "sparse": int(mujoco.mjtJacobian.mjJAC_SPARSE),
+    },
+}
+"""Options of the solver, and the values that are tried where they are not the model's own."""
+_FLAGS = {
+    "island": ("disableflags", int(mujoco.mjtDisableBit.mjDSBL_ISLAND)),
+    "multiccd": ("disableflags", int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)),
+    "sleep": ("enableflags", int(mujoco.mjtEnableBit.mjENBL_SLEEP)),
+}
+"""Flags that are tried the other way, with their bits."""
+_OF_CONTACTS = frozenset(("noslip_iterations", "impratio", "multiccd"))
+
+
+def own_setting(model: Any, pilot: Pilot) -> MeasuredSetting:
+    """The setting that the model has."""
+    return MeasuredSetting(
+        integrator=simulation.integrator_of(model).value,
+        timestep=pilot.scene.timestep,
+        solver=_name(_SOLVERS, int(model.opt.solver)) if pilot.constrained else "",
+        iterations=int(model.opt.iterations) if pilot.constrained else 0,
+        cone=_name(CONES, int(model.opt.cone)) if pilot.contact else "",
+    )
+
+
+def _name(names: dict[str, int], number: int) -> str:
+    return next(name for name, value in names.items() if value == number)
+
+
+def settings(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[MeasuredSetting, ...]:
+    """All settings to measure, each once, the model's own among them."""
+    baseline, ladder = own_setting(model, pilot), pilot.scene.timesteps
+    variants = [
+        replace(baseline, integrator=integrator.value, timestep=step)
+        for integrator in STANDARD
+        for step in reversed(ladder)
+    ]
+    own_index = ladder.index(pilot.scene.timestep)
+    for step in (
+        ladder[own_index : own_index + 1]
+        if quick
+        else ladder[max(0, own_index - 1) : own_index + 2]
+    ):
+        variants += _solving_variants(model, replace(baseline, timestep=step), pilot, quick=quick)
+    return tuple(dict.fromkeys(variants))
+
+
+def _solving_variants(
+    model: Any, baseline: MeasuredSetting, pilot: Pilot, *, quick: bool
+) -> list[MeasuredSetting]:
+    """The settings at a timestep that differ from the model's own in one thing of its solver."""
+    variants = [replace(baseline, cone=cone) for cone in CONES] if pilot.contact else []
+    if not pilot.constrained:
+        return variants
+    variants += [replace(baseline, solver=solver) for solver in _SOLVERS]
+    counts = _QUICK_ITERATIONS if quick else _ITERATIONS
+    variants += [replace(baseline, iterations=n) for n in counts if n < baseline.iterations]
+    if quick:
+        return variants
+    options = [
+        (name, text)
+        for name, values in _OPTIONS.items()
+        for text, value in values.items()
+        if value != getattr(model.opt, name)
+        and (name != "tolerance" or value > model.opt.tolerance)
+    ]
+    for name, (field, bit) in _FLAGS.items():
+        is_set = bool(getattr(model.opt, field) & bit)
+        options.append((name, "enable" if is_set == (field == "disableflags") else "disable"))
+    return variants + [
+        replace(baseline, options=((name, text),))
+        for name, text in options
+        if pilot.contact or name not in _OF_CONTACTS
+    ]
+
+
+def apply(model: Any, setting: MeasuredSetting, own_model: Any) -> None:
+    """Give a `mjModel` a setting; what is empty in it is as in `own_model`, the scene's."""
+    for name in ("solver", "iterations", "cone", "disableflags", "enableflags", *_OPTIONS):
+        setattr(model.opt, name, getattr(own_model.opt, name))
+    simulation.set_integrator(model, Integrator(setting.integrator), setting.timestep)
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    if setting.solver:
+        model.opt.solver = _SOLVERS[setting.solver]
+        model.opt.iterations = setting.iterations
+    if setting.cone:
+        model.opt.cone = CONES[setting.cone]
+    for name, text in setting.options:
+        if name in _OPTIONS:
+            setattr(model.opt, name, _OPTIONS[name][text])
+            continue
+        field, bit = _FLAGS[name]
+        is_set = (text == "enable") == (field == "enableflags")
+        flags = int(getattr(model.opt, field))
+        setattr(model.opt, field, flags | bit if is_set else flags & ~bit)
+
+
+def with_setting(model: Any, setting: MeasuredSetting) -> Any:
+    """A copy of a `mjModel` with a setting, and automatic reset off."""
+    variant = simulation.with_integrator(model, Integrator(setting.integrator), setting.timestep)
+    apply(variant, setting, model)
+    return variant

@@ -1,0 +1,66 @@
+"""The report on a hard case, or on a scenario of the course whose exact motion is known."""
+
+from __future__ import annotations
+
+from mjbench.machine import Machine
+from mjbench.reports import Interval, Record, scene_report
+
+
+class BoundaryLine(scene_report.StableRow, frozen=True):
+    """The largest stable timestep of an integrator, compared with theory."""
+
+    difference: float | None = None
+    """Measured against theory, relative."""
+    beyond: str = ""
+    """The status of the run with the shortest unstable timestep that was tried."""
+    growth: float | None = None
+    """The factor by which velocities grew in a step of that run, where they stayed finite."""
+
+
+class StepCost(Record, frozen=True):
+    """The time of a step of an integrator."""
+
+    integrator: str
+    seconds: Interval
+    """Processor time on the machine of the report."""
+
+
+class ErrorLine(scene_report.MeasuredRun, frozen=True):
+    """An integrator at a timestep."""
+
+    integrator: str
+    timestep: float
+    """s."""
+
+
+class ReferenceLine(Record, frozen=True):
+    """The reference that errors were measured against."""
+
+    kind: str
+    """`closed` or `ode`."""
+    source: str
+    second: str
+    """The source of the second reference."""
+    position: float
+    """How far the two references are apart, m or rad; the motion is known no better."""
+    attitude: float
+    """rad."""
+    velocity: float
+    """m/s or rad/s."""
+
+
+class CaseReport(Record, frozen=True):
+    """Everything that was measured on a hard case."""
+
+    name: str
+    title: str
+    case: int
+    """Its number on the list of hard cases; 0 for one of the course's own."""
+    machine: Machine
+    note: str
+    reference: ReferenceLine
+    boundaries: tuple[BoundaryLine, ...]
+    figures: tuple[scene_report.FigureLine, ...]
+    orders: tuple[scene_report.OrderRow, ...]
+    errors: tuple[ErrorLine, ...]
+    costs: tuple[StepCost, ...]

@@ -1,0 +1,367 @@
+"""The report on a model: speed against error in each of its scenarios, and its sweeps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from mjbench.machine import Machine
+from mjbench.reports import Interval, Record
+
+
+class SweepRow(Record, frozen=True):
+    """The model with one parameter at one value."""
+
+    parameter: str
+    """As the course names it, such as `geom.solref[0]`; `threads` is that of a rollout."""
+    value: str
+    own: bool
+    """Whether it is the value that the model has."""
+    status: str
+    """`ok`, `slow-growth`, `diverged` or `reset`, as of a setting."""
+    reasons: tuple[str, ...] = ()
+    change: float | None = None
+    """How far the motion is from that of the model as it is, in a picture: 1 is just visible.
+    `None` in chaos where it becomes visible, since its size then says nothing of the parameter."""
+    parted: float | None = None
+    """When it becomes visible there, s."""
+    figure: float | None = None
+    """As `change`, of what the scenario declares to be measured, in its unit."""
+    penetration: float | None = None
+    """Deepest contact, m."""
+    slip: float | None = None
+    """The longest way that two geoms slide on each other, m."""
+    restitution: float | None = None
+    """Of the hardest hit: speed apart over speed together, along the normal; 0 for what stays."""
+    residual: float | None = None
+    """Of the solver: the largest difference of forces, constraint or applied, between forward and
+    inverse dynamics, relative to the largest constraint force."""
+    iterations: float | None = None
+    """Of the solver, mean of all steps."""
+    cost: Interval | None = None
+    """Time for the scenario, relative to the model as it is."""
+    throughput: Interval | None = None
+    """Simulated time over wall time, of all that a rollout simulates at once."""
+
+
+class SweepReport(Record, frozen=True):
+    """All rows of a sweep."""
+
+    name: str
+    title: str
+    scenario: str
+    show: tuple[str, ...]
+    """The figures to show; empty: those that differ."""
+    rows: tuple[SweepRow, ...]
+
+
+FLOORS = 10.0
+"""Errors below this many floors of the reference are not given."""
+
+
+class MeasuredSetting(Record, frozen=True):
+    """What can be chosen without changing the scene."""
+
+    integrator: str
+    """As MJCF names it."""
+    timestep: float
+    """s."""
+    solver: str
+    """As MJCF names it; empty where nothing is constrained, so that no solver runs."""
+    iterations: int
+    """At most; 0 where no solver runs."""
+    cone: str
+    """As MJCF names it; empty where nothing can touch."""
+    options: tuple[tuple[str, str], ...] = ()
+    """Options and flags that are not the scene's own, as MJCF names them, with their values."""
+
+    @property
+    def solver_settings(self) -> tuple[str, int, str, tuple[tuple[str, str], ...]]:
+        """All but integrator and timestep."""
+        return self.solver, self.iterations, self.cone, self.options
+
+
+class Errors(Record, frozen=True):
+    """How far a motion is from its reference: at its largest over the horizon, and at its end.
+
+    `None` for what the motion does not have, and where the run was lost.
+    """
+
+    position: tuple[float, float] | None
+    """m or rad: Euclidean norm over coordinates."""
+    attitude: tuple[float, float] | None
+    """rad: the largest angle of any body."""
+    velocity: tuple[float, float] | None
+    """m/s or rad/s: Euclidean norm."""
+
+
+class MeasuredRun(Errors, frozen=True):
+    """One run against its reference."""
+
+    status: str
+    """`ok`, `slow-growth`, `diverged` or `reset`."""
+    reasons: tuple[str, ...]
+    """Why it is not `ok`."""
+    energy_drift: float | None
+    """Relative, with its sign; `None` where energy is not conserved."""
+    momentum_drift: float | None
+    """Relative; `None` where angular momentum is not conserved."""
+    penetration: float
+    """Deepest contact, m."""
+    refsafe: bool
+    """Whether constraints were softened because the timestep is long: it is another model."""
+
+
+class WorkPrecisionRow(MeasuredRun, frozen=True):
+    """One setting in one scenario."""
+
+    setting: MeasuredSetting
+    figure: tuple[float, float] | None
+    """Of what the scenario declares to be measured, in its unit; `None` where it declares none."""
+    slip: float | None
+    """Largest creep of a contact that sticks in the reference, m; `None` without contact."""
+    model_error: float | None
+    """What remains of the error however small the timestep, in the errors' unit (soft contact, a
+    pyramid for a cone): against the closed form; `None` where there is none."""
+    steps: int
+    cost: Interval | None
+    """Time for the scenario, relative to the scene's own setting; `None` where it was not timed."""
+    seconds: Interval | None
+    """Processor time for a simulated second on this machine, s; `None` where it was not timed."""
+    growth: float | None
+    """The factor by which velocities grew in a step; `None` where they did not."""
+    own: bool
+    """Whether it is the scene's own setting."""
+    front: bool
+    """Whether no other is both cheaper and more accurate, beyond what timing can tell."""
+    dominated_by: int | None
+    """The row (from 0) that is cheaper and no less accurate; `None` on the front, and for what was
+    lost or not timed."""
+    seen: float | None = None
+    """The largest displacement or turn of a body in a picture, where 1 is just visible. The front
+    is that of cost and the figure, or where none is declared, of cost and this."""
+    parted: float | None = None
+    """In a chaotic scenario, s: when it is `horizon_error` from the reference; its errors mean
+    nothing later, and are not given."""
+    mean_energy: float | None = None
+    """Mean kinetic energy from the horizon to the end, relative to that of a run in small steps,
+    less 1; `None` where nothing is beyond the horizon."""
+    evaluations: int = 0
+    """How often the forward dynamics are computed in the scenario, on any machine; 0 where that was
+    not recorded."""
+    iterations: float | None = None
+    """Iterations of the solver in the scenario; `None` where none runs."""
+    lucky: str = ""
+    """Why its error says nothing of what the setting does; empty where it does."""
+    same: bool = False
+    """Whether the motion is that of the scene's own setting, to the bit."""
+
+    @property
+    def realtime(self) -> float | None:
+        """Simulated time over processor time."""
+        return 1 / self.seconds.value if self.seconds and self.seconds.value else None
+
+    @property
+    def work(self) -> int:
+        """`evaluations`, also where they were not recorded."""
+        return self.evaluations or max(self.steps, 1) * step_evaluations(self.setting.integrator)
+
+
+def step_evaluations(integrator: str) -> int:
+    """How often a step computes the forward dynamics."""
+    return 4 if integrator == "RK4" else 1
+
+
+class FittedOrder(Record, frozen=True):
+    """The power of the timestep that errors are proportional to."""
+
+    value: float
+    uncertainty: float
+    """Half the width of the interval in which it lies in 95 % of cases."""
+    bend: float
+    """The largest difference of two slopes between neighbouring timesteps: 0 is a straight line."""
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return f"{self.value:.2f} ± {self.uncertainty:.2f}, bend {self.bend:.2f}"
+
+
+class OrderRow(Record, frozen=True):
+    """Orders of an integrator; `None` where errors are too few, or follow no one power."""
+
+    integrator: str
+    position: FittedOrder | None
+    attitude: FittedOrder | None
+    velocity: FittedOrder | None
+
+    @property
+    def has_orders(self) -> bool:
+        """Whether an order is known for any of the errors."""
+        return any(order is not None for order in (self.position, self.attitude, self.velocity))
+
+
+class StableRow(Record, frozen=True):
+    """The largest stable timestep of an integrator in a scenario."""
+
+    integrator: str
+    largest: float | None
+    """s: all that were tried up to it are stable. 0 where none is, `None` where all are."""
+    searched: tuple[float, float]
+    """The shortest and the longest timestep that was tried, s."""
+    islands: tuple[float, float] | None
+    """The shortest and longest stable timesteps beyond the largest, s; `None` where none is."""
+    duration: float
+    """Simulated time of each run, s."""
+    steps: int
+    """Of a run with the largest stable timestep; with the longest, or shortest, where all or none
+    is stable."""
+    tried: int
+    """How many timesteps up to the largest were tried."""
+    energy: float | None
+    """Most energy that a stable run may have, J; `None` where it is not judged."""
+    bracket: tuple[float, float] | None = None
+    """s: the least and the most of what the own start over the duration, over twice the duration,
+    and the start nearby that is lost first say; `None` where all is stable, or it is not known."""
+    theory: float | None = None
+    """s, as `largest`: of linear theory; `None` also where there is none and so no formula."""
+    formula: str = ""
+    """Where the theory comes from; empty where there is none."""
+    orbital: float | None = None
+    """s: the largest timestep with which a periodic motion is stable; `None` where all are."""
+    periodic: bool = False
+    """Whether the motion is periodic, so that `orbital` is known."""
+    gain: tuple[float, float] | None = None
+    """The first timestep (s) with which a scene that nothing drives gains energy, and how much (J);
+    `None` where none does, or something drives it."""
+    tries: tuple[tuple[float, int, int], ...] = ()
+    """The map: by timestep (s), how many runs there were, and how many of them were lost."""
+
+    @property
+    def monotone(self) -> bool:
+        """Whether all timesteps that were tried beyond the largest are lost."""
+        return self.islands is None
+
+
+class FigureLine(Record, frozen=True):
+    """A quantity that was measured and is known."""
+
+    name: str
+    unit: str
+    integrator: str
+    measured: float | None
+    """`None` where it is not finite."""
+    exact: float | None
+    """`None` where theory does not say it."""
+    source: str
+    spread: tuple[float, float] | None = None
+    """Of an ensemble, the range of its middle eight tenths; `measured` is the median then."""
+
+
+class RowVerdict(Record, frozen=True):
+    """Whether a scene's own setting is a good choice."""
+
+    on_front: bool
+    better: int | None
+    """The row that dominates it; `None` where none does."""
+    cost_ratio: float | None
+    """Cost of the better one, relative to the own."""
+    error_ratio: float | None
+    """Error of the better one, relative to the own."""
+    noticeable: bool | None
+    """Whether a learner would see the own setting's error; `None` where it is not known."""
+    text: str
+    """The same in a sentence or two."""
+
+
+class ScenarioReport(Record, frozen=True):
+    """Everything that was measured in a scenario."""
+
+    name: str
+    title: str
+    duration: float
+    """s."""
+    horizon: float
+    """s: how long errors of trajectories mean something; less than the duration in chaos."""
+    hold: float
+    """Seconds for which a command holds; 0 where nothing is commanded."""
+    reference: str
+    """`closed`, `ode` or `self`."""
+    source: str
+    """Where the reference comes from."""
+    floor: float
+    """How far the reference may be off in places and attitudes, m or rad; no error is given below
+    ten times as much. Velocities have a floor of their own."""
+    second: str
+    """The source of the second reference; empty where there is none."""
+    agreement: float | None
+    """The largest difference of the two."""
+    lyapunov: float | None
+    """Largest Lyapunov exponent, 1/s; `None` where the scenario is not chaotic."""
+    figure: str
+    """The declared quantity, with its unit in brackets; empty without one."""
+    rows: tuple[WorkPrecisionRow, ...]
+    orders: tuple[OrderRow, ...]
+    stable: tuple[StableRow, ...]
+    verdict: RowVerdict
+    velocity_floor: float = 0.0
+    """As `floor`, for velocities: around an impact they are known far worse than places."""
+    smooth: bool = True
+    """Whether accelerations are a smooth function of the state; else there are no orders."""
+    notes: tuple[str, ...] = ()
+    """Remarks for reading the figures."""
+    figures: tuple[FigureLine, ...] = ()
+    """What the scenario says is known in theory, measured with its own timestep."""
+    horizons: tuple[float, float] | None = None
+    """s: the shortest and the longest of runs whose beginnings were nudged in different ways;
+    `None` where the scenario is not chaotic."""
+    least_seen: float = 0.0
+    """Below this nothing is known of what is seen."""
+    least_figure: float = 0.0
+    """The same of the declared quantity, in its unit."""
+    cost_of: MeasuredSetting | None = None
+    """The setting that costs are relative to, where the scene's own was lost."""
+    horizon_error: Mapping[str, float] = {}
+    """The errors at which predictions end, by unit. Empty in older reports, where it is a tenth of
+    a radian or of the model's extent."""
+
+    @property
+    def own_setting(self) -> MeasuredSetting | None:
+        """The scene's own setting; `None` where there are no rows."""
+        return next((row.setting for row in self.rows if row.own), None)
+
+
+class SceneCard(Record, frozen=True):
+    """The size of a model, and how fast the browser's engine runs it."""
+
+    bodies: int
+    """Without the world."""
+    geoms: int
+    freedom: int
+    """Degrees of freedom."""
+    possible: int
+    """Pairs of geoms between which MuJoCo looks for contact when they are near each other."""
+    touched: int
+    """Those that touched in any scenario, with the scene's own setting."""
+    mjcf: int
+    """Bytes of the MJCF with the files that it pulls in."""
+    mjb: int
+    """Bytes of the compiled model (an MJB file)."""
+    browser: float | None
+    """Simulated time over the time it takes in WebAssembly (V8), from where the first scenario
+    begins; `None` where it was not measured."""
+
+
+class SceneReport(Record, frozen=True):
+    """Everything that was measured on a model."""
+
+    model: str
+    """Its file below `models/`, without suffix, POSIX."""
+    digest: str
+    """The digest of what the figures depend on in the course: the MJCF, its files and scenarios."""
+    quick: bool
+    """Whether only a part was measured, and in less time."""
+    machine: Machine
+    scenarios: tuple[ScenarioReport, ...]
+    card: SceneCard | None = None
+    """`None` in a report that is about speed and error alone."""
+    sweeps: tuple[SweepReport, ...] = ()

@@ -1,0 +1,159 @@
+"""Which errors of reports are shown, which settings are worth their cost, and texts of both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeAlias
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from mjbench.reports import Interval
+from mjbench.reports.scene_report import (
+    MeasuredRun,
+    MeasuredSetting,
+    WorkPrecisionRow,
+)
+
+INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
+"""Integrators in the order in which they are shown, which also sets their colour and mark."""
+FEWEST_STEPS = 20
+"""Steps of a scenario at the longest timestep that is tried for stability."""
+
+
+class Quantity(Struct, frozen=True):
+    """An error that can be drawn."""
+
+    name: str
+    """The field of a row: `figure`, `seen`, `position`, `attitude` or `velocity`."""
+    label: str
+    """What it is, with its unit."""
+    least: float = 0.0
+    """The floor of the reference: smaller errors mean nothing."""
+
+    def value_of(self, row: MeasuredRun) -> float | None:
+        """The largest error of a row over the horizon; `None` where the row has none."""
+        error: tuple[float, float] | float | None = getattr(row, self.name)
+        value = error[0] if isinstance(error, tuple) else error
+        return None if value is None or not math.isfinite(value) else abs(value)
+
+    def is_resolved(self, rows: Iterable[MeasuredRun]) -> bool:
+        """Whether any of the rows has an error above the floor."""
+        errors = (self.value_of(row) for row in rows)
+        return any(error is not None and error > self.least * (1 + 1e-9) for error in errors)
+
+
+SEEN = Quantity("seen", "what is seen (1: just visible)")
+"""What a learner sees: it is compared where no other error is declared and resolved."""
+
+
+def compared_quantity(rows: Iterable[MeasuredRun], figure: Quantity, least_seen: float) -> Quantity:
+    """The error to compare by: the declared one, if it has a label, unless only `SEEN` is known."""
+    rows, visible = tuple(rows), replace(SEEN, least=least_seen)
+    is_compared = figure.is_resolved(rows) or not visible.is_resolved(rows)
+    return figure if figure.label and is_compared else visible
+
+
+def is_idle(row: WorkPrecisionRow) -> bool:
+    """Whether a setting changes no bit of the motion and saves no time: it is not shown."""
+    return row.same and (row.cost is None or row.cost.high > 1 - _SAVING)
+
+
+_SAVING = 0.03
+"""Times differ by less of themselves from one measurement to the next."""
+
+
+COST_SLACK, ERROR_SLACK = 0.03, 0.05
+"""Relative: costs repeat to a few per cent only."""
+Rows: TypeAlias = Sequence[WorkPrecisionRow]
+
+
+class FrontPoint(Struct, frozen=True):
+    """The place of a setting in the plot."""
+
+    cost: Interval
+    error: float
+
+    def beats(self, rival: FrontPoint) -> bool:
+        """Whether this is clearly better in one respect, and no worse in the other."""
+        is_more_accurate = self.error * (1 + ERROR_SLACK) < rival.error
+        is_no_worse = self.error <= rival.error * (1 + ERROR_SLACK)
+        return (self.is_cheaper(rival) and is_no_worse) or (
+            is_more_accurate and not rival.is_cheaper(self)
+        )
+
+    def is_cheaper(self, rival: FrontPoint) -> bool:
+        """Whether this costs less, beyond what timing can tell."""
+        is_separate = self.cost.high < rival.cost.low
+        return is_separate and self.cost.value * (1 + COST_SLACK) < rival.cost.value
+
+
+def front_point(row: WorkPrecisionRow, quantity: Quantity) -> FrontPoint | None:
+    """The cost and error of a setting; `None` where it was lost, or not timed."""
+    error = quantity.value_of(row)
+    return None if row.cost is None or error is None else FrontPoint(row.cost, error)
+
+
+def front(rows: Rows, quantity: Quantity = SEEN) -> tuple[WorkPrecisionRow, ...]:
+    """Rows that say whether they are on the front, and otherwise which row dominates them.
+
+    A row is dominated where another costs no more and errs no more, and is clearly better in one of
+    the two. A lucky row is on no front, and dominates none. Where none errs there is no front.
+    """
+    points = ((n, front_point(row, quantity)) for n, row in enumerate(rows))
+    places = {n: point for n, point in points if point is not None}
+    if not any(place.error for place in places.values()):
+        places = {}
+    better = {
+        n: [m for m, rival in places.items() if not rows[m].lucky and rival.beats(own_place)]
+        for n, own_place in places.items()
+    }
+
+    def worth(n: int) -> tuple[float, int]:
+        return places[n].cost.value * places[n].error, n
+
+    placed_rows = []
+    for n, row in enumerate(rows):
+        rivals = better.get(n, [])
+        best = min([m for m in rivals if not better[m]] or rivals, key=worth, default=None)
+        on_front = n in better and not rivals and not row.lucky
+        placed_rows.append(replace(row, front=on_front, dominated_by=best))
+    return tuple(placed_rows)
+
+
+def seconds_text(value: float, digits: int = 6) -> str:
+    """A short time with its unit."""
+    for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")):
+        if value >= size * 0.9999995:
+            return f"{float(f'{value / size:.{digits}g}'):.{max(digits, 6)}g} {unit}"
+    return f"{value:.{digits}g} s"
+
+
+def horizon_error_text(errors: Mapping[str, float]) -> str:
+    """The errors at which predictions end."""
+    return " / ".join(f"{error:.3g} {unit}" for unit, error in errors.items()) or "0.1"
+
+
+def setting_text(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> str:
+    """A setting in words; solver, iterations and cone only where they differ from `like`."""
+    parts = [f"{setting.integrator} at {seconds_text(setting.timestep)}"]
+    return ", ".join([*parts, *solving_parts(setting, like)])
+
+
+def solving_parts(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> list[str]:
+    """Solver, iterations and cone of a setting in words, where they differ from those of `like`."""
+    parts = []
+    if setting.solver and (like is None or setting.solver != like.solver):
+        parts.append(setting.solver)
+    if setting.iterations and (like is None or setting.iterations != like.iterations):
+        many = "iteration" if setting.iterations == 1 else "iterations"
+        parts.append(f"{setting.iterations} {many}")
+    if setting.cone and (like is None or setting.cone != like.cone):
+        parts.append(f"{setting.cone} cone")
+    return parts + [f"{name} {value}" for name, value in setting.options]
+
+
+def status_text(status: str) -> str:
+    """How a run went, in words."""
+    return "grew" if status == "slow-growth" else status

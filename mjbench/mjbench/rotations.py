@@ -1,0 +1,90 @@
+"""Rotations as quaternions in MuJoCo's order w, x, y, z, by nothing of MuJoCo's.
+
+All take arrays with any leading shapes that fit together. Quaternions have length 1; an axis may
+have any length but zero.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def quat_mul(a: ArrayLike, b: ArrayLike) -> Array:
+    """The rotation b followed by the rotation a."""
+    aw, ax, ay, az = np.moveaxis(np.asarray(a, float), -1, 0)
+    bw, bx, by, bz = np.moveaxis(np.asarray(b, float), -1, 0)
+    product = (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
+    return np.stack(product, axis=-1)
+
+
+def quat_conj(quat: ArrayLike) -> Array:
+    """The inverse rotation."""
+    conjugate: Array = np.asarray(quat, float) * _CONJUGATE
+    return conjugate
+
+
+def axis_angle_to_quat(axis: ArrayLike, angle: ArrayLike) -> Array:
+    """The rotation by an angle (rad) about an axis."""
+    axis, half = np.asarray(axis, float), 0.5 * np.asarray(angle, float)[..., None]
+    vector = np.sin(half) * (axis / np.linalg.norm(axis, axis=-1, keepdims=True))
+    scalar = np.broadcast_to(np.cos(half), (*vector.shape[:-1], 1))
+    return np.concatenate((scalar, vector), axis=-1)
+
+
+def quat_to_mat(quat: ArrayLike) -> Array:
+    """The rotation matrix (..., 3, 3)."""
+    w, x, y, z = np.moveaxis(np.asarray(quat, float), -1, 0)
+    rows = (
+        ((w * w + x * x) - (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), (w * w + y * y) - (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), (w * w + z * z) - (x * x + y * y)),
+    )
+    length = w * w + x * x + y * y + z * z
+    matrix: Array = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    matrix /= length[..., None, None]
+    return matrix
+
+
+def mat_to_quat(matrix: ArrayLike) -> Array:
+    """The quaternion, with w ≥ 0, of a rotation matrix.
+
+    4 q qᵀ follows from the matrix; its column with the largest diagonal entry loses no digits.
+    Source: Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1 (1978).
+    """
+    m = np.asarray(matrix, float)
+    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(m, (-2, -1), (0, 1))
+    rows = (
+        (1 + a + e + i, h - f, c - g, d - b),
+        (h - f, 1 + a - e - i, d + b, c + g),
+        (c - g, d + b, 1 - a + e - i, h + f),
+        (d - b, c + g, h + f, 1 - a - e + i),
+    )
+    table = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    best = np.argmax(np.diagonal(table, axis1=-2, axis2=-1), axis=-1)
+    column = np.take_along_axis(table, best[..., None, None], axis=-2)[..., 0, :]
+    quat: Array = column / np.linalg.norm(column, axis=-1, keepdims=True)
+    return np.where(quat[..., :1] < 0, -quat, quat)
+
+
+def angular_distance(a: ArrayLike, b: ArrayLike) -> Array:
+    """The angle between two rotations, rad, from 0 to π; nearly equal ones keep its digits.
+
+    conj(a) ⊗ a has no vector part, so that of conj(a) ⊗ b is that of conj(a) ⊗ (b − a), where
+    little is left to cancel.
+    """
+    a, b = np.asarray(a, float), np.asarray(b, float)
+    b = np.where(np.sum(a * b, axis=-1, keepdims=True) < 0, -b, b)
+    vector = quat_mul(quat_conj(a), b - a)[..., 1:]
+    half: Array = np.arctan2(np.linalg.norm(vector, axis=-1), np.abs(np.sum(a * b, axis=-1)))
+    return 2.0 * half

@@ -1,0 +1,284 @@
+"""A model in one of its scenarios, with everything that its author left out filled in.
+
+1. Without declarations each keyframe is a scenario; without a keyframe, the model's own state.
+2. Times are whole numbers of the model's own timestep: a sample is some of them, a hold and the
+   duration are some samples.
+3. The ladder of timesteps is geometric about the model's own; each divides the sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from mjbench.declarations import (
+    DURATION,
+    MOST_STEPS,
+    BenchTable,
+    Declarations,
+    DeclaredScenario,
+    Place,
+    is_multiple,
+    keyframe_scenarios,
+)
+from mjbench.problem import Array, Scenario
+from mjbench.simulation import EngineStates, initial_data
+
+LOOKS = 100
+"""About how many samples a scenario has by default."""
+MIN_SAMPLES = 25
+"""The fewest samples by default."""
+LADDER, QUICK_LADDER = (-3, -2, -1, 0, 1, 2, 3), (-2, -1, 0, 1)
+"""Powers of 2 by which timesteps differ from the model's own."""
+
+
+LONGEST = 10_000_000
+"""The most steps of a scenario at its shortest timestep: more would take hours."""
+_STILL, _OFF_RATE = 1e-6, 0.02
+"""m/s or rad/s: what is slower counts as this fast where velocities are compared; by how much they
+may be off the rates of positions, relative to the fastest."""
+
+
+class SceneError(Exception):
+    """A scenario does not fit its model; `place` is where the mistake is."""
+
+    def __init__(self, message: str, place: Place | None = None, help: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.place = place
+        self.help = help
+
+
+class ExactStates(Struct, frozen=True, eq=False):
+    """What a course knows of a motion, at n times."""
+
+    motions: dict[str, tuple[Array, Array | None]] = {}
+    """`qpos` (n, nq) and `qvel` (n, nv), or `None` where the course gives no velocities: by
+    `motion`, a formula, and `acceleration`, equations that were integrated."""
+    expected: dict[str, float] = {}
+    """Quantities that theory knows."""
+
+
+class ExactMotion(Struct, frozen=True, eq=False):
+    """A motion that the course knows."""
+
+    path: str
+    """Its file."""
+    states: Callable[[Array, Array, Array], ExactStates]
+    """Times (n,) in s, and `qpos` and `qvel` of the beginning → what it says of the times."""
+
+    def check_velocities(self, model: Any, times: Array, begin: tuple[Array, Array]) -> None:
+        """Check that velocities are the rates of positions; a `SceneError` where they are not.
+
+        They are compared on the nearer side of a time: there may be a hit on the other.
+        """
+        step = 1e-4 * float(times[0])
+        looks = np.ravel([times - step, times, times + step], order="F")
+        for qpos, qvel in self.states(looks, *begin).motions.values():
+            if qvel is None:
+                continue
+            rates = np.empty((len(looks) - 1, int(model.nv)))
+            for rate, now, later in zip(rates, qpos[:-1], qpos[1:], strict=True):
+                mujoco.mj_differentiatePos(model, rate, step, now, later)
+            sides, velocities = np.array([rates[::3], rates[1::3]]), qvel[1::3]
+            fastest = np.maximum(np.abs(sides).max(axis=(0, 1)), np.abs(velocities).max(axis=0))
+            gaps = np.abs(sides - velocities).min(axis=0) / np.maximum(fastest, _STILL)
+            if not gaps.max(initial=0.0) <= _OFF_RATE:
+                time, dof = np.unravel_index(int(gaps.argmax()), gaps.shape)
+                message = f"`{self.path}` gives velocities that are not the rates of positions"
+                help = f"number {dof} is {velocities[time, dof]:.3g} at {times[time]:.6g} s"
+                help += f", where the positions give {sides[0, time, dof]:.3g}"
+                raise SceneError(message, Place(self.path), help)
+
+    def engine_states(
+        self, model: Any, scenario: Scenario, states: EngineStates
+    ) -> dict[str, EngineStates]:
+        """Its motions at the times of computed states, whose velocities hold if it gives none."""
+        data = initial_data(scenario, model)
+        motions = self.states(states.times, data.qpos.copy(), data.qvel.copy()).motions
+        own_states = {
+            name: replace(states, qpos=qpos, qvel=states.qvel if qvel is None else qvel)
+            for name, (qpos, qvel) in motions.items()
+        }
+        shapes = (states.qpos.shape, states.qvel.shape)
+        if any((motion.qpos.shape, motion.qvel.shape) != shapes for motion in own_states.values()):
+            message = f"`{self.path}` gives numbers of coordinates that differ from the model's"
+            raise SceneError(
+                message, Place(self.path), "they are those of `qpos`, and perhaps of `qvel`"
+            )
+        return own_states
+
+
+class Scene(Struct, frozen=True):
+    """A scenario of a model, ready to run."""
+
+    name: str
+    title: str
+    scenario: Scenario
+    timesteps: tuple[float, ...]
+    """Rising, the model's own among them, s."""
+    timestep: float
+    """The model's own timestep, s."""
+    bench: BenchTable
+    declaration: DeclaredScenario
+    exact: ExactMotion | None = None
+    """The course's exact motion, if it gives one."""
+
+
+def scenes(model: Any, declarations: Declarations, *, quick: bool = False) -> tuple[Scene, ...]:
+    """The scenarios of a model (`mjModel`); none of one in which nothing can move.
+
+    A `SceneError` where one does not fit.
+    """
+    if not model.nv:
+        if declarations.scenarios:
+            raise SceneError("nothing can move in the model", declarations.scenarios[0].table)
+        return ()
+    _check_fit(declarations, model)
+    step = float(model.opt.timestep)
+    steps = [step * 2.0**power for power in (QUICK_LADDER if quick else LADDER)]
+    scenarios = declarations.scenarios
+    if not scenarios:
+        place = Place(declarations.path)
+        names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
+        titles = [f"from the keyframe {name}" for name in names]
+        scenarios = tuple(
+            DeclaredScenario(name, title, key, table=place)
+            for key, (name, title) in enumerate(zip(names, titles, strict=True))
+        )
+        if not model.nkey:
+            scenarios = (DeclaredScenario(names[0], "from the model's own state", table=place),)
+    return tuple(_scene(model, scenario, declarations.bench, steps) for scenario in scenarios)
+
+
+def _check_fit(declarations: Declarations, model: Any) -> None:
+    """Check that a model has what scenarios name; a `SceneError` where it does not."""
+    for scenario in declarations.scenarios:
+        names = [str(model.key(number).name) for number in range(int(model.nkey))]
+        keyframes = names if isinstance(scenario.keyframe, str) else range(len(names))
+        if scenario.keyframe is not None and scenario.keyframe not in keyframes:
+            message = f"the model has no keyframe `{scenario.keyframe}`"
+            raise SceneError(message, scenario.place("keyframe"))
+        commands = [("controls", row, model.nu) for row in scenario.controls]
+        state = [("qpos", scenario.qpos, model.nq), ("qvel", scenario.qvel, model.nv)]
+        for field, values, count in (*state, *commands):
+            if values and len(values) != count:
+                message = f"`{field}` has {len(values)} numbers, and the model takes {count}"
+                raise SceneError(message, scenario.place(field))
+        sample = scenario.sample
+        for field, length in (("duration", scenario.duration), ("hold", scenario.hold)):
+            if sample is not None and length is not None and not is_multiple(length, sample):
+                message = f"`{field}` ({length:g} s) is not a multiple of `sample` ({sample:g} s)"
+                raise SceneError(message, scenario.place(field))
+        if len(scenario.controls) > 1 and scenario.hold is None:
+            raise SceneError("`hold` is missing: commands follow each other", scenario.table)
+        quantity = scenario.observable
+        if quantity is not None:
+            things = getattr(model, quantity.kind)
+            numbers = range(int(getattr(model, f"n{quantity.kind}")))
+            if quantity.name not in {str(things(number).name) for number in numbers}:
+                message = f"the model has no {quantity.kind} `{quantity.name}`"
+                raise SceneError(message, scenario.place("measure"))
+
+
+def thickness(model: Any) -> Array:
+    """Half the thickness of every geom, and infinity for none (index -1): (ngeom + 1,) m.
+
+    Planes and height fields are infinitely thick: nothing is on their other side.
+    """
+    half = model.geom_aabb[:, 3:].min(axis=1)
+    planes = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+    bottomless = np.isin(model.geom_type, planes)
+    return np.append(np.where(bottomless | (half == 0), np.inf, half), np.inf)
+
+
+def _scene(
+    model: Any, declaration: DeclaredScenario, bench: BenchTable, steps: Sequence[float]
+) -> Scene:
+    step, keyframe = float(model.opt.timestep), declaration.keyframe
+    if isinstance(keyframe, str):
+        keyframe = int(model.key(keyframe).id)
+    qpos = np.array(declaration.qpos)
+    if qpos.size:  # an author need not compute quaternions of length 1
+        mujoco.mj_normalizeQuat(model, qpos)
+    scenario = replace(
+        _scenario_times(step, declaration),
+        qpos=tuple(qpos.tolist()),
+        qvel=declaration.qvel,
+        controls=declaration.controls,
+        keyframe=-1 if keyframe is None else keyframe,
+    )
+    for timestep in declaration.timesteps:
+        if not is_multiple(scenario.sample, timestep):
+            message = (
+                f"the timestep {timestep:g} s does not divide the sample, {scenario.sample:g} s"
+            )
+            help = "give `sample` a value that all timesteps divide"
+            raise SceneError(message, declaration.place("timesteps"), help)
+    by_count = {round(scenario.sample / step): step}
+    for timestep in declaration.timesteps or steps:
+        count = max(1, round(scenario.sample / timestep))
+        by_count.setdefault(count, _decimal(scenario.sample / count))
+    ladder = tuple(by_count[count] for count in sorted(by_count, reverse=True))
+    if scenario.duration > LONGEST * ladder[0]:
+        message = f"{scenario.duration:g} s in steps of {ladder[0]:g} s are over {LONGEST:,} steps"
+        place = declaration.place("duration" if declaration.duration is not None else "timesteps")
+        raise SceneError(message, place, "measure a shorter time, or longer timesteps")
+    title = declaration.title or declaration.name
+    return Scene(declaration.name, title, scenario, ladder, step, bench, declaration)
+
+
+def _scenario_times(step: float, declaration: DeclaredScenario) -> Scenario:
+    duration, sample, hold = declaration.duration, declaration.sample, declaration.hold
+    lengths = (("duration", duration), ("sample", sample), ("hold", hold))
+    whole: dict[str, int] = {}
+    for name, length in lengths:
+        if length is not None and not is_multiple(length, step):
+            message = f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
+            raise SceneError(message)
+        if length is not None:
+            whole[name] = round(length / step)
+    hold_steps, sample_steps = whole.get("hold"), whole.get("sample")
+    count = len(declaration.controls)
+    last = hold_steps * count if hold_steps is not None and count > 1 else 0
+    total = whole.get("duration") or max(last, min(round(DURATION / step), MOST_STEPS), 1)
+    if sample_steps is None:
+        basis = math.gcd(*(whole[name] for name in ("duration", "hold") if name in whole))
+        sample_steps = (
+            _sample_steps(basis, total) if basis else max(8, 8 * round(total / LOOKS / 8))
+        )
+    total = whole.get("duration") or sample_steps * max(
+        MIN_SAMPLES, math.ceil(max(last, total) / sample_steps)
+    )
+    if hold_steps is not None and "duration" not in whole:
+        total = hold_steps * math.ceil(total / hold_steps)
+    return Scenario(
+        duration or _decimal(total * step),
+        sample or _decimal(sample_steps * step),
+        hold=0.0 if hold_steps is None else hold or _decimal(hold_steps * step),
+    )
+
+
+def _decimal(seconds: float) -> float:
+    """A product of decimal fractions as the decimal fraction that it is meant to be."""
+    rounded = float(f"{seconds:.12g}")
+    return rounded if abs(rounded - seconds) <= 1e-15 * seconds else seconds
+
+
+def _sample_steps(basis: int, total: int) -> int:
+    """A divisor of `basis` near the usual number of looks, which longer timesteps divide too."""
+    small = [n for n in range(1, math.isqrt(basis) + 1) if basis % n == 0]
+    divisors = {*small, *(basis // n for n in small)}
+
+    def badness(steps: int) -> float:
+        odd_factors = 3 - min(3, (steps & -steps).bit_length() - 1)
+        deviation = math.log(steps * LOOKS / total)
+        return (deviation if deviation > 0 else -deviation / 2) + 0.7 * odd_factors
+
+    return min(sorted(divisors), key=badness)

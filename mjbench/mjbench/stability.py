@@ -1,0 +1,442 @@
+"""A laboratory of stability: largest stable timesteps by integrator, and what speaks against them.
+
+1. Stable is what stays within what can be over a simulated time that is the same for all timesteps,
+   by the judgement that every run gets: finite, within bounds, and where nothing drives the motion,
+   without much more energy than it has in small steps. What shoots up in the first steps and then
+   decays is a transient of the method and no loss.
+2. One limit has several answers, which need not agree: theory at rest and along a periodic motion;
+   runs from the own start over the span, and over twice the span; runs from starts nearby. All are
+   kept, and only digits on which they agree are shown.
+3. Stability need not be monotone. A grid, even in the logarithm, is tried down to a tenth of the
+   shortest timestep that is lost, and about it from all starts; a bisection follows.
+4. Where nothing drives a scene, its energy cannot rise. The first timestep at which it does is a
+   limit of its own, often far below the first loss.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct, field
+from msgspec.structs import asdict, replace
+
+from mjbench.detector import (
+    Peaks,
+    RunStatus,
+    driving_force,
+    has_bad_state,
+    judge,
+    update_peaks,
+)
+from mjbench.linearization import Theory, find_theory
+from mjbench.pilot import Pilot, longer_setup, nudges
+from mjbench.problem import (
+    STANDARD,
+    Array,
+    Integrator,
+    Limit,
+    Problem,
+    Setup,
+)
+from mjbench.reports.case_report import BoundaryLine
+from mjbench.reports.scene_report import StableRow
+from mjbench.reports.shown_errors import FEWEST_STEPS
+from mjbench.scene import thickness
+from mjbench.simulation import (
+    advance,
+    compile_model,
+    initial_data,
+    simulate,
+    with_integrator,
+)
+
+_REACH, _NEAR = 10.0, 2.0
+"""The grid is tried down to this part of the shortest timestep that is lost; from other starts so
+far below and beyond it."""
+_GRID, _FINE, _CLOSER = 16, 1e-4, 32
+_QUICK_GRID, _COARSE, _QUICK_CLOSER = 6, 1e-2, 8
+"""The timesteps that are tried in a decade, the relative width at which a bisection ends, and the
+timesteps that are tried from half the limit up to it."""
+STARTS, QUICK_STARTS, NEARBY = 5, 3, 1e-4
+"""The starts of runs, the own one among them, and how far the others are from it: rad, or relative
+to the model's extent."""
+MOST_STEPS = 200_000
+"""The most steps of a span."""
+_LOOKS = 500
+"""How often a run is looked at."""
+_TRANSIENT, _DECAY = 8, 0.75
+"""What shoots up in so many first steps is a transient, if it has decayed after that part of
+a run."""
+_AT_REST = 1e-100
+"""The part of its largest speed below which nothing begins to move: subnormal numbers are slow."""
+_SMALL_STEPS = 100_000
+"""Steps of the run that says how much energy there can be, at most."""
+_GAIN, _GAIN_RESOLUTION = 0.01, 0.02
+"""The share of the largest kinetic energy that counts as a rise of energy, and the width at which
+its timestep is known."""
+_SETTLED_STEPS = 2000
+"""Steps, at the limit of theory, of a run that comes to rest: growth at rest shows slowly."""
+
+
+class StabilityTrial(Struct, frozen=True):
+    """A run at one timestep."""
+
+    timestep: float
+    """s."""
+    status: RunStatus
+    growth: float
+    """The factor by which velocities grow in a step, from half the run to its end; NaN where the
+    run was lost before."""
+    energy: float = -math.inf
+    """The most potential and kinetic energy on the way, J."""
+
+    @property
+    def stable(self) -> bool:
+        """Whether the run stayed within what can be."""
+        return self.status is RunStatus.OK
+
+
+class Laboratory(Struct, frozen=True, eq=False):
+    """What runs of an integrator show, by start and timestep."""
+
+    run: Callable[[int, float, float], StabilityTrial]
+    """A start (0 is the own one, the others are near it), a timestep and a time (s) → a run."""
+    span: float
+    """s."""
+    starts: int = 1
+    trials: dict[tuple[int, float], dict[int, StabilityTrial]] = field(default_factory=dict)
+    """By start and timestep, and by the number of spans."""
+
+    def trial(self, start: int, timestep: float, spans: int = 1) -> StabilityTrial:
+        """The run from a start at a timestep (s) over so many spans; each is made once."""
+        runs = self.trials.setdefault((start, timestep), {})
+        if spans not in runs:
+            is_known = 1 in runs and not runs[1].stable  # what is lost stays so
+            runs[spans] = runs[1] if is_known else self.run(start, timestep, spans * self.span)
+        return runs[spans]
+
+    def is_lost(self, start: int, timestep: float, spans: int = 1) -> bool:
+        """Whether it was lost within so many spans."""
+        return not self.trial(start, timestep, spans).stable
+
+    def own_steps(self) -> list[float]:
+        """The timesteps tried from the own start over the span, rising."""
+        return sorted(
+            step for (start, step), runs in self.trials.items() if not start and 1 in runs
+        )
+
+
+def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
+    """The boundaries of all integrators for which they may differ.
+
+    None where the problem names no timesteps to look between.
+    """
+    if problem.search is None:
+        return ()
+    # Only joints with damping know `eulerdamp`.
+    model = compile_model(problem.mjcf, Integrator.EULER, min(problem.timesteps or (1e-3,)))
+    integrators = Integrator if np.any(model.dof_damping) else STANDARD
+    problem = with_energy_bound(problem)
+    theory = find_theory(model, problem.scenario, problem.limit, smooth=problem.smooth)
+    return tuple(boundary(problem, integrator, theory) for integrator in integrators)
+
+
+def with_energy_bound(problem: Problem) -> Problem:
+    """The problem with a bound of its energy, from its motion in small steps over its span."""
+    if driving_force(compile_model(problem.mjcf, Integrator.RK4, 1e-3), problem.scenario):
+        return problem
+    step, scenario = min(problem.timesteps), problem.scenario
+    looks = math.floor(min(problem.span, _SMALL_STEPS * step) / scenario.sample)
+    duration = max(looks * scenario.sample, scenario.duration)
+    longer = replace(problem, scenario=replace(scenario, duration=duration))
+    energy = simulate(longer, compile_model(problem.mjcf, Integrator.RK4, step)).energy
+    most, kinetic = float(energy.sum(axis=1).max()), float(energy[:, 1].max())
+    bound = most + problem.room * kinetic
+    return replace(problem, energy_bound=bound, energy=most, kinetic=kinetic)
+
+
+def boundary(
+    problem: Problem, integrator: Integrator, theory: Theory | None = None
+) -> BoundaryLine:
+    """Search for the largest stable timestep of a problem with a search interval."""
+    assert problem.search is not None
+    low, high = problem.search
+    search = max(low, problem.span / MOST_STEPS), high
+
+    def run(start: int, step: float, span: float) -> StabilityTrial:
+        return run_trial(problem, compile_model(problem.mjcf, integrator, step), span, start=start)
+
+    laboratory = Laboratory(run, problem.span, STARTS)
+    row = search_row(laboratory, integrator, search, problem, theory or Theory(problem.limit))
+    trials = (laboratory.trial(0, step) for step in laboratory.own_steps())
+    lost = next((trial for trial in trials if not trial.stable), None)
+    difference = row.largest / row.theory - 1 if row.largest and row.theory else None
+    return BoundaryLine(
+        **asdict(row),
+        difference=difference,
+        beyond="" if lost is None else lost.status.value,
+        growth=None if lost is None else _finite(lost.growth),
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def search_row(
+    laboratory: Laboratory,
+    integrator: Integrator,
+    search: tuple[float, float],
+    setup: Setup,
+    theory: Theory,
+    *,
+    quick: bool = False,
+) -> StableRow:
+    """Search for the largest stable timestep between two (s), and for what speaks against it.
+
+    1. From the own start over the span: a grid, falling, down to a tenth of the largest timestep
+       below which nothing was lost, a bisection at its end, and a finer grid below that.
+    2. About that all starts over both spans, which makes the map; then a bisection for the start
+       that is lost first, and one for the own start over the doubled span.
+    3. Where nothing drives the motion, the first timestep at which energy rises.
+    """
+    low, high = search
+    count = max(2, round((_QUICK_GRID if quick else _GRID) * math.log10(high / low)) + 1)
+    grid: list[float] = np.geomspace(low, high, count).tolist()
+    resolution = _COARSE if quick else _FINE
+    largest = _look_closer(partial(laboratory.is_lost, 0), grid, resolution, quick)
+    near = [h for h in grid if h < _NEAR * min(largest, grid[-1])] or grid[:1]
+    estimates = [_bisect(partial(laboratory.is_lost, 0, spans=2), near, resolution, _NEAR)]
+    by_start = {
+        n: _bisect(partial(laboratory.is_lost, n, spans=2), near, math.inf, _NEAR)
+        for n in range(1, laboratory.starts)
+    }
+    if by_start:
+        worst = min(by_start, key=lambda n: by_start[n])
+        is_lost = partial(laboratory.is_lost, worst, spans=2)
+        estimates.append(_bisect(is_lost, near, resolution, _NEAR))
+    bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
+    limit, orbital = theory.limit(integrator, search), theory.orbital(integrator)
+    gain = _first_gain(laboratory, grid, setup)
+    steps = laboratory.own_steps()
+    stable_steps = [h for h in steps if h <= largest]
+    islands = [h for h in steps if h > largest and not laboratory.is_lost(0, h)]
+    is_all = math.isinf(largest)
+    return StableRow(
+        integrator=integrator.value,
+        largest=None if is_all else largest,
+        searched=(steps[0], steps[-1]),
+        islands=(islands[0], islands[-1]) if islands and not is_all else None,
+        duration=laboratory.span,
+        steps=step_count(laboratory.span, max(stable_steps, default=steps[0])),
+        tried=len(stable_steps),
+        energy=_finite(setup.energy_bound),
+        bracket=None if min(largest, *estimates) == math.inf else (min(bounds), max(bounds)),
+        theory=None if limit is None else _finite(limit.timestep),
+        formula="" if limit is None else limit.source,
+        orbital=None if orbital is None else _finite(orbital),
+        periodic=orbital is not None,
+        gain=gain,
+        tries=_tries(laboratory),
+    )
+
+
+def _bisect(
+    is_lost: Callable[[float], bool],
+    grid: Sequence[float],
+    resolution: float,
+    reach: float = _REACH,
+) -> float:
+    """The largest timestep below which none is lost: infinite for all of the grid, 0 for none.
+
+    The grid is tried from above, down to `1 / reach` of the shortest that is lost.
+    """
+    lost = math.inf
+    stable = 0.0
+    for step in reversed(grid):
+        if lost < math.inf and step < lost / reach:
+            break
+        if is_lost(step):
+            lost, stable = step, 0.0
+        elif not stable:
+            stable = step
+    if math.isinf(lost) or not stable:
+        return math.inf if math.isinf(lost) else 0.0
+    while lost / stable > 1 + resolution:
+        middle = math.sqrt(lost * stable)
+        lost, stable = (middle, stable) if is_lost(middle) else (lost, middle)
+    return stable
+
+
+def _look_closer(
+    is_lost: Callable[[float], bool], grid: list[float], resolution: float, quick: bool
+) -> float:
+    """`_bisect`, until none of many timesteps below is lost: with impacts islands are narrow."""
+    largest = _bisect(is_lost, grid, resolution)
+    while largest:
+        top = min(largest, grid[-1])
+        closer = np.geomspace(top / _NEAR, top, _QUICK_CLOSER if quick else _CLOSER).tolist()
+        lost = next((step for step in closer[1:-1] if is_lost(step)), None)
+        if lost is None:
+            break
+        grid = [*(step for step in grid if step < lost), lost]
+        largest = _bisect(is_lost, grid, resolution)
+    return largest
+
+
+def _first_gain(
+    laboratory: Laboratory, grid: Sequence[float], setup: Setup
+) -> tuple[float, float] | None:
+    """The first timestep (s) at which energy rises in a scene that nothing drives, and by how much.
+
+    `None` where it does not before the run is lost, or something drives it.
+    """
+    if not math.isfinite(setup.energy):
+        return None
+    least = _GAIN * setup.kinetic
+    lost = [h for h in laboratory.own_steps() if laboratory.is_lost(0, h)]
+    grid = [*(h for h in grid if not lost or h < lost[0]), *lost[:1]]
+
+    def gain(step: float) -> float:
+        trial = laboratory.trial(0, step)
+        return trial.energy - setup.energy
+
+    lossless = _bisect(lambda h: not gain(h) <= least, grid, _GAIN_RESOLUTION, _NEAR)
+    if math.isinf(lossless):
+        return None
+    first = min(h for h in laboratory.own_steps() if h > lossless and not gain(h) <= least)
+    return first, gain(first) if math.isfinite(gain(first)) else 0.0
+
+
+def _tries(laboratory: Laboratory) -> tuple[tuple[float, int, int], ...]:
+    """By timestep the number of runs, from all starts over both spans, and of those lost."""
+    counts: dict[float, tuple[int, int]] = {}
+    for (_, step), runs in laboratory.trials.items():
+        total, lost = counts.get(step, (0, 0))
+        counts[step] = total + len(runs), lost + sum(not run.stable for run in runs.values())
+    return tuple((step, *counts[step]) for step in sorted(counts))
+
+
+def step_count(span: float, timestep: float) -> int:
+    """Steps that make up a span, both in s."""
+    return math.ceil(span / timestep * (1 - 1e-12))
+
+
+def attempt(problem: Problem, integrator: Integrator, timestep: float) -> StabilityTrial:
+    """Run the problem over its span at a timestep (s)."""
+    return run_trial(problem, compile_model(problem.mjcf, integrator, timestep), problem.span)
+
+
+def run_trial(
+    setup: Setup, model: Any, span: float, thickness: Array | None = None, *, start: int = 0
+) -> StabilityTrial:
+    """Run a model over a span (s) with its own timestep, or until it is lost.
+
+    `thickness` is as for `detector.update_peaks`; `start`: 0 for the scenario's own, else one near
+    it. A command changes with the first step that begins after its time: the timestep need not
+    divide the hold.
+    """
+    data = initial_data(setup.scenario, model)
+    if start:
+        direction = nudges(model, STARTS - 1, NEARBY)[start - 1]
+        mujoco.mj_integratePos(model, data.qpos, direction[0], 1.0)
+        data.qvel[:] += direction[1]
+        data.act[:] += NEARBY * (-1) ** start
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    timestep = float(model.opt.timestep)
+    steps = step_count(span, timestep)
+    interval = max(2, steps // _LOOKS)
+    commands = {
+        min(math.ceil(begin / timestep - 1e-9), steps): command
+        for begin, _, command in setup.scenario.holds(span)
+    }
+    stops = sorted({*range(1, _TRANSIENT + 1), *range(0, steps, interval), steps, *commands})
+    sizes: list[tuple[int, float]] = []
+    limits, count, excess_end, energy, is_lost = setup, 0, 0.0, -math.inf, False
+    peak_speed = 0.0
+    for stop in (stop for stop in stops if stop <= steps):
+        try:
+            if stop > count:
+                advance(model, data, stop - count)
+        except mujoco.FatalError:  # MuJoCo does not run it
+            return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan)
+        count, now = stop, update_peaks(data, Peaks(), thickness)
+        if not count:  # before the first step MuJoCo has computed no energy: it says 0
+            now = replace(now, energy=-math.inf)
+        energy = max(energy, now.energy)
+        if count <= _TRANSIENT:
+            fastest = max(limits.velocity_bound, now.velocity)
+            most = max(limits.energy_bound, now.energy)
+            limits = replace(limits, velocity_bound=fastest, energy_bound=most)
+        excess_end = excess_end if now.is_within(setup) else count * timestep
+        is_lost = not now.is_within(limits) or has_bad_state(data)
+        if is_lost or (count > max(commands) and now.velocity < _AT_REST * peak_speed):
+            break
+        peak_speed = max(peak_speed, now.velocity)
+        if commands.get(stop):
+            data.ctrl[:] = commands[stop]
+        sizes.append((count, math.hypot(*data.qvel.tolist())))
+    is_lost = is_lost or excess_end > _DECAY * span  # it shot up, and has not come down
+    status = judge(model, data, count * timestep, now, setup if is_lost else limits).status
+    if is_lost and status is RunStatus.OK:
+        status = RunStatus.SLOW_GROWTH
+    return StabilityTrial(timestep, status, _growth(sizes), energy)
+
+
+def _growth(sizes: list[tuple[int, float]]) -> float:
+    """The factor by which velocities grow in a step, from the middle of a run to its end."""
+    if len(sizes) < 2:
+        return math.nan
+    middle = next(n for n, (count, _) in enumerate(sizes) if 2 * count >= sizes[-1][0])
+    (before, small), (after, large) = sizes[min(middle, len(sizes) - 2)], sizes[-1]
+    if not 0 < small < math.inf or not 0 < large < math.inf:
+        return math.nan
+    return float((large / small) ** (1 / (after - before)))
+
+
+_SEARCH = (0.25, 64.0)
+"""The multiples of the model's timestep between which the largest stable one is searched for."""
+
+
+def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[StableRow, ...]:
+    """The largest stable timestep of every integrator, over the scenario.
+
+    They are searched for as those of the hard cases. No timestep is tried of which the scenario
+    has fewer than 20: so few steps would say nothing.
+    """
+    scene, half_thickness = pilot.scene, thickness(model)
+    duration = scene.declaration.stable_for or scene.scenario.duration
+    low, high = sorted(scene.declaration.search or [part * scene.timestep for part in _SEARCH])
+    limits = scene.declaration.limits
+    setup_over = cache(partial(longer_setup, model, pilot))
+
+    def declared_limit(integrator: Integrator) -> Limit | None:
+        step = limits.get(integrator.value)  # type: ignore[call-overload]
+        return None if step is None else Limit(step, "as the scenario declares")
+
+    theory = find_theory(
+        model, scene.scenario, declared_limit if limits else None, smooth=pilot.smooth
+    )
+
+    def row(integrator: Integrator) -> StableRow | None:
+        def run(start: int, step: float, span: float) -> StabilityTrial:
+            is_longer = span > scene.scenario.duration and not pilot.settles
+            setup = setup_over(span) if is_longer else pilot.setup
+            variant = with_integrator(model, integrator, step)
+            return run_trial(setup, variant, span, half_thickness, start=start)
+
+        span, limit = duration, theory.limit(integrator, (low, high))
+        if pilot.settles and pilot.smooth and limit is not None and math.isfinite(limit.timestep):
+            span = max(span, _SETTLED_STEPS * limit.timestep)
+        search = max(low, span / MOST_STEPS), min(high, span / FEWEST_STEPS)
+        if search[1] <= search[0]:
+            return None
+        laboratory = Laboratory(run, span, QUICK_STARTS if quick else STARTS)
+        return search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
+
+    return tuple(filter(None, map(row, STANDARD)))

@@ -1,0 +1,404 @@
+"""A model with its parameters at other values: its contacts, solver and cost.
+
+1. A parameter is a field of the model's elements as `mujoco.MjSpec` names it, so that all that
+   follows from it is compiled anew. One is changed at a time.
+2. Every step of a run is looked at: a hit is over before the next sample. A slide goes on where two
+   geoms touch again within a sample: what rolls or slides over a stiff surface hops on it.
+3. In chaos the size of a change says nothing of the parameter once it is visible: two runs whose
+   beginnings differ by 1e-10 are as far apart later. When it becomes visible is told instead.
+4. The parameter `threads` is that of `mujoco.rollout`, which runs copies of the scenario.
+"""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Iterator
+from itertools import islice
+from typing import Any, get_args
+
+import mujoco
+import mujoco.rollout
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from mjbench.costs import Clock, Job, scenario_job, time_jobs
+from mjbench.declarations import DeclaredSweep, Expected, Place, SweepValue, Variation
+from mjbench.measure import (
+    Pair,
+    contact_speeds,
+    quantity_name,
+    quantity_values,
+    touching_contacts,
+    visible_error,
+    visible_errors,
+)
+from mjbench.pilot import NUDGE, nudges, with_setting
+from mjbench.problem import STANDARD, Scenario, Setup
+from mjbench.reports import Interval
+from mjbench.reports.scene_report import (
+    FigureLine,
+    MeasuredSetting,
+    SweepReport,
+    SweepRow,
+)
+from mjbench.scene import Scene, SceneError, thickness
+from mjbench.simulation import (
+    EngineStates,
+    advance,
+    initial_data,
+    integrator_of,
+    silent,
+    simulate,
+    with_integrator,
+)
+
+THREADS = "threads"
+_PARAMETER = re.compile(r"(?P<kind>[a-z]+)(:(?P<name>.+))?\.(?P<field>\w+)(\[(?P<at>\d+)\])?")
+_PLURALS = {"body": "bodies", "equality": "equalities", "mesh": "meshes"}
+_ENUMS = {
+    "cone": mujoco.mjtCone,
+    "integrator": mujoco.mjtIntegrator,
+    "jacobian": mujoco.mjtJacobian,
+    "solver": mujoco.mjtSolver,
+}
+_COPIES, _MOST_STEPS = 8, 2000
+"""Scenarios that each thread runs in a rollout, and steps of one at most."""
+
+
+def measure_sweep(
+    spec: Any,
+    scene: Scene,
+    sweep: DeclaredSweep,
+    clocks: tuple[Clock, Clock] | None,
+    *,
+    quick: bool = False,
+    piece: slice | None = None,
+) -> SweepReport:
+    """Measure a model (`MjSpec`) with its parameters at other values.
+
+    `clocks`: processor time of the thread and wall time, in ns; `None`: nothing is timed. `piece`:
+    which of the values, over all parameters. A `SceneError` where a value is none of the model.
+    """
+    base = _runnable(spec.compile())
+    threads = [part for part in sweep.variations if part.parameter == THREADS]
+    parts = [part for part in sweep.variations if part.parameter != THREADS]
+    values = [(part, value) for part in parts for value in part.values]
+    values = values if piece is None else values[piece]
+    variants = [_variant(spec, scene.scenario, part, value) for part, value in values]
+    base_run = simulate(Setup(scenario=scene.scenario), base, thickness(base))
+    states = base_run.states if base_run.judgement.ok else None
+    chaotic = states is not None and _is_chaotic(scene, base, states)
+    rows = [_measure_variant(scene, base, states, chaotic, row, model) for row, model in variants]
+    if clocks is not None:
+        with silent():
+            usable = [n for n, row in enumerate(rows) if row.status == "ok"]
+            jobs = [
+                scenario_job(model, [scene.scenario], float(model.opt.timestep))
+                for model in (base, *(variants[n][1] for n in usable))
+            ]
+            timings = time_jobs(jobs, 0, clocks[0], quick=quick)
+            for n, timing in zip(usable, timings[1:], strict=True):
+                rows[n] = replace(rows[n], cost=timing.ratio)
+            for part in threads:
+                rows += _rollouts(scene.scenario, base, part, clocks[1], quick=quick)
+    show = tuple("parted" if chaotic and name == "change" else name for name in sweep.show)
+    return SweepReport(sweep.name, sweep.title or sweep.name, scene.name, show, tuple(rows))
+
+
+def _is_chaotic(scene: Scene, model: Any, states: EngineStates) -> bool:
+    """Whether a run whose beginning is off by 1e-10 comes to be visibly elsewhere."""
+    data = initial_data(scene.scenario, model)
+    for position, velocity in nudges(model, 2, NUDGE):
+        qpos = data.qpos.copy()
+        mujoco.mj_integratePos(model, qpos, position, 1.0)
+        twin = replace(scene.scenario, qpos=tuple(qpos), qvel=tuple(data.qvel + velocity))
+        run = simulate(Setup(scenario=twin), model, thickness(model))
+        if run.judgement.ok and visible_error(model, scene, run.states, states) >= 1:
+            return True
+    return False
+
+
+def _variant(
+    spec: Any, scenario: Scenario, part: Variation, value: SweepValue
+) -> tuple[SweepRow, Any]:
+    """A row on which nothing is known, and the model with the parameter at this value."""
+    changed_spec = spec.copy()
+    before, after = _change(changed_spec, part, value)
+    try:
+        model = _runnable(changed_spec.compile())
+        scenario.steps(float(model.opt.timestep))
+    except ValueError as error:
+        message = (
+            f"`{part.parameter}` cannot be `{_value_text(value)}`: {' '.join(str(error).split())}"
+        )
+        raise SceneError(message, part.place) from None
+    text = f"{100 * (float(value) - 1):+g} %" if part.relative else _value_text(value)  # type: ignore[arg-type]
+    is_own = all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
+    return SweepRow(part.parameter, text, own=is_own, status="ok"), model
+
+
+def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], list[Any]]:
+    """Give the elements of a variation a value; what they had before, and have now."""
+    match = _PARAMETER.fullmatch(part.parameter)
+    kind, name, field = match.group("kind", "name", "field") if match else ("", "", "")
+    candidates = getattr(spec, _PLURALS.get(kind, f"{kind}s"), ())
+    elements = (
+        [spec.option] if kind == "option" else [o for o in candidates if name in (None, o.name)]
+    )
+    if match is None or not elements or not hasattr(elements[0], field):
+        message = f"the model has no parameter `{part.parameter}`"
+        help = "it is named as in `mujoco.MjSpec`: `option.timestep`, `geom:ball.solref[0]`"
+        raise SceneError(message, part.place, help)
+    at, before, after = match["at"], [], []
+    for element in elements:
+        old = getattr(element, field)
+        before.append(np.array(old, copy=True))
+        try:
+            new: Any = value
+            if isinstance(value, str):
+                members = _ENUMS[field].__members__
+                numbers = {name.partition("_")[2].lower(): m for name, m in members.items()}
+                new = int(numbers[value.lower()])
+            if at is not None:
+                old[int(at)] = old[int(at)] * new if part.relative else new
+            elif isinstance(old, np.ndarray):
+                old[:] = old * new if part.relative else new
+            else:
+                setattr(element, field, type(old)(old * new if part.relative else new))
+        except (TypeError, ValueError, KeyError, IndexError):
+            message = f"`{part.parameter}` cannot be `{_value_text(value)}`"
+            raise SceneError(message, part.place) from None
+        after.append(np.array(getattr(element, field), copy=True))
+        if part.relative and not np.isfinite(after[-1]).all():
+            message = f"`{part.parameter}` is not given in the MJCF, so it cannot be scaled"
+            raise SceneError(message, part.place)
+    return before, after
+
+
+def _value_text(value: SweepValue) -> str:
+    if isinstance(value, tuple):
+        return " ".join(f"{number:g}" for number in value)
+    return value if isinstance(value, str) else f"{value:g}"
+
+
+def _runnable(model: Any) -> Any:
+    """A copy of a model with automatic reset off."""
+    return with_integrator(model, integrator_of(model), float(model.opt.timestep))
+
+
+def _measure_variant(
+    scene: Scene,
+    base: Any,
+    base_states: EngineStates | None,
+    chaotic: bool,
+    row: SweepRow,
+    model: Any,
+) -> SweepRow:
+    """Run a model and fill its row; `base_states` is `None` where the model as it is was lost."""
+    try:
+        run = simulate(Setup(scenario=scene.scenario), model, thickness(model))
+    except mujoco.FatalError as error:
+        return replace(row, status="diverged", reasons=(f"MuJoCo does not run it: {error}",))
+    judgement = run.judgement
+    row = replace(row, status=judgement.status.value, reasons=judgement.reasons)
+    if not judgement.ok:
+        return row
+    row = with_contacts(scene.scenario, model, row)
+    if base_states is None:
+        return row
+    changes = visible_errors(base, scene, run.states, base_states)
+    if chaotic and changes.max() >= 1:
+        return replace(row, parted=float(run.states.times[np.argmax(changes >= 1)]))
+    row = replace(row, change=float(changes.max()))
+    if quantity_name(base, scene):
+        values = quantity_values(model, scene, run.states)
+        distances = np.linalg.norm(values - quantity_values(base, scene, base_states), axis=1)
+        row = replace(row, figure=float(distances.max()))
+    return row
+
+
+class _Hit(Struct):
+    """Two geoms that touch."""
+
+    closing: float
+    """Speed with which they approach at the beginning, m/s."""
+    contact: Any
+    """The latest one."""
+    parting: float = 0.0
+    """Speed with which they part at the end, m/s; 0 if they stay together."""
+    depth: float = 0.0
+    """Deepest contact, m."""
+
+
+class _Slide(Struct):
+    """Two geoms that slide on each other."""
+
+    time: float
+    """When they last touched, s."""
+    speed: float
+    """Of the one along the other then, m/s."""
+    distance: float
+    """Distance slid, m."""
+
+
+def with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
+    """Add what contacts and solver do, step by step."""
+    model_copy = _runnable(model)
+    model_copy.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_FWDINV)
+    step = float(model_copy.opt.timestep)
+    steps = scenario.steps(step) * len(scenario.times)
+    data, scratch = initial_data(scenario, model_copy), initial_data(scenario, model_copy)
+    current: dict[Pair, _Hit] = {}
+    hits: list[_Hit] = []
+    slides: dict[Pair, _Slide] = {}
+    longest: float | None = None
+    residual = force = iterations = 0.0
+    for number, command in enumerate(scenario.commands(step), 1):
+        if command:
+            data.ctrl[:] = command
+        advance(model_copy, data)
+        residual = max(residual, float(data.solver_fwdinv.max()))
+        force = max(force, float(np.linalg.norm(data.qfrc_constraint)))
+        iterations += int(data.solver_niter.sum())
+        scratch.qpos[:], scratch.qvel[:] = data.qpos, data.qvel
+        mujoco.mj_fwdPosition(model_copy, scratch)
+        mujoco.mj_fwdVelocity(model_copy, scratch)
+        current = _follow_hits(model_copy, scratch, current, hits)
+        for pair, hit in current.items():
+            time, speed = number * step, contact_speeds(model_copy, scratch, hit.contact)[1]
+            slide = slides.get(pair)
+            if slide is None or time - slide.time > scenario.sample * (1 + 1e-9):
+                slides[pair] = slide = _Slide(time, speed, speed * step)
+            else:
+                slide.distance += (time - slide.time) * (slide.speed + speed) / 2
+                slide.time, slide.speed = time, speed
+            longest = max(longest or 0.0, slide.distance)
+    closing = (hit for hit in hits if hit.closing > 0)
+    hardest = max(closing, key=lambda hit: hit.closing, default=None)
+    return replace(
+        row,
+        penetration=max((hit.depth for hit in hits), default=None),
+        slip=longest,
+        restitution=hardest.parting / hardest.closing if hardest is not None else None,
+        residual=residual / force if force else None,
+        iterations=iterations / steps if force else None,
+    )
+
+
+def _follow_hits(
+    model: Any, data: Any, previous: dict[Pair, _Hit], hits: list[_Hit]
+) -> dict[Pair, _Hit]:
+    """Note what happened to hits in a step, and add new ones; the pairs that touch now."""
+    current: dict[Pair, _Hit] = {}
+    for contact in touching_contacts(data):
+        pair = (int(contact.geom[0]), int(contact.geom[1]))
+        hit = previous.get(pair) or current.get(pair)
+        if hit is None:
+            hit = _Hit(-contact_speeds(model, data, contact)[0], contact)
+            hits.append(hit)
+        current[pair], hit.contact = hit, copy.copy(contact)
+        hit.depth = max(hit.depth, -float(contact.dist))
+    for pair in previous.keys() - current.keys():
+        hit = previous[pair]
+        hit.parting = max(0.0, contact_speeds(model, data, hit.contact)[0])
+    return current
+
+
+def _rollouts(
+    scenario: Scenario, model: Any, part: Variation, clock: Clock, *, quick: bool
+) -> Iterator[SweepRow]:
+    counts = [int(value) for value in part.values if not isinstance(value, str | tuple)]
+    batch, step = _COPIES * max(counts, default=1), float(model.opt.timestep)
+    steps = min(_MOST_STEPS, scenario.steps(step) * len(scenario.times))
+    state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+    data = initial_data(scenario, model)
+    mujoco.mj_getState(model, data, state, int(mujoco.mjtState.mjSTATE_FULLPHYSICS))
+    begins, control = np.tile(state, (batch, 1)), None
+    if scenario.controls:
+        control = np.tile([*islice(scenario.commands(step), steps)], (batch, 1, 1))
+
+    def job(pool: mujoco.rollout.Rollout) -> Job:
+        datas = [mujoco.MjData(model) for _ in range(max(1, pool.nthread))]
+        return lambda: pool.rollout(model, datas, begins, control, nstep=steps)
+
+    pools = [mujoco.rollout.Rollout(nthread=count) for count in counts]
+    try:
+        timings = time_jobs([job(pool) for pool in pools], 0, clock, quick=quick)
+    finally:
+        for pool in pools:
+            pool.close()
+    for count, timing in zip(counts, timings, strict=True):
+        took, simulated = timing.nanoseconds, batch * steps * step * 1e9
+        speed = Interval(simulated / took.value, simulated / took.high, simulated / took.low)
+        yield SweepRow(THREADS, f"{count}", own=False, status="ok", throughput=speed)
+
+
+def measure_expected(model: Any, scene: Scene, baseline: MeasuredSetting) -> Iterator[FigureLine]:
+    """What is known in theory, under every integrator at the scene's own timestep."""
+    expected: dict[str, tuple[float, str]] = {
+        name: (value, "as declared") for name, value in scene.declaration.expected.items()
+    }
+    if scene.exact is not None:
+        data = initial_data(scene.scenario, model)
+        quantities = scene.exact.states(np.zeros(1), data.qpos.copy(), data.qvel.copy()).expected
+        unknown = sorted(quantities.keys() - set(get_args(Expected)))
+        if unknown:
+            message = f"`{scene.exact.path}` expects `{unknown[0]}`, which is not measured"
+            help = f"known: {', '.join(get_args(Expected))}"
+            raise SceneError(message, Place(scene.exact.path), help)
+        expected |= {name: (value, scene.exact.path) for name, value in quantities.items()}
+    for integrator in STANDARD if expected else ():
+        setting = replace(baseline, integrator=integrator.value)
+        variant = with_setting(model, setting)
+        row = SweepRow("integrator", integrator.value, own=False, status="ok")
+        row = with_contacts(scene.scenario, variant, row)
+        readings = _reading_figures(scene, variant) if expected.keys() & _OF_READINGS else {}
+        for name, (exact, source) in expected.items():
+            unit = {"penetration": "m", "slip": "m"}.get(name, "")
+            if name in _OF_READINGS:
+                unit = "s" if name == "crossing" else _UNIT.sub(r"\1", quantity_name(model, scene))
+                value = readings.get(name)
+            elif (value := getattr(row, name)) is None and name != "restitution":
+                value = 0.0  # nothing touched
+            yield FigureLine(name, unit, integrator.value, value, exact, source)
+
+
+_OF_READINGS = frozenset(("crossing", "last", "largest", "smallest"))
+"""Quantities of what a sensor reads at every step."""
+_UNIT = re.compile(r"[^\[]*(?:\[(.*)\])?")
+
+
+def _reading_figures(scene: Scene, model: Any) -> dict[str, float]:
+    """When a sensor's reading first changes its sign, its last value, the largest and smallest."""
+    from scipy.interpolate import CubicSpline
+
+    quantity = scene.declaration.observable
+    if quantity is None or quantity.kind != "sensor" or model.sensor(quantity.name).dim != 1:
+        message = "a quantity of a reading is expected, and `measure` names no sensor of one number"
+        raise SceneError(message, scene.declaration.place("expected"))
+    every_step = replace(scene.scenario, sample=float(model.opt.timestep))
+    run = simulate(Setup(scenario=every_step), model, thickness(model))
+    if not run.judgement.ok:
+        return {}
+    scene, data = replace(scene, scenario=every_step), initial_data(scene.scenario, model)
+    start = EngineStates(np.zeros(1), data.qpos[None], data.qvel[None], data.act[None])
+    readings = np.concatenate(
+        [quantity_values(model, scene, states)[:, 0] for states in (start, run.states)]
+    )
+    times = np.concatenate([start.times, run.states.times])
+    figures = {
+        "last": float(readings[-1]),
+        "largest": float(readings.max()),
+        "smallest": float(readings.min()),
+    }
+    signed = np.flatnonzero(readings)  # it may be exactly 0 on its way
+    changes = np.flatnonzero(np.diff(np.sign(readings[signed])))
+    if changes.size:
+        before, after = signed[changes[0]], signed[changes[0] + 1]
+        part = slice(max(0, before - 3), after + 4)
+        roots = CubicSpline(times[part], readings[part]).roots(extrapolate=False)
+        middle = (times[before] + times[after]) / 2
+        figures["crossing"] = float(roots[np.nanargmin(np.abs(roots - middle))])
+    return figures

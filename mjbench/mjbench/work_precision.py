@@ -1,0 +1,431 @@
+"""Speed against error of a model in its scenarios.
+
+Every setting is run, judged and compared, then timed beside the model's own. The error of a lost
+run is not given; no other is below ten floors of the reference. Errors count to the horizon, and
+what should be conserved is watched to the end. Errors are also given as a learner sees them: how
+far bodies are displaced or turned in a picture, where 1 is just visible.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import mujoco
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import asdict, replace
+
+from mjbench import known_motion, measure, simulation
+from mjbench.costs import Clock, costs, mark_luck, verdict
+from mjbench.detector import driving_force, overlap_names
+from mjbench.pilot import (
+    Pilot,
+    horizon_error,
+    horizon_errors,
+    nudges,
+    own_setting,
+    position_distances,
+    run_pilot,
+    settings,
+    with_setting,
+)
+from mjbench.reports import scene_report
+from mjbench.reports.shown_errors import (
+    FrontPoint,
+    Quantity,
+    compared_quantity,
+    front,
+    horizon_error_text,
+    is_idle,
+    setting_text,
+    solving_parts,
+)
+from mjbench.scene import Scene, thickness
+from mjbench.stability import run_trial, stable_rows
+from mjbench.sweep import measure_expected
+
+_CONSERVED = 1e-8
+"""The relative change, over the reference, below which a quantity counts as conserved."""
+
+
+class Basis(Struct, frozen=True, eq=False):
+    """What is known of a scene before its settings are measured."""
+
+    model: Any
+    pilot: Pilot
+    baseline: scene_report.MeasuredSetting
+    """The scene's own setting."""
+    cones: Mapping[str, known_motion.Cone]
+    energy: float | None
+    """The scale for changes of energy, J; `None` where energy is not conserved."""
+    momentum_conserved: bool
+    late_energy: float | None
+    """Mean kinetic energy after the horizon, J; `None` where it is the end."""
+    least_seen: float
+    """Below this nothing is known of what is seen."""
+    least_figure: float
+    """The same of the declared quantity."""
+
+    @property
+    def reference(self) -> known_motion.KnownMotion:
+        """The reference of the scene's own setting."""
+        return self.cones[self.baseline.cone].reference
+
+
+def measure_scenario(
+    model: Any,
+    scene: Scene,
+    *,
+    quick: bool = False,
+    clock: Clock | None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> scene_report.ScenarioReport:
+    """Measure a model (`mjModel`) in one of its scenarios.
+
+    `clock`: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
+    `tell` gets a line about each stage. A `SceneError` where the scenario does not fit the model,
+    or diverges at every timestep.
+    """
+    tell(f"{scene.name}: a first run")
+    pilot = run_pilot(model, scene)
+    tell(f"{scene.name}: the reference")
+    cones = known_motion.find_references(model, pilot, quick=quick)
+    baseline = own_setting(model, pilot)
+    reference = cones[baseline.cone].reference
+    conserved = find_conserved(model, pilot, reference)
+    late_energy = measure.mean_late_energy(model, pilot, reference.horizon)
+    leasts = zip(
+        *(known_motion.least_known(model, scene, cone.reference) for cone in cones.values()),
+        strict=True,
+    )
+    basis = Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
+    measurements = _measure_settings(basis, settings(model, pilot, quick=quick), tell)
+    measured_rows = [row for row, _ in measurements]
+    noticeable = [sees for _, sees in measurements]
+    cost_of = None
+    if clock is not None:
+        tell(f"{scene.name}: times")
+        measured_rows, cost_of = _with_costs(basis, measured_rows, clock, quick)
+    tell(f"{scene.name}: stable timesteps")
+    largest = stable_rows(model, pilot, quick=quick)
+    limits = {row.integrator: row.largest for row in largest if row.largest is not None}
+    figure = Quantity("figure", measure.quantity_name(model, scene), basis.least_figure)
+    quantity = compared_quantity(measured_rows, figure, basis.least_seen)
+    rows = front(mark_luck(measured_rows, limits, quantity), quantity)
+    holds = partial(_holds, basis, rows, quantity, quick)
+    error = horizon_error(model, scene)
+    judgement = verdict(rows, noticeable, quantity, holds, horizon_error_text(error))
+    return scene_report.ScenarioReport(
+        name=scene.name,
+        title=scene.title,
+        duration=scene.scenario.duration,
+        horizon=reference.horizon,
+        hold=scene.scenario.hold,
+        reference=reference.kind,
+        source=reference.source,
+        floor=reference.floor.place,
+        velocity_floor=reference.floor.velocity,
+        second=reference.second,
+        agreement=reference.agreement,
+        lyapunov=pilot.lyapunov,
+        horizons=None if pilot.lyapunov is None else pilot.horizons,
+        smooth=pilot.smooth,
+        notes=_notes(basis, largest, rows, cost_of, quantity),
+        figure=measure.quantity_name(model, scene),
+        rows=rows,
+        orders=measure.fit_scene_orders(model, rows, baseline, reference.states, reference.floor)
+        if pilot.smooth
+        else (),
+        figures=tuple(measure_expected(model, scene, baseline)),
+        stable=largest,
+        verdict=judgement,
+        least_seen=basis.least_seen,
+        least_figure=basis.least_figure,
+        cost_of=cost_of,
+        horizon_error=error,
+    )
+
+
+def find_conserved(
+    model: Any, pilot: Pilot, reference: known_motion.KnownMotion
+) -> tuple[float | None, bool]:
+    """What the author says is conserved, or else what the reference conserves.
+
+    The scale for changes of energy, J, or `None` where energy is not conserved; and whether the
+    angular momentum about the centre of mass is.
+    """
+    scenario = pilot.scene.scenario
+    conserved = pilot.scene.declaration.conserved
+    data = simulation.initial_data(scenario, model)
+    states = [
+        (data.qpos.copy(), data.qvel.copy()),
+        *zip(reference.states.qpos, reference.states.qvel, strict=True),
+    ]
+    table = np.array([simulation.invariants(model, data, qpos, qvel) for qpos, qvel in states])
+    energies, momenta = table[:, :2], table[:, 2:]
+    scale = measure.energy_scale(energies)
+    if conserved is not None:
+        energy = "energy" in conserved and scale > 0
+        return scale if energy else None, "angular-momentum" in conserved
+    if not pilot.smooth or reference.kind == "self":
+        return None, False
+    drifts = measure.energy_drift(energies), measure.momentum_drift(momenta)
+    is_conserved = [drift is not None and abs(drift) < _CONSERVED for drift in drifts]
+    return scale if is_conserved[0] else None, is_conserved[1]
+
+
+def _measure_settings(
+    basis: Basis, choices: Sequence[scene_report.MeasuredSetting], tell: Callable[[str], None]
+) -> list[tuple[scene_report.WorkPrecisionRow, bool | None]]:
+    """The rows of settings, and what is noticed of each.
+
+    What changes no bit at the own timestep is not crossed with others.
+    """
+    baseline, rows_by_setting, idle_solving = basis.baseline, {}, set()
+    base_states: simulation.EngineStates | None = None
+    # Other solvers come last, and of them those at the own timestep first.
+    for setting in sorted(
+        choices,
+        key=lambda s: (
+            s != baseline,
+            s.solver_settings != baseline.solver_settings,
+            s.timestep != baseline.timestep,
+        ),
+    ):
+        if setting.solver_settings in idle_solving and setting.timestep != baseline.timestep:
+            continue
+        tell(f"{basis.pilot.scene.name}: {setting_text(setting)}")
+        row, sees, states = _measure_setting(basis, setting)
+        base_states = states if row.own else base_states
+        is_alike = setting == replace(setting, timestep=baseline.timestep)
+        is_alike = is_alike and setting.integrator == baseline.integrator and not row.own
+        if states is not None and base_states is not None and is_alike:
+            pairs = ((states.qpos, base_states.qpos), (states.qvel, base_states.qvel))
+            row = replace(row, same=all(np.array_equal(a, b) for a, b in pairs))
+            idle_solving |= {setting.solver_settings} if row.same else set()
+        rows_by_setting[setting] = row, sees
+    return [rows_by_setting[setting] for setting in choices if setting in rows_by_setting]
+
+
+def _holds(
+    basis: Basis,
+    rows: Sequence[scene_report.WorkPrecisionRow],
+    quantity: Quantity,
+    quick: bool,
+    better: scene_report.MeasuredSetting,
+) -> bool:
+    """Whether another setting is better than the scene's own from starts nearby too."""
+    model, pilot = basis.model, basis.pilot
+    scene, scenario = pilot.scene, pilot.scene.scenario
+    places = [next(row for row in rows if row.setting == s) for s in (better, basis.baseline)]
+    starts = nudges(model, 2 * (_QUICK_STARTS if quick else _STARTS), _NEARBY)
+    part = max(better.timestep, basis.baseline.timestep) / (_PARTS * (len(starts) + 1))
+    fine = simulation.without_sleep(with_setting(model, replace(basis.baseline, timestep=part)))
+    for number, (position, velocity) in enumerate(starts, 1):
+        data = simulation.initial_data(scenario, model)
+        mujoco.mj_integratePos(model, data.qpos, position, 1.0)
+        data.qvel[:] += velocity
+        if pilot.jumps:
+            simulation.advance(fine, data, _PARTS * number)
+        start = {"qpos": tuple(data.qpos), "qvel": tuple(data.qvel)}
+        nudged_scenario = replace(scenario, **start)
+        setup = replace(pilot.setup, scenario=nudged_scenario)
+        near = replace(pilot, scene=replace(scene, scenario=nudged_scenario), setup=setup)
+        points = []
+        for row in places:
+            base = with_setting(model, replace(basis.baseline, cone=row.setting.cone))
+            reference = basis.cones[row.setting.cone].reference
+            exact = known_motion.find_nearby(base, near, reference, quick=quick)
+            if exact is None:
+                return True
+            run = simulation.simulate(setup, with_setting(model, row.setting), thickness(model))
+            if not run.judgement.ok or row.cost is None:
+                return False
+            states = run.states.head(len(exact.times))
+            if quantity.name == "figure":
+                error = float(measure.quantity_errors(model, near.scene, states, exact).max())
+                error = max(error, quantity.least)
+            else:
+                error = max(measure.visible_error(model, scene, states, exact), quantity.least)
+                error += basis.cones[row.setting.cone].visible_model_error
+            points.append(FrontPoint(row.cost, error))
+        if not points[0].beats(points[1]):
+            return False
+    return True
+
+
+_NEARBY, _PARTS = 1e-4, 8
+"""How far starts nearby are off: rad, or relative to the extent; velocities per s. Where something
+is hit, they are also later by parts of a timestep, in so many steps each: where in a step a hit
+falls is luck."""
+_STARTS, _QUICK_STARTS = 2, 1
+"""From how many random directions starts nearby come, each to both sides."""
+
+
+def _notes(
+    basis: Basis,
+    largest: Sequence[scene_report.StableRow],
+    rows: Sequence[scene_report.WorkPrecisionRow],
+    cost_of: scene_report.MeasuredSetting | None,
+    compared_quantity: Quantity,
+) -> tuple[str, ...]:
+    model, pilot, reference = basis.model, basis.pilot, basis.reference
+    notes = [reference.note]
+    if cost_of is not None:
+        text = setting_text(cost_of)
+        notes.append(f"costs are relative to {text}, as the scene's own setting does not run")
+    figure = measure.quantity_name(model, pilot.scene)
+    if figure and compared_quantity.name != "figure":
+        notes.append(f"no error of the {figure} is resolved: settings are compared by what is seen")
+    idle = [", ".join(solving_parts(r.setting, basis.baseline)) for r in rows if is_idle(r)]
+    if idle:
+        notes.append(f"the same motion to the bit, and no time saved, with {'; '.join(idle)}")
+    if pilot.jumps:
+        reasons = ", ".join(pilot.jumps)
+        notes.append(f"errors follow no power of the timestep, because of {reasons}")
+    slip = next((row.slip for row in rows if row.own), None) or 0.0
+    cone = basis.cones[basis.baseline.cone]
+    if cone.is_held and slip > scene_report.FLOORS * reference.floor.position:
+        notes.append(
+            f"what sticks creeps by {slip:.3g} m under the scene's own setting, "
+            "though friction stays below its limit: in the engine it is soft"
+        )
+    if reference.horizon < pilot.scene.scenario.duration * (1 - 1e-9):
+        notes.append(
+            f"errors count until {reference.horizon:.6g} s: the motion is not known beyond"
+        )
+    if pilot.scene.declaration.horizon_error and pilot.lyapunov is None:
+        error = horizon_error_text(horizon_error(model, pilot.scene))
+        notes.append(f"no run that begins 1e-10 away comes to be off by {error}: it is not chaotic")
+    if int(model.opt.enableflags) & mujoco.mjtEnableBit.mjENBL_SLEEP:
+        notes.append("nothing sleeps in the reference, so errors hold what sleep changes")
+    if pilot.peaks.sunk > 1:
+        names = overlap_names(model, pilot.peaks)
+        notes.append(f"{names} are so soft that the middle of one comes to lie in the other")
+    if drivers := driving_force(model, pilot.scene.scenario):
+        notes.append(f"energy is not judged: {drivers}")
+    states = np.abs(np.hstack([reference.states.qpos, reference.states.qvel, reference.states.act]))
+    if np.any((states > 0) & (states < np.finfo(np.float64).tiny)):
+        notes.append("the state holds subnormal numbers, with which processors are slow")
+    limit = simulation.refsafe_from(model, contact=pilot.contact)
+    refsafe_limit = limit if pilot.constrained else math.inf
+    if any(
+        (row.searched[1] if row.largest is None else row.largest) > refsafe_limit for row in largest
+    ):
+        notes.append(
+            f"beyond {refsafe_limit:.6g} s refsafe softens constraints: stable, but another model"
+        )
+    return tuple(note for note in notes if note)
+
+
+def _with_costs(
+    basis: Basis, rows: Sequence[scene_report.WorkPrecisionRow], clock: Clock, quick: bool
+) -> tuple[list[scene_report.WorkPrecisionRow], scene_report.MeasuredSetting | None]:
+    """Add the costs of usable settings, relative to the scene's own.
+
+    Where that one was lost they are relative to the longest timestep under its integrator that
+    runs, or else to the first setting that does; this is returned.
+    """
+    timed_rows = list(rows)
+    usable = [index for index, row in enumerate(rows) if row.status == "ok"]
+    if not usable:
+        return timed_rows, None
+    settings, baseline = [rows[index].setting for index in usable], basis.baseline
+    alike = [s for s in settings if s == replace(baseline, timestep=s.timestep)]
+    base = max(alike, key=lambda s: s.timestep, default=settings[0])
+    base = baseline if baseline in settings else base
+    scene = basis.pilot.scene
+    timings = costs(basis.model, scene, settings, settings.index(base), clock, quick=quick)
+    for index, timing in zip(usable, timings, strict=True):
+        seconds = timing.nanoseconds.scale(1e-9 / scene.scenario.duration)
+        timed_rows[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
+    return timed_rows, None if base == baseline else base
+
+
+def _measure_setting(
+    basis: Basis, setting: scene_report.MeasuredSetting
+) -> tuple[scene_report.WorkPrecisionRow, bool | None, simulation.EngineStates | None]:
+    """Run a scene under a setting and compare it with its reference; the cost is added later.
+
+    The flag says whether a learner sees the error, for the scene's own setting with that of its
+    cone; `None` where the reference is not known well enough. The states are those of the run.
+    """
+    model, pilot, cone = basis.model, basis.pilot, basis.cones[setting.cone]
+    variant = with_setting(model, setting)
+    steps, energy = round(pilot.scene.scenario.duration / setting.timestep), basis.energy
+    figures: dict[str, Any] = dict.fromkeys(scene_report.WorkPrecisionRow.__struct_fields__) | {
+        "setting": setting,
+        "status": "diverged",  # as of a run that MuJoCo refuses
+        "reasons": (),
+        "penetration": 0.0,
+        "model_error": cone.model_error,
+        "refsafe": pilot.constrained and simulation.refsafe_active(variant, contact=pilot.contact),
+        "steps": steps,
+        "evaluations": steps * scene_report.step_evaluations(setting.integrator),
+        "lucky": "",
+        "own": setting == basis.baseline,
+        **dict.fromkeys(("front", "same"), False),
+    }
+    row = scene_report.WorkPrecisionRow(**figures)
+    try:
+        run = simulation.simulate(pilot.setup, variant, thickness(model))
+    except mujoco.FatalError as error:
+        return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None, None
+    row = replace(
+        row,
+        status=run.judgement.status.value,
+        reasons=run.judgement.reasons,
+        energy_drift=None if energy is None else measure.energy_drift(run.energy, energy),
+        momentum_drift=measure.momentum_drift(run.momentum) if basis.momentum_conserved else None,
+        mean_energy=measure.mean_energy(run, cone.reference.horizon, basis.late_energy),
+        penetration=run.penetration,
+    )
+    if not run.judgement.ok:
+        variant = with_setting(model, setting)
+        growth = run_trial(pilot.setup, variant, pilot.setup.scenario.duration).growth
+        has_grown = math.isfinite(growth) and growth > 1
+        return replace(row, growth=growth if has_grown else None), None, None
+    if pilot.constrained:
+        # A step of RK4 has four times the iterations of its last evaluation.
+        count = simulation.count_iterations(with_setting(model, setting), pilot.scene.scenario)
+        row = replace(row, iterations=count * row.evaluations / steps)
+    return *_with_errors(basis, row, run), run.states
+
+
+def _with_errors(
+    basis: Basis, row: scene_report.WorkPrecisionRow, run: simulation.Run
+) -> tuple[scene_report.WorkPrecisionRow, bool | None]:
+    model, scene, cone = basis.model, basis.pilot.scene, basis.cones[row.setting.cone]
+    reference = cone.reference
+    states = run.states.head(len(reference.states.times))
+    exact = simulation.motion_of(model, reference.states)
+    run_errors = measure.errors(simulation.motion_of(model, states), exact, reference.floor)
+    floor = basis.least_seen
+    visible = measure.visible_error(model, scene, states, reference.states)
+    noticeable = None if max(1, visible) <= floor else visible >= 1
+    if row.own and cone.visible_model_error >= 1:
+        noticeable = True
+    creep = None if cone.sticks is None else measure.measure_slip(model, scene, states, cone.sticks)
+    if basis.pilot.lyapunov is not None:
+        unit = horizon_errors(model, scene)
+        gaps = position_distances(model, states.qpos, reference.states.qpos, unit)
+        far = np.flatnonzero(gaps >= 1)
+        if far.size:
+            # How far apart they are later depends on the last digit of the start.
+            return replace(row, parted=float(states.times[far[0]]), slip=creep), noticeable
+    figure = None
+    if measure.quantity_name(model, scene):
+        distances = measure.quantity_errors(model, scene, states, reference.states)
+        sizes = np.maximum([distances.max(), distances[-1]], basis.least_figure)
+        figure = float(sizes[0]), float(sizes[1])
+    row = replace(
+        row,
+        **asdict(run_errors),
+        figure=figure,
+        seen=max(visible, floor) + cone.visible_model_error,
+        slip=creep,
+    )
+    return row, noticeable

@@ -1,0 +1,254 @@
+"""Divergence never passes as success, and measuring does not disturb a run."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from mjbench.cases import measure
+from mjbench.detector import Peaks, RunStatus, driving_force, judge
+from mjbench.linearization import find_theory
+from mjbench.pilot import longer_setup, run_pilot
+from mjbench.problem import Integrator, Scenario, Setup
+from mjbench.problems import all_problems
+from mjbench.scene import scenes, thickness
+from mjbench.simulation import advance, compile_model, refsafe_active, simulate
+from mjbench.stability import attempt
+from samples.surveys import parse_declared
+
+SPRING = """
+<mujoco>
+  <option gravity="0 0 0"/>
+  <worldbody>
+    <body><joint type="slide" stiffness="100"/><geom size="0.1" mass="1"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+BOUNDS = Setup(scenario=Scenario(1.0, 1.0), position_bound=1.0, velocity_bound=10.0)
+
+
+def spring_data(timestep: float, qpos: float = 0.0, qvel: float = 0.0) -> tuple[Any, Any]:
+    model = mujoco.MjModel.from_xml_string(SPRING)
+    model.opt.timestep = timestep
+    data = mujoco.MjData(model)
+    data.qpos[0], data.qvel[0] = qpos, qvel
+    return model, data
+
+
+def test_a_run_that_was_reset_and_ends_with_error_zero_is_lost() -> None:
+    model, data = spring_data(0.3, qvel=1.0)
+    advance(model, data, 1000)
+    assert data.qpos[0] == 0.0 == data.qvel[0]  # as if it had come to rest
+    judgement = judge(model, data, 1000 * 0.3)
+    assert judgement.status is RunStatus.RESET
+    assert "MuJoCo warned of bad accelerations" in judgement.reasons
+    assert any("the state was reset" in reason for reason in judgement.reasons)
+
+
+def test_a_slow_growth_without_any_warning_is_seen() -> None:
+    model, data = spring_data(0.2002, qpos=0.5)
+    advance(model, data, 130)
+    assert abs(data.qpos[0]) > 100
+    assert not any(warning.number for warning in data.warning)
+    judgement = judge(model, data, 130 * 0.2002, setup=BOUNDS)
+    assert judgement.status is RunStatus.SLOW_GROWTH
+    assert any(reason.startswith("positions reached") for reason in judgement.reasons)
+
+
+def test_a_state_that_is_no_number() -> None:
+    for field in ("qpos", "qvel"):
+        model, data = spring_data(0.01)
+        getattr(data, field)[0] = np.nan
+        assert judge(model, data, 0.0).reasons[0] == "the state is not finite"
+
+
+def test_peaks_may_reach_every_bound_and_pass_none() -> None:
+    bounds = {"position_bound": 1.0, "velocity_bound": 2.0, "penetration_bound": 3.0}
+    setup = Setup(scenario=Scenario(0.0, 0.0), energy_bound=4.0, **bounds)
+    peaks = Peaks(position=1.0, velocity=2.0, penetration=3.0, sunk=1.0, energy=4.0)
+    assert peaks.is_within(setup)
+    for name in ("position", "velocity", "penetration", "sunk", "energy"):
+        assert not replace(peaks, **{name: getattr(peaks, name) + 0.1}).is_within(setup), name
+    assert not replace(peaks, position=np.nan).is_within(setup)
+
+
+def test_bodies_deep_in_each_other_raise_no_warning_and_are_seen() -> None:
+    sunk = all_problems()["stack-10000"]
+    soft = replace(sunk, mjcf=sunk.mjcf.replace('solref="0.004 1"', 'solref="0.04 1"'))
+    soft = replace(soft, scenario=replace(soft.scenario, qpos=(0.0, 0.0)))
+    run = simulate(soft, compile_model(soft.mjcf, Integrator.EULER, 1e-3))
+    assert run.judgement.status is RunStatus.DIVERGED
+    assert len(run.judgement.reasons) == 1
+    assert "as deep in each other" in run.judgement.reasons[0]
+
+
+def test_bodies_deep_in_each_other_are_named_with_the_time() -> None:
+    text = """<mujoco><worldbody><body name="torso"><geom name="t" size=".2"/></body>
+      <body name="leg" pos="0 0 .3"><joint type="slide" axis="0 0 1"/><geom size=".02" mass="9"
+      contype="0" conaffinity="0"/><body>
+      <geom size=".05" mass="0" solref=".5 1" priority="1"/></body></body>
+      </worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    run = simulate(Setup(scenario=Scenario(0.5, 0.1)), model, thickness(model))
+    (reason,) = run.judgement.reasons
+    assert reason.startswith("torso and a part of leg lie ")
+    assert " times as deep in each other as they may, at 0." in reason and reason.endswith(" s")
+
+
+def test_what_sinks_in_after_the_scenario_is_not_lost_in_longer_runs() -> None:
+    """A ball falls for 0.45 s, then into a floor so soft that its middle is below the surface."""
+    mjcf = """<mujoco><worldbody><geom type="plane" size="1 1 1" solref="0.2 1"/><body pos="0 0 1">
+    <freejoint/><geom size=".05" mass="1"/></body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(mjcf)
+    (scene,) = scenes(model, parse_declared('[[scenario]]\nname = "s"\nduration = 0.4\n'))
+    pilot = run_pilot(model, scene)
+    bounds = [longer_setup(model, pilot, span).sunk_bound for span in (0.4, 0.8)]
+    assert bounds[0] == 1.0 and bounds[1] > 2.0, "it sinks by more than its diameter"
+
+
+def test_no_error_is_given_for_a_run_that_was_lost() -> None:
+    problem = all_problems()["damped-spring-0"]
+    fast = replace(problem, mjcf=problem.mjcf.replace('stiffness="100"', 'stiffness="1e6"'))
+    line = measure(fast, Integrator.RK4, 0.02)
+    assert (line.status, line.position, line.velocity) == ("diverged", None, None)
+
+
+def test_where_energy_can_be_judged() -> None:
+    """Only where nothing drives the motion: no actuator, no wind, nothing that is not counted."""
+    motor = '<motor joint="j"/>'
+    servo = '<position joint="j" kp="9"/>'
+    none, pushed = Scenario(1.0, 1.0), Scenario(1.0, 1.0, controls=((0.5,),))
+    keyed = Scenario(1.0, 1.0, keyframe=0)
+    key = '<keyframe><key ctrl="1"/></keyframe>'
+    for actuator, option, joint, rest, scenario, causes in (
+        ("", "", "", "", none, ""),
+        (motor, "", "", "", none, ""),
+        (motor, "", "", "", Scenario(1.0, 1.0, controls=((0.0,),)), ""),
+        (motor, "", "", "", pushed, "actuators act"),
+        (motor, "", "", key, keyed, "actuators act"),
+        (servo, "", "", "", none, "actuators act"),
+        (servo, '<flag actuation="disable"/>', "", "", none, ""),
+        ("", "", 'damping="2" frictionloss="1"', "", none, ""),
+        ("", "", 'damping="2 -1"', "", none, "damping is negative"),
+        ('<motor joint="j" damping="-1"/>', "", "", "", none, "damping is negative"),
+        ('<motor joint="j" ctrlrange="1 2"/>', "", "", "", none, "actuators act"),
+        ('<motor joint="j" forcerange="1 2"/>', "", "", "", none, "actuators act"),
+        ("", "", 'damping="-2"', "", none, "damping is negative"),
+    ):
+        text = f"""<mujoco><option>{option}</option><worldbody><body>
+            <joint name="j" {joint}/><geom size=".1"/></body></worldbody>
+            <actuator>{actuator}</actuator>{rest}</mujoco>"""
+        model = mujoco.MjModel.from_xml_string(text)
+        assert driving_force(model, scenario) == causes, (actuator, option, joint)
+    model.dof_damping[:] = 0
+    model.opt.wind[0], model.body_gravcomp[1] = 1.0, 1.0
+    assert driving_force(model, none) == "gravity is compensated", "wind is nothing in a vacuum"
+    model.opt.density = 1.2
+    assert driving_force(model, none) == "wind blows, gravity is compensated"
+    model.opt.wind[0], model.body_gravcomp[1] = 0.0, 0.0
+    assert driving_force(model, none) == ""
+    for field, cause in (
+        (model.geom_fluid, "a fluid stores energy"),
+        (model.geom_surfacevel, "a surface moves"),
+        (model.geom_adhesion, "contacts adhere"),
+    ):
+        field.flat[0] = 1.0
+        assert driving_force(model, none) == cause
+        field.flat[0] = 0.0
+
+
+def test_a_state_that_shot_up_and_came_back_is_seen() -> None:
+    # A rod's transverse velocity grows to 1e6 rad/s, turns the axial one down, and decays again.
+    problem = all_problems()["thin-rod"]
+    assert problem.limit is not None
+    limit = problem.limit(Integrator.RK4)
+    assert limit is not None
+    trial = attempt(problem, Integrator.RK4, 3.1 / math.sqrt(8) * limit.timestep)
+    assert not trial.stable
+
+
+def test_a_good_run_is_good() -> None:
+    model, data = spring_data(0.01, qpos=0.5)
+    advance(model, data, 100)
+    good = judge(model, data, 1.0, setup=BOUNDS)
+    assert good.ok and good.reasons == ()
+    data.time = math.nan
+    assert judge(model, data, 1.0).status is RunStatus.RESET
+
+
+def test_warnings_are_counted_and_not_printed(capfd: pytest.CaptureFixture[str]) -> None:
+    model, data = spring_data(0.3, qvel=1.0)
+    before = mujoco.get_mju_user_warning()
+    advance(model, data, 100)
+    assert data.warning[int(mujoco.mjtWarning.mjWARN_BADQACC)].number == 1
+    assert capfd.readouterr() == ("", "")
+    assert mujoco.get_mju_user_warning() is before
+
+
+def test_measuring_does_not_disturb_the_run() -> None:
+    problem = all_problems()["stack-10"]
+    run = simulate(problem, compile_model(problem.mjcf, Integrator.EULER, 1e-3))
+    model = compile_model(problem.mjcf, Integrator.EULER, 1e-3)
+    data = mujoco.MjData(model)
+    data.qpos[:] = problem.scenario.qpos
+    mujoco.mj_step(model, data, round(problem.scenario.duration / 1e-3))
+    assert np.array_equal(run.states.qpos[-1], data.qpos)
+    assert np.array_equal(run.states.qvel[-1], data.qvel)
+
+
+def test_commands_are_those_of_their_hold() -> None:
+    problem = all_problems()["stiff-servo-1"]
+    run = simulate(problem, compile_model(problem.mjcf, Integrator.IMPLICIT, 1e-4))
+    model = compile_model(problem.mjcf, Integrator.IMPLICIT, 1e-4)
+    data = mujoco.MjData(model)
+    for (command,) in problem.scenario.controls:
+        data.ctrl[0] = command
+        mujoco.mj_step(model, data, 500)
+    assert run.states.qpos[-1, 0] == data.qpos[0]
+
+
+def test_refsafe_is_told() -> None:
+    for name, timestep, active in (
+        ("stack-1", 2e-3, False),
+        ("stack-1", 2.1e-3, True),
+        ("elastic-impact", 1.0, False),  # a stiffness
+        ("soft-equality-1", 1.0, False),  # switched off
+        ("pendulum-connect-90", 0.0101, True),
+        ("pendulum-connect-90", 0.01, False),
+        ("tumbling-box", 1.0, False),  # contact is off
+        ("damped-spring-1", 1.0, False),
+    ):
+        model = compile_model(all_problems()[name].mjcf, Integrator.EULER, timestep)
+        assert refsafe_active(model) is active, (name, timestep)
+    stack = compile_model(all_problems()["stack-1"].mjcf, Integrator.EULER, 2.1e-3)
+    assert not refsafe_active(stack, contact=False), "where nothing touches, nothing is softened"
+    for attributes in ('limited="true" range="-1 1"', 'frictionloss="1"'):
+        joint = f"<joint type='slide' {attributes}/>"
+        text = f"<mujoco><worldbody><body>{joint}<geom size='.1'/></body></worldbody></mujoco>"
+        assert refsafe_active(compile_model(text, Integrator.EULER, 0.011)), attributes
+        assert not refsafe_active(compile_model(text, Integrator.EULER, 0.009)), attributes
+
+
+def test_theory_ends_where_longer_steps_have_another_rest() -> None:
+    """Beyond 10 ms contacts are softer, and a block sinks deeper; a servo knows nothing of it."""
+    servo = """<body pos="2 0 1"><joint axis="0 1 0" stiffness="2e4" damping="100"/>
+    <geom size=".1" pos=".3 0 0" mass="1"/></body>"""
+    block = """<geom type="plane" size="1 1 1"/><body pos="0 0 .1"><freejoint/>
+    <geom type="box" size=".1 .1 .1"/></body>"""
+    limits = []
+    for world in (servo, servo + block):
+        model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{world}</worldbody></mujoco>")
+        theory = find_theory(model, Scenario(1.0, 0.05), None, smooth=False)
+        limits.append(
+            [theory.limit(name, (1e-3, 0.05)) for name in (Integrator.RK4, Integrator.EULER)]
+        )
+    (rk4, euler), (rk4_beside, euler_beside) = limits
+    assert rk4_beside is not None and rk4_beside.timestep == pytest.approx(rk4.timestep, rel=1e-3)
+    assert euler.timestep > 0.01 and euler_beside is None

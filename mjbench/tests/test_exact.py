@@ -1,0 +1,324 @@
+"""A known motion, `NAME.exact.py`: errors refer to it, or it is a mistake."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mjbench.bench import CannotMeasureError, compile_subject, run_scenario
+from mjbench.cli import read_subject
+from mjbench.host import LocalHost
+from mjbench.reports.scene_report import ScenarioReport
+
+pytestmark = pytest.mark.long
+
+BALL = """\
+<mujoco>
+  <worldbody>
+    <body><joint name="j" type="slide" axis="0 0 1"/><geom size="0.1"/></body>
+  </worldbody>
+  <sensor><jointpos name="height" joint="j"/></sensor>
+</mujoco>
+"""
+TOML = '[[scenario]]\nname = "up"\nqpos = [1]\nqvel = [3]\nduration = 0.4\nsample = 0.1\n'
+TOML += 'measure = "sensor:height"\n'
+EXACT = """\
+print("reading")
+
+
+def motion(time, qpos, qvel):
+    return qpos + qvel * time - 9.81 / 2 * time**2{velocity}
+"""
+
+
+def write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write(tmp_path / "ball.xml", BALL)
+    return tmp_path
+
+
+def report(folder: Path, exact: str, toml: str = TOML) -> ScenarioReport:
+    write(folder / "ball.exact.py", exact)
+    write(folder / "ball.toml", toml)
+    host = LocalHost(folder, lambda text: None)
+    compiled_model = compile_subject(read_subject(folder / "ball.xml"), host, quick=True)
+    return run_scenario(compiled_model, 0, host, quick=True, timed=False)
+
+
+def mistake(folder: Path, exact: str, toml: str = TOML) -> CannotMeasureError:
+    with pytest.raises(CannotMeasureError) as caught:
+        report(folder, exact, toml)
+    return caught.value
+
+
+def test_errors_are_taken_from_the_exact_motion(folder: Path) -> None:
+    for velocity in (", qvel - 9.81 * time", ""):
+        scenario = report(folder, EXACT.format(velocity=velocity))
+        assert (scenario.reference, scenario.source) == ("closed", "ball.exact.py")
+        assert scenario.second == "Bulirsch–Stoer over mj_forward" and scenario.floor < 1e-13
+        (own_row,) = (row for row in scenario.rows if row.own)
+        assert own_row.position is not None
+        assert own_row.position[0] == pytest.approx(9.81 * 0.4 * 0.002 / 2)
+        assert own_row.figure == pytest.approx(own_row.position)
+    with_reference = TOML + 'reference = "ode"\n'
+    assert report(folder, EXACT.format(velocity=""), with_reference).reference == "ode"
+
+
+EQUATIONS = """\
+def acceleration(time, qpos, qvel):
+    return -9.81{} + 0 * qpos
+"""
+
+
+def test_equations_of_motion_are_integrated(folder: Path) -> None:
+    scenario = report(folder, EQUATIONS.format(""))
+    assert scenario.reference == "closed" and scenario.floor < 1e-11
+    help = mistake(folder, EQUATIONS.format(" * (1 + 1e-5)")).help
+    assert help.startswith("in the scenario `up` it errs by 7.8e-06 in position: two integrations")
+    loose = report(folder, EQUATIONS.format(" * (1 + 1e-5)"), TOML + "precision = 1e-4\n")
+    assert 1e-6 < loose.floor < 1e-4, "and no error is given that is not known"
+
+
+def test_two_motions_of_the_course_are_told_apart(folder: Path) -> None:
+    """A formula and equations: the one that errs is named, and the engine decides."""
+    exact = EXACT.format(velocity=", qvel - 9.81 * time") + "\n\n" + EQUATIONS
+    assert report(folder, exact.format("")).floor < 1e-11
+    message = mistake(folder, exact.format(" * (1 + 1e-5)")).message
+    assert message == "`ball.exact.py`, `acceleration`, is not this scene's motion"
+
+
+PENDULUM = """\
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody><body><joint name="j" axis="0 1 0"/>
+    <geom size=".01" pos="0 0 -1" mass="1"/><inertial pos="0 0 -1" mass="1" diaginertia="0 0 0"/>
+  </body></worldbody>
+  <sensor><jointpos name="angle" joint="j"/></sensor>
+</mujoco>
+"""
+QUARTER = """\
+from scipy.special import ellipk
+
+
+def expected(qpos, qvel):
+    return {"crossing": ellipk(0.5) / 9.81**0.5, "largest": qpos[0]}
+"""
+
+
+def test_quantities_of_theory_are_measured_by_their_formula(folder: Path) -> None:
+    """A pendulum let go at 90°: it is down after a quarter of its period, K(1/2)/√g."""
+    write(folder / "ball.xml", PENDULUM.replace('"0 0 0"/>', '"1e-9 1e-9 1e-9"/>'))
+    start = "qpos = [1.5707963267948966]\nduration = 1\nsample = 0.02\nmeasure = 'sensor:angle'\n"
+    toml = f"[[scenario]]\nname = 'swing'\n{start}"
+    scenario = report(folder, QUARTER, toml + "energy_bound = 9.9\n")
+    figures = {(line.integrator, line.name): line for line in scenario.figures}
+    crossing = figures["RK4", "crossing"]
+    assert (crossing.unit, crossing.source) == ("s", "ball.exact.py")
+    assert crossing.exact == pytest.approx(0.59196, abs=1e-6)
+    assert crossing.measured == pytest.approx(crossing.exact, abs=1e-6)
+    euler = figures["Euler", "crossing"].measured
+    assert euler is not None and 1e-5 < abs(euler - crossing.exact) < 1e-2
+    assert figures["RK4", "largest"].measured == 1.5707963267948966, "where it begins"
+    assert {row.energy for row in scenario.stable} == {9.9}
+    message = mistake(folder, QUARTER.replace("largest", "loudest"), toml).message
+    assert message == "`ball.exact.py` expects `loudest`, which is not measured"
+
+
+BOUNCE = """\
+<mujoco>
+  <option timestep="0.002" cone="elliptic"/>
+  <worldbody>
+    <geom type="plane" size="5 5 .1" friction="0.5"/>
+    <body pos="0 0 .1"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>
+    <geom type="box" size=".1 .1 .1" mass="1" friction="0.5"/></body>
+  </worldbody>
+</mujoco>
+"""
+SLIDE = """\
+def motion(time, qpos, qvel):
+    stop = min(time, qvel[0] / (9.81 * {friction}))
+    return [qvel[0] * stop - 9.81 * {friction} / 2 * stop**2, {height}]
+"""
+
+
+FRICTION = """\
+def motion(time, qpos, qvel):
+    stop = min(time, qvel[0] / 9)
+    return qpos + qvel * stop - 9 / 2 * stop**2, qvel - 9 * stop
+"""
+
+
+def test_an_exact_motion_with_contact_is_what_stiffer_contacts_tend_to(folder: Path) -> None:
+    write(folder / "ball.xml", BOUNCE)
+    toml = '[[scenario]]\nname = "slide"\nqvel = [1, 0]\nduration = 0.4\nsample = 0.02\n'
+    scenario = report(folder, SLIDE.format(friction=0.5, height=0), toml)
+    assert scenario.reference == "closed" and scenario.figures == ()
+    (own_row,) = (row for row in scenario.rows if row.own)
+    assert own_row.seen is not None and own_row.seen > 3 * scenario.least_seen, "resolved"
+    toml_with_figures = toml + "expected = { penetration = 1e-4 }\nlimits = { Euler = 0.01 }\n"
+    scenario = report(folder, SLIDE.format(friction=0.5, height=0), toml_with_figures)
+    depths = {line.integrator: (line.measured, line.exact) for line in scenario.figures}
+    assert depths["Euler"] == (pytest.approx(2.1e-4, rel=0.2), 1e-4)
+    assert scenario.stable[0].theory == 0.01
+    for values in ({"friction": 0.6, "height": 0}, {"friction": 0.5, "height": "time"}):
+        diagnostic = mistake(folder, SLIDE.format(**values), toml)
+        assert "is not this scene's motion" in diagnostic.message, values
+        assert "contacts as they are" in diagnostic.help, values
+
+
+ROLL = """\
+<mujoco>
+  <option timestep="0.002" cone="elliptic"/>
+  <default><geom friction="0.8"/></default>
+  <worldbody>
+    <geom type="plane" size="5 5 .1" euler="0 20 0"/>
+    <body euler="0 20 0"><body pos="0 0 .1"><joint type="slide" axis="1 0 0"/>
+      <joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/><geom size=".1" mass="1"/>
+    </body></body>
+  </worldbody>
+</mujoco>
+"""
+ROLLED = """\
+from math import radians, sin
+
+A = 5 / 7 * {g} * sin(radians(20))
+
+
+def motion(time, qpos, qvel):
+    return [A * time**2 / 2, 0, A * time**2 / 0.2], [A * time, 0, A * time / 0.1]
+"""
+
+
+def test_an_exact_motion_with_contact_that_is_off_by_a_hundred_thousandth_is_refused(
+    folder: Path,
+) -> None:
+    write(folder / "ball.xml", ROLL)
+    toml = '[[scenario]]\nname = "roll"\nduration = 1\nsample = 0.04\n'
+    scenario = report(folder, ROLLED.format(g=9.81), toml)
+    assert scenario.reference == "closed" and scenario.floor < 1e-5
+    diagnostic = mistake(folder, ROLLED.format(g=9.81 * (1 + 1e-5)), toml)
+    assert "is not this scene's motion" in diagnostic.message
+    assert "4, 8, 16" in diagnostic.help, "where the softness of contacts hides it no longer"
+
+
+def test_velocities_of_an_exact_motion_with_contact_are_rates_of_its_positions(
+    folder: Path,
+) -> None:
+    """Against an engine whose contacts are soft only places are compared."""
+    write(folder / "ball.xml", BOUNCE)
+    toml = '[[scenario]]\nname = "slide"\nqvel = [1, 0]\nduration = 0.4\nsample = 0.02\n'
+    slide = SLIDE.format(friction=0.5, height=0)[:-1] + ", [{} * (qvel[0] - 4.905 * stop), 0]\n"
+    assert report(folder, slide.format(1), toml).reference == "closed"
+    diagnostic = mistake(folder, slide.format(0.9), toml)
+    assert diagnostic.message.endswith("gives velocities that are not the rates of positions")
+    assert diagnostic.help == "number 0 is 0.812 at 0.02 s, where the positions give 0.902"
+
+
+SOFT = """\
+<mujoco>
+  <option timestep="0.002" gravity="0 0 0"/>
+  <default><geom condim="1" solref="-1000 -20" solimp="0.9 0.9 0.001"/></default>
+  <worldbody>
+    <geom type="plane" size="5 5 .1"/>
+    <body pos="0 0 .1"><freejoint/><geom size=".1" mass="1"/></body>
+  </worldbody>
+</mujoco>
+"""
+REBOUND = """\
+from math import atan, cos, exp, pi, sin
+
+
+def motion(time, qpos, qvel):
+    t = min(time, (pi - atan(0.75)) / 30)  # until nothing pushes any more
+    z = qvel[2] / 30 * exp(-10 * t) * sin(30 * t)
+    v = qvel[2] * exp(-10 * t) * (cos(30 * t) - sin(30 * t) / 3)
+    return [0, 0, 0.1 + z + v * (time - t), 1, 0, 0, 0]
+"""
+
+
+def test_an_exact_motion_of_soft_contacts_is_known_as_well_as_the_engine_agrees(
+    folder: Path,
+) -> None:
+    """Stiffer contacts tend to something else, which says nothing of this motion."""
+    write(folder / "ball.xml", SOFT)
+    toml = '[[scenario]]\nname = "hit"\nqvel = [0, 0, -0.5, 0, 0, 0]\nduration = 0.2\n'
+    scenario = report(folder, REBOUND, toml + "sample = 0.02\n")
+    assert scenario.reference == "closed" and scenario.floor < 1e-4
+    own_row = next(row for row in scenario.rows if row.own)
+    assert own_row.position is not None and own_row.position[0] > 2 * scenario.floor
+
+
+ROPE = """\
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody>
+    <body><joint name="j" type="slide" axis="0 0 1"/><geom size="0.1" mass="1"/></body>
+  </worldbody>
+  <tendon>
+    <fixed limited="true" range="0 9" solimplimit="0.9 0.9 0.001">
+      <joint joint="j" coef="1"/>
+    </fixed>
+  </tendon>
+</mujoco>
+"""
+STRETCHED = """\
+from math import exp
+
+
+def motion(time, qpos, qvel):
+    gone, rest = exp(-time / 0.02), -0.1 * 9.81 * 0.02**2
+    return [rest - rest * (1 + time / 0.02) * gone], [rest * time / 0.02**2 * gone]
+"""
+
+
+def test_an_exact_motion_is_that_of_a_soft_rope_or_of_one_that_does_not_stretch(
+    folder: Path,
+) -> None:
+    write(folder / "ball.xml", ROPE)
+    toml = '[[scenario]]\nname = "hang"\nduration = 0.1\nsample = 0.01\n'
+    stiff = "def motion(time, qpos, qvel):\n    return [0], [0]\n"
+    for exact in (STRETCHED, stiff):
+        scenario = report(folder, exact, toml)
+        assert scenario.reference == "closed" and scenario.floor < 1e-5
+    diagnostic = mistake(folder, STRETCHED.replace("0.02", "0.03"), toml)
+    assert "is not this scene's motion" in diagnostic.message
+
+
+def test_errors_are_resolved_down_to_the_floor_of_an_exact_motion_with_friction(
+    folder: Path,
+) -> None:
+    model = BALL.replace('axis="0 0 1"', 'axis="1 0 0" frictionloss="9"')
+    write(folder / "ball.xml", model.replace('size="0.1"', 'size="0.1" mass="1"'))
+    scenario = report(folder, FRICTION, TOML.replace("duration = 0.4", "duration = 0.5"))
+    own_row = next(row for row in scenario.rows if row.own)
+    assert own_row.figure == pytest.approx(own_row.position) and own_row.seen
+    assert own_row.figure[0] > scenario.least_figure and own_row.seen > scenario.least_seen
+    assert "resolves no error" not in scenario.verdict.text
+
+
+def test_what_is_not_exact_or_no_motion_is_a_mistake(folder: Path) -> None:
+    cases = {
+        EXACT.format(velocity="").replace("/ 2", "/ 3"): "is not this scene's motion",
+        "def motion(time, qpos, qvel):\n    return [1, 2]\n": "gives numbers of coordinates that",
+        "x = 1\n": "gives no motion: KeyError: 'motion'",
+        "def motion(time, qpos, qvel):\n    return qpos * float('nan')\n": "or not a number",
+        "import sys\n\nsys.exit()\n": "gives no motion: it exits",
+        "def motion(time, qpos, qvel):\n    return [1] * int(1 + time * 9)\n": "coordinates change",
+    }
+    for text, message in cases.items():
+        diagnostic = mistake(folder, text)
+        assert message in diagnostic.message, text
+        assert diagnostic.place.path == "ball.exact.py", text
+
+
+def test_what_was_measured_depends_on_it(folder: Path) -> None:
+    digests = {read_subject(folder / "ball.xml").digest}
+    for exact in (EXACT, EXACT + "\n"):
+        write(folder / "ball.exact.py", exact)
+        digests.add(read_subject(folder / "ball.xml").digest)
+    assert len(digests) == 3

@@ -1,0 +1,229 @@
+"""References of scenes, and how well they are known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from mjbench.known_motion import KnownMotion, find_reference, self_reference
+from mjbench.pilot import run_pilot
+from mjbench.problem import Integrator
+from mjbench.scene import SceneError, scenes
+from samples.surveys import NO_DECLARATIONS, parse_declared
+
+pytestmark = pytest.mark.long
+
+PENDULUM = """\
+<mujoco>
+  <option timestep="0.002">{option}</option>
+  <worldbody>
+    <geom type="plane" size="3 3 1" pos="0 0 {floor}"/>
+    <body>
+      <joint axis="0 1 0" {joint}/>
+      <geom type="sphere" size="0.02" mass="1" pos="0 0 -1"/>
+    </body>
+  </worldbody>
+  <actuator><general joint="{acts}" {actuator}/></actuator>
+  <keyframe><key name="level" qpos="1.5707963267948966"/></keyframe>
+</mujoco>
+"""
+
+
+def pendulum(joint: str = "", floor: float = -9, actuator: str = "", option: str = "") -> Any:
+    text = PENDULUM.format(
+        joint=f'name="pin" {joint}', floor=floor, acts="pin", actuator=actuator, option=option
+    )
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def reference_of(
+    model: Any, text: str = 'name = "a"\nkeyframe = 0\nduration = 0.5\n'
+) -> KnownMotion:
+    (scene,) = scenes(model, parse_declared("[[scenario]]\n" + text), quick=True)
+    return find_reference(model, run_pilot(model, scene), quick=True)
+
+
+def test_a_smooth_scene_is_integrated_twice() -> None:
+    reference = reference_of(pendulum("damping='0.3'"))
+    assert (reference.kind, reference.note) == ("ode", "")
+    assert reference.source == "Bulirsch–Stoer over mj_forward"
+    assert reference.second == "DOP853 over mj_forward"
+    assert reference.agreement < 1e-12
+    assert reference.horizon == 0.5
+
+
+@pytest.mark.parametrize(
+    ("model", "reason"),
+    [
+        (pendulum(floor=-0.5), "contact"),
+        (pendulum("range='60 120' limited='true'"), "a limit that is reached"),
+        (pendulum("frictionloss='0.2'"), "dry friction"),
+    ],
+    ids=["contact", "limit", "friction"],
+)
+def test_where_something_jumps_the_engine_is_its_own_reference(model: Any, reason: str) -> None:
+    (scene,) = scenes(model, NO_DECLARATIONS, quick=True)
+    pilot = run_pilot(model, scene)
+    assert pilot.jumps == (reason,)
+    reference = find_reference(model, pilot, quick=True)
+    assert reference.kind == "self"
+    step = 1e6 * min(scene.timesteps) / 8
+    assert reference.source == f"the engine itself: implicitfast at {step:.6g} µs, Newton's solver"
+    assert reference.second == f"the same under Euler at {2 * step:.6g} µs"
+    assert reference.floor.place > 1e-7, "it is not called better known than it is"
+
+
+FULL = 'dyntype="integrator" gainprm="2" actlimited="true" actrange="-{most} {most}"'
+"""An activation that a constant command fills until it is full."""
+
+
+def test_an_activation_at_its_limit_is_a_jump() -> None:
+    # `mj_forward` knows nothing of the clamp: both integrations agree, on another motion.
+    model = pendulum("damping='1'", actuator=FULL.format(most=0.3))
+    model.key_ctrl[0, 0] = 1.0
+    (scene,) = scenes(model, NO_DECLARATIONS, quick=True)
+    pilot = run_pilot(model, scene)
+    assert pilot.jumps == ("an activation at its limit",)
+    reference = find_reference(model, pilot, quick=True)
+    assert (reference.kind, reference.states.act[-1, 0]) == ("self", 0.3)
+    unseen = replace(pilot, jumps=())  # as of something that is not looked for
+    reference = find_reference(model, unseen, quick=True)
+    note = "no integration: the engine with small steps converges to something else"
+    assert (reference.kind, reference.note) == ("self", note)
+
+
+def test_an_activation_that_looks_ahead_by_a_timestep() -> None:
+    text = 'dyntype="filterexact" dynprm="0.1" gainprm="2"'
+    early = pendulum(actuator=f'{text} actearly="true"')
+    late = pendulum(actuator=text)
+    for model in (early, late):
+        model.key_ctrl[0, 0] = 1.0
+    first, second = reference_of(early), reference_of(late)
+    assert (first.kind, second.kind) == ("ode", "ode")
+    assert np.array_equal(first.states.qpos, second.states.qpos)
+
+
+def test_commands_and_activations_are_integrated() -> None:
+    """A filter of first order on a motor: what a formula says, with commands held."""
+    act = 'dyntype="filter" dynprm="0.2" gainprm="3"'
+    model = pendulum("", actuator=act, option='<flag gravity="disable"/>')
+    text = 'name = "a"\ncontrols = [[1], [-1]]\nhold = 0.2\nsample = 0.1\nduration = 0.4\n'
+    reference = reference_of(model, text)
+    times = reference.states.times
+    rising = 1 - np.exp(-times / 0.2)
+    then = -1 + (1 + 1 - np.exp(-1.0)) * np.exp(-(times - 0.2) / 0.2)
+    exact = np.where(times <= 0.2 + 1e-9, rising, then)
+    assert reference.kind == "ode"
+    assert np.max(np.abs(reference.states.act[:, 0] - exact)) < 1e-12
+
+
+ATWOOD = """\
+<mujoco>
+  <option timestep="0.001"/>
+  <default><geom contype="0" conaffinity="0"/><joint type="slide" axis="0 0 1"/></default>
+  <worldbody>
+    <geom name="wheel" type="cylinder" size="0.1 0.02" pos="0 0 2" euler="90 0 0"/>
+    <site name="aside" pos="0 0 2.3"/>
+    <body pos="-0.1 0 1"><joint/><geom size="0.05" mass="2"/><site name="left"/></body>
+    <body pos="0.1 0 1"><joint/><geom size="0.05" mass="1"/><site name="right"/></body>
+  </worldbody>
+  <tendon>
+    <spatial limited="true" range="0 2.3141592653589793" solimplimit="0.95 0.95 0.001">
+      <site site="left"/><geom geom="wheel" sidesite="aside"/><site site="right"/>
+    </spatial>
+  </tendon>
+</mujoco>
+"""
+
+
+def test_two_runs_that_agree_by_luck_do_not_bound_a_reference() -> None:
+    """When the rope, just taut, begins to pull is a matter of rounding."""
+    model = mujoco.MjModel.from_xml_string(ATWOOD)
+    text = '[[scenario]]\nname = "a"\nduration = 0.1\nsample = 0.01\n'
+    (scene,) = scenes(model, parse_declared(text))
+    reference = self_reference(model, run_pilot(model, scene), (Integrator.RK4,) * 3)
+    # An impedance of 0.95 leaves a twentieth of the acceleration; the rope is critically damped.
+    phase, rest = reference.states.times / 0.02, -2 * 9.81 * 0.05 * 0.02**2
+    exact = rest * (1 - (1 + phase) * np.exp(-phase))
+    assert np.abs(reference.states.qpos.sum(axis=1) - exact).max() < 3 * reference.floor.place
+
+
+def test_an_author_may_choose() -> None:
+    text = 'name = "a"\nkeyframe = 0\nduration = 0.1\nreference = '
+    assert reference_of(pendulum(), text + '"self"').kind == "self"
+    with pytest.raises(SceneError) as caught:
+        reference_of(pendulum(floor=-0.5), 'name = "a"\nkeyframe = 0\nreference = "ode"')
+    assert caught.value.message == "no integration can be the reference: there is contact"
+
+
+SPRING = """\
+<mujoco>
+  <option timestep="0.001"/>
+  <worldbody>
+    <body>
+      <joint type="slide" axis="1 0 0" stiffness="{stiffness}" damping="2"/>
+      <geom size="0.1" mass="1" contype="0" conaffinity="0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def spring(stiffness: float) -> Any:
+    return mujoco.MjModel.from_xml_string(SPRING.format(stiffness=stiffness))
+
+
+def test_a_closed_form_comes_first_and_is_refused_where_it_is_of_something_else() -> None:
+    text = (
+        'name = "a"\nduration = 1\nqpos = [1]\nqvel = [5]\nreference = "closed:damped-spring-0.1"\n'
+    )
+    reference = reference_of(spring(100), text)
+    assert (reference.kind, reference.second) == ("closed", "Bulirsch–Stoer over mj_forward")
+    assert reference.agreement < 1e-11
+    message_of_form = "the closed form of `damped-spring-0.1` is not this scene's motion"
+    fast, coin = text.replace("[5]", "[5.1]"), text.replace("damped-spring-0.1", "coin")
+    for model, toml, message in (
+        (spring(101), text, message_of_form),
+        (spring(100), fast, "the scenario starts differently from"),
+        (pendulum(), coin, "the model has different joints"),
+    ):
+        with pytest.raises(SceneError) as caught:
+            reference_of(model, toml)
+        assert caught.value.message.startswith(message)
+        assert caught.value.span is not None
+        assert caught.value.span.text.startswith('"closed:')
+
+
+TWO_POINTS = """<body><joint axis="0 1 0"/>
+  <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/>
+  <body pos="0 0 -1"><joint axis="0 1 0"/>
+    <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/></body></body>"""
+LINK = '<body pos="0.1 0 0"><joint axis="0 1 0"/><geom type="capsule" size="0.02" '
+LINK += 'fromto="0 0 0 0.1 0 0"/>'
+CHAOTIC = '<mujoco><option><flag contact="disable"/></option><worldbody>{}</worldbody></mujoco>'
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("bodies", "table", "horizon"),
+    [
+        # Rounding in small steps grows to more than 1e-6, though the motion is the engine's.
+        (TWO_POINTS, "qpos = [2, 0.5]\nduration = 14\nsample = 0.02\ntimesteps = [62.5e-6]", 12.8),
+        # The twins, in the engine's steps, stay near for longer than the two integrations do.
+        (LINK * 10 + "</body>" * 10, "duration = 5\nsample = 0.05\ntimesteps = [0.000125]", 3.65),
+    ],
+    ids=["pendulums", "chain"],
+)
+def test_a_chaotic_motion_is_integrated_as_long_as_it_is_known(
+    bodies: str, table: str, horizon: float
+) -> None:
+    model = mujoco.MjModel.from_xml_string(CHAOTIC.format(bodies))
+    (scene,) = scenes(model, parse_declared(f'[[scenario]]\nname = "a"\n{table}\n'))
+    reference = find_reference(model, run_pilot(model, scene))
+    assert (reference.kind, reference.note) == ("ode", "")
+    assert reference.horizon == pytest.approx(horizon, abs=0.1)
+    assert reference.floor.position < 0.1 * 0.1

@@ -1,0 +1,405 @@
+"""The largest stable timesteps, beside theory."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import pytest
+from msgspec.structs import replace
+
+from mjbench.declarations import Declarations, DeclaredScenario, Place
+from mjbench.detector import RunStatus
+from mjbench.linearization import Theory, find_rest, find_theory
+from mjbench.pilot import run_pilot
+from mjbench.problem import STANDARD, Integrator, Scenario, Setup
+from mjbench.problems import all_problems
+from mjbench.problems.oscillators import rk4_factor, rk4_limit
+from mjbench.reports.scene_report import StableRow
+from mjbench.scene import scenes
+from mjbench.simulation import compile_model
+from mjbench.stability import (
+    Laboratory,
+    StabilityTrial,
+    attempt,
+    boundaries,
+    boundary,
+    search_row,
+    stable_rows,
+    with_energy_bound,
+)
+
+pytestmark = pytest.mark.long
+
+
+def test_limits_are_those_of_theory() -> None:
+    """What is beyond by δ grows by 2δ in a step or more: it shows after a growth of exp 9."""
+    mismatches = []
+    limited = [p for p in all_problems().values() if p.limit is not None]
+    problems = [with_energy_bound(replace(p, span=1.0)) for p in limited]
+    for problem, integrator in itertools.product(problems, Integrator):
+        theory = problem.limit(integrator) if problem.limit else None
+        trials = {0.1: True, 1.0: True, 10.0: True}
+        if theory is None or theory.timestep == 0:
+            continue
+        if math.isfinite(theory.timestep):
+            problem = replace(problem, span=4000 * theory.timestep)
+            trials = {0.996 * theory.timestep: True, 1.004 * theory.timestep: False}
+        for timestep, stable in trials.items():
+            trial = attempt(problem, integrator, timestep)
+            if trial.stable != stable:
+                mismatches.append((problem.name, integrator, timestep, trial.status))
+    assert mismatches == []
+
+
+def test_a_boundary_is_found_beside_theory() -> None:
+    problem = replace(all_problems()["damped-spring-0.1"], search=(0.1, 1.0), span=200.0)
+    lines = {line.integrator: line for line in boundaries(problem)}
+    assert {integrator.value for integrator in Integrator} == set(lines), "damping: eulerdamp"
+    for integrator in (Integrator.EULER, Integrator.EULER_EXPLICIT, Integrator.RK4):
+        line = lines[integrator.value]
+        assert line.largest is not None and line.difference is not None
+        assert abs(line.difference) < 0.01
+        assert line.monotone and line.beyond == "slow-growth"
+        assert line.duration == problem.span == 200
+        assert line.steps == math.ceil(200 / line.largest)
+        assert line.tried >= 8
+
+
+def test_where_all_or_none_is_stable() -> None:
+    problem = replace(all_problems()["damped-spring-1"], search=(0.05, 0.5))
+    line = boundary(problem, Integrator.DISCRETE)
+    assert (line.largest, line.searched, line.steps) == (None, (0.05, 0.5), 1000)
+    assert (line.bracket, line.theory, line.formula) == (None, None, DISCRETE)
+    line = boundary(replace(problem, search=(0.6, 2.0)), Integrator.EULER)
+    assert (line.largest, line.difference, line.tried) == (0.0, None, 0)
+    assert boundaries(replace(problem, search=None)) == ()
+    undamped = replace(all_problems()["damped-spring-0"], search=(0.1, 0.3), span=10.0)
+    assert Integrator.EULER_EXPLICIT.value not in {row.integrator for row in boundaries(undamped)}
+
+
+DISCRETE = "implicit in positions and velocities"
+
+
+def search(
+    lost: Callable[[int, float, float], bool], interval: tuple[float, float], starts: int = 3
+) -> StableRow:
+    """What a laboratory finds whose runs from a start, at a timestep and over a time, are lost."""
+
+    def run(start: int, step: float, span: float) -> StabilityTrial:
+        status = RunStatus.DIVERGED if lost(start, step, span) else RunStatus.OK
+        return StabilityTrial(step, status, 1.0)
+
+    setup = Setup(scenario=Scenario(5.0, 5.0))
+    laboratory = Laboratory(run, 5.0, starts)
+    return search_row(laboratory, Integrator.RK4, interval, setup, Theory())
+
+
+@pytest.mark.parametrize(
+    ("island", "largest"),
+    [
+        ((50.0, 57.7), 50.0),
+        ((11.0, 12.7), 11.0),  # a fifth of it
+        ((8.0, 9.3), 8.0),
+        ((70.0, 90.0), 62.0),
+    ],
+)
+def test_the_largest_is_below_everything_that_is_lost(
+    island: tuple[float, float], largest: float
+) -> None:
+    low, high = island
+    row = search(lambda _, step, span: low < step < high or 62 < step < 100, (1.0, 1000.0))
+    assert row.largest == pytest.approx(largest, rel=2e-4)
+    assert row.largest <= largest
+    assert row.islands is not None and row.islands[1] == pytest.approx(1000.0)
+    assert row.searched[0] <= max(1.001, largest / 7)
+    assert row.bracket is not None and row.bracket[0] <= row.largest <= row.bracket[1]
+    assert row.steps == math.ceil(5.0 / row.largest)
+
+
+def test_narrow_islands_below_the_limit_are_looked_for() -> None:
+    """They lie between timesteps of the grid, as where a ball strikes in a phase of a step."""
+    for low, high in ((40.0, 41.0), (38.1, 38.9)):
+        row = search(lambda _, step, __: low < step < high or step > 50, (1.0, 1000.0))  # noqa: B023
+        assert row.largest == pytest.approx(low, rel=2e-4)
+    row = search(lambda _, step, __: 600 < step < 620, (1.0, 1000.0))
+    assert row.largest == pytest.approx(600, rel=2e-4), "though all of the grid is stable"
+
+
+def test_energy_counts_up_to_the_first_loss_only() -> None:
+    """Bodies deep in each other end a run before its energy rises."""
+
+    def row_of(rises: float) -> StableRow:
+        def run(_: int, step: float, __: float) -> StabilityTrial:
+            status = RunStatus.DIVERGED if step > 30 else RunStatus.OK
+            energy = 9.0 if rises < step < 30 or step > 300 else 1.0
+            return StabilityTrial(step, status, 1.0, energy)
+
+        setup = Setup(scenario=Scenario(5.0, 5.0), energy=1.0, kinetic=1.0)
+        laboratory = Laboratory(run, 5.0, 1)
+        return search_row(laboratory, Integrator.RK4, (1.0, 1000.0), setup, Theory())
+
+    gain = row_of(20.0).gain
+    assert gain is not None and gain[0] == pytest.approx(20, rel=0.03) and gain[1] == 8.0
+    assert row_of(30.0).gain is None
+    row = row_of(0.1)
+    assert row.gain is not None and row.gain[0] == row.searched[0]
+
+
+def test_a_limit_is_known_as_far_as_spans_and_starts_agree() -> None:
+    """Over twice the time it is lost a little earlier, and from one of the starts much earlier."""
+    row = search(lambda _, step, span: step > 25.4 + 0.4 / span, (1.0, 1000.0))
+    assert row.bracket == pytest.approx((25.44, 25.48), abs=5e-3)
+    row = search(lambda start, step, _: step > (19 if start == 2 else 25.4), (1.0, 1000.0))
+    assert row.bracket == pytest.approx((19, 25.4), rel=1e-2)
+    shares = {lost / runs for step, runs, lost in row.tries if 19 < step < 25}
+    assert any(0 < share < 1 for share in shares), "the map shows where some are lost"
+    row = search(lambda start, step, _: start == 1 and step > 500, (1.0, 1000.0))
+    assert row.largest is None and row.bracket == pytest.approx((500, 1000), rel=1e-2)
+    row = search(lambda _, step, __: step > 25.4 and not 60 < step < 80, (1.0, 1000.0))
+    assert row.islands == pytest.approx((60, 80), rel=0.05)
+
+
+def test_what_grows_or_falls_farther_in_a_longer_time_is_not_lost() -> None:
+    ball = """<mujoco><worldbody><body pos="0 0 10"><joint type="slide" axis="0 0 1"/>
+    <geom size="0.1" mass="1"/></body></worldbody></mujoco>"""
+    # It doubles every 1.4 s, under any method: twice the duration shows 148 times as much.
+    excited = """<mujoco><option timestep="0.005" gravity="0 0 0"/><worldbody><body>
+    <joint type="slide" stiffness="25" damping="-1"/><geom size="0.1" mass="1"/></body>
+    </worldbody></mujoco>"""
+    rows = [*rows_of(ball, stable_for=6.0).values()]
+    rows += rows_of(excited, qpos=(0.1,), stable_for=10.0, search=(0.001, 0.02)).values()
+    for row in rows:
+        assert (row.largest, row.bracket) == (None, None), row.integrator
+
+
+def test_the_energy_that_nothing_can_raise_is_that_of_the_beginning() -> None:
+    """The first run, in steps of Euler's method, has more now and then."""
+    mjcf = """<mujoco><option timestep="0.01"/><worldbody><body><joint axis="0 1 0"/>
+    <inertial pos="1 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(mjcf)
+    table = DeclaredScenario("s", table=Place("m.xml"), duration=2.0, qvel=(1.0,))
+    (scene,) = scenes(model, Declarations("m.xml", (table,)))
+    assert run_pilot(model, scene).setup.energy == 1.0, "½ (1 + 1) 1²"
+
+
+def test_energies_of_a_first_run_that_gains_energy_bound_nothing() -> None:
+    """Euler's method loses a top that spins at 200 rad/s at every timestep."""
+    mjcf = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint type="ball"/>
+    <inertial pos="0 0 0" mass="1" diaginertia="0.006 0.006 0.0004"/></body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(mjcf)
+    start = {"qvel": (0.0, 20.0, 200.0), "duration": 2.0}
+    table = DeclaredScenario("s", table=Place("m.xml"), timesteps=(5e-4,), **start)
+    (scene,) = scenes(model, Declarations("m.xml", (table,)))
+    energy = 0.5 * (0.006 * 20**2 + 0.0004 * 200**2)
+    setup = run_pilot(model, scene).setup
+    assert (setup.energy, setup.kinetic) == pytest.approx((energy, energy), rel=1e-6)
+    assert setup.energy_bound == pytest.approx(11 * energy, rel=1e-6)
+
+
+def test_what_hangs_at_rest_gains_no_energy() -> None:
+    """Before the first step MuJoCo has computed none: 0 J would be more than there can be."""
+    mjcf = """<mujoco><option timestep="0.01"/><worldbody><body><joint axis="0 1 0"/>
+    <inertial pos="0 0 -1" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+    assert {row.gain for row in rows_of(mjcf, search=(0.02, 0.08)).values()} == {None}
+
+
+def test_what_a_weld_sets_in_motion_has_no_energy_to_gain() -> None:
+    """It is a spring whose energy is not counted."""
+    weld = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody>
+    <body name="sled"><joint type="slide" axis="1 0 0"/><geom size=".05" mass="1"/></body>
+    </worldbody><equality><weld body1="sled" relpose="-.3 0 0 1 0 0 0" solref=".1 .5"/></equality>
+    </mujoco>"""
+    assert {row.gain for row in rows_of(weld, search=(0.001, 0.02)).values()} == {None}
+
+
+def test_a_rest_about_which_forces_have_two_laws_has_no_theory() -> None:
+    """A muscle activates in other times than it deactivates; a post just touches a plane.
+
+    A mean of both sides would give limits all the same, with digits that mean nothing.
+    """
+    muscle = """<joint name="j" type="slide" stiffness="60" damping="2"/><geom size=".1"/></body>
+    </worldbody><actuator><muscle joint="j" force="50" lengthrange="-.4 .4"/></actuator>"""
+    post = """<joint type="slide" axis="0 0 1" stiffness="9"/><joint axis="0 1 0" stiffness="9"/>
+    <geom type="cylinder" size=".1 .5"/></body><geom type="plane" size="1 1 1"/></worldbody>"""
+    head = '<mujoco><option gravity="0 0 0"/><worldbody><body pos="0 0 .5">'
+    for rest in (muscle, post):
+        model = mujoco.MjModel.from_xml_string(f"{head}{rest}</mujoco>")
+        assert find_rest(model, Scenario(1.0, 0.1)) is None
+
+
+ARM = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
+<joint name="j" axis="0 1 0" {}/><inertial pos="0 0 0" mass="10" diaginertia="13.33 13.33 13.33"/>
+</body></worldbody>{}</mujoco>"""
+SERVO = '<actuator><position joint="j" kp="2e5" kv="1500"/></actuator>'
+
+
+def rows_of(mjcf: str, *names: str, **fields: Any) -> dict[str, StableRow]:
+    model = mujoco.MjModel.from_xml_string(mjcf)
+    table = DeclaredScenario("s", table=Place("m.xml"), duration=2.0, **fields)
+    (scene,) = scenes(model, Declarations("m.xml", (table,)))
+    return {row.integrator: row for row in stable_rows(model, run_pilot(model, scene), quick=True)}
+
+
+def test_a_servo_is_stable_as_far_as_the_spring_and_damper_that_it_is() -> None:
+    """Linear theory: 10.468 ms where damping is explicit, 25.468 where implicit, RK4 21.585."""
+    servo = rows_of(ARM.format("", SERVO), qpos=(0.0,), controls=((0.1,),), hold=2.0)
+    spring = rows_of(ARM.format('stiffness="2e5" damping="1500"', ""), qpos=(0.1,))
+    for rows, expected in (
+        (servo, {"Euler": 10.468, "implicit": 25.468, "RK4": 21.585}),
+        (spring, {"Euler": 25.468, "implicit": 25.468, "RK4": 21.585}),
+    ):
+        for name, limit in expected.items():
+            row = rows[name]
+            assert row.theory == pytest.approx(limit * 1e-3, rel=1e-4), name
+            assert row.bracket is not None
+            assert row.bracket == pytest.approx((limit * 1e-3,) * 2, rel=0.012), name
+        assert (rows["discrete"].theory, rows["discrete"].largest) == (None, None)
+    assert servo["RK4"].gain is None, "a motor drives it"
+    # It overshoots in one step, which no damper does, and decays: a gain, and no loss.
+    # Between two stages RK4 has more energy from 16.5 ms on, and in no state before 19.8 ms.
+    assert spring["RK4"].gain is not None and spring["RK4"].gain[0] == pytest.approx(
+        0.0199, rel=0.03
+    )
+
+
+def test_a_state_of_an_actuator_that_nothing_excites_is_lost_from_starts_nearby() -> None:
+    """A filter of 20 ms is explicit under Euler: it is unstable beyond 40 ms."""
+    actuator = '<actuator><general joint="j" dyntype="filter" dynprm="0.02" gainprm="4000"/>'
+    mjcf = ARM.format('stiffness="4000" damping="200"', actuator + "</actuator>")
+    row = rows_of(mjcf, qpos=(0.1,), controls=((0.0,),), hold=2.0)["Euler"]
+    assert row.theory == pytest.approx(0.04, rel=1e-5)
+    assert row.bracket is not None and row.bracket[0] == pytest.approx(0.04, rel=0.02)
+    assert row.bracket[1] > 0.05
+
+
+def test_theory_at_rest_is_that_of_formulas() -> None:
+    mismatches = []
+    for problem in (p for p in all_problems().values() if p.limit is not None and p.case != 3):
+        model = compile_model(problem.mjcf, Integrator.RK4, min(problem.timesteps))
+        theory = find_theory(model, problem.scenario, None, smooth=False)
+        for integrator in STANDARD:
+            computed, exact = theory.limit(integrator, (1e-4, 10.0)), problem.limit(integrator)
+            assert computed is not None and exact is not None, problem.name
+            if computed.timestep != pytest.approx(exact.timestep, rel=1e-4):
+                mismatches.append((problem.name, integrator, computed.timestep, exact.timestep))
+    assert mismatches == []
+
+
+def test_theory_of_models_that_sleep_or_lie_exactly_still() -> None:
+    """A model with sleep has the limits that it has awake, and `discrete` none for springs."""
+    discs = """<mujoco><option gravity="0 0 0" sleep_tolerance="0.1"><flag sleep="{}"/></option>
+    <worldbody>{}</worldbody><tendon>{}</tendon></mujoco>"""
+    bodies = "".join(
+        f'<body pos="{n} 0 0"><joint name="j{n}" axis="1 0 0"/>'
+        '<inertial pos="0 0 0" mass="1" diaginertia=".01 .01 .01"/></body>'
+        for n in range(5)
+    )
+    springs = [(0, 0), (0, 1), (1, 2), (2, 3), (3, 4), (4, 4)]
+    tendons = "".join(
+        f'<fixed stiffness="4"><joint joint="j{a}" coef="1"/>'
+        + (f'<joint joint="j{b}" coef="-1"/>' if a != b else "")
+        + "</fixed>"
+        for a, b in springs
+    )
+    exact = 1 / (20 * math.sin(math.radians(75)))  # 2 / ω of the fastest mode
+    for sleep in ("disable", "enable"):
+        model = mujoco.MjModel.from_xml_string(discs.format(sleep, bodies, tendons))
+        scenario = Scenario(2.0, 0.04, qpos=(0.2, 0.0, 0.0, 0.0, -0.1))
+        theory = find_theory(model, scenario, None, smooth=True)
+        for integrator, limit in ((Integrator.EULER, exact), (Integrator.RK4, exact * 2**0.5)):
+            computed = theory.limit(integrator, (1e-3, 1.0))
+            assert computed is not None and computed.timestep == pytest.approx(limit, rel=1e-5)
+        computed = theory.limit(Integrator.DISCRETE, (1e-3, 1.0))
+        assert computed is not None and computed.timestep == math.inf
+
+
+def test_theory_along_a_period_is_where_a_pendulum_is_lost() -> None:
+    """From 179° it goes round beyond 0.168 s; hanging at rest it would be stable to 0.64 s."""
+    problem = all_problems()["pendulum-hinge-179"]
+    model = compile_model(problem.mjcf, Integrator.RK4, min(problem.timesteps))
+    scenario = replace(problem.scenario, duration=10.0)
+    theory = find_theory(model, scenario, None, smooth=True)
+    limit = theory.limit(Integrator.EULER, (1e-3, 1.0))
+    assert limit is not None and limit.timestep == pytest.approx(0.6417, rel=1e-3)
+    assert theory.orbit is not None and theory.orbit.period == pytest.approx(7.86483, rel=1e-4)
+    assert theory.orbital(Integrator.EULER) == pytest.approx(0.168, rel=0.1)
+    falling = find_rest(model, replace(scenario, qpos=(math.pi,)))
+    assert falling is None, "upright it is unstable by itself"
+
+
+def test_theory_along_a_period_of_a_spring_is_that_at_rest() -> None:
+    """What diverges so far that no difference is left of two runs is unstable all the same."""
+    spring = mujoco.MjModel.from_xml_string(
+        '<mujoco><option gravity="0 0 0"/><worldbody><body><joint type="slide" stiffness="400"/>'
+        '<geom size="0.1" mass="1"/></body></worldbody></mujoco>'
+    )
+    theory = find_theory(spring, Scenario(2.0, 0.1, (0.1,), (0.0,)), None, smooth=True)
+    for integrator, limit in ((Integrator.EULER, 0.1), (Integrator.RK4, 0.1 * 2**0.5)):
+        assert theory.orbital(integrator) == pytest.approx(limit, rel=0.01), integrator
+        at_rest = theory.limit(integrator, (1e-4, 0.005))  # far beyond what runs are tried with
+        assert at_rest is not None and at_rest.timestep == pytest.approx(limit, rel=1e-5)
+
+
+def test_a_motion_that_is_lost_at_every_timestep_if_slowly_has_no_limit_along_its_period() -> None:
+    """Under Euler's method what circles spirals away, at a rate in proportion to the timestep."""
+    mjcf = """<mujoco><worldbody><body><joint type="ball"/>
+    <inertial pos="0 0 -1" mass="1" diaginertia="0.01 0.01 0.01"/></body></worldbody></mujoco>"""
+    model, tilt = mujoco.MjModel.from_xml_string(mjcf), math.pi / 6
+    rate = math.sqrt(9.81 / math.cos(tilt))
+    qpos = (math.cos(tilt / 2), math.sin(tilt / 2), 0.0, 0.0)
+    qvel = (0.0, rate * math.sin(tilt), rate * math.cos(tilt))
+    theory = find_theory(model, Scenario(4.0, 0.02, qpos, qvel), None, smooth=True)
+    assert theory.orbit is not None
+    assert theory.orbit.period == pytest.approx(2 * math.pi / rate, rel=1e-6)
+    assert theory.orbital(Integrator.EULER) == 0.0
+    assert theory.orbital(Integrator.RK4) == pytest.approx(0.7, rel=0.05)
+
+
+def test_energy_that_cannot_be_is_instability() -> None:
+    """Of all that a swinging chain has, 0.25 J, it had 300 J after 2,000 steps of 7.5 ms."""
+    chain = with_energy_bound(all_problems()["chain-balls"])
+    rest = 6 * 7 / 2 * 0.1 * 9.81 * 0.1  # J below the pivot when it hangs
+    assert chain.energy_bound + rest == pytest.approx(11 * 0.26, rel=0.1)
+    trial = attempt(chain, Integrator.EULER, 7.5e-3)
+    assert trial.status is RunStatus.SLOW_GROWTH
+    assert trial.growth > 1
+    assert attempt(chain, Integrator.EULER, 2e-3).stable
+    servo = with_energy_bound(all_problems()["stiff-servo-1"])
+    assert servo.energy_bound == math.inf, "a motor drives it"
+
+
+def test_all_timesteps_run_for_the_same_time() -> None:
+    """A body that leaves its bounds at the end of that time, whatever divides it."""
+    drifting = replace(
+        all_problems()["damped-spring-0"],
+        mjcf="<mujoco><option gravity='0 0 0'/><worldbody><body><joint type='slide'/>"
+        "<geom size='.1'/></body></worldbody></mujoco>",
+        scenario=Scenario(0.4, 0.1, (0.0,), (1.0,)),
+        span=0.39,
+        position_bound=0.385,
+    )
+    steps = [part * 0.39 / n for n in range(2, 60) for part in (1.0, 1.01)]
+    assert [step for step in steps if attempt(drifting, Integrator.EULER, step).stable] == []
+    assert attempt(replace(drifting, span=0.38), Integrator.EULER, 0.01).stable
+
+
+def test_growth_beyond_the_boundary_is_that_of_theory() -> None:
+    problem = all_problems()["damped-spring-10"]
+    # −z² − 2ζz + … : the larger root of λ² − (2 − 2ζz − z²) λ + (1 − 2ζz) at z = hω
+    z = 1.01 * 2 * (math.sqrt(101) - 10)
+    half = 1 - 10 * z - z * z / 2
+    root = abs(half) + math.sqrt(half * half - (1 - 20 * z))
+    endless = replace(problem, position_bound=math.inf, velocity_bound=math.inf)
+    endless = replace(endless, span=100 * z)
+    trial = attempt(endless, Integrator.EULER_EXPLICIT, z / 10)
+    assert trial.growth == pytest.approx(root, rel=1e-8)
+
+
+def test_the_polynomial_of_runge_and_kutta() -> None:
+    assert rk4_limit(0.0) == pytest.approx(2 * math.sqrt(2), rel=1e-12)
+    assert rk4_limit(1.0) == pytest.approx(2.785293563405282, rel=1e-9)
+    assert abs(rk4_factor(2j * math.sqrt(2))) == pytest.approx(1.0, rel=1e-15)
