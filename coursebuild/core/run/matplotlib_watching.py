@@ -28,6 +28,8 @@ from typing import Any
 _MODULE = "matplotlib.backend_bases"
 MOST_DATA = 1 << 20
 """The most bytes of data that a figure holds; one with more is compared as it is drawn."""
+_SHADES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""The places in a colour map whose colours are kept."""
 _DIGITS = 4
 """The decimal places that are kept of a place, as a part of its axis."""
 
@@ -264,7 +266,8 @@ def _style(artist: Any) -> dict[str, Any]:
     style: dict[str, Any] = {}
     mapped = getattr(artist, "get_array", lambda: None)() is not None
     if mapped:
-        style["colours"] = str(artist.get_cmap().name)
+        colours = artist.get_cmap()(_SHADES)  # it need not have a name that stays
+        style["colours"] = [to_hex(rgba, keep_alpha=True) for rgba in colours]
     for name in ("color", "facecolor", "edgecolor"):
         colour = getattr(artist, f"get_{name}", None)
         if colour is not None and not mapped:

@@ -238,7 +238,7 @@ def _style_difference(old: Part, new: Part) -> str:
     for name, before in old.style.items():
         now = new.style.get(name, "")
         if before != now:
-            words = [", ".join(v[:3]) if isinstance(v, list) else v for v in (now, before)]
+            words = [", ".join(v[:5]) if isinstance(v, list) else v for v in (now, before)]
             return f"has the {name} {words[0]} where {words[1]} is recorded"
     if old.sizes != new.sizes:
         return "has markers of other sizes"

@@ -108,6 +108,11 @@ CHANGES: dict[str, tuple[Draw, Draw]] = {
         one_axes(lambda axes: axes.imshow([[0, 1], [2, 9]])),
         one_axes(lambda axes: axes.imshow([[0, 1], [3, 9]])),
     ),
+    "the image 1 has the colours #000000ff, #404040ff, #808080ff, #c0c0c0ff, #ffffffff "
+    "where #ffffffff, #bfbfbfff, #7f7f7fff, #3f3f3fff, #000000ff is recorded": (
+        one_axes(lambda axes: axes.imshow([[0, 1]], cmap="gray_r")),
+        one_axes(lambda axes: axes.imshow([[0, 1]], cmap="gray")),
+    ),
     "the collection 1 has its point 2 of 3 at (1, 2.5) where (1, 2) is recorded": (
         one_axes(lambda axes: axes.scatter([0, 1, 2], [0, 2, 4])),
         one_axes(lambda axes: axes.scatter([0, 1, 2], [0, 2.5, 4])),
