@@ -115,9 +115,11 @@ class _Updater:
         remarks += record_remarks
         verdicts = [v for v in compare_all(new_course, runs) if v.status == "verified"]
         asked_paths = {extraction.path for extraction in self.scripts}
-        others = (e for e in self.extracted_scripts.extractions if e.path not in asked_paths)
+        unasked_scripts = (
+            e for e in self.extracted_scripts.extractions if e.path not in asked_paths
+        )
         reason = "update runs what is recorded"
-        scripts, labs = _unasked_lines(self.course, others, self.documents, reason)
+        scripts, labs = _unasked_lines(self.course, unasked_scripts, self.documents, reason)
         return judge(
             self.course,
             diagnostics,

@@ -202,8 +202,10 @@ def test_an_edited_file_goes_back_into_its_parts(make: Make) -> None:
     assert folder.main("extract", "--adopt").status == 0
     assert folder.text(folder.lesson()) == text.replace("largest", "max")
     assert folder.text(PATH) == code.replace("largest", "max")
-    across = code.replace('print("sum", sum(rod))\n\ndef step', "print(rod)\nx = 1\ndef leap")
-    folder.write(PATH, across)
+    crossing_code = code.replace(
+        'print("sum", sum(rod))\n\ndef step', "print(rod)\nx = 1\ndef leap"
+    )
+    folder.write(PATH, crossing_code)
     result = folder.main("extract", "--adopt")
     assert result.status == 1 and "a change goes from one of its parts into the next" in result.out
-    assert folder.text(PATH) == across
+    assert folder.text(PATH) == crossing_code
