@@ -39,7 +39,8 @@ _UPRIGHT = re.compile(r"\$\s*(?:\\[,;: ])*\\(?:mathrm|text|textrm)\s*\{([^{}$]*)
 _TEX_SIGNS = (
     (re.compile(r"\\(?:mathrm|text|textrm|operatorname)\s*(?:\{([^{}]*)\}|(\w))"), r" \1\2"),
     (re.compile(r"\^?\{?\\(?:circ|degree)\}?"), "°"),
-    (re.compile(r"°\s+(?=[CF]\b)"), "°"),
+    (re.compile(r"(?:°|\b(?:degrees?|deg|Grad)\b)\s*([CF])(?:elsius|ahrenheit)?\b"), r"°\1"),
+    (re.compile(r"\*\*"), "^"),
     (re.compile(r"\\cdot"), "·"),
     (re.compile(r"\\mu\s*"), "µ"),
     (re.compile(r"\\Omega"), "Ω"),
@@ -116,6 +117,8 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
     words = phrase.split()[: _LONGEST_PRODUCT + 1]
     unit = NO_UNIT
     for count, word in enumerate(words[:_LONGEST_PRODUCT], 1):
+        if word.startswith("(") and count > 1 and words[count - 2] not in _SIGNS:
+            break  # a remark
         product = " ".join(words[:count])
         bare = _without_closing(product)
         follows = words[count] if bare == product and count < len(words) else ""
