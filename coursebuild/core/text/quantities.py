@@ -91,6 +91,11 @@ def plain_unit(tex: str) -> str:
     return " ".join(tex.split())
 
 
+def with_unit(number: str, unit: str) -> str:
+    """Return a number's text with its unit; only the degree stands at the digits."""
+    return f"{number}{unit}" if unit in ("", "°") else f"{number} {unit}"
+
+
 def are_different(left: UnitText, right: UnitText) -> bool:
     """Whether both are units, and certainly not the same one."""
     return (

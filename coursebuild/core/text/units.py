@@ -398,11 +398,6 @@ def is_name(word: str) -> bool:
     return len(word) == 2 and word[0] not in "kMGcmnµμ" and bool(find_symbol(word))
 
 
-def with_unit(number: str, unit: str) -> str:
-    """Return a number's text with its unit; only the degree stands at the digits."""
-    return f"{number}{unit}" if unit in ("", "°") else f"{number} {unit}"
-
-
 def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
     """Yield what is wrong with a unit, which may be empty."""
     text = _PER.sub("/", " ".join(unit.text.split()))
