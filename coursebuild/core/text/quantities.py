@@ -133,7 +133,7 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
         if has_names or count > 1:
             is_certain &= re.match(r"[\d.+−-]", follows) is None
         if longer and not unit:
-            is_word = is_name(bare) and (follows[:1].isalnum() or _has_maximum(text))
+            is_word = is_name(bare) and (follows.strip("|") != "" or _has_maximum(text))
             if is_word or not is_certain:
                 return NO_UNIT
             unit = longer
