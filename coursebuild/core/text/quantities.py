@@ -29,6 +29,8 @@ _SECOND_READINGS = {
 }
 """What text means besides: an acceleration in `2 g` is 981 Gal."""
 
+_MAGNITUDES = frozenset("BGMP")
+"""In text they count billions and millions more often than they are units."""
 _SIGNS = frozenset(("/", "·", "⋅", "*", "per"))
 _PER_UNIT = re.compile(r"/[^\W\d_]")
 _GAP = re.compile(r"[ \t]{2,}|\t")
@@ -134,12 +136,14 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
             is_certain &= re.match(r"[\d.+−-]", follows) is None
         if longer and not unit:
             is_word = is_name(bare) and (follows.strip("|") != "" or _has_maximum(text))
-            if is_word or not is_certain:
+            if is_word or not is_certain or bare in _MAGNITUDES:
                 return NO_UNIT
             unit = longer
         elif longer and (is_name(_without_closing(word)) or not is_certain):
-            unit = UnitText(unit.text, unit.readings + longer.readings)  # `kW h` or `m in`
-            break
+            if not _is_one_word(bare, longer):
+                unit = UnitText(unit.text, unit.readings + longer.readings)  # `m in`
+                break
+            unit = longer
         elif longer:
             unit = longer
         if not longer and not is_open and words[count - 2 : count - 1] == ["per"]:
@@ -150,6 +154,12 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
     if is_attached and (len(unit.text) == 1 or is_name(unit.text)):
         return unit if "." in text[:at].split()[-1] else NO_UNIT  # `4A` and `2d`
     return unit
+
+
+def _is_one_word(product: str, unit: UnitText) -> bool:
+    """Whether a product may be written together, as `kW h` may."""
+    together = UnitText("", find_units(product.replace(" ", "")))
+    return bool(together) and not are_different(together, unit)
 
 
 def _has_maximum(text: str) -> bool:
