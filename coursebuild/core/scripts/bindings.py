@@ -49,7 +49,7 @@ from coursebuild.core.scripts.tables import header_unit
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.numbers import Number, difference
-from coursebuild.core.text.units import with_unit
+from coursebuild.core.text.quantities import with_unit
 
 _SILENT_OUTCOMES = (
     Outcome.FAILED,

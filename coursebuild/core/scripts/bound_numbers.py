@@ -254,7 +254,7 @@ class BoundText(Struct, frozen=True):
 def _whole_words(text: str) -> str:
     """A pattern for a text with white space of any width, not starting or ending inside a word."""
     lead = r"(?<!\w)" if text[:1].isalnum() else ""
-    tail = r"(?!\w)" if text[-1:].isalnum() else ""
+    tail = r"(?![\w/^·²³⁻])" if text[-1:].isalnum() else ""  # `m` is no part of `m/s`
     return lead + r"\s+".join(re.escape(word) for word in text.split()) + tail
 
 

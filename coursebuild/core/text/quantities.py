@@ -29,6 +29,8 @@ _SECOND_READINGS = {
 }
 """What text means besides: an acceleration in `2 g` is 981 Gal."""
 
+_MAGNITUDES = frozenset("BGMP")
+"""In text they count billions and millions more often than they are units."""
 _SIGNS = frozenset(("/", "·", "⋅", "*", "per"))
 _PER_UNIT = re.compile(r"/[^\W\d_]")
 _GAP = re.compile(r"[ \t]{2,}|\t")
@@ -39,7 +41,8 @@ _UPRIGHT = re.compile(r"\$\s*(?:\\[,;: ])*\\(?:mathrm|text|textrm)\s*\{([^{}$]*)
 _TEX_SIGNS = (
     (re.compile(r"\\(?:mathrm|text|textrm|operatorname)\s*(?:\{([^{}]*)\}|(\w))"), r" \1\2"),
     (re.compile(r"\^?\{?\\(?:circ|degree)\}?"), "°"),
-    (re.compile(r"°\s+(?=[CF]\b)"), "°"),
+    (re.compile(r"(?:°|\b(?:degrees?|deg|Grad)\b)\s*([CF])(?:elsius|ahrenheit)?\b"), r"°\1"),
+    (re.compile(r"\*\*"), "^"),
     (re.compile(r"\\cdot"), "·"),
     (re.compile(r"\\mu\s*"), "µ"),
     (re.compile(r"\\Omega"), "Ω"),
@@ -90,6 +93,11 @@ def plain_unit(tex: str) -> str:
     return " ".join(tex.split())
 
 
+def with_unit(number: str, unit: str) -> str:
+    """Return a number's text with its unit; only the degree stands at the digits."""
+    return f"{number}{unit}" if unit in ("", "°") else f"{number} {unit}"
+
+
 def are_different(left: UnitText, right: UnitText) -> bool:
     """Whether both are units, and certainly not the same one."""
     return (
@@ -116,6 +124,8 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
     words = phrase.split()[: _LONGEST_PRODUCT + 1]
     unit = NO_UNIT
     for count, word in enumerate(words[:_LONGEST_PRODUCT], 1):
+        if word.startswith("(") and count > 1 and words[count - 2] not in _SIGNS:
+            break  # a remark
         product = " ".join(words[:count])
         bare = _without_closing(product)
         follows = words[count] if bare == product and count < len(words) else ""
@@ -125,13 +135,15 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
         if has_names or count > 1:
             is_certain &= re.match(r"[\d.+−-]", follows) is None
         if longer and not unit:
-            is_word = is_name(bare) and (follows[:1].isalnum() or _has_maximum(text))
-            if is_word or not is_certain:
+            is_word = is_name(bare) and (follows.strip("|") != "" or _has_maximum(text))
+            if is_word or not is_certain or bare in _MAGNITUDES:
                 return NO_UNIT
             unit = longer
         elif longer and (is_name(_without_closing(word)) or not is_certain):
-            unit = UnitText(unit.text, unit.readings + longer.readings)  # `kW h` or `m in`
-            break
+            if not _is_one_word(bare, longer):
+                unit = UnitText(unit.text, unit.readings + longer.readings)  # `m in`
+                break
+            unit = longer
         elif longer:
             unit = longer
         if not longer and not is_open and words[count - 2 : count - 1] == ["per"]:
@@ -142,6 +154,12 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
     if is_attached and (len(unit.text) == 1 or is_name(unit.text)):
         return unit if "." in text[:at].split()[-1] else NO_UNIT  # `4A` and `2d`
     return unit
+
+
+def _is_one_word(product: str, unit: UnitText) -> bool:
+    """Whether a product may be written together, as `kW h` may."""
+    together = UnitText("", find_units(product.replace(" ", "")))
+    return bool(together) and not are_different(together, unit)
 
 
 def _has_maximum(text: str) -> bool:

@@ -181,6 +181,7 @@ _TOKEN = re.compile(
     rf"(?P<word>{_WORD})(?P<power>{_POWER})?|(?P<one>1)(?![\d.])|(?P<open>\()"
     rf"|(?P<close>\))(?P<group_power>{_POWER})?|(?P<sign>{_GAP}*[·⋅*×/.]{_GAP}*|{_GAP}+)"
 )
+_TWO_UNITS = re.compile(rf"(?<![^\W\d_])m([^\W\d_m])(?={_POWER})")
 _PER = re.compile(r"\s+per\s+")
 _LONGEST = 100
 
@@ -267,7 +268,8 @@ UNITS, NAMES = _read_table()
 def find_units(text: str) -> tuple[Unit, ...]:
     """The units that a text such as `N m/rad` may be, an empty one being 1; none for another text.
 
-    Of `J/kg K` one may divide by all that follows the solidus, or by the first factor.
+    Of `J/kg K` one may divide by all that follows the solidus, or by the first factor; `ms⁻¹` is
+    of milliseconds, or metres per second.
     """
     source = _PER.sub("/", text.strip())
     if not source:
@@ -275,8 +277,10 @@ def find_units(text: str) -> tuple[Unit, ...]:
     if len(source) > _LONGEST:
         return ()
     readings = _parse(source)
-    if re.search(r"/[^()/]*[ ·⋅*]", source):
+    if re.search(r"/[^()/]*[ ·⋅*.]", source):
         readings += _parse(source, is_wide=True)
+    if _TWO_UNITS.search(source):
+        readings += _parse(_TWO_UNITS.sub(r"m \1", source))
     return tuple(dict.fromkeys(readings))
 
 
@@ -392,11 +396,6 @@ def is_name(word: str) -> bool:
     if symbol in UNITS:
         return word not in NAMES and UNITS[symbol].marks.strip("*") != ""
     return len(word) == 2 and word[0] not in "kMGcmnµμ" and bool(find_symbol(word))
-
-
-def with_unit(number: str, unit: str) -> str:
-    """Return a number's text with its unit; only the degree stands at the digits."""
-    return f"{number}{unit}" if unit in ("", "°") else f"{number} {unit}"
 
 
 def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:

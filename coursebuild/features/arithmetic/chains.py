@@ -105,10 +105,7 @@ def _check_chain(
                     mistake = FormulaComparison("unread", left.start, right.end, reason, letter)
             elif symbols and relation not in ("?", "≡"):
                 follows = unit if right is statement.sides[-1] else ""
-                comparison = SymbolComparison(statement, i, symbols, follows)
-                mistake = comparison.find_mistake()
-                if mistake is not None and comparison.has_readings:
-                    raise right.get_expression().not_understood("a unit in it has two readings")
+                mistake = SymbolComparison(statement, i, symbols, follows).find_mistake()
             else:
                 continue
         except NotJudged:

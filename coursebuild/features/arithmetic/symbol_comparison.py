@@ -81,7 +81,7 @@ class SymbolComparison:
         """`unit`: what follows the second side in the text."""
         self.chain, self.symbols = chain, symbols
         self.sides, self.relation = chain.sides[index : index + 2], chain.relations[index]
-        self.unit = find_unit(unit) if unit else None
+        self.unit, self.unit_text = find_unit(unit) if unit else None, unit
         is_equation = self.relation in ("=", "≈")
         self.is_claim = is_equation and any(side.is_numeric for side in self.sides)
 
@@ -92,6 +92,17 @@ class SymbolComparison:
             NotUnderstood: it states a number of symbols with values, and cannot be computed.
             NotJudged: there is nothing to compare but units, which fit.
         """
+        try:
+            mistake = self._find_mistake()
+        except WrongDimensions:
+            if not self.has_readings:
+                raise
+        else:
+            if mistake is None or not self.has_readings:
+                return mistake
+        raise self.expressions[1].not_understood("a unit in it has two readings")
+
+    def _find_mistake(self) -> FormulaComparison | None:
         self.is_claim &= any(symbol.value is not None for symbol in self.symbols.values())
         try:
             self.expressions = [side.get_expression() for side in self.sides]
@@ -132,7 +143,7 @@ class SymbolComparison:
     def has_readings(self) -> bool:
         """Whether a unit has several sizes, or its scale another zero than its quantity."""
         parts = [part for expression in self.expressions for part in expression.walk()]
-        texts = {part.text for part in parts if part.kind == "unit"}
+        texts = {self.unit_text, *(part.text for part in parts if part.kind == "unit")}
         texts |= {symbol.unit_text for symbol in self.known.values()}
         units = map(find_units, texts)
         return any(len(group) > 1 or any(unit.zero for unit in group) for group in units)

@@ -38,7 +38,7 @@ from coursebuild.core.pages.marks import (
 from coursebuild.core.pages.renderer import Renderer, Strings
 from coursebuild.core.pages.typography import number
 from coursebuild.core.pages.urls import Place
-from coursebuild.core.text.units import with_unit
+from coursebuild.core.text.quantities import with_unit
 from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
 from coursebuild.features.lab.reply import LabRecord, PublishedLab

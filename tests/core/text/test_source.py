@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from coursebuild.core.text.quantities import with_unit
 from coursebuild.core.text.source import Excerpt, Source, Span
-from coursebuild.core.text.units import check_unit, find_units, with_unit
+from coursebuild.core.text.units import check_unit, find_units
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from coursebuild.core.drawing.scales import Scale, separate_labels, typeset_number
 from coursebuild.core.drawing.scales import markup_text as _text
-from coursebuild.core.text.units import with_unit
+from coursebuild.core.text.quantities import with_unit
 from coursebuild.features.lab.equations.reference import CurveRun
 from coursebuild.features.lab.model import ODE, Lab
 from coursebuild.features.lab.picture.draw import Floor, FreeCamera, draw, round_length
