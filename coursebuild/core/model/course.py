@@ -18,7 +18,7 @@ from coursebuild.core.text.source import Source, Span, key_of
 CALLOUTS: tuple[str, ...] = tuple(
     """
     established derivation implementation recommendation research unverified version warning
-    try solution note tip important caution
+    try solution note tip important caution theorem lemma definition algorithm exercise
     """.split()
 )
 """Their labels and promises are interface texts, `callout.NAME` and `promise.NAME`."""
