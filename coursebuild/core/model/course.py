@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import fields
 from coursebuild.core.model.blocks import Comparison, Document, Filter, Recording
-from coursebuild.core.model.fields import Slug, WebPlace, describe, matching
+from coursebuild.core.model.fields import Author, Slug, WebPlace, describe, matching
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.text.source import Source, Span, key_of
 
@@ -350,6 +350,8 @@ class Course(Struct, frozen=True):
     theme: Theme = Theme()
     words: Mapping[str, Words] = {}
     """By language: of the course, and of the lessons and pages in others."""
+    authors: tuple[Author, ...] = ()
+    doi: str = ""
     version: str = ""
     """Of the course, the name of a folder; sites of several may stand beside each other."""
     bibliography: Source | None = None

@@ -23,6 +23,7 @@ from markupsafe import Markup
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import ExportContext
+from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, to_html
 from coursebuild.core.pages.renderer import direction
 from coursebuild.core.text.characters import visible
@@ -79,7 +80,7 @@ def slides_file(context: ExportContext) -> OutputFile:
     script = context.assets.file("js/slides.js").decode().replace("</", "<\\/")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     evaluation = " 'unsafe-eval'" if any(path.endswith(".wasm") for path in files) else ""
-    language, results = course.language or "en", context.library.results
+    language, results = course.language_of(lesson) or "en", context.library.results
     html = context.library.render(
         "book/slides.html",
         language=language,
@@ -91,6 +92,7 @@ def slides_file(context: ExportContext) -> OutputFile:
         head_title=f"{lesson.id} {lesson.title} · {course.title}",
         course=course,
         lesson=lesson,
+        citation=citation(course, words, course.base_url, lesson.title),
         verified=words("site.verified", engine=results.engine, python=results.python),
         slides=[(section, Markup(to_html(part))) for section, part in _split(content)],
         words=Markup(page_words),
