@@ -44,6 +44,7 @@ from coursebuild.core.pages.frame import (
     versions,
 )
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.materials import in_language
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import (
     PageFacts,
@@ -338,11 +339,14 @@ def text_of(entry: PageEntry, library: Library) -> SourceText | None:
 
 def page_request(entry: PageEntry, library: Library, mistakes: Mistakes = ()) -> PageRequest:
     """Make the request to draw a page."""
-    course, inputs = library.course, entry.inputs(library)
+    course = library.course
+    owner = library.pages.get(entry.id) if entry.kind == "page" else library.lessons.get(entry.id)
+    language = course.language if owner is None else course.language_of(owner)
+    inputs = entry.inputs(in_language(library, language))
     return PageRequest.of(
         inputs,
         text_of(entry, library),
-        inputs.head.language or course.language,
+        language,
         course.base_url,
         course.theme.template_texts,
         is_manual=course.is_manual,

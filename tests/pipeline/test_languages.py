@@ -15,7 +15,10 @@ Tableau : Les valeurs. {#tab:values}
 | - |
 | 1 |
 
-Dans [](#tab:values), la note du labo :
+Par [](#thm:euler) et [](lesson:1.1#thm:first), dans [](#tab:values), la note du labo :
+
+> [!theorem] Euler {#thm:euler}
+> Vrai.
 
 ```lab ode
 title = "Chute"
@@ -27,7 +30,8 @@ note = "Comme dans la leçon 1.1."
 
 
 def test_a_lesson_has_a_language_of_its_own(make: Make) -> None:
-    folder = make(GOOD, FRENCH, GOOD.replace("hello.py", "third.py"))
+    theorem = "\n> [!theorem]- First {#thm:first}\n> True.\n"
+    folder = make(GOOD + theorem, FRENCH, GOOD.replace("hello.py", "third.py"))
     text = folder.text("content/course.toml")
     before, mark, after = text.partition('slug = "two"\n')
     folder.write("content/course.toml", f'{before}{mark}language = "fr"\n{after}')
@@ -39,6 +43,10 @@ def test_a_lesson_has_a_language_of_its_own(make: Make) -> None:
     assert french.startswith('<!DOCTYPE html>\n<html lang="fr"')
     assert "Tableau" in french and "Aller au contenu" in french
     assert "Table 1" not in french
+    assert '<a href="#thm:euler">Théorème 1.2.1</a>' in french
+    assert '<a href="1.1-one.html#thm%3Afirst">Théorème 1.1.1</a>' in french
+    assert '<details class="callout callout-theorem" id="thm:first">' in english
+    assert "Theorem 1.1.1</span>" in english
     assert french.count('<a href="1.1-one.html">la leçon 1.1</a>') == 0
     assert french.count('<a href="1.1-one.html">leçon 1.1</a>') == 2
 

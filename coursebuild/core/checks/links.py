@@ -80,7 +80,8 @@ def check_links(
         for inline in model.walk_inlines(model.block_inlines(block)):
             if isinstance(inline, model.Link):
                 target = model.resolve(inline.target, course, document.source.path)
-                yield from checker.check_target(inline.target_span, target)
+                diagnostics = [*checker.check_target(inline.target_span, target)]
+                yield from diagnostics or checker.check_number(inline, target)
             elif isinstance(inline, model.Image) and inline.url_span not in recorded_spans:
                 yield from checker.check_media("the image ", inline.url, inline.url_span)
             elif isinstance(inline, model.RawInline):
@@ -160,6 +161,23 @@ class _Checker(Struct, frozen=True):
             page = targets.pages[name]
             yield from _check_document_anchor(span, target.anchor, page, f"page `{name}`")
 
+    def check_number(self, link: model.Link, target: model.Target) -> Iterator[Diagnostic]:
+        """Report a link without a text to what has no number either."""
+        document: model.Document | None = self.document
+        match target:
+            case model.LessonTarget(id=name, anchor=anchor):
+                document = self.targets.lessons[name]
+            case model.PageTarget(id=name, anchor=anchor):
+                document = self.targets.pages[name]
+            case model.UrlTarget(url=url):
+                anchor = unquote(url.partition("#")[2])
+            case _:
+                return
+        if link.bare and document is not None and anchor not in _numbered_ids(document):
+            message = "this link has no text, so no reader sees it"
+            help = "write one in the brackets"
+            yield diagnose("link-text", link.span, message, help=help)
+
     def check_url(self, span: Span, url: str) -> Iterator[Diagnostic]:
         parts = urlsplit_or_none(url)
         if parts is None:
@@ -195,6 +213,14 @@ class _Checker(Struct, frozen=True):
             yield diagnose("image-remote", span, message, help=help)
         else:
             yield from self.check_file(url, span)
+
+
+def _numbered_ids(document: model.Document) -> frozenset[str]:
+    if document.summaries is not None:
+        return frozenset(item.id for item in document.numbered_items if item.number)
+    formulas = (f.label for f in model.display_formulas(document) if f.label is not None)
+    labels = (*formulas, *(label for _, label in model.labelled_blocks(document)))
+    return frozenset(label.id for label in labels)
 
 
 def _check_document_anchor(

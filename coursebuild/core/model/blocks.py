@@ -70,8 +70,8 @@ class BlockQuote(Located, frozen=True):
     blocks: tuple[Block, ...]
 
 
-class Callout(Located, frozen=True):
-    """`> [!kind] Title`."""
+class Callout(Labelled, frozen=True):
+    """`> [!kind] Title`; a label gives it a number among those of its kind."""
 
     kind: str
     kind_span: Span
@@ -380,6 +380,8 @@ class NumberedItem(Struct, frozen=True):
     """Whether its page writes the number beside it, as a formula may show one itself."""
     domain: str | None = None
     """The conditions under which it was tried as an identity, perhaps empty."""
+    callout: str = ""
+    """The kind of callout that it is, if it is one."""
 
     @property
     def kind(self) -> str:

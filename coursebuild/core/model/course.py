@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import fields
 from coursebuild.core.model.blocks import Comparison, Document, Filter, Recording
-from coursebuild.core.model.fields import Slug, WebPlace, describe, matching
+from coursebuild.core.model.fields import Author, Slug, WebPlace, describe, matching
 from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.text.source import Source, Span, key_of
@@ -19,7 +19,7 @@ from coursebuild.core.text.source import Source, Span, key_of
 CALLOUTS: tuple[str, ...] = tuple(
     """
     established derivation implementation recommendation research unverified version warning
-    try solution note tip important caution
+    try solution note tip important caution theorem lemma definition algorithm exercise
     """.split()
 )
 """Their labels and promises are interface texts, `callout.NAME` and `promise.NAME`."""
@@ -355,6 +355,8 @@ class Course(Struct, frozen=True):
     theme: Theme = Theme()
     words: Mapping[str, Words] = {}
     """By language: of the course, and of the lessons and pages in others."""
+    authors: tuple[Author, ...] = ()
+    doi: str = ""
     version: str = ""
     """Of the course, the name of a folder; sites of several may stand beside each other."""
     bibliography: Source | None = None

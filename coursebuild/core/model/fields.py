@@ -1,4 +1,4 @@
-"""Types of fields that several declarations share.
+"""Types of fields that several declarations share, and who wrote a course.
 
 In the `extra` of a `Meta` are two remarks for the decoder: `text` ("blocks" or "inlines": the
 string is Markdown) and `expects` (words for what the pattern or the bounds allow).
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, TypeAlias
 
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 NOT_BLANK = r"\S"
 
@@ -64,3 +64,32 @@ Slug: TypeAlias = Annotated[
         "lower-case letters and digits in words joined by single hyphens",
     ),
 ]
+
+
+Orcid: TypeAlias = Annotated[
+    str,
+    matching(
+        r"^[0-9]{4}-[0-9]{4}-[0-9]{4}-[0-9]{3}[0-9X]$", "an ORCID iD, as in `0000-0002-1825-0097`"
+    ),
+]
+
+
+class Author(Struct, frozen=True, forbid_unknown_fields=True):
+    """Who wrote the course."""
+
+    name: Annotated[Text, describe("as it is to be cited")]
+    orcid: Annotated[Orcid | None, describe("their [ORCID iD](https://orcid.org)")] = None
+
+    @property
+    def address(self) -> str:
+        """That of the ORCID iD; empty without one."""
+        return f"https://orcid.org/{self.orcid}" if self.orcid else ""
+
+    @property
+    def is_misspelt(self) -> bool:
+        """Whether the last digit of the ORCID iD does not follow from the others (ISO 7064)."""
+        total = 0
+        digits = (self.orcid or "").replace("-", "")
+        for digit in digits[:-1]:
+            total = (total + int(digit)) * 2
+        return bool(digits) and digits[-1] != "0123456789X"[(12 - total % 11) % 11]

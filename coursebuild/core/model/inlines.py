@@ -210,6 +210,8 @@ class Link(Located, frozen=True):
     title: str
     children: tuple[Inline, ...]
     mention: bool = False
+    bare: bool = False
+    """Whether its author gave it no text, so that it shows the number of what it leads to."""
 
 
 class Image(Located, frozen=True):

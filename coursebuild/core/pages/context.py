@@ -211,7 +211,8 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     def _names(self) -> Mapping[str, str]:
         prefix = self.inputs.number_prefix
         items = self.numbered_items.values()
-        return {item.id: item_name(item, prefix, self.words) for item in items}
+        kinds = self.inputs.callouts
+        return {item.id: item_name(item, prefix, self.words, kinds) for item in items}
 
     # what the writer of HTML needs
 

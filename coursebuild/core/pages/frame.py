@@ -19,13 +19,14 @@ from msgspec import Struct
 
 from coursebuild.core.features import PageKind, PagePart
 from coursebuild.core.model import Course, Lesson
+from coursebuild.core.model.fields import Author
 from coursebuild.core.model.lesson_record import shown_versions
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets, Names
 from coursebuild.core.pages.context import PageHead
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.materials import renderer_for
-from coursebuild.core.pages.renderer import Texts, direction
+from coursebuild.core.pages.renderer import Strings, Texts, direction
 from coursebuild.core.registry import added_pages, features, has_copies, page_copies, page_kind
 from coursebuild.core.text.characters import visible
 
@@ -124,6 +125,8 @@ class FrameInputs(Struct, frozen=True):
     version: str
     is_manual: bool
     names: Names
+    authors: tuple[Author, ...] = ()
+    doi: str = ""
 
     @classmethod
     def of(cls, library: Library, names: Names) -> FrameInputs:
@@ -143,6 +146,8 @@ class FrameInputs(Struct, frozen=True):
             version=course.version,
             is_manual=course.is_manual,
             names=names,
+            authors=course.authors,
+            doi=course.doi,
         )
 
 
@@ -186,6 +191,9 @@ class PageFrame(Struct, frozen=True):
             kind=head.kind,
             language=language,
             direction=direction(language),
+            citation=citation(
+                inputs, renderer.words, canonical, head.title if head.kind == "lesson" else ""
+            ),
             root=place.href(urls.HOME).removesuffix(urls.HOME),
             robots="" if head.indexed else "noindex",
             icon=place.href(names.icon),
@@ -204,6 +212,17 @@ class PageFrame(Struct, frozen=True):
             page_words=script_words(renderer.words.texts, parts),
         )
         return f"{visible(html)}\n"
+
+
+def citation(
+    course: Course | FrameInputs, words: Strings, address: str = "", part: str = ""
+) -> str:
+    """How a course, or the part of this title, is to be cited; empty if it names no authors."""
+    if not course.authors:
+        return ""
+    link = f"https://doi.org/{course.doi}" if course.doi else address
+    names = words.join(author.name for author in course.authors)
+    return ". ".join(filter(None, (names, part, course.title, course.version, link)))
 
 
 def script_words(keys: Collection[str], parts: Iterable[str]) -> tuple[str, ...]:
@@ -261,6 +280,8 @@ def _course(course: Course) -> dict[str, Json]:
             "description": course.summary,
             "inLanguage": course.language,
             "url": urls.absolute(course.base_url, urls.HOME),
+            "author": _people(course),
+            "identifier": f"https://doi.org/{course.doi}" if course.doi else "",
         }
     )
 
@@ -279,8 +300,14 @@ def _resource(library: Library, lesson: Lesson) -> dict[str, Json]:
             "competencyRequired": needs,
             "timeRequired": f"PT{lesson.minutes}M" if lesson.minutes else "",
             "license": library.course.licence,
+            "author": _people(library.course),
         }
     )
+
+
+def _people(course: Course) -> list[Json]:
+    people = ({"name": author.name, "@id": author.address} for author in course.authors)
+    return [{"@type": "Person", **_filled({**person})} for person in people]
 
 
 def _filled(data: dict[str, Json]) -> dict[str, Json]:

@@ -6,6 +6,8 @@ import functools
 from collections.abc import Mapping
 from unicodedata import normalize
 
+from msgspec.structs import replace
+
 from coursebuild.core.model import Course
 from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.model.results import Formula, MathError, PublishedTrials, Reports, Results
@@ -46,6 +48,23 @@ def make_library(
         if name in blocks
     }
     return Library(course, results, assets, renderer, reports, values, trials.files)
+
+
+def in_language(library: Library, language: str) -> Library:
+    """The library with the words of a language, kept beside that of the course."""
+    if language == library.words.language:
+        return library
+    versions: dict[str, Library] = library.__dict__.setdefault("versions", {})
+    if language not in versions:
+        renderer = renderer_for(
+            library.assets,
+            language,
+            library.course.theme.template_texts,
+            library.renderer.formulas,
+            is_manual=library.course.is_manual,
+        )
+        versions[language] = replace(library, renderer=renderer)
+    return versions[language]
 
 
 def renderer_for(

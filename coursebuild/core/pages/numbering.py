@@ -1,4 +1,4 @@
-r"""Numbers of formulas, figures, tables, listings and labs.
+r"""Numbers of formulas, figures, tables, listings, labs and callouts.
 
 1. What has a label has a number, in the order of the text, and nothing else: a number is there to
    be referred to. Each kind is counted for itself.
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from html import unescape
 from typing import TypeVar
 from urllib.parse import unquote
@@ -51,9 +51,10 @@ def number_items(document: model.Document, mathml: Mathml) -> dict[int, model.Nu
             )
     counts = Counter[str]()
     for block, label in model.labelled_blocks(document):
-        item = model.NumberedItem(label.id)
-        counts[item.kind] += 1
-        items[block.span.start] = model.NumberedItem(label.id, str(counts[item.kind]))
+        callout = block.kind if isinstance(block, model.Callout) else ""
+        kind = callout or label.id.partition(":")[0]
+        counts[kind] += 1
+        items[block.span.start] = model.NumberedItem(label.id, str(counts[kind]), callout=callout)
     return items
 
 
@@ -64,10 +65,17 @@ def items_of(document: model.Document, mathml: Mathml) -> tuple[model.NumberedIt
     return tuple(number_items(document, mathml).values())
 
 
-def item_name(item: model.NumberedItem, prefix: str, words: Strings) -> str:
-    """The name of an item, such as "(3)" or "Figure 4.2.3"; empty without a number."""
-    if not item.number or item.kind == "eq":
+def item_name(
+    item: model.NumberedItem, prefix: str, words: Strings, callouts: Mapping[str, model.CalloutKind]
+) -> str:
+    """The name of an item, such as "(3)" or "Theorem 4.2.3"; empty without a number.
+
+    `callouts` are the kinds of callouts that may have one, with their labels.
+    """
+    if not item.number or (item.kind == "eq" and not item.callout):
         return item.number and f"({item.number})"
+    if item.callout:
+        return f"{callouts[item.callout].label} {prefix}{item.number}"
     return words(f"number.{item.kind}", number=prefix + item.number)
 
 
@@ -103,7 +111,7 @@ def name_elsewhere(library: Library, path: str, target: model.Target) -> str:
     target = model.resolve(target, library.course, path)
     if not isinstance(target, model.LessonTarget | model.PageTarget):
         return ""
-    if target.anchor is None or target.anchor.partition(":")[0] not in model.LABEL_KINDS:
+    if target.anchor is None or ":" not in target.anchor:
         return ""
     lesson = isinstance(target, model.LessonTarget)
     owner = library.lessons.get(target.id) if lesson else library.pages.get(target.id)
@@ -111,7 +119,9 @@ def name_elsewhere(library: Library, path: str, target: model.Target) -> str:
         return ""
     items = items_of(owner.document, library.mathml)
     item = next((item for item in items if item.id == target.anchor), None)
-    name = item and item_name(item, number_prefix(owner.id) if lesson else "", library.words)
+    prefix = number_prefix(owner.id) if lesson else ""
+    kinds = {kind.name: library.callout(kind.name) for kind in library.course.callouts}
+    name = item and item_name(item, prefix, library.words, kinds)
     if not item or not name:
         return ""
     if owner.document.source.path == path or (lesson and item.kind != "eq"):

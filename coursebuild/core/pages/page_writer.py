@@ -118,6 +118,7 @@ class PageWriter(PageContext, frozen=True):
                     "blocks/callout.html",
                     callout=block,
                     kind=self.inputs.callouts[block.kind],
+                    number=self.number(block.label),
                     title=self.inlines(block.title),
                     body=self.blocks(block.blocks),
                 )

@@ -24,6 +24,7 @@ from coursebuild.core.drawing.contrast import (
 from coursebuild.core.model import Filter, LessonTable, Limits, Silence
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
 from coursebuild.core.model.fields import (
+    Author,
     Language,
     NotNegative,
     RelativeTolerance,
@@ -160,6 +161,9 @@ def check_launch(node: ObjectNode, fields: Launch, repository: str | None) -> It
 Url: TypeAlias = Annotated[
     str, matching(r"^https?://[^\s/]\S*$", "an address that begins with `https://` or `http://`")
 ]
+Doi: TypeAlias = Annotated[
+    str, matching(r"^10\.\d{4,9}/\S+$", "a DOI without an address, as in `10.5281/zenodo.1234567`")
+]
 Version: TypeAlias = Annotated[
     str, matching(r"^[0-9]+\.[0-9]+\.[0-9]+$", "a version of three numbers, as in `3.14.0`")
 ]
@@ -214,6 +218,10 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
         Url | None, describe("where its sources are: pages get a link to edit their file")
     ] = None
     licence: Annotated[str, describe("its name, as in `CC-BY-4.0`, shown in the footer")] = ""
+    authors: Annotated[
+        tuple[Author, ...], describe("who wrote it, in the order in which they are cited")
+    ] = ()
+    doi: Annotated[Doi | None, describe("its DOI, by which it is cited")] = None
     version: Annotated[
         Edition | None,
         describe("of the course, as in `2026` or `1.2.0`: shown in the head of each page"),

@@ -16,6 +16,7 @@ from msgspec.structs import asdict, replace
 
 from coursebuild.core import model
 from coursebuild.core.model.course import CALLOUTS, Launch
+from coursebuild.core.model.fields import Author
 from coursebuild.core.syntax.course_schema import (
     CourseFile,
     LevelTable,
@@ -119,6 +120,8 @@ def _build_course(
         base_url=settings.base_url or "",
         repository=settings.repository or "",
         licence=settings.licence,
+        authors=settings.authors,
+        doi=settings.doi or "",
         version=settings.version or "",
         folds=settings.folds,
         id=settings.id or "",
@@ -284,6 +287,10 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
             for member in tolerances:
                 message = f'`{member.key.value}` counts only with `compare = "rtol"`'
                 yield diagnose("field-value", member.key.span, message)
+    for node, author in decoding.find_structs(Author):
+        if author.is_misspelt:
+            message = f"`{author.orcid}` is no ORCID iD: its last digit does not fit the others"
+            yield diagnose("field-value", node.place("orcid"), message)
     for node, places in decoding.find_structs(Launch):
         repository = root.object("course").get("repository")
         address = repository.value if isinstance(repository, StringNode) else None

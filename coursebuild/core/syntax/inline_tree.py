@@ -226,7 +226,7 @@ class _TokenReader:
         title, target = str(opening.attrs.get("title", "")), classify(url)
         if (diagnostic := check_link_text(target, children, span)) is not None:
             self.report(diagnostic)
-        return model.Link(span, target, destination, title, children)
+        return model.Link(span, target, destination, title, children, bare=not children)
 
     def _find_destination(self, start: int, label_end: int, end: int) -> Span:
         """The span of the destination of a link or image: in itself, or in its definition."""

@@ -20,6 +20,8 @@ T = TypeVar("T")
 
 _LABEL_ID = re.compile(rf"\{{#((?P<kind>{'|'.join(LABEL_KINDS)}):[\w-]+)(?=[\s}}])")
 
+_CALLOUT_LABEL = re.compile(r"\{#(([A-Za-z]+):[\w-]+)\}")
+
 
 class ParsingState:
     """The state of the parser of one document."""
@@ -77,6 +79,21 @@ class ParsingState:
         source = value_text(values["given"]) if "given" in values else None
         domain = (values["check"] or braces.slice(end, end)) if "check" in values else None
         label = Label(braces.span(2, end), match[1], source, domain)
+        self.anchors.take(label.id, label.span)
+        return label
+
+    def take_callout_label(self, braces: Excerpt | None) -> Label | None:
+        """The label of a callout, whose prefix is of the author's choice, as in `thm:euler`."""
+        if braces is None:
+            return None
+        match = _CALLOUT_LABEL.fullmatch(braces.text)
+        if match is None or match[2] in (*LABEL_KINDS, "term"):
+            message = f"`{braces.text}` is not a label of a callout"
+            help = "write `{#thm:name}`, of letters, digits, `-` and `_`; "
+            help += ", ".join(f"`{kind}:`" for kind in LABEL_KINDS) + " are of other things"
+            self.reject_label(braces, message, help)
+            return None
+        label = Label(braces.span(2, 2 + len(match[1])), match[1])
         self.anchors.take(label.id, label.span)
         return label
 

@@ -278,15 +278,24 @@ class TextReader:
             if head is not None:
                 self.state.diagnostics += head.diagnostics
                 kind, place, folded = head.value.kind, head.value.kind_span, head.value.folded
-                title, rest = self.inlines(head.value.title), head.value.rest
+                heading, braces = split_label(head.value.title)
+                title, rest = self.inlines(heading), head.value.rest
+                label = self._take_callout_label(braces)
                 self.index += 3
                 blocks: tuple[model.Block, ...] = ()
                 rest, mark = split_source_mark(rest)
                 if rest.text:
                     blocks = (model.Paragraph(rest.span(), self.inlines(rest), source_mark=mark),)
                 blocks += self._read_blocks("blockquote_close")
-                return model.Callout(span, kind, place, title, folded, blocks)
+                return model.Callout(span, kind, place, title, folded, blocks, label=label)
         return model.BlockQuote(span, self._read_blocks("blockquote_close"))
+
+    def _take_callout_label(self, braces: Excerpt | None) -> model.Label | None:
+        if braces is not None and self.nested:
+            message = "a callout in a text of a quiz or lab has no label"
+            self.state.reject_label(braces, message, "label callouts of the lesson's text")
+            return None
+        return self.state.take_callout_label(braces)
 
     def _read_list(self, token: PositionedToken) -> model.ListBlock:
         ordered = token.type == "ordered_list_open"

@@ -285,7 +285,11 @@ def doubtful_places(
     id = re.escape(lesson.id)
     words = [words for _, words in sorted(course.words.items())]
     singular, plural, conjunctions, ranges = (
-        "|".join(dict.fromkeys(re.escape(name) for each in words for name in getattr(each, field)))
+        "|".join(
+            dict.fromkeys(
+                re.escape(name) for vocabulary in words for name in getattr(vocabulary, field)
+            )
+        )
         for field in ("lesson", "lessons", "conjunctions", "range")
     )
     names = re.compile(

@@ -32,6 +32,7 @@ from coursebuild.core.model.lesson_record import shown_versions
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import ExportContext
+from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, parse_html, to_html
 from coursebuild.core.pages.renderer import direction
 from coursebuild.core.run import gate
@@ -243,6 +244,8 @@ def page_file(context: ExportContext, *, page_numbers: bool = False) -> OutputFi
         summary=course.summary,
         facts=summary_line(context),
         licence=course.licence,
+        authors=course.authors,
+        citation=citation(course, context.library.words, course.base_url),
         levels=course.written_levels,
         level_anchor=level_anchor,
         lesson_anchor=lambda lesson: _anchor(lesson.id),

@@ -22,6 +22,7 @@ from coursebuild.core.model import Lesson, Level
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import ExportContext
+from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import to_xml
 from coursebuild.core.pages.renderer import direction
 from coursebuild.core.pages.theme import COURSE, accents
@@ -176,6 +177,8 @@ class _Epub:
             summary=self._course.summary,
             facts=chapters.summary_line(self._context),
             licence=self._course.licence,
+            authors=self._course.authors,
+            citation=citation(self._course, self._library.words, self._course.base_url),
             address=self._course.base_url,
         )
         return self._page(self._course.title, body, "frontmatter")
@@ -201,6 +204,8 @@ class _Epub:
             title=course.title,
             summary=course.summary,
             licence=course.licence,
+            authors=course.authors,
+            doi=course.doi,
             address=course.base_url,
             modified=_MODIFICATION_TIME,
             visual=bool(self._pictures),

@@ -25,6 +25,7 @@ from coursebuild.core.model.lesson_record import shown_versions
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import ExportContext
+from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, to_html
 from coursebuild.core.pages.renderer import direction
 from coursebuild.core.text.characters import visible
@@ -81,7 +82,7 @@ def slides_file(context: ExportContext) -> OutputFile:
     script = context.assets.file("js/slides.js").decode().replace("</", "<\\/")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     evaluation = " 'unsafe-eval'" if any(path.endswith(".wasm") for path in files) else ""
-    language, runs = course.language or "en", context.library.runs
+    language, runs = course.language_of(lesson) or "en", context.library.runs
     scripts = document_scripts(lesson.document) if lesson.document is not None else ()
     versions = shown_versions(runs[s.path].provenance for s in scripts if s.path in runs)
     html = context.library.render(
@@ -95,6 +96,7 @@ def slides_file(context: ExportContext) -> OutputFile:
         head_title=f"{lesson.id} {lesson.title} · {course.title}",
         course=course,
         lesson=lesson,
+        citation=citation(course, words, course.base_url, lesson.title),
         verified=words("site.verified", versions=words.join(versions)) if versions else "",
         slides=[(section, Markup(to_html(part))) for section, part in _split(content)],
         words=Markup(page_words),

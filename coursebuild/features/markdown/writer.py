@@ -113,7 +113,8 @@ class DocumentWriter:
                 text = marks.table(header, rows, align)
                 return self._below_caption(block, text, self.inlines(block.caption))
             case model.Callout():
-                label = f"**{marks.escape_marks(self.page.inputs.callouts[block.kind].label)}**"
+                name = self.number(block.label) or self.page.inputs.callouts[block.kind].label
+                label = f"**{marks.escape_marks(name)}**"
                 title = self.inlines(block.title)
                 head = f"{label} {title}" if title else label
                 inner = self.blocks(block.blocks)

@@ -204,9 +204,11 @@ def _write_notebook(
 ) -> bytes:
     head, *cells = json.loads(site.note(page))
     setup = () if archive is None else _setup_cells(site, lesson, archive)
+    names = [author.name for author in site.library.course.authors]
     document = {
         "cells": [head, *setup, *cells],
         "metadata": {
+            **({"authors": [{"name": name} for name in names]} if names else {}),
             "kernelspec": {
                 "display_name": "Python 3 (ipykernel)",
                 "language": "python",

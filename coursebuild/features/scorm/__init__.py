@@ -39,7 +39,7 @@ def package_files(context: ExportContext) -> Iterator[SiteFile]:
     files.append(OutputFile("sco/scorm.js", script))
     yield from files
     for lesson in context.course.written_lessons:
-        language = context.course.language or "en"
+        language = context.course.language_of(lesson) or "en"
         html = context.library.render(
             "scorm/start.html",
             language=language,

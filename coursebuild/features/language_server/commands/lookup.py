@@ -105,11 +105,14 @@ def label_titles(library: Library, owner: Owner | None, document: model.Document
     """The names and captions of what has a label in a document: `Figure 1.2.1: The flip`."""
     prefix = number_prefix(owner.id) if isinstance(owner, model.Lesson) else ""
     items = number_items(document, library.mathml).values()
-    titles = {item.id: item_name(item, prefix, library.words) for item in items}
+    kinds = {kind.name: library.callout(kind.name) for kind in library.course.callouts}
+    titles = {item.id: item_name(item, prefix, library.words, kinds) for item in items}
     captions = {formula.id: formula.tex for formula in display_formulas(document)}
     for block, label in model.labelled_blocks(document):
         match block:
             case model.Table(caption=inlines) | model.Paragraph(children=inlines):
+                captions[label.id] = model.plain_text(inlines)
+            case model.Callout(title=inlines):
                 captions[label.id] = model.plain_text(inlines)
             case model.Script(path=path):
                 captions[label.id] = path

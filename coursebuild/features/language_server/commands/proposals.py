@@ -337,7 +337,7 @@ def _label_name(texts: OpenTexts, path: str, label: str, span: Span) -> _Name | 
 
     def rename_label(name: str) -> types.WorkspaceEdit:
         prefix, colon, _ = label.partition(":")
-        is_numbered = colon and prefix in model.LABEL_KINDS
+        is_numbered = bool(colon)
         if not re.fullmatch(rf"{prefix}:[\w-]+" if is_numbered else r"[\w:.-]*[\w:-]", name):
             form = f"`{prefix}:` and then " if is_numbered else ""
             raise JsonRpcInvalidParams(f"a label is {form}letters, digits, `-` and `_`")
