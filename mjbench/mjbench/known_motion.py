@@ -127,9 +127,7 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
     # The formula comes first, and the equations bound it, where there are both.
     states, source = next(iter(motions.values())), exact.path
     least = least.at_least(gaps[-1])
-    return _with_closed_form(
-        model, reference, states, source, least, f"`{source}`", Place(exact.path)
-    )
+    return _with_closed_form(model, reference, states, source, least, f"`{source}`", Place(source))
 
 
 def find_nearby(

@@ -39,9 +39,9 @@ def test_reports_are_as_their_schema_says() -> None:
     ):
         validator.validate(json.loads(data))
     value = json.loads(BENCH.encode(scene()))
-    for wrong in ({"version": 2}, {"scene": {}}, {"holds": "mjbench diet"}, {"more": 1}):
+    for change in ({"version": 2}, {"scene": {}}, {"holds": "mjbench diet"}, {"more": 1}):
         with pytest.raises(ValidationError):
-            validator.validate(value | wrong)
+            validator.validate(value | change)
 
 
 def test_fields_of_reports_are_described() -> None:

@@ -362,7 +362,7 @@ sample = 0.08
         turns = np.column_stack([qpos[0] + qvel[0] * times, np.full_like(times, qpos[1])])
         return ExactStates({"motion": (turns, np.tile(qvel, (len(times), 1)))})
 
-    scene = replace(scene, exact=ExactMotion(scene.declaration.span, states))
+    scene = replace(scene, exact=ExactMotion("a.exact.py", states))
     advance, now = mujoco.mj_step, [0]
 
     def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int = 1) -> None:

@@ -77,7 +77,8 @@ def _changes(value: Any) -> Iterator[tuple[str, bool, Any]]:
 @functools.cache
 def _hints(kind: type[Struct]) -> dict[str, Any]:
     """The types of the fields of a struct, also of those that its module imports for types only."""
-    names = {struct.__name__: struct for struct in _subclasses(Struct)}
+    structs = (s for s in _subclasses(Struct) if s.__module__.startswith("coursebuild."))
+    names = {struct.__name__: struct for struct in structs}
     hints = get_type_hints(kind, localns=names)
     if kind is Reports:  # the core does not say what reports are
         hints |= {"scenes": Mapping[str, SceneReport], "diets": Mapping[str, DietReport]}

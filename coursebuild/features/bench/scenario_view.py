@@ -387,7 +387,8 @@ def _engine_table(words: Strings, scenario: EngineScenario, label: str) -> grids
             return ""
         if row.status == "diverged":
             return f"{status_text(row.status)}: {row.message}"
-        return words(f"measured.{row.status}", reason=row.message)
+        key = "unsupported" if row.status == "unsupported" else "failed"
+        return words(f"measured.{key}", reason=row.message)
 
     counts = sorted({cost.worlds for row in rows for cost in row.costs})
     columns: list[tuple[str, list[str]]] = [
