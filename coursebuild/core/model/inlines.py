@@ -67,6 +67,8 @@ class NumberBinding(Located, frozen=True):
     """Its source from `{given="…"}`, perhaps empty; `None` where a script has printed it."""
     unit: str = ""
     """That of a symbol whose value it is."""
+    words: str = ""
+    """Those of `{out="words"}`, printed right before it; empty where it has only one place."""
 
 
 LABEL_KINDS = {

@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.scripts.lines import MappedText, Side, plain_text, replace_ranges
-from coursebuild.core.scripts.tables import RowCell, table_rows
+from coursebuild.core.scripts.table_cells import RowCell, table_rows
 from coursebuild.core.text.numbers import (
     Number,
     has_groups,
@@ -151,13 +151,29 @@ class BoundText(Struct, frozen=True):
 
     def is_in(self, lines: Sequence[PrintedLine]) -> bool:
         """Whether printed numbers that may be meant, rounded, are those of the binding."""
-        digits = self.numbers[0].text.lstrip("+-\u2212")
-        equal_windows = filter(
-            self.shows, self._windows(line for line in lines if digits in line.text)
+        return bool(self.candidates(lines))
+
+    def candidates(self, lines: Sequence[PrintedLine], following: str = "") -> list[Window]:
+        """The printed numbers that it may show, each place once; `following` stands behind it."""
+        windows = [window for window in self.windows(lines) if self.shows(window)]
+        if self.stray:
+            windows = list(filter(self.has_context, windows))
+        units = frozenset() if self.after else units_at(following)
+
+        def has_unit(window: Window) -> bool:
+            return not units.isdisjoint(units_at(window.line.text, window.numbers[-1].end))
+
+        for test in (has_unit, self._is_verbatim):
+            windows = list(filter(test, windows)) or windows
+        unique = {(plain_text(w.line.text), w.numbers[0].start): w for w in reversed(windows)}
+        return list(reversed(unique.values()))
+
+    def _is_verbatim(self, window: Window) -> bool:
+        """Whether the numbers are printed exactly as they are shown."""
+        texts = (
+            [plain_text(n.text) for n in numbers] for numbers in (self.numbers, window.numbers)
         )
-        if any(map(self.has_context, equal_windows)):  # nearly always, so look here first
-            return True
-        return not self.stray and any(map(self.shows, self.windows(lines)))
+        return next(texts) == next(texts)
 
     def wrong_unit(self, lines: Sequence[PrintedLine], following: str) -> tuple[str, str] | None:
         """A printed number with its unit, and the text beside it here, if that is another unit.

@@ -37,13 +37,8 @@ from coursebuild.core.scripts.lines import (
     replace_ranges,
     same_number,
 )
-from coursebuild.core.scripts.tables import (
-    HEADER_HELP,
-    RowCell,
-    TableMatcher,
-    table_rows,
-    unit_changes,
-)
+from coursebuild.core.scripts.table_cells import RowCell, table_rows
+from coursebuild.core.scripts.tables import HEADER_HELP, TableMatcher, unit_changes
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import round_like
 from coursebuild.core.text.source import Excerpt, Span

@@ -21,11 +21,15 @@ from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts import bindings, failures
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
+from coursebuild.core.scripts.bound_places import document_bindings
 from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.lines import ELLIPSIS, Side
-from coursebuild.core.scripts.tables import HEADER_HELP, table_rows
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
+from coursebuild.core.scripts.provenance import Addresses
+from coursebuild.core.scripts.table_cells import table_rows
+from coursebuild.core.scripts.tables import HEADER_HELP
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.numbers import Number, only_number, scan, within_tolerance
 from coursebuild.core.text.source import Excerpt
@@ -40,7 +44,7 @@ def script_findings(
     extractions: Sequence[Extraction],
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
-    evidence: bindings.BindingEvidence | None = None,
+    addresses: Addresses | None = None,
     all_extractions: Sequence[Extraction] | None = None,
     other_runs: Mapping[str, ScriptRun] | None = None,
     broken: Collection[str] = (),
@@ -54,7 +58,7 @@ def script_findings(
         extractions: the scripts that were run, perhaps not all of the course.
         runs: what they did.
         verdicts: their output compared with the recorded one.
-        evidence: see `check_bindings`.
+        addresses: see `check_bindings`.
         all_extractions: all scripts of the course, if known.
         other_runs: earlier runs of the same scripts, by path, where there are any.
         broken: files of models that do not compile; no script that reads one is reported.
@@ -70,18 +74,18 @@ def script_findings(
             diagnostics += [] if diagnostic is None else [diagnostic]
             diagnostics += failures.divergence_diagnostics(extraction, run, scripts)
             diagnostics += failures.effect_diagnostics(extraction, run, scripts)
-    outputs = bindings.PrintedOutputs(verdicts, runs, scripts)
+    outputs = PrintedOutputs(verdicts, runs, scripts)
     return (
         *diagnostics,
-        *output_findings(course, documents, outputs, evidence, other_runs),
+        *output_findings(course, documents, outputs, addresses, other_runs),
     )
 
 
 def output_findings(
     course: Course,
     documents: Iterable[tuple[Owner, Document]],
-    outputs: bindings.PrintedOutputs,
-    evidence: bindings.BindingEvidence | None = None,
+    outputs: PrintedOutputs,
+    addresses: Addresses | None = None,
     other_runs: Mapping[str, ScriptRun] | None = None,
 ) -> Iterator[Diagnostic]:
     """What is wrong with the recorded outputs and bound numbers of some documents."""
@@ -99,7 +103,7 @@ def output_findings(
             elif verdict.status == "drift":
                 dependents = bindings.dependent_bindings(verdict, course.documents, outputs)
                 yield drift_diagnostic(verdict, owner.id, dependents)
-        yield from bindings.check_bindings(document, outputs, evidence)
+        yield from bindings.check_bindings(document, outputs, addresses)
         yield from _find_unmarked(course, document, outputs.runs)
 
 
@@ -182,17 +186,6 @@ def find_instability(
     return instability_diagnostic(recording, before, now, comparison)
 
 
-def collect_evidence(
-    course: Course, runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]
-) -> bindings.BindingEvidence:
-    """The lines by which the bindings of a course hold."""
-    evidence: bindings.BindingEvidence = {}
-    outputs = bindings.PrintedOutputs(verdicts, runs)
-    for document in course.documents:
-        bindings.check_bindings(document, outputs, evidence)
-    return evidence
-
-
 def count_unproven(
     course: Course, runs: Iterable[ScriptRun], verdicts: Iterable[Verdict]
 ) -> dict[str, tuple[int, int]]:
@@ -200,14 +193,14 @@ def count_unproven(
     unrun = {run.path for run in runs if not run.did_run}
     if not unrun:
         return {}
-    outputs = bindings.PrintedOutputs(verdicts, ())
+    outputs = PrintedOutputs(verdicts, ())
     recorded: list[str | None] = []
     bound: list[str | None] = []
     for document in course.documents:
         recorded += (verdict.recording.script for verdict in outputs.of_document(document))
         figures = recorded_figures(document)
         recorded += (figure.script for figure in figures if not figure.path.endswith(".csv"))
-        for binding in bindings.document_bindings(document):
+        for binding in document_bindings(document):
             of_binding = outputs.of_binding(binding)
             bound.append(binding.script or (of_binding[0].recording.script if of_binding else None))
     return {path: (recorded.count(path), bound.count(path)) for path in unrun}

@@ -24,16 +24,15 @@ from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.diff import number_change
 from coursebuild.core.scripts.lines import (
     CanonicalText,
-    MappedText,
     SameNumber,
     Side,
     always_match,
-    apply_filters,
     canonicalize,
     numbers_fit,
     plain_text,
     same_number,
 )
+from coursebuild.core.scripts.table_cells import RowCell, cell_text, table_rows
 from coursebuild.core.text.numbers import Number, relative_error
 from coursebuild.core.text.source import Span
 from coursebuild.core.text.units import units_at
@@ -42,18 +41,6 @@ _HEADER_UNIT = re.compile(r"[(\[]([^()\[\]]+)[)\]]\Z")
 HEADER_HELP = "write the unit that is printed, or put the columns in order"
 _ALIKE_WEIGHT = 6
 _PLACES = 64
-
-
-class RowCell(Struct, frozen=True):
-    """A cell of a recorded table."""
-
-    cell: model.Cell
-    mapped: MappedText
-    canonical: CanonicalText
-
-    def span(self, number: Number) -> Span:
-        """Where a number of the cell stands in the lesson."""
-        return Span(self.cell.span.source, *self.mapped.origin(number.start, number.end))
 
 
 class RowMatch(Struct, frozen=True):
@@ -66,21 +53,6 @@ class RowMatch(Struct, frozen=True):
     row: tuple[RowCell, ...]
     line: int
     pairs: tuple[tuple[RowCell, Number, Number], ...]
-
-
-def table_rows(
-    table: model.Table, filters: Iterable[model.Filter] = ()
-) -> tuple[tuple[RowCell, ...], ...]:
-    """The body rows of a table; cells and rows without text are left out."""
-    rules = tuple(filters)
-    texts = ([(cell, _cell_text(cell, rules)) for cell in row] for row in table.rows)
-    rows = (
-        tuple(
-            RowCell(cell, mapped, canonicalize(mapped.text)) for cell, mapped in row if mapped.text
-        )
-        for row in texts
-    )
-    return tuple(row for row in rows if row)
 
 
 def compare_table(
@@ -115,7 +87,7 @@ def unit_changes(
             place = matcher.lines[match.line], number.end
             printed.setdefault(columns[id(cell.cell)], []).append(place)
     for column, places in sorted(printed.items()):
-        header = _cell_text(table.header[column], ())
+        header = cell_text(table.header[column], ())
         unit = _HEADER_UNIT.search(header.text)
         shown_units = frozenset() if unit is None else units_at(unit[1])
         units = [units_at(line, end) for line, end in places]
@@ -247,50 +219,3 @@ def _nearest_places(
                 extended.append((cost, [*places, place], end))
         best = extended
     return min(best, key=lambda way: way[0])[1]
-
-
-# --- cells
-
-_RUN = re.compile(r"\s{2,}|[^\S ]")
-_ENDS = re.compile(r"\A\s+|\s+\Z")
-
-
-def _cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
-    """The plain text of a cell, filtered; origins are offsets in the lesson's source.
-
-    Marks of Markdown are gone, minus signs are hyphens, runs of white space are one space. A
-    stretch that Markdown changed (entities, escapes) stands for all of itself.
-    """
-    stretches: list[MappedText] = []
-    for inline in model.walk_inlines(cell.children):
-        span = inline.span
-        match inline:
-            case model.Text():
-                text = inline.text
-            case model.CodeSpan():
-                # Between the backticks, without padding
-                markdown, text = span.text, inline.text
-                edge = len(markdown) - len(markdown.lstrip("`"))
-                if len(markdown) - 2 * edge == len(text) + 2:
-                    edge += 1
-                span = Span(span.source, span.start + edge, span.end - edge)
-            case model.NumberBinding():
-                text, span = inline.text, inline.text_span
-            case model.Math():
-                text, span = inline.tex.text, inline.tex.span()
-            case model.Image():
-                text = inline.alt
-            case model.SoftBreak() | model.HardBreak():
-                text = " "
-            case model.RawInline():
-                text = " " if inline.html.startswith("<br") else ""
-            case _:
-                continue
-        stretches.append(
-            MappedText.copy(text, span.start)
-            if span.text == text
-            else MappedText.substitute_for(span.start, span.end, text)
-        )
-    mapped = apply_filters(MappedText.join(stretches), filters)
-    folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
-    return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)

@@ -117,10 +117,13 @@ def read_meaning(
     source = value_text(values["given"]) if "given" in values else None
     value, number = values.get("value"), None
     if value is not None and _NUMBER.fullmatch(value.text) and not {"out", "given"} <= {*values}:
-        script = value_text(values.get("out")) or None
+        printed = values.get("out")
+        origin_text = value_text(printed)
+        is_quoted = printed is not None and origin_text and _is_quoted(printed)
+        script, words = (None, origin_text) if is_quoted else (origin_text or None, "")
         origin = None if "out" in values else source or ""
         unit = value_text(values.get("unit"))
-        number = NumberBinding(braces.span(), value.text, value.span(), script, origin, unit)
+        number = NumberBinding(braces.span(), value.text, value.span(), script, origin, unit, words)
     elif "value" in values or "out" in values:
         text = "" if value is None else value.text
         reason = f"`{text}` is no value of a symbol"
@@ -143,6 +146,11 @@ def read_meaning(
     return Meaning(braces.span(), meaning, unit), source, number
 
 
+def _is_quoted(value: Excerpt) -> bool:
+    start = value.span().start
+    return value.span().source.text[start - 1] == '"'
+
+
 def value_text(value: Excerpt | None) -> str:
     """The text of a value on one line; empty for none."""
     return "" if value is None else collapse_spaces(value.text)
@@ -155,8 +163,8 @@ _UNREAD = re.compile(
 )
 """Braces directly after code, a formula or a bracket that begin as an attribute there does."""
 _BINDING_HELP = (
-    "write `{out}`, `{out=examples/x.py}`, `{given}` or `{code}`; write `\\{` for a brace that "
-    "readers should see"
+    'write `{out}`, `{out="words before it"}`, `{out=examples/x.py}`, `{given}` or `{code}`; write '
+    "`\\{` for a brace that readers should see"
 )
 _HELPS = {"binding": _BINDING_HELP, "symbol": _SYMBOL_HELP, "term": _TERM_HELP}
 

@@ -303,7 +303,8 @@ class _TokenReader:
             return model.NumberBinding(
                 span, token.content, place, None, collapse_spaces(token.info)
             )
-        return model.NumberBinding(span, token.content, place, token.info or None)
+        words = collapse_spaces(token.meta["words"])
+        return model.NumberBinding(span, token.content, place, token.info or None, words=words)
 
     def _read_html(self, token: PositionedToken, span: Span) -> model.RawInline:
         html = self.content.slice(token.start, token.end)
