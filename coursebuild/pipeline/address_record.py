@@ -15,9 +15,10 @@ from msgspec import Struct
 from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Document
-from coursebuild.core.scripts.bound_places import bound_values
+from coursebuild.core.model.results import Address
+from coursebuild.core.scripts.bound_places import document_values
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.provenance import Address, Addresses, ShownValue
+from coursebuild.core.scripts.provenance import Addresses, ShownValue
 
 
 class _Line(Struct, frozen=True, omit_defaults=True):
@@ -62,7 +63,7 @@ def write_addresses(
             continue
         lines = [
             _Line(value.text, value.script, value.before, addresses[value], value.nth, value.count)
-            for _, value in bound_values(document, outputs)
+            for value in document_values(document, outputs)
             if value in addresses
         ]
         data = b"".join(msgspec.json.encode(line) + b"\n" for line in lines)

@@ -22,7 +22,7 @@ from coursebuild.core.files.write import check_writable, write_atomic
 from coursebuild.core.model import Course, Document
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bindings import check_bindings
-from coursebuild.core.scripts.bound_places import bound_values, follow_outputs
+from coursebuild.core.scripts.bound_places import document_values, follow_outputs
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import adopt_file, apply_edits, block_text, update_body
 from coursebuild.core.scripts.extract import extract as extract_course
@@ -121,7 +121,11 @@ class _Updater:
             scripts=script_lines(
                 self.scripts,
                 runs,
-                [v for v in compare_all(new_course, runs) if v.status == "verified"],
+                [
+                    v
+                    for v in compare_all(new_course, runs, self.addresses)
+                    if v.status == "verified"
+                ],
                 self.course,
             ),
             documents=self.documents,
@@ -152,7 +156,8 @@ class _Updater:
             if recording.script not in printed:
                 continue
             comparison = self.course.comparison_of(recording)
-            edit = update_body(recording, comparison, printed[recording.script])
+            at = outputs.row_addresses(recording)
+            edit = update_body(recording, comparison, printed[recording.script], at)
             if isinstance(edit, Edit):
                 edits.setdefault(recording.span.source, []).append(edit)
             elif edit is not None:
@@ -172,7 +177,7 @@ class _Updater:
 
     def _outputs(self, course: Course, runs: Sequence[ScriptRun]) -> PrintedOutputs:
         paths = (e.path for e in self.extracted_scripts.extractions)
-        return PrintedOutputs(compare_all(course, runs), runs, paths)
+        return PrintedOutputs(compare_all(course, runs, self.addresses), runs, paths)
 
     def _chosen_documents(self, course: Course) -> list[Document]:
         return [
@@ -218,7 +223,9 @@ class _Updater:
         paths = {extraction.path for extraction in self.scripts}
 
         def verdicts(course: Course) -> list[Verdict]:
-            return [v for v in compare_all(course, runs) if v.recording.script in paths]
+            return [
+                v for v in compare_all(course, runs, self.addresses) if v.recording.script in paths
+            ]
 
         # What was written above a script has moved it.
         extractions = [e for e in extract_course(new_course).value if e.path in paths]
@@ -255,11 +262,11 @@ class _Updater:
         new_documents = {document.source.path: document for document in new_course.documents}
         for document in self._chosen_documents(self.course):
             new_document = new_documents.get(document.source.path)
-            old_values = bound_values(document, before)
-            new_values = () if new_document is None else bound_values(new_document, now)
+            old_values = document_values(document, before)
+            new_values = () if new_document is None else document_values(new_document, now)
             if len(old_values) != len(new_values):
                 continue
-            for (_, old), (_, new) in zip(old_values, new_values, strict=True):
+            for old, new in zip(old_values, new_values, strict=True):
                 if old in self.addresses:
                     self.addresses[new] = self.addresses[old]
 

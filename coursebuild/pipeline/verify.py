@@ -117,7 +117,7 @@ def verify(
         say,
         options.sandbox,
     )
-    runner = _ScriptRunner(course, options, extracted_scripts, scripts, known_runs)
+    runner = _ScriptRunner(course, options, extracted_scripts, scripts, known_runs, addresses)
     runs, (trial_results, trial_diagnostics) = _run_with_trials(
         runner.run, trials, context, options.progress
     )
@@ -149,7 +149,7 @@ def verify(
     run_diagnostics = (
         *(d for d in extracted_scripts.diagnostics if d.span in chosen_places),
         *trial_diagnostics,
-        *runner.find_mistakes(owned_documents, runs, verdicts, addresses, other_runs, broken_paths),
+        *runner.find_mistakes(owned_documents, runs, verdicts, other_runs, broken_paths),
         *figure_diagnostics,
     )
     interpreter = options.interpreter
@@ -187,11 +187,13 @@ class _ScriptRunner:
         extracted_scripts: ExtractedScripts,
         scripts: Sequence[Extraction],
         known_runs: Mapping[str, ScriptRun] | None,
+        addresses: Addresses,
     ) -> None:
         self.course, self.options = course, options
         self.scripts = [e for e in scripts if e in extracted_scripts.runnable]
         self.left_out = [e for e in scripts if e not in extracted_scripts.runnable]
         self.extracted_scripts, self.known_runs = extracted_scripts, known_runs
+        self.addresses = addresses
         self.store = options.run_store()
 
     def run(self) -> tuple[ScriptRun, ...]:
@@ -231,7 +233,7 @@ class _ScriptRunner:
         self, runs: Sequence[ScriptRun]
     ) -> tuple[tuple[Verdict, ...], list[Diagnostic], tuple[ScriptLine, ...]]:
         """Return verdicts on recorded outputs, diagnostics of figures, and lines of a report."""
-        verdicts = compare_all(self.course, runs)
+        verdicts = compare_all(self.course, runs, self.addresses)
         read = functools.partial(read_recorded, self.options.root)
         figure_diagnostics = list(figure_findings(self.course, runs, read))
         drifted_figures = [diagnostic.span for diagnostic in figure_diagnostics]
@@ -245,7 +247,6 @@ class _ScriptRunner:
         documents: Iterable[tuple[Owner, Document]],
         runs: Sequence[ScriptRun],
         verdicts: Sequence[Verdict],
-        addresses: Addresses,
         other_runs: Mapping[str, ScriptRun] | None,
         broken_paths: Collection[str],
     ) -> Iterator[Diagnostic]:
@@ -256,7 +257,7 @@ class _ScriptRunner:
             self.scripts,
             runs,
             verdicts,
-            addresses,
+            self.addresses,
             self.extracted_scripts.extractions,
             other_runs,
             broken_paths,

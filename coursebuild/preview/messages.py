@@ -242,11 +242,10 @@ def _outputs(
             if verdict.status == "drift":
                 run = library.runs[verdict.recording.script or ""]
                 edits = new_output(session, library, course, verdict)
-                is_refused = isinstance(edits, Diagnostic)
                 output |= {
                     "rows": diff_rows(verdict, run.stdout),
-                    "offer": None if is_refused or not edits else Offer.of(*edits),
-                    "refused": edits.message if is_refused else "",
+                    "offer": Offer.of(*edits) if isinstance(edits, tuple) and edits else None,
+                    "refused": edits.message if isinstance(edits, Diagnostic) else "",
                 }
         yield output
 
@@ -260,7 +259,9 @@ def new_output(
     """
     run = library.runs[verdict.recording.script or ""]
     unstable_output = find_instability(verdict, run, session.runs.other_runs())
-    edit = unstable_output or update_body(verdict.recording, verdict.comparison, run.stdout)
+    edit = unstable_output or update_body(
+        verdict.recording, verdict.comparison, run.stdout, verdict.row_addresses
+    )
     if not isinstance(edit, Edit):
         return edit or ()
     results, addresses = library.results, dict(session.runs.addresses)

@@ -60,7 +60,7 @@ class RunHistory:
         """What is known of a course's scripts as they are now."""
         keys = script_keys(course)
         runs = tuple(run for path, (key, run) in self._runs.items() if keys.get(path) == key)
-        return replace(self.last_results, runs=runs, verdicts=compare(course, runs))
+        return replace(self.last_results, runs=runs, verdicts=compare(course, runs, self.addresses))
 
     def take(self, course: Course, verification: Verification, trials: PublishedTrials) -> None:
         """Take the results of verifying a course."""

@@ -203,6 +203,29 @@ class Change(Struct, frozen=True):
     """Leading significant digits that agree."""
 
 
+LineName: TypeAlias = tuple[str, ...]
+"""Numbers that tell a line from others with the same words, in one notation."""
+
+
+class Address(Struct, frozen=True, omit_defaults=True):
+    """Where in an output a value was printed; numbers in words are written `#`."""
+
+    line: str
+    place: int
+    """The index of the first of its numbers in the line."""
+    heading: str = ""
+    name: LineName = ()
+    """Empty where no sought_word line has its words."""
+    names: tuple[LineName, ...] = ()
+    """Those of all lines with the same words."""
+
+    @property
+    def text(self) -> str:
+        """The printed line in words."""
+        name = f", where it begins with {' '.join(self.name)}" if self.name else ""
+        return f"`{self.line}`{name}" + (f" below `{self.heading}`" if self.heading else "")
+
+
 class Verdict(Struct, frozen=True):
     """The comparison of one recorded output with a run."""
 
@@ -212,6 +235,12 @@ class Verdict(Struct, frozen=True):
     status: Literal["verified", "drift", "volatile", "unchecked"]
     """`unchecked`: the script did not run to its end."""
     changes: tuple[Change, ...] = ()
+    row_addresses: tuple[tuple[Address, ...], ...] = ()
+    """Of a table: where the numbers of each row were printed."""
+    rivals: tuple[str, ...] = ()
+    """Of a table: printed lines of which its rows may mean any."""
+    rows: tuple[int, int] = (0, 0)
+    """Of a table: how many rows it shows, and of how many that were printed."""
 
 
 class Formula(Struct, frozen=True):

@@ -20,7 +20,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.results import Change, DriftKind, Outcome, Verdict
+from coursebuild.core.model.results import Address, Change, DriftKind, Outcome, Verdict
 from coursebuild.core.scripts.bound_numbers import (
     BoundText,
     PrintedLine,
@@ -39,9 +39,9 @@ from coursebuild.core.scripts.bound_places import (
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body, recording_key
 from coursebuild.core.scripts.provenance import (
-    Address,
     Addresses,
 )
+from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Fix,
@@ -87,6 +87,10 @@ def check_bindings(
         at = tuple(address for place in places if (address := place.address) is not None)
         if at and len(at) == len(places):
             addresses[value] = at
+    for verdict in outputs.of_document(document):
+        rows = row_values(document, verdict.recording, verdict.comparison.filters)
+        places_of_rows = zip(rows, verdict.row_addresses, strict=False)
+        addresses |= {value: at for value, at in places_of_rows if at}
     return tuple(diagnostics)
 
 

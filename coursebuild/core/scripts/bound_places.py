@@ -18,18 +18,18 @@ from typing import NamedTuple
 from msgspec import Struct
 
 from coursebuild.core import model
-from coursebuild.core.model.results import Outcome, Verdict
+from coursebuild.core.model.results import Address, Outcome, Verdict
 from coursebuild.core.scripts.bound_numbers import BoundText, Window
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.scripts.provenance import (
-    Address,
     Addresses,
     PrintedText,
     ShownValue,
     masked,
     shown_values,
 )
+from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.diagnostics import Edit, Note
 
 
@@ -48,6 +48,16 @@ def bound_values(
         for b in bindings
     )
     return tuple(zip(bindings, shown_values(texts), strict=True))
+
+
+def document_values(document: model.Document, outputs: PrintedOutputs) -> tuple[ShownValue, ...]:
+    """The bound numbers of a document, and the rows of its recorded tables."""
+    rows = (
+        value
+        for verdict in outputs.of_document(document)
+        for value in row_values(document, verdict.recording, verdict.comparison.filters)
+    )
+    return (*(value for _, value in bound_values(document, outputs)), *rows)
 
 
 _MARKUP = re.compile(r"\{[^{}]*\}|[`*_$]")

@@ -22,14 +22,14 @@ from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun
 from coursebuild.core.scripts import bindings, failures
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
 from coursebuild.core.scripts.bound_places import document_bindings
+from coursebuild.core.scripts.column_titles import HEADER_HELP
 from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.lines import ELLIPSIS, Side
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.scripts.provenance import Addresses
-from coursebuild.core.scripts.table_cells import table_rows
-from coursebuild.core.scripts.tables import HEADER_HELP
+from coursebuild.core.scripts.table_cells import cell_text, table_rows
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.numbers import Number, only_number, scan, within_tolerance
 from coursebuild.core.text.source import Excerpt
@@ -93,6 +93,7 @@ def output_findings(
         for verdict in outputs.of_document(document):
             recording = verdict.recording
             yield from _find_loose(verdict)
+            yield from _judge_table(verdict)
             run = outputs.runs.get(recording.script or "")
             if run is not None and run.outcome is Outcome.OK and not run.stdout.strip():
                 yield failures.silence_diagnostic(recording, run.path)
@@ -146,6 +147,24 @@ def _find_loose(verdict: Verdict) -> Iterator[Diagnostic]:
             yield diagnose("recording-loose", place, message, help=help)
 
 
+def _judge_table(verdict: Verdict) -> Iterator[Diagnostic]:
+    """Report empty cells of a recorded table, and rows that may be any of several lines."""
+    table = verdict.recording.body
+    if not isinstance(table, Table):
+        return
+    empty_cells = (cell for row in table.rows for cell in row if not cell_text(cell, ()).text)
+    if table_rows(table) and (cell := next(empty_cells, None)) is not None:
+        message = "an empty cell of a recorded table shows nothing that was printed"
+        help = "write what is printed, or `\u2026` for what is left out"
+        yield diagnose("recording-body", cell.span, message, help=help)
+    if verdict.rivals:
+        message = f"`{verdict.recording.script}` printed the rows of this table in several ways"
+        notes = [Note(f"`{line}`") for line in verdict.rivals[:_MAX_NOTES]]
+        help = "write the words and units that are printed with the numbers into the header"
+        place = verdict.recording.caption_span
+        yield diagnose("output-ambiguous", place, message, help=help, notes=notes)
+
+
 def _find_unmarked(
     course: Course, document: Document, runs: Mapping[str, ScriptRun]
 ) -> Iterator[Diagnostic]:
@@ -179,7 +198,8 @@ def find_instability(
     earlier_run = other_runs.get(recording.script or "")
     if run is None or earlier_run is None or {run.outcome, earlier_run.outcome} != {Outcome.OK}:
         return None
-    changes = compare(recording, comparison, earlier_run.stdout).changes
+    at = verdict.row_addresses
+    changes = compare(recording, comparison, earlier_run.stdout, at).changes
     if [(c.span, c.printed) for c in changes] == [(c.span, c.printed) for c in verdict.changes]:
         return None
     before, now = (Side.of(r.stdout, comparison.filters) for r in (earlier_run, run))
@@ -214,7 +234,7 @@ def drift_diagnostic(
 ) -> Diagnostic:
     """A recorded output of a lesson or page, `owner`, that differs from this run."""
     recording, update = verdict.recording, f"`coursebuild update {owner}`"
-    if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
+    if not verdict.changes:
         message = f"no output of `{recording.script}` is recorded yet"
         return diagnose("output-drift", recording.caption_span, message, help=f"run {update}")
     changes = verdict.changes

@@ -6,9 +6,11 @@ from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 
 from coursebuild.core import model
-from coursebuild.core.model.results import ScriptRun, Verdict
-from coursebuild.core.scripts.bound_numbers import lines_of_run, printed_lines
+from coursebuild.core.model.results import Address, ScriptRun, Verdict
+from coursebuild.core.scripts.bound_numbers import PrintedLine, lines_of_run, printed_lines
 from coursebuild.core.scripts.provenance import PrintedText
+from coursebuild.core.scripts.table_cells import row_text
+from coursebuild.core.scripts.tables import TableMatcher, updated_row
 
 
 class PrintedOutputs:
@@ -58,11 +60,20 @@ class PrintedOutputs:
             self._texts[key] = PrintedText(lines)
         return self._texts[key]
 
+    def row_addresses(self, recording: model.Recording) -> tuple[tuple[Address, ...], ...]:
+        """Where the rows of a recorded table were printed, as far as that is known."""
+        key = recording_key(recording)
+        verdicts = self._by_document.get(recording.span.path, ())
+        return next((v.row_addresses for v in verdicts if recording_key(v.recording) == key), ())
+
     def updated_text(self, verdict: Verdict) -> PrintedText:
         """The lines of a recorded output as `update` writes it."""
         recording, comparison = verdict.recording, verdict.comparison
-        if isinstance(recording.body, model.Table):
-            return self.text(verdict)
+        if isinstance(body := recording.body, model.Table):
+            stdout, at = self.runs[recording.script or ""].stdout, verdict.row_addresses
+            rows = TableMatcher(body, comparison, stdout, at).match().rows
+            lines = (row_text(updated_row(row, comparison)) for row in rows)
+            return PrintedText([PrintedLine(line) for line in lines])
         return self.text_of_run(recording.script or "", comparison.own_filters)
 
     def text_of_run(self, path: str, filters: Sequence[model.Filter]) -> PrintedText:

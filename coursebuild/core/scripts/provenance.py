@@ -17,31 +17,10 @@ from typing import TypeAlias
 
 from msgspec import Struct
 
+from coursebuild.core.model.results import Address, LineName
 from coursebuild.core.scripts.bound_numbers import PrintedLine, Window
 from coursebuild.core.scripts.lines import MARK, canonicalize, plain_text
 from coursebuild.core.text.numbers import scan
-
-LineName: TypeAlias = tuple[str, ...]
-"""Numbers that tell a line from others with the same words, in one notation."""
-
-
-class Address(Struct, frozen=True, omit_defaults=True):
-    """Where in an output a value was printed; numbers in words are written `#`."""
-
-    line: str
-    place: int
-    """The index of the first of its numbers in the line."""
-    heading: str = ""
-    name: LineName = ()
-    """Empty where no sought_word line has its words."""
-    names: tuple[LineName, ...] = ()
-    """Those of all lines with the same words."""
-
-    @property
-    def text(self) -> str:
-        """The printed line in words."""
-        name = f", where it begins with {' '.join(self.name)}" if self.name else ""
-        return f"`{self.line}`{name}" + (f" below `{self.heading}`" if self.heading else "")
 
 
 class ShownValue(Struct, frozen=True):
@@ -100,6 +79,10 @@ class PrintedText:
             self._by_words.setdefault((heading, words), []).append(at)
             if any(map(str.isalpha, words)) and (not numbers or words.endswith(":")):
                 heading, heading_numbers = words, numbers
+
+    def heading(self, line: int) -> str:
+        """The heading of a line, by its index."""
+        return self._keys[line].heading
 
     def address(self, window: Window) -> Address | None:
         """The address of printed numbers; `None` where nothing tells their line from others."""

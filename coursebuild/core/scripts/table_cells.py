@@ -25,6 +25,7 @@ class RowCell(Struct, frozen=True):
     """A cell of a recorded table."""
 
     cell: model.Cell
+    column: int
     mapped: MappedText
     canonical: CanonicalText
 
@@ -33,19 +34,34 @@ class RowCell(Struct, frozen=True):
         return Span(self.cell.span.source, *self.mapped.origin(number.start, number.end))
 
 
+ELISIONS = ("\u2026", "...")
+"""A cell that is left out; a row of such cells stands for any printed rows."""
+
+
 def table_rows(
     table: model.Table, filters: Iterable[model.Filter] = ()
 ) -> tuple[tuple[RowCell, ...], ...]:
-    """The body rows of a table; cells and rows without text are left out."""
+    """The body rows of a table; cells without text, or left out, and rows of such are not there."""
     rules = tuple(filters)
-    texts = ([(cell, cell_text(cell, rules)) for cell in row] for row in table.rows)
     rows = (
         tuple(
-            RowCell(cell, mapped, canonicalize(mapped.text)) for cell, mapped in row if mapped.text
+            RowCell(cell, column, mapped, canonicalize(mapped.text))
+            for column, cell in enumerate(row)
+            if (mapped := cell_text(cell, rules)).text not in ("", *ELISIONS)
         )
-        for row in texts
+        for row in table.rows
     )
     return tuple(row for row in rows if row)
+
+
+def elides_rows(table: model.Table) -> bool:
+    """Whether a row of a table stands for printed rows that it does not show."""
+    return any(all(cell_text(c, ()).text in ELISIONS for c in row) for row in table.rows)
+
+
+def row_text(row: Iterable[RowCell]) -> str:
+    """The cells of a row as one line."""
+    return "  ".join(cell.mapped.text for cell in row)
 
 
 def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:

@@ -177,12 +177,12 @@ def actions(
         if verdict.status == "drift" and span.source == place.source and _overlap(span, place):
             course = texts.session.course
             assert course is not None  # it has been run
-            edits = new_output(texts.session, texts.library, course, verdict)
-            if not isinstance(edits, Diagnostic) and edits:
+            new_edits = new_output(texts.session, texts.library, course, verdict)
+            if isinstance(new_edits, tuple) and new_edits:
                 drifts = (d for d in diagnostics if d.rule == "output-drift")
                 solved = [d for d in drifts if span.contains(d.span)]
                 title = f"accept what `{verdict.recording.script}` prints"
-                actions.append(_make_action(texts.places, title, edits, solved))
+                actions.append(_make_action(texts.places, title, new_edits, solved))
     actions += _bind_numbers(texts, place)
     asked_kinds = tuple(str(getattr(kind, "value", kind)) for kind in params.context.only or ("",))
     kinds = [str(getattr(action.kind, "value", action.kind)) for action in actions]
