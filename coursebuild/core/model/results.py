@@ -203,10 +203,6 @@ class Change(Struct, frozen=True):
     """Leading significant digits that agree."""
 
 
-LineName: TypeAlias = tuple[str, ...]
-"""Numbers that tell a line from others with the same words, in one notation."""
-
-
 class Address(Struct, frozen=True, omit_defaults=True):
     """Where in an output a value was printed; numbers in words are written `#`."""
 
@@ -214,15 +210,15 @@ class Address(Struct, frozen=True, omit_defaults=True):
     place: int
     """The index of the first of its numbers in the line."""
     heading: str = ""
-    name: LineName = ()
-    """Empty where no sought_word line has its words."""
-    names: tuple[LineName, ...] = ()
+    name: str = ""
+    """The numbers that tell the line from others with its words; empty where none has these."""
+    names: tuple[str, ...] = ()
     """Those of all lines with the same words."""
 
     @property
     def text(self) -> str:
         """The printed line in words."""
-        name = f", where it begins with {' '.join(self.name)}" if self.name else ""
+        name = f", where it begins with {self.name}" if self.name else ""
         return f"`{self.line}`{name}" + (f" below `{self.heading}`" if self.heading else "")
 
 

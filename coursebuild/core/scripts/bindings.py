@@ -143,7 +143,7 @@ def _check(
         lines = (line for texts in bound.groups for text in texts for line in text.lines)
         if next(text_places(bound.text.before, lines), None) is not None:
             return None, ()
-    places = bound.places()
+    places = bound.places() if bound.text.numbers else []
     if len(places) > 1:
         return _ambiguous(bound, places), places
     if places:
@@ -268,6 +268,8 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
     places_now = next(filter(None, map(bound.look_up, bound.groups)), [])
     if len({text.rewrite(place.window) for place in places_now}) > 1:
         message = f"the places that showed `{binding.text}` have different numbers now"
+        if binding.words:
+            message = f"`{bound.path}` printed `{binding.words}` before {len(places_now)} numbers"
         notes, help = [place.note(binding) for place in places_now[:_MAX_NOTES]], _CHOOSE
         return diagnose("binding-mismatch", binding.text_span, message, help=help, notes=notes)
     if places_now:

@@ -234,7 +234,8 @@ def drift_diagnostic(
 ) -> Diagnostic:
     """A recorded output of a lesson or page, `owner`, that differs from this run."""
     recording, update = verdict.recording, f"`coursebuild update {owner}`"
-    if not verdict.changes:
+    is_empty = isinstance(recording.body, Excerpt) and not recording.body.text.strip()
+    if is_empty or not verdict.changes:
         message = f"no output of `{recording.script}` is recorded yet"
         return diagnose("output-drift", recording.caption_span, message, help=f"run {update}")
     changes = verdict.changes

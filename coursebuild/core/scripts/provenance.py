@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.model.results import Address, LineName
+from coursebuild.core.model.results import Address
 from coursebuild.core.scripts.bound_numbers import PrintedLine, Window
 from coursebuild.core.scripts.lines import MARK, canonicalize, plain_text
 from coursebuild.core.text.numbers import scan
@@ -59,8 +59,8 @@ def masked(text: str) -> str:
 class _LineKey(Struct, frozen=True):
     heading: str
     words: str
-    heading_numbers: LineName
-    numbers: LineName
+    heading_numbers: tuple[str, ...]
+    numbers: tuple[str, ...]
 
 
 class PrintedText:
@@ -70,7 +70,7 @@ class PrintedText:
         self.lines = lines
         self._keys: list[_LineKey] = []
         self._by_words: dict[tuple[str, str], list[int]] = {}
-        heading, heading_numbers = "", LineName()
+        heading, heading_numbers = "", tuple[str, ...]()
         for at, line in enumerate(lines):
             words = masked(line.text)
             numbers = tuple(format(n.value.normalize(), "f") for n in line.numbers)
@@ -101,7 +101,7 @@ class PrintedText:
         """What stands at an address, `count` numbers; `None` where that is not certain."""
         lines = self._by_words.get((address.heading, address.line), [])
         if address.name and lines:
-            depth = len(address.name) - len(self._keys[lines[0]].heading_numbers)
+            depth = len(address.name.split()) - len(self._keys[lines[0]].heading_numbers)
             names = [_name(self._keys[i], depth) for i in lines]
             is_intact = {*names} <= {*address.names} or {*names} >= {*address.names}
             lines = [
@@ -186,6 +186,6 @@ def _ends_with(context: _Words, sought: _Words) -> bool:
     )
 
 
-def _name(key: _LineKey, depth: int) -> LineName:
+def _name(key: _LineKey, depth: int) -> str:
     """The numbers of a line's heading and the first `depth` of its own; none for depth -1."""
-    return () if depth < 0 else key.heading_numbers + key.numbers[:depth]
+    return "" if depth < 0 else " ".join(key.heading_numbers + key.numbers[:depth])

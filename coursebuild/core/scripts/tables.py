@@ -57,6 +57,7 @@ class Layout(NamedTuple):
     heading: str
     parts: tuple[str, ...]
     """Before, between and after the cells."""
+    columns: tuple[int, ...]
 
 
 class Fit(NamedTuple):
@@ -339,7 +340,8 @@ class TableMatcher:
                     parts.append(canonical.skeleton[at:place])
                     at = place + len(cell.canonical.skeleton)
                 parts.append(canonical.skeleton[at:])
-                layout = Layout(self.text.heading(line), tuple(parts))
+                columns = tuple(cell.column for cell in cells)
+                layout = Layout(self.text.heading(line), tuple(parts), columns)
                 yield Fit(line, way, layout, is_right)
 
     # --- the header
