@@ -22,6 +22,7 @@ from coursebuild.features.authoring.course_map import (
     rename_references,
     with_lesson_renamed,
 )
+from coursebuild.pipeline.address_record import record_path
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import documents_by_name
 from coursebuild.report.text import location, visible
@@ -65,6 +66,11 @@ def run(arguments: argparse.Namespace) -> int:
         changes = [change for change in changes if change is not lesson_change]
         changes.append(FileChange(replace(lesson, id=new).path, None, lesson_change.new))
         changes.append(FileChange(lesson.path, lesson_change.old, None))
+        record = record_path(lesson.path)
+        if (root / record).exists():
+            data = read_bytes(root, record)
+            changes.append(FileChange(record_path(replace(lesson, id=new).path), None, data))
+            changes.append(FileChange(record, data, None))
     files = (path for top in (*FOLDERS, "src") for path in (root / top).rglob("*.*"))
     code = [path for path in files if path.suffix in (".py", ".js") and path.is_file()]
     sources = read_sources(root, sorted(path.relative_to(root).as_posix() for path in code)).value

@@ -42,6 +42,7 @@ from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.known_names import options_by_command
 from coursebuild.features.names.resolve import resolver_of
 from coursebuild.features.references import works_of
+from coursebuild.pipeline.address_record import record_path
 
 _NAME = r"[A-Za-z_]\w*"
 _SUBJECTS = (
@@ -280,8 +281,11 @@ def _lesson_name(texts: OpenTexts, lesson: model.Lesson, span: Span) -> _Name:
         changes = places.changes([Edit(course.map.span(), new_map), *text_edits])
         identifier = types.OptionalVersionedTextDocumentIdentifier
         file_edits = [types.TextDocumentEdit(identifier(uri), e) for uri, e in changes.items()]
-        old, new = places.uri(lesson.path), places.uri(replace(lesson, id=id).path)
-        file_renames = [] if lesson.document is None else [types.RenameFile(old, new)]
+        old, new = lesson.path, replace(lesson, id=id).path
+        paths = [] if lesson.document is None else [(old, new)]
+        if (texts.session.root / record_path(old)).exists():
+            paths.append((record_path(old), record_path(new)))
+        file_renames = [types.RenameFile(places.uri(a), places.uri(b)) for a, b in paths]
         return types.WorkspaceEdit(document_changes=[*file_edits, *file_renames])
 
     return _Name(span.source.span(start, start + len(lesson.id)), lesson.id, rename_lesson)
