@@ -280,7 +280,7 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
         label = f"{places_now[0].window.text} {are} printed there now, in `{plain_text(line.text)}`"
         help = Fix(f"write `{better}`", better, safe=True) if better else ""
         return diagnose("binding-mismatch", binding.text_span, message, label=label, help=help)
-    if not bound.addresses:
+    if binding.words:
         message = f"`{bound.path}` printed no number right after `{binding.words}`"
         return diagnose("binding-mismatch", binding.text_span, message)
     line_text = bound.addresses[0].text
