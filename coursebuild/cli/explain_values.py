@@ -17,6 +17,7 @@ from coursebuild.core.scripts.bound_places import bound_values, find_texts
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
+from coursebuild.core.scripts.provenance import describe_line
 from coursebuild.core.scripts.table_cells import table_rows
 from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.source import Span
@@ -66,7 +67,7 @@ def value_origins(root: Path, course: Course, path: str, line: int) -> tuple[Val
             for place, locate in zip(places, recorded, strict=True)
             if locate is not None
         ]
-        texts = tuple(f"number {a.place + 1} of {a.text}" for a in at)
+        texts = tuple(f"number {a.place + 1} of {describe_line(a)}" for a in at)
         origin = ValueOrigin(binding.text, value.script, texts, tuple(map(location, spans)))
         origins.append((binding.span, origin))
     for verdict in outputs.of_document(document):
@@ -74,7 +75,7 @@ def value_origins(root: Path, course: Course, path: str, line: int) -> tuple[Val
         rows = table_rows(body, filters) if isinstance(body, Table) else ()
         for row, value in zip(rows, row_values(document, verdict.recording, filters), strict=True):
             at = addresses.get(value, ())
-            texts = tuple(f"number {a.place + 1} of {a.text}" for a in at)
+            texts = tuple(f"number {a.place + 1} of {describe_line(a)}" for a in at)
             span = row[0].cell.span.to(row[-1].cell.span)
             origins.append((span, ValueOrigin(value.text, value.script, texts)))
     return tuple(origin for span, origin in origins if is_there(span))

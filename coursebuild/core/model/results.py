@@ -211,15 +211,8 @@ class Address(Struct, frozen=True, omit_defaults=True):
     """The index of the first of its numbers in the line."""
     heading: str = ""
     name: str = ""
-    """The numbers that tell the line from others with its words; empty where none has these."""
     names: tuple[str, ...] = ()
-    """Those of all lines with the same words."""
-
-    @property
-    def text(self) -> str:
-        """The printed line in words."""
-        name = f", where it begins with {self.name}" if self.name else ""
-        return f"`{self.line}`{name}" + (f" below `{self.heading}`" if self.heading else "")
+    """The numbers that tell the line from others with its words, and those of all such lines."""
 
 
 class Verdict(Struct, frozen=True):

@@ -38,9 +38,7 @@ from coursebuild.core.scripts.bound_places import (
 )
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body, recording_key
-from coursebuild.core.scripts.provenance import (
-    Addresses,
-)
+from coursebuild.core.scripts.provenance import Addresses, describe_line
 from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -283,7 +281,7 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
     if binding.words:
         message = f"`{bound.path}` printed no number right after `{binding.words}`"
         return diagnose("binding-mismatch", binding.text_span, message)
-    line_text = bound.addresses[0].text
+    line_text = describe_line(bound.addresses[0])
     message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"
     notes = [place.note(binding) for place in replace(bound, addresses=()).places()[:_MAX_NOTES]]
     help = 'bind it anew: choose the words before it, as in `{out="tau"}`'

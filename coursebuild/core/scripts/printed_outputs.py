@@ -40,10 +40,13 @@ class PrintedOutputs:
         return self._by_document.get(document.source.path, ())
 
     def of_binding(self, binding: model.NumberBinding) -> list[Verdict]:
-        """The recorded outputs that a binding depends on."""
+        """The recorded outputs that a binding depends on; in a caption, that of the caption."""
         if binding.script is not None:
             return self._by_script.get(binding.script, [])
         verdicts = self._by_document.get(binding.span.path, [])
+        own = [v for v in verdicts if v.recording.caption_span.contains(binding.span)]
+        if own:
+            return own[:1]
         after = bisect_left(verdicts, binding.span.start + 1, key=end_of_body)
         return verdicts[after - 1 : after] if after else []
 

@@ -42,6 +42,12 @@ Addresses: TypeAlias = dict[ShownValue, tuple[Address, ...]]
 mean, which are several where its author has chosen none."""
 
 
+def describe_line(address: Address) -> str:
+    """The printed line of an address in words."""
+    name = f", where it begins with {address.name}" if address.name else ""
+    return f"`{address.line}`{name}" + (f" below `{address.heading}`" if address.heading else "")
+
+
 def shown_values(texts: Iterable[tuple[str, str, str, str]]) -> Iterator[ShownValue]:
     """Values from their path, script, words before and text, in the order of the lesson."""
     values = list(texts)
@@ -172,7 +178,7 @@ def _words(text: str) -> _Words:
         at = number.end
     parts += ((word, False) for word in text[at:].split())
     bare = (
-        (word if is_number else word.strip("=:,;()[]|<>~"), is_number) for word, is_number in parts
+        (word if is_number else word.strip("=:,;()[]|<>~/"), is_number) for word, is_number in parts
     )
     return tuple((word, is_number) for word, is_number in bare if word)
 
