@@ -1,6 +1,7 @@
 """`coursebuild explain`: explain a rule, or why something would run again.
 
-Of a path it says whether it would run again, why, and what depends on it. The lessons are read and
+Of a path it says whether it would run again, why, and what depends on it; of a line of a lesson,
+where its values come from. The lessons are read and
 parsed; nothing is run, compiled or written, and neither NumPy nor MuJoCo is imported.
 """
 
@@ -17,6 +18,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_format, options_of, style_of
+from coursebuild.cli.explain_values import origins_text, value_origins
 from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.resources import rules_page
 from coursebuild.core.model import (
@@ -155,13 +157,14 @@ examples:
   coursebuild explain output-drift             a rule, as in error[output-drift]
   coursebuild explain 4.2                      would the scripts of a lesson run, and why?
   coursebuild explain models/pendulum.xml      what depends on this file?
+  coursebuild explain content/lessons/4.2-mass-and-inertia.md:570    where do its numbers come from?
 """
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    help = "a rule, or a script, lab, lesson, page, model, or any file of the project"
-    parser.add_argument("name", metavar="RULE|PATH", help=help)
+    help = "a rule; a script, lab, lesson, page, model, or any file; or a line of a lesson"
+    parser.add_argument("name", metavar="RULE|PATH[:LINE]", help=help)
     add_format(parser, "text", "json")
 
 
@@ -172,7 +175,13 @@ def run(arguments: argparse.Namespace) -> int:
     if rule is not None:
         text = rule_text(rule, rules_page())
         return write(json_text(rule) if arguments.format == "json" else text, CLEAN)
-    explanation = explain(options_of(arguments), arguments.name)
+    options = options_of(arguments)
+    if match := re.fullmatch(r"(.+\.md):([1-9][0-9]{0,8})", arguments.name):
+        path = path_from_root(match[1], options.root)
+        origins = value_origins(options.root, load_course(options.root), path, int(match[2]))
+        text = origins_text(f"{path}:{match[2]}", origins)
+        return write(json_text(origins) if arguments.format == "json" else text, CLEAN)
+    explanation = explain(options, arguments.name)
     if arguments.format == "json":
         return write(json_text(plain(explanation, runs="own", shown_in="shown")), CLEAN)
     return write(explanation_text(explanation, style_of(sys.stdout)), CLEAN)

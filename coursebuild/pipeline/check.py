@@ -26,7 +26,9 @@ from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.findings import unproven_units
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
+from coursebuild.pipeline.address_record import write_addresses
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.proofs import remarks_on_proofs
@@ -88,6 +90,8 @@ def check(
             inventory = [*unproven(course), *unproven_units(course, runs, verdicts)]
         report = checked_course.report(diagnostics, inventory)
         if shard is None:
+            checked_course.remember_addresses()
+        if shard is None:
             remarks += remarks_on_proofs(
                 course,
                 options.store,
@@ -138,6 +142,19 @@ class CheckedCourse(Struct, frozen=True):
             return report
         depends = depends_on(self.course, verification.results, self.options.interpreter)
         return replace(report, depends=depends)
+
+    def remember_addresses(self) -> None:
+        """Keep where the shown values of documents without errors were printed."""
+        verification = self.verification
+        outputs = PrintedOutputs(verification.results.verdicts, verification.results.runs)
+        documents = [
+            document
+            for document in self.course.documents
+            if self.documents is None or document.source.path in self.documents
+        ]
+        diagnostics = (*self.diagnostics, *verification.run_diagnostics)
+        broken = {diagnostic.span.path for diagnostic in diagnostics if diagnostic.is_error}
+        write_addresses(self.options.root, documents, outputs, verification.addresses, broken)
 
 
 def read_and_verify(

@@ -1,7 +1,7 @@
 """`coursebuild update` and `extract`: what scripts print, and what they are, into the lessons.
 
-Each lesson is written whole or not at all, and only if nobody changed it meanwhile. Where a new
-output makes a bound number false, a diagnostic says what is printed now in its place.
+Each lesson is written whole or not at all, and only if nobody changed it meanwhile. A bound number
+becomes what stands at its address now; where that is gone, a diagnostic says so.
 
 What is written was printed by one run. Whether another prints the same, and which digits hold, is
 found out later: by `serve` when it is idle, and by `check --sensitivity`.
@@ -19,17 +19,22 @@ from coursebuild.core.files.examples import Obstacle
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import change_files, check_writable, write_atomic
-from coursebuild.core.model import Course
+from coursebuild.core.model import Course, Document
 from coursebuild.core.model.results import Outcome, ScriptRun, TrialLine, Verdict
 from coursebuild.core.registry import feature_trials
+from coursebuild.core.scripts.bindings import check_bindings
+from coursebuild.core.scripts.bound_places import document_values, follow_outputs
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import adopt_file, apply_edits, block_text, update_body
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.extract import extract as extract_course
 from coursebuild.core.scripts.figures import figure_findings
-from coursebuild.core.scripts.findings import collect_evidence, script_findings
+from coursebuild.core.scripts.findings import script_findings
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs, recording_key
+from coursebuild.core.scripts.provenance import PrintedText
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Source
+from coursebuild.pipeline.address_record import read_addresses, write_addresses
 from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
@@ -88,6 +93,7 @@ class _Updater:
         paths |= {figure.script for figure in find_figures(course, self.documents)}
         self.scripts = [e for e in self.extracted_scripts.runnable if e.path in paths]
         """The scripts that have an output or a figure to bring up to date."""
+        self.addresses = read_addresses(options.root, course.documents)
 
     def update(self, began: float) -> Report:
         runs = run(self.course, self.scripts, self.options)
@@ -146,16 +152,41 @@ class _Updater:
         }
         edits: dict[Source, list[Edit]] = {}
         refusals: list[Diagnostic] = []
+        refused_outputs: set[tuple[str, int]] = set()
+        outputs = self._outputs(self.course, runs)
         for recording in self.recordings:
             if (good_run := good_runs.get(recording.script or "")) is None:
                 continue
             comparison = self.course.comparison_of(recording)
-            edit = update_body(recording, comparison, good_run.output_of(recording.part))
+            at = outputs.row_addresses(recording)
+            edit = update_body(recording, comparison, good_run.output_of(recording.part), at)
             if isinstance(edit, Edit):
                 edits.setdefault(recording.span.source, []).append(edit)
             elif edit is not None:
                 refusals.append(edit)
+                refused_outputs.add(recording_key(recording))
+
+        def text_after(verdict: Verdict) -> PrintedText | None:
+            is_refused = recording_key(verdict.recording) in refused_outputs
+            return None if is_refused else outputs.updated_text(verdict)
+
+        for document in self._chosen_documents(self.course):
+            check_bindings(document, outputs, self.addresses)
+            followers = list(follow_outputs(document, outputs, self.addresses, text_after))
+            if followers:
+                edits.setdefault(document.source, []).extend(followers)
         return edits, refusals
+
+    def _outputs(self, course: Course, runs: Sequence[ScriptRun]) -> PrintedOutputs:
+        paths = (e.path for e in self.extracted_scripts.extractions)
+        return PrintedOutputs(compare_all(course, runs, self.addresses), runs, paths)
+
+    def _chosen_documents(self, course: Course) -> list[Document]:
+        return [
+            document
+            for document in course.documents
+            if self.documents is None or document.source.path in self.documents
+        ]
 
     def _add_source_parts(self, edits: dict[Source, list[Edit]]) -> None:
         """Add the edits of parts of files; leave out lessons that are not to be written over."""
@@ -208,13 +239,14 @@ class _Updater:
         paths = {extraction.path for extraction in self.scripts}
 
         def verdicts(course: Course) -> list[Verdict]:
-            return [v for v in compare_all(course, runs) if v.recording.script in paths]
+            return [
+                v for v in compare_all(course, runs, self.addresses) if v.recording.script in paths
+            ]
 
         # What was written above a script has moved it.
         extractions = [e for e in extract_course(new_course).value if e.path in paths]
-        evidence = None
         if new_course is not self.course:
-            evidence = collect_evidence(self.course, runs, verdicts(self.course))
+            self._carry_addresses(new_course, runs)
         chosen_documents = [
             (owner, document)
             for owner, document in new_course.owned_documents
@@ -227,13 +259,32 @@ class _Updater:
                 extractions,
                 runs,
                 verdicts(new_course),
-                evidence,
+                self.addresses,
                 find_module=functools.partial(find_module, self.options.root),
             ),
             *figure_findings(new_course, runs, functools.partial(read_recorded, self.options.root)),
         ]
+        if not self.dry_run:
+            outputs = self._outputs(new_course, runs)
+            write_addresses(
+                self.options.root, self._chosen_documents(new_course), outputs, self.addresses
+            )
         # A drift that was not updated has its own diagnostic; a dry run leaves all drifts.
         return [d for d in diagnostics if d.rule not in ("output-drift", "figure-drift")]
+
+    def _carry_addresses(self, new_course: Course, runs: Sequence[ScriptRun]) -> None:
+        """Keep the addresses of numbers that were written anew."""
+        before, now = self._outputs(self.course, runs), self._outputs(new_course, runs)
+        new_documents = {document.source.path: document for document in new_course.documents}
+        for document in self._chosen_documents(self.course):
+            new_document = new_documents.get(document.source.path)
+            old_values = document_values(document, before)
+            new_values = () if new_document is None else document_values(new_document, now)
+            if len(old_values) != len(new_values):
+                continue
+            for old, new in zip(old_values, new_values, strict=True):
+                if old in self.addresses:
+                    self.addresses[new] = self.addresses[old]
 
 
 def changed_text(verb: str, source: Source, new: str) -> str:

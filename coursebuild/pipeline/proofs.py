@@ -20,7 +20,7 @@ from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Course, Document, Recording, Table, find_blocks
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.registry import feature_trials
-from coursebuild.core.scripts.bindings import document_bindings
+from coursebuild.core.scripts.bound_places import document_bindings
 from coursebuild.core.text.source import Source, Span
 from coursebuild.core.values import fingerprint
 from coursebuild.report.values import plural

@@ -31,13 +31,15 @@ from coursebuild.core.model.results import (
 from coursebuild.core.registry import check_runs, feature_trials
 from coursebuild.core.run.run_store import RunStore
 from coursebuild.core.run.script_environment import engine_version
-from coursebuild.core.scripts.bindings import BindingEvidence, document_bindings
+from coursebuild.core.scripts.bound_places import document_bindings
 from coursebuild.core.scripts.compare import repeat_findings
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
+from coursebuild.core.scripts.provenance import Addresses
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.pipeline.address_record import read_addresses
 from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
 from coursebuild.pipeline.scripts import (
@@ -66,6 +68,8 @@ class Verification(Struct, frozen=True):
     """A line for each script that was chosen, also for one that was left out."""
     labs: tuple[TrialLine, ...]
     """Likewise."""
+    addresses: Addresses
+    """Where the shown values of the course were printed when they last held."""
 
     @property
     def diagnostics(self) -> tuple[Diagnostic, ...]:
@@ -80,19 +84,22 @@ def verify(
     static: bool = False,
     shard: Shard | None = None,
     repeat: bool = False,
-    evidence: BindingEvidence | None = None,
+    addresses: Addresses | None = None,
     known_runs: Mapping[str, ScriptRun] | None = None,
     other_runs: Mapping[str, ScriptRun] | None = None,
 ) -> Verification:
     """Verify a course, or only what stands in the documents with these paths.
 
     `static`: with the static forms of labs, which only a build needs. `repeat`: what is recorded
-    from a script's only run must be borne out by another, now. `evidence`: the lines by which bound
-    numbers held before. A preview has `known_runs`, by path, that are known to hold, and
-    `other_runs` of the same scripts, and repeats nothing here.
+    from a script's only run must be borne out by another, now. `addresses`: where shown values
+    held before, besides what is remembered; it gets where they hold now. A preview has
+    `known_runs`, by path, that are known to hold, and `other_runs` of the same scripts, and repeats
+    nothing here.
     """
     options.store.listen(options.progress.say)
     options = options.for_course(course)
+    addresses = {} if addresses is None else addresses
+    addresses |= read_addresses(options.root, course.documents) | addresses
     is_preview = known_runs is not None
     # A preview holds the lock for no longer, so that other commands need not wait for its scripts.
     with project_lock(options.root) if is_preview else contextlib.nullcontext():
@@ -110,7 +117,7 @@ def verify(
         say,
         options.sandbox,
     )
-    runner = _ScriptRunner(course, options, extracted_scripts, scripts, known_runs)
+    runner = _ScriptRunner(course, options, extracted_scripts, scripts, known_runs, addresses)
     runs, (trial_results, trial_diagnostics) = _run_with_trials(
         runner.run, trials, context, options.progress
     )
@@ -142,14 +149,14 @@ def verify(
     run_diagnostics = (
         *(d for d in extracted_scripts.diagnostics if d.span in chosen_places),
         *trial_diagnostics,
-        *runner.find_mistakes(owned_documents, runs, verdicts, evidence, other_runs, broken_paths),
+        *runner.find_mistakes(owned_documents, runs, verdicts, other_runs, broken_paths),
         *figure_diagnostics,
     )
     interpreter = options.interpreter
     engine = engine_version() if interpreter is None else interpreter.engine
     results = Results(runs, verdicts, (), models, engine, trial_results)
     labs = _lab_lines(course, trials, trial_results)
-    return Verification(results, course_diagnostics, run_diagnostics, lines, labs)
+    return Verification(results, course_diagnostics, run_diagnostics, lines, labs, addresses)
 
 
 def _lab_lines(
@@ -179,11 +186,13 @@ class _ScriptRunner:
         extracted_scripts: ExtractedScripts,
         scripts: Sequence[Extraction],
         known_runs: Mapping[str, ScriptRun] | None,
+        addresses: Addresses,
     ) -> None:
         self.course, self.options = course, options
         self.scripts = [e for e in scripts if e in extracted_scripts.runnable]
         self.left_out = [e for e in scripts if e not in extracted_scripts.runnable]
         self.extracted_scripts, self.known_runs = extracted_scripts, known_runs
+        self.addresses = addresses
         self.store = options.run_store()
 
     def run(self) -> tuple[ScriptRun, ...]:
@@ -223,7 +232,7 @@ class _ScriptRunner:
         self, runs: Sequence[ScriptRun]
     ) -> tuple[tuple[Verdict, ...], list[Diagnostic], tuple[ScriptLine, ...]]:
         """Return verdicts on recorded outputs, diagnostics of figures, and lines of a report."""
-        verdicts = compare_all(self.course, runs)
+        verdicts = compare_all(self.course, runs, self.addresses)
         read = functools.partial(read_recorded, self.options.root)
         figure_diagnostics = list(figure_findings(self.course, runs, read))
         drifted_figures = [diagnostic.span for diagnostic in figure_diagnostics]
@@ -237,7 +246,6 @@ class _ScriptRunner:
         documents: Iterable[tuple[Owner, Document]],
         runs: Sequence[ScriptRun],
         verdicts: Sequence[Verdict],
-        evidence: BindingEvidence | None,
         other_runs: Mapping[str, ScriptRun] | None,
         broken_paths: Collection[str],
     ) -> Iterator[Diagnostic]:
@@ -248,7 +256,7 @@ class _ScriptRunner:
             self.scripts,
             runs,
             verdicts,
-            evidence,
+            self.addresses,
             self.extracted_scripts.extractions,
             other_runs,
             broken_paths,

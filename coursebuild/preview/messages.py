@@ -19,6 +19,7 @@ from msgspec import Struct
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model import (
+    Course,
     Document,
     Recording,
     document_scripts,
@@ -29,11 +30,14 @@ from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.pages.library import Library
-from coursebuild.core.scripts.bindings import document_bindings
+from coursebuild.core.scripts.bindings import check_bindings
+from coursebuild.core.scripts.bound_places import document_bindings, follow_outputs
 from coursebuild.core.scripts.diff import diff_rows
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.figures import figure_difference, prepare_figure
 from coursebuild.core.scripts.findings import find_instability
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
+from coursebuild.core.scripts.provenance import PrintedText
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.check import judge
@@ -60,16 +64,21 @@ class Offer(Struct, frozen=True):
 
     @classmethod
     def of(cls, *edits: Edit) -> Offer:
-        """The offer of edits of one text."""
+        """The offer of edits, of which those of the first one's text are shown."""
         source = edits[0].span.source
-        new = apply_edits(source.text, edits)
+        new = apply_edits(source.text, (edit for edit in edits if edit.span.source == source))
         return cls(source.path, source.text.encode(), new.encode(), edits)
 
     @property
     def id(self) -> str:
         """The id by which it is accepted."""
         digest = hashlib.sha256(self.path.encode())
-        for data in (self.old or b"", self.new):
+        elsewhere = [
+            f"{edit.span.path}:{edit.span.start}:{edit.text}".encode()
+            for edit in self.edits
+            if edit.span.path != self.path
+        ]
+        for data in (self.old or b"", self.new, *elsewhere):
             digest.update(b"%d:" % len(data) + data)
         return digest.hexdigest()[:24]
 
@@ -102,14 +111,16 @@ def accept(session: Session, path: str, ids: str) -> str:
     with session.condition:
         news = _collect_news(session, path)
         parts = (*news["outputs"], *news["figures"], *news["numbers"], *news["problems"])
+        parts += tuple(choice for part in news["problems"] for choice in part["choices"])
         offers = {part["offer"].id: part["offer"] for part in parts if part.get("offer")}
         accepted_offers = [offers[id] for id in ids.split() if id in offers]
         if not accepted_offers or len(accepted_offers) < len(ids.split()):
             return "this is no longer what the page offers; look at it again"
         edits: dict[Source, list[Edit]] = {}
         for offer in accepted_offers:
-            for edit in offer.edits:
-                edits.setdefault(edit.span.source, []).append(edit)
+            for edit in offer.edits:  # two outputs of a script may offer the same number
+                edits_there = edits.setdefault(edit.span.source, [])
+                edits_there += [] if edit in edits_there else [edit]
     changes = [
         FileChange(s.path, s.text.encode(), apply_edits(s.text, edits_there).encode())
         for s, edits_there in edits.items()
@@ -173,12 +184,13 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
         "figures": [],
         "numbers": [],
     }
-    if document is not None and library is not None:
+    course = session.course
+    if document is not None and library is not None and course is not None:
         news["scripts"] = [
             {"path": script.path, "state": _state(library.runs.get(script.path))}
             for script in document_scripts(document)
         ]
-        news["outputs"] = list(_outputs(session, library, document))
+        news["outputs"] = list(_outputs(session, library, course, document))
         news["figures"] = list(_figures(session, library, document))
         news["numbers"] = list(_numbers(document, report.diagnostics))
     return news
@@ -202,6 +214,11 @@ def _describe_mistake(
     has_mark = is_in_text and span.start in marks
     line = span.source.line_text(span.line)
     end = len(line) if span.end_line > span.line else span.end_column - 1
+    choices = [
+        {"text": note.message, "offer": Offer.of(*note.edits)}
+        for note in diagnostic.notes
+        if note.edits and may_edit(session.root, note.edits[0].span.path)
+    ]
     return {
         "severity": diagnostic.severity,
         "rule": diagnostic.rule,
@@ -212,12 +229,14 @@ def _describe_mistake(
         "notes": [
             (note.message if note.span is None else f"{location(note.span)}: {note.message}")
             for note in diagnostic.notes
+            if not note.edits
         ],
         "line": line,
         "start": span.column - 1,
         "end": max(end, span.column - 1),
         "here": is_here,
         "mark": f"mistake:{span.start}" if has_mark else "",
+        "choices": choices,
         **offer,
     }
 
@@ -229,7 +248,9 @@ def _state(run: ScriptRun | None) -> str:
     return "running" if run is None else run.outcome.value
 
 
-def _outputs(session: Session, library: Library, document: Document) -> Iterator[dict[str, Any]]:
+def _outputs(
+    session: Session, library: Library, course: Course, document: Document
+) -> Iterator[dict[str, Any]]:
     """Describe recorded outputs, each with its number among those of its script on the page."""
     numbers = output_numbers(document)
     for recording in find_blocks(document, Recording):
@@ -244,22 +265,42 @@ def _outputs(session: Session, library: Library, document: Document) -> Iterator
             output["state"] = verdict.status
             if verdict.status == "drift":
                 run = library.runs[verdict.recording.script or ""]
-                edit = new_output(session, library, verdict)
+                edits = new_output(session, library, course, verdict)
                 output |= {
                     "rows": diff_rows(verdict, run.output_of(recording.part)),
-                    "offer": Offer.of(edit) if isinstance(edit, Edit) else None,
-                    "refused": edit.message if isinstance(edit, Diagnostic) else "",
+                    "offer": Offer.of(*edits) if isinstance(edits, tuple) and edits else None,
+                    "refused": edits.message if isinstance(edits, Diagnostic) else "",
                 }
         yield output
 
 
-def new_output(session: Session, library: Library, verdict: Verdict) -> Edit | Diagnostic | None:
-    """Make the edit that `coursebuild update` would, unless another run printed something else."""
+def new_output(
+    session: Session, library: Library, course: Course, verdict: Verdict
+) -> tuple[Edit, ...] | Diagnostic:
+    """Make the edits that `coursebuild update` would, unless another run printed something else.
+
+    The first is of the output, the others of numbers that are bound to it.
+    """
     recording = verdict.recording
     run = library.runs[recording.script or ""]
     unstable_output = find_instability(verdict, run, session.runs.other_runs())
-    printed = run.output_of(recording.part)
-    return unstable_output or update_body(recording, verdict.comparison, printed)
+    edit = unstable_output or update_body(
+        recording, verdict.comparison, run.output_of(recording.part), verdict.row_addresses
+    )
+    if not isinstance(edit, Edit):
+        return edit or ()
+    results, addresses = library.results, dict(session.runs.addresses)
+    outputs = PrintedOutputs(results.verdicts, results.runs, library.scripts)
+
+    def text_after(other: Verdict) -> PrintedText:
+        is_new = other.recording == recording
+        return outputs.updated_text(other) if is_new else outputs.text(other)
+
+    edits = [edit]
+    for document in course.documents:
+        check_bindings(document, outputs, addresses)
+        edits += follow_outputs(document, outputs, addresses, text_after)
+    return tuple(edits)
 
 
 # --- figures

@@ -25,7 +25,6 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.run.script_server import RunAll, RunStoppedError, ScriptServer
-from coursebuild.core.scripts.bindings import BindingEvidence
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.sensitivity import noise_warnings
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -65,8 +64,6 @@ class BackgroundRebuild:
         """The session's `edits` when the work began last."""
         self._measured: set[str] = set()
         """The scripts that ran with moved initial states."""
-        self._evidence: BindingEvidence = {}
-        """The lines that proved bound numbers, also before an output was accepted."""
         self._server = ScriptServer()
         self._style = style
         self._printed: tuple[Diagnostic, ...] | None = None
@@ -201,7 +198,7 @@ class BackgroundRebuild:
                 course,
                 options,
                 static=True,
-                evidence=self._evidence,
+                addresses=session.runs.addresses,
                 known_runs=known_runs,
                 other_runs=session.runs.other_runs(),
             )

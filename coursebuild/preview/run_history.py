@@ -22,6 +22,7 @@ from coursebuild.core.model.results import (
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import extract, jobs
+from coursebuild.core.scripts.provenance import Addresses
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.verify import Verification
 from coursebuild.report import ScriptLine
@@ -49,7 +50,8 @@ class RunHistory:
         """Of scripts that ran once more, by path: the run before, and the new one."""
         self.noise: tuple[Diagnostic, ...] = ()
         """Recorded digits that do not hold, of scripts whose initial states were moved."""
-
+        self.addresses: Addresses = {}
+        """Where shown values held last, also before an output was accepted."""
         self.running: dict[str, tuple[float, float | None]] = {}
         """The scripts that run now, by path: when each began, in seconds since 1970, and how long
         it took the last time."""
@@ -58,7 +60,7 @@ class RunHistory:
         """What is known of a course's scripts as they are now."""
         keys = script_keys(course)
         runs = tuple(run for path, (key, run) in self._runs.items() if keys.get(path) == key)
-        return replace(self.last_results, runs=runs, verdicts=compare(course, runs))
+        return replace(self.last_results, runs=runs, verdicts=compare(course, runs, self.addresses))
 
     def take(self, course: Course, verification: Verification, trials: PublishedTrials) -> None:
         """Take the results of verifying a course."""

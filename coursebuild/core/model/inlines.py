@@ -70,6 +70,8 @@ class NumberBinding(Located, frozen=True):
     """That of a symbol whose value it is."""
     comma: bool = False
     """Whether a comma may stand before its decimals, as in the language of the text."""
+    words: str = ""
+    """Those of `{out="words"}`, printed right before it; empty where it has only one place."""
 
 
 class SourceMark(Located, frozen=True):

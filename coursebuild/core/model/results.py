@@ -215,6 +215,18 @@ class Change(Struct, frozen=True):
     """Leading significant digits that agree."""
 
 
+class Address(Struct, frozen=True, omit_defaults=True):
+    """Where in an output a value was printed; numbers in words are written `#`."""
+
+    line: str
+    place: int
+    """The index of the first of its numbers in the line."""
+    heading: str = ""
+    name: str = ""
+    names: tuple[str, ...] = ()
+    """The numbers that tell the line from others with its words, and those of all such lines."""
+
+
 class Verdict(Struct, frozen=True):
     """The comparison of one recorded output with a run."""
 
@@ -224,6 +236,12 @@ class Verdict(Struct, frozen=True):
     status: Literal["verified", "drift", "volatile", "unchecked"]
     """`unchecked`: the script did not run to its end."""
     changes: tuple[Change, ...] = ()
+    row_addresses: tuple[tuple[Address, ...], ...] = ()
+    """Of a table: where the numbers of each row were printed."""
+    rivals: tuple[str, ...] = ()
+    """Of a table: printed lines of which its rows may mean any."""
+    rows: tuple[int, int] = (0, 0)
+    """Of a table: how many rows it shows, and of how many that were printed."""
 
 
 class Formula(Struct, frozen=True):

@@ -50,6 +50,8 @@ class ShownVerdict(Struct, frozen=True):
 
     status: Literal["verified", "drift", "volatile", "unchecked"]
     comparison: model.Comparison
+    rows: tuple[int, int] = (0, 0)
+    """Of a table: how many rows it shows, and of how many that were printed."""
 
 
 class CitedEntry(Struct, frozen=True):

@@ -72,7 +72,7 @@ def document_inputs(
         number_prefix=number_prefix,
         callouts={b.kind: library.callout(b.kind) for b in blocks if isinstance(b, model.Callout)},
         runs=runs,
-        verdicts={start: ShownVerdict(v.status, v.comparison) for start, v in verdicts if v},
+        verdicts={at: ShownVerdict(v.status, v.comparison, v.rows) for at, v in verdicts if v},
         trials={start: value for start, value in trials if value is not None},
         blocks={b.span.start: make(library, place, b) for b, make in values if make is not None},
         citations=citations(library, place, document),

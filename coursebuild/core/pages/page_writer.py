@@ -237,7 +237,11 @@ def output_receipt(page: PageContext, block: model.Recording) -> Receipt:
                 text = words("receipt.once", when=run.recorded)
             if run.unrepeated:
                 return Receipt("unverified", words("receipt.unrepeated", versions=versions))
-            return Receipt("verified", f"{text} {_describe_comparison(words, verdict.comparison)}.")
+            text = f"{text} {_describe_comparison(words, verdict.comparison)}."
+            rows, printed_rows = verdict.rows
+            if rows < printed_rows:
+                text += f" {words('receipt.rows', count=rows, printed=printed_rows)}"
+            return Receipt("verified", text)
         case "volatile":
             return Receipt("volatile", words("receipt.volatile", versions=versions))
         case "drift":

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.scripts.lines import MappedText, Side, plain_text, replace_ranges
-from coursebuild.core.scripts.tables import RowCell, table_rows
+from coursebuild.core.scripts.table_cells import RowCell, table_rows
 from coursebuild.core.text.numbers import (
     Number,
     has_groups,
@@ -24,12 +24,13 @@ from coursebuild.core.text.numbers import (
     write_comma,
 )
 from coursebuild.core.text.quantities import (
+    NO_UNIT,
     UnitText,
     are_different,
+    is_same_unit,
     numbers_of_quantities,
-    printed_unit,
     unit_behind,
-    unit_of_column,
+    unit_of_printed,
 )
 from coursebuild.core.text.source import Excerpt, Source, Span
 
@@ -111,16 +112,9 @@ class Window(Struct, frozen=True):
 
     def units(self, lines: Sequence[PrintedLine]) -> list[UnitText]:
         """The units that are printed with them, the lines being all of their output."""
-        text = self.line.text
-        return [
-            printed_unit(text, number.start, number.end)
-            or unit_of_column(text, number.start, self._lines_above(lines))
-            for number in self.numbers
-        ]
-
-    def _lines_above(self, lines: Sequence[PrintedLine]) -> list[str]:
         index = next((i for i, line in enumerate(lines) if line is self.line), 0)
-        return [line.text for line in lines[:index]]
+        above = [line.text for line in lines[:index]]
+        return [unit_of_printed(self.line.text, number, above) for number in self.numbers]
 
     @property
     def text(self) -> str:
@@ -183,24 +177,45 @@ class BoundText(Struct, frozen=True):
 
     def is_in(self, lines: Sequence[PrintedLine]) -> bool:
         """Whether printed numbers that may be meant, rounded, are those of the binding."""
-        digits = self.numbers[0].text.lstrip("+-\u2212")
-        equal_windows = filter(
-            self.shows, self._windows(line for line in lines if digits in line.text)
+        return bool(self.candidates(lines))
+
+    def candidates(self, lines: Sequence[PrintedLine], following: str = "") -> list[Window]:
+        """The printed numbers that it may show, each place once; `following` stands behind it."""
+        windows = self.shown_windows(lines)
+        if self.stray:
+            windows = list(filter(self.has_context, windows))
+        unit = NO_UNIT if self.after else unit_behind(following)
+
+        def has_unit(window: Window) -> bool:
+            return bool(unit) and is_same_unit(unit, window.units(lines)[-1])
+
+        for test in (has_unit, self._is_verbatim):
+            windows = list(filter(test, windows)) or windows
+        unique = {(plain_text(w.line.text), w.numbers[0].start): w for w in reversed(windows)}
+        return list(reversed(unique.values()))
+
+    def _is_verbatim(self, window: Window) -> bool:
+        """Whether the numbers are printed exactly as they are shown."""
+        texts = (
+            [plain_text(n.text) for n in numbers] for numbers in (self.numbers, window.numbers)
         )
-        if any(map(self.has_context, equal_windows)):  # nearly always, so look here first
-            return True
-        return not self.stray and any(map(self.shows, self.windows(lines)))
+        return next(texts) == next(texts)
+
+    def shown_windows(self, lines: Sequence[PrintedLine]) -> list[Window]:
+        """The printed numbers that may be meant, and are those of the binding."""
+        return [window for window in self.windows(lines) if self.shows(window)]
 
     def wrong_unit(
-        self, lines: Sequence[PrintedLine], following: str
+        self, windows: Iterable[Window], lines: Sequence[PrintedLine], following: str
     ) -> tuple[Number, str, str] | None:
         """A printed number with its unit, and the unit that it has here, if that is another.
 
-        `following` is what stands behind the binding.
+        `windows` are printed numbers, and `lines` all of their output; `following` is what stands
+        behind the binding.
         """
         shown_units = self.units(following)
         difference: tuple[Number, str, str] | None = None
-        for window in filter(self.shows, self.windows(lines) if any(shown_units) else ()):
+        for window in windows if any(shown_units) else ():
             pairs = zip(window.numbers, shown_units, window.units(lines), strict=True)
             mismatches = ((n, p.text, s.text) for n, s, p in pairs if are_different(s, p))
             difference = next(mismatches, None)

@@ -31,13 +31,18 @@ from coursebuild.core.scripts.diff import (
 )
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher, Side
-from coursebuild.core.scripts.tables import compare_table
+from coursebuild.core.scripts.provenance import Addresses
+from coursebuild.core.scripts.tables import RowAddresses, compare_table, row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 
-def verify(course: model.Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ...]:
+def verify(
+    course: model.Course, runs: Iterable[ScriptRun], addresses: Addresses | None = None
+) -> tuple[Verdict, ...]:
     """A verdict for every recording of the course that has a script, in order.
+
+    `addresses` holds those where rows of tables held before.
 
     Where two blocks have the same path, only the first is run; what is recorded below the second
     is not compared with its output. Nor is an output whose fence has mistakes in its options.
@@ -57,17 +62,24 @@ def verify(course: model.Course, runs: Iterable[ScriptRun]) -> tuple[Verdict, ..
                 if not printed.strip() or is_repeated or not block.readable:
                     verdicts.append(Verdict(block, comparison, "unchecked"))
                 else:
-                    verdicts.append(compare(block, comparison, printed))
+                    rows = row_values(document, block, comparison.filters)
+                    at = tuple((addresses or {}).get(value, ()) for value in rows)
+                    verdicts.append(compare(block, comparison, printed, at))
     return tuple(verdicts)
 
 
-def compare(recording: model.Recording, comparison: model.Comparison, stdout: str) -> Verdict:
-    """The verdict on one recording, given what its script printed."""
+def compare(
+    recording: model.Recording,
+    comparison: model.Comparison,
+    stdout: str,
+    addresses: RowAddresses = (),
+) -> Verdict:
+    """The verdict on one recording, given what its script printed; see `verify`."""
     body = recording.body
     if comparison.mode is model.Mode.VOLATILE:
         return Verdict(recording, comparison, "volatile")
     if isinstance(body, model.Table):
-        return compare_table(recording, body, comparison, stdout)
+        return compare_table(recording, body, comparison, stdout, addresses)
     if stdout in (body.text, f"{body.text}\n"):  # as it nearly always is
         return Verdict(recording, comparison, "verified")
     recorded, printed = (Side.of(text, comparison.filters) for text in (body.text, stdout))

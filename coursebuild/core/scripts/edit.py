@@ -6,8 +6,7 @@
    a filter, stay as the author wrote them. Line ends and what stands before each line (`> `,
    indentation) are those of the lesson.
 3. A table is brought up to date number by number, in place; under `digits` a number keeps as many
-   decimals as the author showed. A row that fits no line is refused: which line it was meant to
-   show cannot be known.
+   decimals as the author showed. A row that may be no line, or several, is refused.
 4. The new text is compared with the run: an output that the lesson's text cannot hold is refused.
 
 Code that lessons show from the project's files is what these hold, or gets the edit that makes it
@@ -25,11 +24,11 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby, pairwise, zip_longest
 
-from msgspec.structs import replace
-
 from coursebuild.core import model
 from coursebuild.core.scripts.align import StepKind, align, same_lines
+from coursebuild.core.scripts.column_titles import HEADER_HELP
 from coursebuild.core.scripts.failures import without_indentation
+from coursebuild.core.scripts.fill_table import fill_table
 from coursebuild.core.scripts.lines import (
     ELLIPSIS,
     LineMatcher,
@@ -37,16 +36,10 @@ from coursebuild.core.scripts.lines import (
     replace_ranges,
     same_number,
 )
-from coursebuild.core.scripts.tables import (
-    HEADER_HELP,
-    RowCell,
-    TableMatcher,
-    read_cell,
-    table_rows,
-    unit_changes,
-)
+from coursebuild.core.scripts.table_cells import table_rows
+from coursebuild.core.scripts.tables import RowAddresses, TableMatcher, number_text
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
-from coursebuild.core.text.numbers import point_decimals, round_like, write_comma
+from coursebuild.core.text.numbers import point_decimals, write_comma
 from coursebuild.core.text.source import Excerpt, Span
 
 _FENCE = re.compile(r"`{3,}|~{3,}")
@@ -69,13 +62,18 @@ def apply_edits(text: str, edits: Iterable[Edit]) -> str:
 
 
 def update_body(
-    recording: model.Recording, comparison: model.Comparison, stdout: str
+    recording: model.Recording,
+    comparison: model.Comparison,
+    stdout: str,
+    addresses: RowAddresses = (),
 ) -> Edit | Diagnostic | None:
     """What to write into a recording whose script printed this; `None` where it matches already."""
     if not stdout.strip():
         return refusal(recording.caption_span, "the script printed nothing to record", "")
     if isinstance(recording.body, model.Table):
-        return _update_table(recording.body, comparison, stdout)
+        if not table_rows(recording.body):
+            return fill_table(recording.body, stdout)
+        return _update_table(recording.body, comparison, stdout, addresses)
     body, filters = recording.body, comparison.filters
     if comparison.mode is model.Mode.VOLATILE:
         before, now = Side.of(body.text).lines, Side.of(stdout).lines
@@ -264,47 +262,44 @@ MINUS = "\u2212"
 
 
 def _update_table(
-    table: model.Table, comparison: model.Comparison, stdout: str
+    table: model.Table, comparison: model.Comparison, stdout: str, addresses: RowAddresses
 ) -> Edit | Diagnostic | None:
-    filters = comparison.filters
-    printed = Side.of(stdout, filters)
     if comparison.mode is model.Mode.VOLATILE:
         comparison = model.Comparison()
-    matcher = TableMatcher(table_rows(table, filters), printed, comparison)
-    matches = matcher.match()
-    rows: list[tuple[RowCell, ...]] = []
+    matcher = TableMatcher(table, comparison, stdout, addresses)
+    match = matcher.match()
+    if match.rivals and not all(row.certain for row in match.rows):
+        lines = " or ".join(f"`{line}`" for line in match.rivals)
+        message, help = f"its rows may be lines such as {lines}", "show what tells them apart"
+        return refusal(table.span.first_line(), message, f"{help}: words or units in the header")
     edits: list[Edit] = []
-    for match in matches:
-        if match.line < 0:
-            span = match.row[0].cell.span.to(match.row[-1].cell.span)
-            return refusal(span, "no line of this run has the cells of this row in order")
-        places: dict[int, list[tuple[int, int, str]]] = {id(cell): [] for cell in match.row}
-        for cell, old, new in match.pairs:
+    for row in match.rows:
+        if row.line < 0 or not row.certain:
+            span = row.row[0].cell.span.to(row.row[-1].cell.span)
+            reason = (
+                "several lines of this run have" if row.line >= 0 else "no line of this run has"
+            )
+            return refusal(span, f"{reason} the cells of this row in order")
+        for cell, old, new in row.pairs:
             if same_number(old, new, comparison):
                 continue
-            span, text = cell.span(old), new.text
+            span, text = cell.span(old), number_text(old, new, comparison)
             has_comma = table.comma and point_decimals(span.text) != span.text
-            pointed_text = point_decimals(span.text) if has_comma else span.text
-            if pointed_text.replace(MINUS, "-") != old.text:
-                reason = "a number pointed_text with an entity or an escape cannot be replaced"
+            shown = point_decimals(span.text) if has_comma else span.text
+            if shown.replace(MINUS, "-") != old.text:
+                reason = "a number written with an entity or an escape cannot be replaced"
                 return refusal(span, reason)
-            if comparison.mode is model.Mode.DIGITS and old.is_inexact and new.place < old.place:
-                text = round_like(old, new.value) or text
-            text = write_comma(text) if has_comma else text
-            places[id(cell)].append((old.start, old.end, text))
             # The minus signs of the old number stay: before it, and in its exponent.
+            text = write_comma(text) if has_comma else text
             halves = (re.split("(?=[eE])", half) for half in (span.text, text))
             parts = zip_longest(*halves, fillvalue="")
             signed = (part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
             edits.append(Edit(span, "".join(signed)))
-        texts = ((cell, replace_ranges(cell.mapped.text, places[id(cell)])) for cell in match.row)
-        rows.append(tuple(replace(cell, canonical=read_cell(table, text)) for cell, text in texts))
-    if TableMatcher(rows, printed, comparison).find_matching_lines() is None:
-        span = table.span if not edits else edits[0].span
-        return refusal(span, "the table cannot be made to match what the script prints")
+    change = next(matcher.header_changes(match), None)
+    if change is not None:
+        return refusal(change.span, "the header is not what is printed", HEADER_HELP)
     if not edits:
-        change = next(unit_changes(table, matches, matcher), None)
-        return refusal(change.span, "units are not replaced", HEADER_HELP) if change else None
+        return None
     whole = edits[0].span.to(edits[-1].span)
     at = whole.start
     ranges = ((edit.span.start - at, edit.span.end - at, edit.text) for edit in edits)

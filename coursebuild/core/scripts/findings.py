@@ -22,11 +22,16 @@ from coursebuild.core.model.lesson_record import LessonRecord, describe_comparis
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts import bindings, failures
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
+from coursebuild.core.scripts.bound_places import document_bindings
+from coursebuild.core.scripts.column_titles import HEADER_HELP
 from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.lines import ELLIPSIS, Side
-from coursebuild.core.scripts.tables import HEADER_HELP, table_rows, unprinted_units
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
+from coursebuild.core.scripts.provenance import Addresses
+from coursebuild.core.scripts.table_cells import cell_text, table_rows
+from coursebuild.core.scripts.tables import TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.numbers import Number, only_number, scan, within_tolerance
 from coursebuild.core.text.source import Excerpt, Span
@@ -41,7 +46,7 @@ def script_findings(
     extractions: Sequence[Extraction],
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
-    evidence: bindings.BindingEvidence | None = None,
+    addresses: Addresses | None = None,
     all_extractions: Sequence[Extraction] | None = None,
     other_runs: Mapping[str, ScriptRun] | None = None,
     broken: Collection[str] = (),
@@ -55,7 +60,7 @@ def script_findings(
         extractions: the scripts that were run, perhaps not all of the course.
         runs: what they did.
         verdicts: their output compared with the recorded one.
-        evidence: see `check_bindings`.
+        addresses: see `check_bindings`.
         all_extractions: all scripts of the course, if known.
         other_runs: earlier runs of the same scripts, by path, where there are any.
         broken: files of models that do not compile; no script that reads one is reported.
@@ -71,18 +76,18 @@ def script_findings(
             diagnostics += [] if diagnostic is None else [diagnostic]
             diagnostics += failures.divergence_diagnostics(extraction, run, scripts)
             diagnostics += failures.effect_diagnostics(extraction, run, scripts)
-    outputs = bindings.PrintedOutputs(verdicts, runs, scripts)
+    outputs = PrintedOutputs(verdicts, runs, scripts)
     return (
         *diagnostics,
-        *output_findings(course, documents, outputs, evidence, other_runs),
+        *output_findings(course, documents, outputs, addresses, other_runs),
     )
 
 
 def output_findings(
     course: Course,
     documents: Iterable[tuple[Owner, Document]],
-    outputs: bindings.PrintedOutputs,
-    evidence: bindings.BindingEvidence | None = None,
+    outputs: PrintedOutputs,
+    addresses: Addresses | None = None,
     other_runs: Mapping[str, ScriptRun] | None = None,
 ) -> Iterator[Diagnostic]:
     """What is wrong with the recorded outputs and bound numbers of some documents."""
@@ -91,6 +96,7 @@ def output_findings(
         for verdict in outputs.of_document(document):
             recording = verdict.recording
             yield from _find_loose(verdict)
+            yield from _judge_table(verdict)
             run = outputs.runs.get(recording.script or "")
             ran_well = run is not None and run.outcome is Outcome.OK
             if run is not None and ran_well and not run.output_of(recording.part).strip():
@@ -103,7 +109,7 @@ def output_findings(
                 dependents = bindings.dependent_bindings(verdict, course.documents, outputs)
                 change = _environment_change(verdict, run, record)
                 yield drift_diagnostic(verdict, owner.id, dependents, change)
-        yield from bindings.check_bindings(document, outputs, evidence)
+        yield from bindings.check_bindings(document, outputs, addresses)
         yield from _find_unmarked(course, document, outputs.runs)
 
 
@@ -146,6 +152,24 @@ def _find_loose(verdict: Verdict) -> Iterator[Diagnostic]:
             yield diagnose("recording-loose", place, message, help=help)
 
 
+def _judge_table(verdict: Verdict) -> Iterator[Diagnostic]:
+    """Report empty cells of a recorded table, and rows that may be any of several lines."""
+    table = verdict.recording.body
+    if not isinstance(table, Table):
+        return
+    empty_cells = (cell for row in table.rows for cell in row if not cell_text(cell, ()).text)
+    if table_rows(table) and (cell := next(empty_cells, None)) is not None:
+        message = "an empty cell of a recorded table shows nothing that was printed"
+        help = "write what is printed, or `\u2026` for what is left out"
+        yield diagnose("recording-body", cell.span, message, help=help)
+    if verdict.rivals:
+        message = f"`{verdict.recording.script}` printed the rows of this table in several ways"
+        notes = [Note(f"`{line}`") for line in verdict.rivals[:_MAX_NOTES]]
+        help = "write the words and units that are printed with the numbers into the header"
+        place = verdict.recording.caption_span
+        yield diagnose("output-ambiguous", place, message, help=help, notes=notes)
+
+
 def _find_unmarked(
     course: Course, document: Document, runs: Mapping[str, ScriptRun]
 ) -> Iterator[Diagnostic]:
@@ -180,23 +204,13 @@ def find_instability(
     earlier_run = other_runs.get(recording.script or "")
     if run is None or earlier_run is None or {run.outcome, earlier_run.outcome} != {Outcome.OK}:
         return None
-    changes = compare(recording, comparison, earlier_run.output_of(recording.part)).changes
+    at, earlier_output = verdict.row_addresses, earlier_run.output_of(recording.part)
+    changes = compare(recording, comparison, earlier_output, at).changes
     if [(c.span, c.printed) for c in changes] == [(c.span, c.printed) for c in verdict.changes]:
         return None
     outputs = (r.output_of(recording.part) for r in (earlier_run, run))
     before, now = (Side.of(output, comparison.filters) for output in outputs)
     return instability_diagnostic(recording, before, now, comparison)
-
-
-def collect_evidence(
-    course: Course, runs: Sequence[ScriptRun], verdicts: Sequence[Verdict]
-) -> bindings.BindingEvidence:
-    """The lines by which the bindings of a course hold."""
-    evidence: bindings.BindingEvidence = {}
-    outputs = bindings.PrintedOutputs(verdicts, runs)
-    for document in course.documents:
-        bindings.check_bindings(document, outputs, evidence)
-    return evidence
 
 
 def count_unproven(
@@ -206,14 +220,14 @@ def count_unproven(
     unrun = {run.path for run in runs if not run.did_run}
     if not unrun:
         return {}
-    outputs = bindings.PrintedOutputs(verdicts, ())
+    outputs = PrintedOutputs(verdicts, ())
     recorded: list[str | None] = []
     bound: list[str | None] = []
     for document in course.documents:
         recorded += (verdict.recording.script for verdict in outputs.of_document(document))
         figures = recorded_figures(document)
         recorded += (figure.script for figure in figures if not figure.path.endswith(".csv"))
-        for binding in bindings.document_bindings(document):
+        for binding in document_bindings(document):
             of_binding = outputs.of_binding(binding)
             bound.append(binding.script or (of_binding[0].recording.script if of_binding else None))
     return {path: (recorded.count(path), bound.count(path)) for path in unrun}
@@ -223,14 +237,16 @@ def unproven_units(
     course: Course, runs: Iterable[ScriptRun], verdicts: Iterable[Verdict]
 ) -> Iterator[Diagnostic]:
     """List the units of bound numbers and recorded columns that no script printed."""
-    outputs = bindings.PrintedOutputs(verdicts, runs)
+    outputs = PrintedOutputs(verdicts, runs)
     for document in course.documents:
         for verdict in outputs.of_document(document):
             table, run = verdict.recording.body, outputs.runs.get(verdict.recording.script or "")
             if isinstance(table, Table) and run is not None and run.did_run:
-                for span, unit in unprinted_units(table, verdict.comparison, run.stdout):
+                printed = run.output_of(verdict.recording.part)
+                matcher = TableMatcher(table, verdict.comparison, printed, verdict.row_addresses)
+                for span, unit in matcher.unprinted_units():
                     yield _unproven_unit(span, unit)
-        for binding in bindings.document_bindings(document):
+        for binding in document_bindings(document):
             if unit := bindings.unprinted_unit(binding, outputs):
                 yield _unproven_unit(binding.text_span, unit)
 
@@ -264,7 +280,8 @@ def drift_diagnostic(
     `change`: what is another now than when it was recorded.
     """
     recording, update = verdict.recording, f"`coursebuild update {owner}`"
-    if isinstance(recording.body, Excerpt) and not recording.body.text.strip():
+    is_empty = isinstance(recording.body, Excerpt) and not recording.body.text.strip()
+    if is_empty or not verdict.changes:
         message = f"no output of `{recording.script}` is recorded yet"
         return diagnose("output-drift", recording.caption_span, message, help=f"run {update}")
     changes = verdict.changes

@@ -1,12 +1,15 @@
-"""Recorded tables: does each row stand in a line of the output?
+"""Recorded tables: which printed line each row is, and whether its cells are printed there.
 
-1. A body row's cells, as plain text, must stand in order in one printed line, white space folded;
-   each row in a line further down than the row before. All other lines are free. A header is, too,
-   but for its unit, which is not another one than is printed with the numbers.
-2. Cells match whole words and whole numbers only: `4` not in `14`. Numbers match by the
-   comparison's mode.
-3. Where a row has no such line, rows and lines are aligned; a row that fits a line except for its
-   numbers has drifted, and each of its numbers is compared with the nearest printed one.
+1. A row may be any line that has its cells in order: whole words and whole numbers, whatever the
+   numbers are. What is left of the line is its layout. The rows of a table have one layout, under
+   one heading, in the order of the lines; where there is none, each row is taken by itself.
+2. If all numbers are right in one layout, it is that. Among several the table means the one that is
+   better in something and worse in nothing: rows that are right, words and units of the header that
+   are printed with the numbers; if these are alike, the share of the line's numbers that the row
+   shows. Where there is no such layout, the table is ambiguous.
+3. Addresses that are remembered decide before all of this.
+4. Numbers match by the comparison's mode. In the header a unit, or a word that names a printed
+   number, must not be that of another one.
 """
 
 from __future__ import annotations
@@ -15,229 +18,408 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache, partial
 from itertools import islice
+from typing import NamedTuple
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.results import Change, DriftKind, Verdict
+from coursebuild.core.model.results import Address, Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
+from coursebuild.core.scripts.bound_numbers import PrintedLine, Window
+from coursebuild.core.scripts.column_titles import ColumnTitle, PrintedRow, swapped_columns
 from coursebuild.core.scripts.diff import number_change
 from coursebuild.core.scripts.lines import (
+    MARK,
     CanonicalText,
-    MappedText,
     SameNumber,
     Side,
     always_match,
-    apply_filters,
     canonicalize,
     numbers_fit,
     plain_text,
     same_number,
 )
-from coursebuild.core.text.numbers import Number, point_decimals, relative_error
-from coursebuild.core.text.quantities import (
-    NO_UNIT,
-    UnitText,
-    are_different,
-    printed_unit,
-    unit_of_column,
-    unit_of_header,
-)
+from coursebuild.core.scripts.provenance import PrintedText, ShownValue, shown_values
+from coursebuild.core.scripts.table_cells import RowCell, elides_rows, row_text, table_rows
+from coursebuild.core.text.numbers import Number, relative_error, round_like
+from coursebuild.core.text.quantities import UnitText, are_different, unit_of_printed
 from coursebuild.core.text.source import Span
 
-HEADER_HELP = (
-    "write the unit that is printed, or put the columns in order; where it is not meant, mark it:"
-    ' `` `s`{given="…"} ``'
-)
 _ALIKE_WEIGHT = 6
-_PLACES = 64
+_PLACES = 200
+"""The most ways to find a row in a line that are looked at."""
+RowAddresses = tuple[tuple[Address, ...], ...]
+"""For each row of a table the addresses of its numbers; none where they are not known."""
 
 
-class RowCell(Struct, frozen=True):
-    """A cell of a recorded table."""
+class Layout(NamedTuple):
+    """What is left of a line without the cells of a row."""
 
-    cell: model.Cell
-    mapped: MappedText
-    canonical: CanonicalText
+    heading: str
+    parts: tuple[str, ...]
+    """Before, between and after the cells."""
+    columns: tuple[int, ...]
 
-    def span(self, number: Number) -> Span:
-        """Where a number of the cell stands in the lesson."""
-        return Span(self.cell.span.source, *self.mapped.origin(number.start, number.end))
+
+class Fit(NamedTuple):
+    """A way to find a row in a line: where its cells begin there."""
+
+    line: int
+    places: tuple[int, ...]
+    layout: Layout
+    is_right: bool
+    """Whether its numbers match, too."""
 
 
 class RowMatch(Struct, frozen=True):
     """A row of a table and the line that it stands in; `line` is -1 where there is none.
 
-    Where some of its numbers differ from the line's, `pairs` holds each cell, its recorded number
-    and the printed one.
+    `pairs` holds each of its numbers with its cell and the printed one.
     """
 
     row: tuple[RowCell, ...]
-    line: int
-    pairs: tuple[tuple[RowCell, Number, Number], ...]
+    line: int = -1
+    pairs: tuple[tuple[RowCell, Number, Number], ...] = ()
+    certain: bool = True
+    """Whether no other line can be meant."""
 
 
-def table_rows(
-    table: model.Table, filters: Iterable[model.Filter] = ()
-) -> tuple[tuple[RowCell, ...], ...]:
-    """The body rows of a table; cells and rows without text are left out."""
-    rules = tuple(filters)
-    texts = ([(cell, _cell_text(cell, rules)) for cell in row] for row in table.rows)
-    rows = (
-        tuple(
-            RowCell(cell, mapped, read_cell(table, mapped.text))
-            for cell, mapped in row
-            if mapped.text
-        )
-        for row in texts
-    )
-    return tuple(row for row in rows if row)
+class TableMatch(Struct, frozen=True):
+    """The rows of a table with their lines."""
 
-
-def read_cell(table: model.Table, text: str) -> CanonicalText:
-    """What the text of a cell says, its decimals behind a point."""
-    return canonicalize(point_decimals(text) if table.comma else text)
+    rows: tuple[RowMatch, ...]
+    rivals: tuple[str, ...] = ()
+    """Lines, each of another layout, of which the table may mean any."""
+    printed: int = 0
+    """How many lines have the layout of the table."""
 
 
 def compare_table(
-    recording: model.Recording, table: model.Table, comparison: model.Comparison, stdout: str
+    recording: model.Recording,
+    table: model.Table,
+    comparison: model.Comparison,
+    stdout: str,
+    addresses: RowAddresses = (),
 ) -> Verdict:
     """The verdict on a recorded table."""
-    rows, printed = table_rows(table, comparison.filters), Side.of(stdout, comparison.filters)
+    matcher = TableMatcher(table, comparison, stdout, addresses)
+    if not matcher.rows:
+        return Verdict(recording, comparison, "drift")
+    match = matcher.match()
     changes: list[Change] = []
-    matcher = TableMatcher(rows, printed, comparison)
-    matches = matcher.match()
-    for match in matches:
-        if match.line < 0:
-            first, last = match.row[0].cell.span, match.row[-1].cell.span
-            changes.append(Change(DriftKind.MISSING, first.to(last), _row_text(match.row), ""))
-        for cell, old, new in match.pairs:
+    for row in match.rows:
+        if row.line < 0:
+            first, last = row.row[0].cell.span, row.row[-1].cell.span
+            changes.append(Change(DriftKind.MISSING, first.to(last), row_text(row.row), ""))
+        for cell, old, new in row.pairs:
             if not same_number(old, new, comparison):
                 span = cell.span(old)
                 changes.append(number_change(span, span.text, new.text, (old, new)))
-    if not changes:
-        changes += unit_changes(table, matches, matcher)
-    return Verdict(recording, comparison, "drift" if changes else "verified", tuple(changes))
+    changes += [] if changes else matcher.header_changes(match)
+    shown = (len(match.rows), 0 if elides_rows(table) else match.printed)
+    return Verdict(
+        recording,
+        comparison,
+        "drift" if changes else "verified",
+        tuple(changes),
+        addresses if changes else matcher.addresses(match),
+        match.rivals,
+        shown,
+    )
 
 
-def unit_changes(
-    table: model.Table, matches: Iterable[RowMatch], matcher: TableMatcher
-) -> Iterator[Change]:
-    """Units in a header that are not those printed with the column's numbers."""
-    headers = [_cell_text(cell, ()) for cell in table.header]
-    shown_units = list(map(header_unit, table.header))
-    mismatches: dict[int, UnitText] = {}
-    for column, printed in _column_units(table, matches, matcher):
-        if are_different(shown_units[column], printed):
-            mismatches.setdefault(column, printed)
-    for column, printed in sorted(mismatches.items()):
-        header, unit = headers[column], shown_units[column]
-        at = header.text.rfind(unit.text)
-        place = (at, at + len(unit.text)) if at >= 0 else (0, len(header.text))
-        span = Span(table.span.source, *header.origin(*place))
-        yield Change(DriftKind.TEXT, span, unit.text, printed.text)
-
-
-def header_unit(header: model.Cell) -> UnitText:
-    """The unit of a column, unless its source is said, as in `` τ (`s`{given="a guess"}) ``."""
-    inlines = model.walk_inlines(header.children)
-    is_given = any(isinstance(i, model.NumberBinding) and i.source is not None for i in inlines)
-    return NO_UNIT if is_given else unit_of_header(_cell_text(header, ()).text)
-
-
-def unprinted_units(
-    table: model.Table, comparison: model.Comparison, stdout: str
-) -> Iterator[tuple[Span, str]]:
-    """The headers whose units nothing prints, and these."""
-    rows, printed = table_rows(table, comparison.filters), Side.of(stdout, comparison.filters)
-    matcher = TableMatcher(rows, printed, comparison)
-    columns: dict[int, list[UnitText]] = {}
-    for column, unit in _column_units(table, matcher.match(), matcher):
-        columns.setdefault(column, []).append(unit)
-    for column, units in columns.items():
-        unit = header_unit(table.header[column])
-        if unit and not any(units):
-            yield table.header[column].span, unit.text
-
-
-def _column_units(
-    table: model.Table, matches: Iterable[RowMatch], matcher: TableMatcher
-) -> Iterator[tuple[int, UnitText]]:
-    """The column of each number of a table, and the unit that is printed with it."""
-    columns = {id(cell): at for row in table.rows for at, cell in enumerate(row)}
-    for match in matches:
-        line = matcher.lines[match.line]
-        for cell, _, number in matcher.pairs(match.row, match.line) if match.line >= 0 else ():
-            unit = printed_unit(line, number.start, number.end)
-            unit = unit or unit_of_column(line, number.start, matcher.lines[: match.line])
-            yield columns[id(cell.cell)], unit
-
-
-def _row_text(row: Sequence[RowCell]) -> str:
-    return "  ".join(cell.mapped.text for cell in row)
+def row_values(
+    document: model.Document, recording: model.Recording, filters: Iterable[model.Filter] = ()
+) -> tuple[ShownValue, ...]:
+    """The rows of a recorded table as values that a lesson shows."""
+    if not isinstance(recording.body, model.Table) or recording.script is None:
+        return ()
+    number = model.output_numbers(document)[recording.span.start]
+    path, before = document.source.path, f"row of output {number}"
+    rows = table_rows(recording.body, filters)
+    return tuple(shown_values((path, recording.script, before, row_text(row)) for row in rows))
 
 
 class TableMatcher:
     """Matches the rows of one table with the lines of one output."""
 
     def __init__(
-        self, rows: Sequence[tuple[RowCell, ...]], printed: Side, comparison: model.Comparison
+        self,
+        table: model.Table,
+        comparison: model.Comparison,
+        stdout: str,
+        addresses: RowAddresses = (),
     ) -> None:
-        self.rows = rows
+        self.rows = table_rows(table, comparison.filters)
+        self.titles = [ColumnTitle.of(cell) for cell in table.header]
+        self._addresses = addresses if len(addresses) == len(self.rows) else [()] * len(self.rows)
         self._numbers_match = partial(same_number, comparison=comparison)
-        self.lines = [plain_text(text) for text in printed.lines]
+        self.lines = list(map(plain_text, Side.of(stdout, comparison.filters).lines))
+        self.text = PrintedText([PrintedLine(line) for line in self.lines])
         self._canonical_line = cache(lambda line: canonicalize(self.lines[line]))
+        self._fits_of_row = cache(self._fits_at_address)
 
-    def match(self) -> tuple[RowMatch, ...]:
-        """The line of each row: with its numbers if possible, else with the rest of it."""
-        lines = self.find_matching_lines()
-        if lines is None:
-            lines = [-1] * len(self.rows)
-            for number, line in pair([_row_text(r) for r in self.rows], self.lines, self._weight):
-                lines[number] = line
-        matches: list[RowMatch] = []
-        for row, line in zip(self.rows, lines, strict=True):
-            if line < 0 or self._matches(row, line):
-                matches.append(RowMatch(row, line, ()))
-            else:
-                matches.append(RowMatch(row, line, self.pairs(row, line)))
-        return tuple(matches)
+    def match(self) -> TableMatch:
+        """The line of each row."""
+        layouts = self._common_layouts()
+        if not layouts:
+            return TableMatch(tuple(self._match_rows(None)))
+        is_right = any(self._right_rows(layout) == len(self.rows) for layout in layouts)
+        rivals: tuple[str, ...] = ()
+        if len(layouts) > 1:
+            rivals = tuple(dict.fromkeys(map(self._describe, layouts)))
+        if rivals and not is_right:
+            nearest = (self._nearest_fit(row, layouts) for row in range(len(self.rows)))
+            rows = (self._row_match(row, fit, is_certain=False) for row, fit in enumerate(nearest))
+            return TableMatch(tuple(rows), rivals)
+        matches = tuple(self._match_rows(layouts[0]))
+        return TableMatch(matches, rivals, self._count_lines(layouts[0]))
 
-    def pairs(
-        self, row: tuple[RowCell, ...], line: int
-    ) -> tuple[tuple[RowCell, Number, Number], ...]:
-        """Each number of a row that fits a line, with its cell and the printed one."""
-        canonical = self._canonical_line(line)
-        places = _nearest_places(row, canonical, self._numbers_match)
+    def addresses(self, match: TableMatch) -> RowAddresses:
+        """The addresses of the numbers of each row; none of a row that has not all."""
+        rows = []
+        for row in match.rows:
+            line = self.text.lines[row.line]
+            at = [
+                self.text.address(Window(line, (number,)))
+                for _, _, number in row.pairs
+                if number in line.numbers  # the 1 of a unit such as `1/min` is none
+            ]
+            rows.append(tuple(a for a in at if a is not None) if None not in at else ())
+        return tuple(rows)
+
+    # --- layouts
+
+    def _common_layouts(self) -> list[Layout]:
+        """The layouts that all rows have, of which none is better in all than another."""
+        layouts = (
+            [
+                layout
+                for layout in dict.fromkeys(fit.layout for fit in self._fits_of_row(0))
+                if all(self._fits_in(row, layout) for row in range(len(self.rows)))
+            ]
+            if self.rows
+            else []
+        )
+        right = [layout for layout in layouts if self._right_rows(layout) == len(self.rows)]
+        scores = {layout: self._score(layout) for layout in right or layouts}
+        return [
+            layout
+            for layout, score in scores.items()
+            if not any(_dominates(rival, score) for rival in scores.values())
+        ]
+
+    def _describe(self, layout: Layout) -> str:
+        line = self.lines[self._fits_in(0, layout)[0].line]
+        return f"{layout.heading} / {line}" if layout.heading else line
+
+    def _fits_in(self, row: int, layout: Layout) -> list[Fit]:
+        return [fit for fit in self._fits_of_row(row) if fit.layout == layout]
+
+    def _right_rows(self, layout: Layout) -> int:
+        rows = range(len(self.rows))
+        return sum(any(fit.is_right for fit in self._fits_in(row, layout)) for row in rows)
+
+    def _score(self, layout: Layout) -> tuple[float, ...]:
+        """How well a layout suits the table, in several respects."""
+        fit = self._fits_in(0, layout)[0]
+        numbers = [(cell.column, number) for cell, _, number in self._pairs(0, fit)]
+        printed_row = PrintedRow.of(self.lines[fit.line], layout.heading)
+        verdicts = [
+            self.titles[column].names(printed_row, number, self._unit(fit.line, number))
+            for column, number in numbers
+        ]
+        share = len(numbers) / max(1, printed_row.count)
+        return self._right_rows(layout), verdicts.count(True), -verdicts.count(False), share
+
+    def _count_lines(self, layout: Layout | None) -> int:
+        """How many printed lines have a layout, whatever text their cells hold."""
+        if layout is None:
+            return 0
+        cells = [cell.canonical.skeleton for cell in self.rows[0]]
+        patterns = [re.escape(cell) if MARK in cell else r"\S.*?" for cell in cells]
+        parts = [re.escape(part) for part in layout.parts]
+        pattern = re.compile("".join(a + b for a, b in zip(parts, [*patterns, ""], strict=True)))
+        return sum(
+            self.text.heading(line) == layout.heading
+            and pattern.fullmatch(self._canonical_line(line).skeleton) is not None
+            for line in range(len(self.lines))
+        )
+
+    # --- rows
+
+    def _fits_at_address(self, row: int) -> tuple[Fit, ...]:
+        """The way to find a row at its addresses; where they are gone, those that are right."""
+        fits, addresses = tuple(self._find_fits(row)), self._addresses[row]
+        if not addresses:
+            return fits
+        windows = [self.text.find(address, 1) for address in addresses]
+        numbers = [window.numbers[0] for window in windows if window is not None]
+        line = windows[0].line if windows[0] is not None else None
+        for fit in fits:
+            at_line = self.text.lines[fit.line]
+            printed = [n for _, _, n in self._pairs(row, fit) if n in at_line.numbers]
+            if at_line is line and printed == numbers:
+                return (fit,)
+        return tuple(fit for fit in fits if fit.is_right)
+
+    def _match_rows(self, layout: Layout | None) -> Iterator[RowMatch]:
+        """Each row with its line, in order; only lines of this layout where one is given."""
+        fits = [
+            self._fits_of_row(row) if layout is None else self._fits_in(row, layout)
+            for row in range(len(self.rows))
+        ]
+        lines = sorted({fit.line for fits_of_row in fits for fit in fits_of_row})
+
+        def weight(row: int, at: int) -> int:
+            fits_there = [fit for fit in fits[row] if fit.line == lines[at]]
+            if any(fit.is_right for fit in fits_there):
+                return MATCH
+            return max((self._weight(row, fit) for fit in fits_there), default=0)
+
+        texts = list(map(row_text, self.rows))
+        line_of_row = dict(pair(texts, [self.lines[line] for line in lines], weight))
+        matches: list[Fit | None] = []
+        for row in range(len(self.rows)):
+            at = line_of_row.get(row)
+            there = [fit for fit in fits[row] if at is not None and fit.line == lines[at]]
+            best = max(there, key=lambda fit: (fit.is_right, self._weight(row, fit)), default=None)
+            matches.append(best)
+        are_all = layout is not None and len(lines) == len(self.rows)
+        are_named = all(
+            fit is not None and self._is_named(row, fit, fits[row])
+            for row, fit in enumerate(matches)
+        )
+        for row, fit in enumerate(matches):
+            is_only = len({fit.line for fit in fits[row]}) == 1
+            is_certain = fit is None or fit.is_right or is_only or are_all or are_named
+            yield self._row_match(row, fit, is_certain=is_certain)
+
+    def _is_named(self, row: int, fit: Fit, fits: Iterable[Fit]) -> bool:
+        """Whether the first number of a row is that of this line and of no other."""
+        lines = {
+            other.line
+            for other in fits
+            for _, old, new in self._pairs(row, other)[:1]
+            if self._numbers_match(old, new)
+        }
+        return lines == {fit.line}
+
+    def _nearest_fit(self, row: int, layouts: Sequence[Layout]) -> Fit:
+        """The way in which the numbers of a row are nearest to the printed ones."""
+
+        def distance(fit: Fit) -> float:
+            errors = [relative_error(a.value, b.value) for _, a, b in self._pairs(row, fit)]
+            return sum(1.0 if error is None else min(1.0, float(error)) for error in errors)
+
+        return min((fit for layout in layouts for fit in self._fits_in(row, layout)), key=distance)
+
+    def _weight(self, row: int, fit: Fit) -> int:
+        """Less for a row more of whose numbers differ."""
+        pairs = self._pairs(row, fit)
+        count = sum(self._numbers_match(old, new) for _, old, new in pairs)
+        return 2 + (_ALIKE_WEIGHT - 2) * count // max(1, len(pairs))
+
+    def _row_match(self, row: int, fit: Fit | None, *, is_certain: bool = True) -> RowMatch:
+        if fit is None:
+            return RowMatch(self.rows[row])
+        return RowMatch(self.rows[row], fit.line, self._pairs(row, fit), is_certain)
+
+    def _pairs(self, row: int, fit: Fit) -> tuple[tuple[RowCell, Number, Number], ...]:
+        canonical = self._canonical_line(fit.line)
         return tuple(
-            (cell, recorded, printed)
-            for cell, place in zip(row, places, strict=True)
-            for recorded, printed in zip(
+            (cell, old, new)
+            for cell, place in zip(self.rows[row], fit.places, strict=True)
+            for old, new in zip(
                 cell.canonical.numbers, canonical.numbers_at(cell.canonical, place), strict=True
             )
         )
 
-    def find_matching_lines(self) -> list[int] | None:
-        """A line for each row, in order, if all of them match."""
-        line_numbers: list[int] = []
-        first_line = 0
-        for row in self.rows:
-            lines = range(first_line, len(self.lines))
-            line = next((n for n in lines if self._matches(row, n)), None)
-            if line is None:
-                return None
-            line_numbers.append(line)
-            first_line = line + 1
-        return line_numbers
+    def _find_fits(self, row: int) -> Iterator[Fit]:
+        """The ways to find a row, those first in which its numbers match."""
+        cells = self.rows[row]
+        for line in range(len(self.lines)):
+            canonical = self._canonical_line(line)
+            places = dict.fromkeys(_find_rows(cells, canonical, 0, self._numbers_match), True)
+            for way in islice(_find_rows(cells, canonical, 0, always_match), _PLACES):
+                places.setdefault(way, False)
+            for way, is_right in places.items():
+                parts, at = [], 0
+                for cell, place in zip(cells, way, strict=True):
+                    parts.append(canonical.skeleton[at:place])
+                    at = place + len(cell.canonical.skeleton)
+                parts.append(canonical.skeleton[at:])
+                columns = tuple(cell.column for cell in cells)
+                layout = Layout(self.text.heading(line), tuple(parts), columns)
+                yield Fit(line, way, layout, is_right)
 
-    def _matches(self, row: Sequence[RowCell], line: int) -> bool:
-        return _stands_in(row, self._canonical_line(line), self._numbers_match)
+    # --- the header
 
-    def _weight(self, row: int, line: int) -> int:
-        if self._matches(self.rows[row], line):
-            return MATCH
-        is_alike = _stands_in(self.rows[row], self._canonical_line(line), always_match)
-        return _ALIKE_WEIGHT if is_alike else 0
+    def header_changes(self, match: TableMatch) -> Iterator[Change]:
+        """Units of the header that are not those of its numbers, and titles that are swapped."""
+        for column, units in sorted(self._column_units(match).items()):
+            title = self.titles[column]
+            other = next((unit for unit in units if are_different(title.unit, unit)), None)
+            if other is not None:
+                yield Change(DriftKind.TEXT, title.unit_span, title.unit.text, other.text)
+        for row in match.rows[:1]:
+            numbers = {cell.column: number for cell, _, number in reversed(row.pairs)}
+            line = PrintedRow.of(self.lines[row.line], self.text.heading(row.line))
+            columns = swapped_columns(dict(enumerate(self.titles)), line, numbers)
+            for column, right in columns.items():
+                title = self.titles[column]
+                back = next((a for a, b in columns.items() if b == column), right)
+                yield Change(DriftKind.TEXT, title.span, title.text, self.titles[back].text)
+
+    def unprinted_units(self) -> Iterator[tuple[Span, str]]:
+        """The titles whose units nothing prints, and these."""
+        for column, units in self._column_units(self.match()).items():
+            title = self.titles[column]
+            if title.unit and not any(units):
+                yield title.span, title.unit.text
+
+    def _column_units(self, match: TableMatch) -> dict[int, list[UnitText]]:
+        """The units that are printed with the numbers of each column."""
+        units: dict[int, list[UnitText]] = {}
+        for row in match.rows:
+            for cell, _, number in row.pairs:
+                units.setdefault(cell.column, []).append(self._unit(row.line, number))
+        return units
+
+    def _unit(self, line: int, number: Number) -> UnitText:
+        """The unit that is printed with a number of a line."""
+        return unit_of_printed(self.lines[line], number, self.lines[:line])
+
+
+def number_text(old: Number, new: Number, comparison: model.Comparison) -> str:
+    """A printed number as it replaces a recorded one."""
+    if comparison.mode is model.Mode.DIGITS and old.is_inexact and new.place < old.place:
+        return round_like(old, new.value) or new.text
+    return new.text
+
+
+def updated_row(match: RowMatch, comparison: model.Comparison) -> tuple[RowCell, ...]:
+    """A row with the numbers that are printed now."""
+    places: dict[int, list[tuple[int, int, str]]] = {cell.column: [] for cell in match.row}
+    for cell, old, new in match.pairs:
+        if not same_number(old, new, comparison):
+            text = number_text(old, new, comparison)
+            places[cell.column].append((old.start, old.end, text))
+    return tuple(
+        replace(cell, mapped=cell.mapped.replace_ranges({(a, b): t for a, b, t in at}))
+        for cell in match.row
+        for at in (places[cell.column],)
+    )
+
+
+def _dominates(rival: Sequence[float], score: Sequence[float]) -> bool:
+    """Whether a layout is better in something and worse in nothing; its share counts last."""
+    *respects, share = rival
+    *others, other_share = score
+    if respects == others:
+        return share > other_share
+    return all(a >= b for a, b in zip(respects, others, strict=True))
 
 
 def _is_word(character: str) -> bool:
@@ -260,85 +442,14 @@ def _find_places(
         place = text.find(cell_text, place + 1)
 
 
-def _stands_in(row: Sequence[RowCell], line: CanonicalText, numbers_match: SameNumber) -> bool:
-    """Whether the cells stand in a line in order, each after the one before."""
-    at = 0
-    for cell in row:
-        place = next(_find_places(cell.canonical, line, at, numbers_match), None)
-        if place is None:
-            return False
-        at = place + len(cell.canonical.skeleton)
-    return True
-
-
-def _nearest_places(
-    row: Sequence[RowCell], line: CanonicalText, numbers_match: SameNumber
-) -> list[int]:
-    """Places in order for cells that fit the line, such that their numbers are nearest to its."""
-    # For each place of the last cell: the cost so far, the places, the offset where it ends.
-    best: list[tuple[float, list[int], int]] = [(0.0, [], 0)]
-    for cell in row:
-        extended: list[tuple[float, list[int], int]] = []
-        start = min(end for _, _, end in best)
-        for place in islice(_find_places(cell.canonical, line, start, always_match), _PLACES):
-            before = [way for way in best if way[2] <= place]
-            if before:
-                cost, places, _ = min(before, key=lambda way: way[0])
-                # The numbers' relative errors, each at most 1
-                for recorded, printed in zip(
-                    cell.canonical.numbers, line.numbers_at(cell.canonical, place), strict=True
-                ):
-                    if not numbers_match(recorded, printed):
-                        error = relative_error(recorded.value, printed.value)
-                        cost += 0.01 + (1.0 if error is None else min(1.0, float(error)))
-                end = place + len(cell.canonical.skeleton)
-                extended.append((cost, [*places, place], end))
-        best = extended
-    return min(best, key=lambda way: way[0])[1]
-
-
-# --- cells
-
-_RUN = re.compile(r"\s{2,}|[^\S ]")
-_ENDS = re.compile(r"\A\s+|\s+\Z")
-
-
-def _cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
-    """The plain text of a cell, filtered; origins are offsets in the lesson's source.
-
-    Marks of Markdown are gone, minus signs are hyphens, runs of white space are one space. A
-    stretch that Markdown changed (entities, escapes) stands for all of itself.
-    """
-    stretches: list[MappedText] = []
-    for inline in model.walk_inlines(cell.children):
-        span = inline.span
-        match inline:
-            case model.Text():
-                text = inline.text
-            case model.CodeSpan():
-                # Between the backticks, without padding
-                markdown, text = span.text, inline.text
-                edge = len(markdown) - len(markdown.lstrip("`"))
-                if len(markdown) - 2 * edge == len(text) + 2:
-                    edge += 1
-                span = Span(span.source, span.start + edge, span.end - edge)
-            case model.NumberBinding():
-                text, span = inline.text, inline.text_span
-            case model.Math():
-                text, span = inline.tex.text, inline.tex.span()
-            case model.Image():
-                text = inline.alt
-            case model.SoftBreak() | model.HardBreak():
-                text = " "
-            case model.RawInline():
-                text = " " if inline.html.startswith("<br") else ""
-            case _:
-                continue
-        stretches.append(
-            MappedText.copy(text, span.start)
-            if span.text == text
-            else MappedText.substitute_for(span.start, span.end, text)
-        )
-    mapped = apply_filters(MappedText.join(stretches), filters)
-    folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
-    return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)
+def _find_rows(
+    row: Sequence[RowCell], line: CanonicalText, start: int, numbers_match: SameNumber
+) -> Iterator[tuple[int, ...]]:
+    """The ways in which the cells stand in a line in order, each after the one before."""
+    if not row:
+        yield ()
+        return
+    cell = row[0].canonical
+    for place in _find_places(cell, line, start, numbers_match):
+        for rest in _find_rows(row[1:], line, place + len(cell.skeleton), numbers_match):
+            yield (place, *rest)

@@ -127,10 +127,15 @@ def read_meaning(
     value, number = values.get("value"), None
     is_number = value is not None and _NUMBER.fullmatch(value.text) is not None
     if value is not None and is_number and not {"out", "given"} <= {*values}:
-        script = value_text(values.get("out")) or None
+        printed = values.get("out")
+        origin_text = value_text(printed)
+        is_quoted = printed is not None and origin_text and _is_quoted(printed)
+        script, words = (None, origin_text) if is_quoted else (origin_text or None, "")
         origin = None if "out" in values else source or ""
         unit = value_text(values.get("unit"))
-        number = NumberBinding(braces.span(), value.text, value.span(), script, origin, unit)
+        number = NumberBinding(
+            braces.span(), value.text, value.span(), script, origin, unit, words=words
+        )
     elif "value" in values or "out" in values:
         text = "" if value is None else value.text
         reason = f"`{text}` is no value of a symbol"
@@ -153,6 +158,11 @@ def read_meaning(
     return Meaning(braces.span(), meaning, unit), source, number
 
 
+def _is_quoted(value: Excerpt) -> bool:
+    start = value.span().start
+    return value.span().source.text[start - 1] == '"'
+
+
 def value_text(value: Excerpt | None) -> str:
     """The text of a value on one line; empty for none."""
     return "" if value is None else collapse_spaces(value.text)
@@ -167,8 +177,8 @@ _UNREAD = re.compile(
 """Braces that begin as an attribute does: after code, a formula, a bracket, or for a source
 anywhere."""
 _BINDING_HELP = (
-    "write `{out}`, `{out=examples/x.py}` or `{code}`; write `\\{` for a brace that readers should "
-    "see"
+    'write `{out}`, `{out="words before it"}`, `{out=examples/x.py}` or `{code}`; write `\\{` for '
+    "a brace that readers should see"
 )
 _GIVEN_HELP = (
     'write `{given="its source"}` behind a number in backticks, a formula or a paragraph, or alone '

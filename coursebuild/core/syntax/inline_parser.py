@@ -49,15 +49,17 @@ def _emphasis(state: rules_inline.StateInline, silent: bool) -> bool:
 
 
 _BINDING = re.compile(
-    r"""\{out(?:=(?:"([^\s{}"']+)"|([^\s{}"']+)))?\}|\{(given)="([^{}"]+)"\}|\{code\}"""
+    r"""\{out(?:=(?P<script>[^\s{}"']+)(?:\ "(?P<line>[^{}"]+)")?|="(?P<words>[^{}"]+)")?\}
+    |\{(?P<given>given)="(?P<source>[^{}"]+)"\}|\{code\}""",
+    re.VERBOSE,
 )
 
 
 def _code_span(state: rules_inline.StateInline, silent: bool) -> bool:
     """A code span; with `{out}` after it a `number_binding`, the script's path in its `info`.
 
-    With `{given="…"}` it is a `number_given`, and its `info` the source; that of code is `code`, if
-    `{code}` follows.
+    The words of `{out="words"}` are in its `meta`. With `{given="…"}` it is a `number_given`, and
+    its `info` the source; that of code is `code`, if `{code}` follows.
     """
     start = state.pos
     if not rules_inline.backtick(state, silent):
@@ -72,8 +74,9 @@ def _code_span(state: rules_inline.StateInline, silent: bool) -> bool:
         if match[0] == "{code}":
             token.info = "code"
             return True
-        token.type = "number_given" if match[3] else "number_binding"
-        token.info = match[1] or match[2] or match[4] or ""
+        token.type = "number_given" if match["given"] else "number_binding"
+        token.info = match["script"] or match["source"] or ""
+        token.meta["words"] = match["line"] or match["words"] or ""
         token.map = [start + len(token.markup), end - len(token.markup)]
     return True
 

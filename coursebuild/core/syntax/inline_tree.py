@@ -307,6 +307,7 @@ class _TokenReader:
             script=None if is_given else token.info or None,
             source=collapse_spaces(token.info) if is_given else None,
             comma=self.state.has_decimal_comma,
+            words="" if is_given else collapse_spaces(token.meta["words"]),
         )
 
     def _read_html(self, token: PositionedToken, span: Span) -> model.RawInline:

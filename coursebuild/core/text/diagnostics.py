@@ -21,18 +21,20 @@ from coursebuild.core.text.source import Source, Span
 T_co = TypeVar("T_co", covariant=True)
 
 
-class Note(Struct, frozen=True):
-    """A further remark, and where it points (if anywhere)."""
-
-    message: str
-    span: Span | None = None
-
-
 class Edit(Struct, frozen=True):
     """A replacement of the text of `span` by `text`."""
 
     span: Span
     text: str
+
+
+class Note(Struct, frozen=True):
+    """A further remark, and where it points (if anywhere)."""
+
+    message: str
+    span: Span | None = None
+    edits: tuple[Edit, ...] = ()
+    """What an author writes to choose this one of several ways."""
 
 
 class Fix(str):

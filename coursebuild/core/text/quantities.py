@@ -107,6 +107,11 @@ def are_different(left: UnitText, right: UnitText) -> bool:
     )
 
 
+def is_same_unit(left: UnitText, right: UnitText) -> bool:
+    """Whether both are units, and may be the same one."""
+    return bool(left) and bool(right) and not are_different(left, right)
+
+
 def printed_unit(line: str, start: int, end: int) -> UnitText:
     """The unit of the number at `line[start:end]` in what a program printed, in its own line."""
     return unit_behind(line, end, has_names=line[:1].isalpha()) or _unit_of_label(line[:start])
@@ -215,6 +220,12 @@ def _unit_of_label(before: str) -> UnitText:
     before = before[-_REACH:]
     gap = _TO_NUMBER.search(before)
     return NO_UNIT if gap is None else unit_of_header(before[: gap.start()])
+
+
+def unit_of_printed(line: str, number: Number, above: Sequence[str]) -> UnitText:
+    """The unit of a printed number: that in its own line, or that of its column."""
+    unit = printed_unit(line, number.start, number.end)
+    return unit or unit_of_column(line, number.start, above)
 
 
 def unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:

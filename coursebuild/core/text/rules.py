@@ -183,6 +183,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "recording-loose": "With this `atol`, 0 would do for each number of an output.",
         "recorded-run": "The run of a script with `record=once` is missing or out of date.",
         "output-drift": "A recorded output differs from what the script prints.",
+        "output-ambiguous": "A shown value may be any of several printed ones.",
         "output-unmarked": "A text is what a script printed, but is not compared.",
         "output-noise": "Digits of an output change if initial states are moved by 1e-12.",
         "output-unstable": "Two runs of a script print different lines.",
@@ -240,7 +241,8 @@ _WARNINGS = frozenset(
     draft-empty unit-unproven file-unlisted no-scripts theme-contrast template-outdated heading-skip
     markup-foreign math-brackets math-command symbol-repeated footnote-unused image-alt
     recording-loose script-unrepeatable script-penetration script-writes script-connects
-    output-noise report-stale bench-unrecorded lab-penetration lab-reset package-reduced
+    output-ambiguous output-noise report-stale bench-unrecorded lab-penetration lab-reset
+    package-reduced
     """.split()
 )
 

@@ -131,7 +131,7 @@ export class Panel {
     return h('ol', { class: 'preview-problems' }, ...problems.map((problem) => this.makeProblem(problem)))
   }
 
-  makeProblem({ severity, rule, place, message, label, help, notes, line, start, end, mark, offer, fixed }) {
+  makeProblem({ severity, rule, place, message, label, help, notes, choices, line, start, end, mark, offer, fixed }) {
     const item = h('li', { class: `preview-problem preview-${severity}` })
     item.append(
       h('p', { class: 'preview-message' }, h('strong', {}, this.say(severity)), ' ', h('span', OF_THE_TOOL, ...formatCode(message))),
@@ -143,6 +143,7 @@ export class Panel {
       item.append(h('pre', { class: 'preview-source', tabindex: '0', dir: 'ltr' }, line.slice(0, start), excerpt, line.slice(Math.max(end, start + 1))))
     }
     if (label) item.append(h('p', { class: 'preview-label', ...OF_THE_TOOL }, ...formatCode(label)))
+    for (const { text, offer: choice } of choices) item.append(h('p', OF_THE_TOOL, ...formatCode(text)), ...this.makeFix(choice, ''))
     for (const note of notes) item.append(h('pre', { class: 'preview-note', ...OF_THE_TOOL }, note))
     if (help) item.append(h('p', { class: 'preview-help', ...OF_THE_TOOL }, ...formatCode(help)))
     if (offer) item.append(...this.makeFix(offer, fixed))

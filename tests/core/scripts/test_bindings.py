@@ -287,3 +287,19 @@ def test_fewer_digits_of_what_was_printed_always_hold(
     text = f"{value:.{printed}f}"
     rounded = Decimal(text).quantize(Decimal(1).scaleb(-min(printed, fewer)), ROUND_HALF_EVEN)
     assert find_mistake(f"`{rounded:f} J`{{out}}", f"E = {text} J, 3 steps\n") is None
+
+
+def test_words_before_a_number_choose_it() -> None:
+    printed = "Euler:\nerror 2.5, h = 0.1 s\nRK4:\nerror 2.5, h = 0.1 s\nrate 1/min 2.5 and 2.5\n"
+    for words, holds in CASES["words"]:
+        mistake = find_mistake(f'`2.5`{{out="{words}"}}', printed)
+        assert (mistake is None) is holds, words
+    text = f'{script()}{output(printed)}\nHere $x${{value=2.5 out="Euler error"}}.\n'
+    assert check(text, make_run(printed)) == ()
+
+
+def test_a_number_in_a_caption_is_one_of_its_own_output() -> None:
+    text = script() + "\nOutput, after `1.5`{out} s:\n\n```text\nt 1.5\n```\n"
+    assert check(text, make_run("t 1.5\n")) == ()
+    (diagnostic,) = check(text.replace("`1.5`", "`2.5`"), make_run("t 1.5\n"))
+    assert diagnostic.rule == "binding-mismatch"

@@ -24,6 +24,7 @@ from coursebuild.features.authoring.course_map import (
     rename_references,
     with_lesson_renamed,
 )
+from coursebuild.pipeline.address_record import addresses_path
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import documents_by_name
 from coursebuild.report.text import location, visible
@@ -44,13 +45,17 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def _move_record(root: Path, old: str, new: str) -> list[FileChange]:
-    """Let the record of a lesson, if it has one, follow it from one path to another."""
-    if not (root / record_path(old)).is_file():
-        return []
-    data = read_bytes(root, record_path(old))
-    text = LessonRecord.parse(data.decode("utf-8", "replace")).text(new.rpartition("/")[2])
-    moved_file = FileChange(record_path(new), None, text.encode())
-    return [moved_file, FileChange(record_path(old), data, None)]
+    """Let what is remembered of a lesson follow it from one path to another."""
+    changes: list[FileChange] = []
+    for path_of in (record_path, addresses_path):
+        if (root / path_of(old)).is_file():
+            data = new_data = read_bytes(root, path_of(old))
+            if path_of is record_path:  # which names its lesson
+                record = LessonRecord.parse(data.decode("utf-8", "replace"))
+                new_data = record.text(new.rpartition("/")[2]).encode()
+            changes.append(FileChange(path_of(new), None, new_data))
+            changes.append(FileChange(path_of(old), data, None))
+    return changes
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -15,9 +15,9 @@ from lsprotocol import types
 from msgspec.structs import replace
 
 from coursebuild.core.model import CodeSpan, NumberBinding, Text, document_inlines
-from coursebuild.core.scripts.bindings import PrintedOutputs
 from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.findings import output_findings
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
 from coursebuild.core.text.numbers import scan_prose
 from coursebuild.core.text.rules import Severity, rule_address
@@ -31,7 +31,7 @@ from coursebuild.report.values import with_hints
 
 _COMPARISON_RULES = (
     *("output-drift", "script-silent"),
-    *("binding-mismatch", "binding-orphan", "binding-volatile"),
+    *("binding-mismatch", "binding-orphan", "binding-volatile", "output-ambiguous"),
 )
 """The rules that are checked by a comparison alone, without a run."""
 
@@ -67,16 +67,22 @@ def _diagnose(session: Session, version: int) -> tuple[Diagnostic, ...]:
                 for owner, document in course.owned_documents
                 if document.source.path in changed_paths
             ]
-            diagnostics += tuple(output_findings(course, changed_documents, printed))
+            addresses = dict(session.runs.addresses)
+            diagnostics += tuple(output_findings(course, changed_documents, printed, addresses))
         for diagnostic in last_run:
             span = _move_span(diagnostic.span, sources)
             if span is None:  # its lines have changed
                 continue
+            is_same = span is diagnostic.span
             notes = tuple(
-                Note(note.message, note.span and _move_span(note.span, sources))
+                Note(
+                    note.message,
+                    note.span and _move_span(note.span, sources),
+                    note.edits if is_same else (),
+                )
                 for note in diagnostic.notes
             )
-            edits = diagnostic.edits if span is diagnostic.span else ()
+            edits = diagnostic.edits if is_same else ()
             diagnostics += (replace(diagnostic, span=span, notes=notes, edits=edits),)
     return with_hints(judge(course, diagnostics))
 
@@ -152,6 +158,13 @@ def actions(
         for d in diagnostics
         if d.edits and _overlap(d.span, place)
     ]
+    actions += [
+        _make_action(texts.places, note.message, note.edits, [d])
+        for d in diagnostics
+        if _overlap(d.span, place)
+        for note in d.notes
+        if note.edits
+    ]
     fixable = (d for d in diagnostics if all(edit.span.source == place.source for edit in d.edits))
     if safe_fixes := choose_fixes(fixable):
         edits = [edit for diagnostic in safe_fixes for edit in diagnostic.edits]
@@ -162,12 +175,14 @@ def actions(
     for verdict in texts.library.results.verdicts:
         span = verdict.recording.span
         if verdict.status == "drift" and span.source == place.source and _overlap(span, place):
-            edit = new_output(texts.session, texts.library, verdict)
-            if isinstance(edit, Edit):
+            course = texts.session.course
+            assert course is not None  # it has been run
+            new_edits = new_output(texts.session, texts.library, course, verdict)
+            if isinstance(new_edits, tuple) and new_edits:
                 drifts = (d for d in diagnostics if d.rule == "output-drift")
                 solved = [d for d in drifts if span.contains(d.span)]
                 title = f"accept what `{verdict.recording.script}` prints"
-                actions.append(_make_action(texts.places, title, [edit], solved))
+                actions.append(_make_action(texts.places, title, new_edits, solved))
     actions += _bind_numbers(texts, place)
     asked_kinds = tuple(str(getattr(kind, "value", kind)) for kind in params.context.only or ("",))
     kinds = [str(getattr(action.kind, "value", action.kind)) for action in actions]
@@ -218,6 +233,6 @@ def _bind_numbers(texts: OpenTexts, place: Span) -> Iterator[types.CodeAction]:
             sources = (
                 printed.of_binding(binding) if shown_text.numbers and _overlap(span, place) else []
             )
-            if any(shown_text.is_in(printed.lines(verdict)) for verdict in sources):
+            if any(shown_text.is_in(printed.text(verdict).lines) for verdict in sources):
                 title = f"bind `{text}` to what `{sources[0].recording.script}` prints"
                 yield _make_action(texts.places, title, [Edit(span, f"{code}{{out}}")])

@@ -27,8 +27,8 @@ from coursebuild.core.pages.numbering import (
     number_items,
     number_prefix,
 )
-from coursebuild.core.scripts.bindings import PrintedOutputs
 from coursebuild.core.scripts.bound_numbers import BoundText
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
@@ -296,7 +296,7 @@ class _Lookup:
         results, number = self.library.results, BoundText.of(binding.text, binding.comma)
         printed = PrintedOutputs(results.verdicts, results.runs, self.library.scripts)
         for verdict in printed.of_binding(binding) if number.numbers else ():
-            for window in number.windows(printed.lines(verdict)):
+            for window in number.windows(printed.text(verdict).lines):
                 if number.shows(window) and window.line.locate is not None:
                     place = window.line.locate(window.numbers[0].start, window.numbers[-1].end)
                     printed_line = fence("text", window.line.text, wary=True)

@@ -23,6 +23,7 @@ from pygls.exceptions import JsonRpcInvalidParams
 from coursebuild.core import model
 from coursebuild.core.checks.links import anchors
 from coursebuild.core.files.errors import UsageError
+from coursebuild.core.model.lesson_record import record_path
 from coursebuild.core.pages.library import Library
 from coursebuild.core.registry import CORE_FENCES, fence_names
 from coursebuild.core.syntax.attributes import collapse_spaces, term_id
@@ -42,6 +43,7 @@ from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.known_names import options_by_command
 from coursebuild.features.names.resolve import resolver_of
 from coursebuild.features.references import works_of
+from coursebuild.pipeline.address_record import addresses_path
 
 _NAME = r"[A-Za-z_]\w*"
 _SUBJECTS = (
@@ -289,8 +291,12 @@ def _lesson_name(texts: OpenTexts, lesson: model.Lesson, span: Span) -> _Name:
         changes = places.changes([Edit(course.map.span(), new_map), *text_edits])
         identifier = types.OptionalVersionedTextDocumentIdentifier
         file_edits = [types.TextDocumentEdit(identifier(uri), e) for uri, e in changes.items()]
-        old, new = places.uri(lesson.path), places.uri(replace(lesson, id=id).path)
-        file_renames = [] if lesson.document is None else [types.RenameFile(old, new)]
+        old, new = lesson.path, replace(lesson, id=id).path
+        paths = [] if lesson.document is None else [(old, new)]
+        for path_of in (record_path, addresses_path):
+            if (texts.session.root / path_of(old)).exists():
+                paths.append((path_of(old), path_of(new)))
+        file_renames = [types.RenameFile(places.uri(a), places.uri(b)) for a, b in paths]
         return types.WorkspaceEdit(document_changes=[*file_edits, *file_renames])
 
     return _Name(span.source.span(start, start + len(lesson.id)), lesson.id, rename_lesson)

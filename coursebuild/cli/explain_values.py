@@ -1,0 +1,103 @@
+"""`coursebuild explain FILE:LINE`: where the values that a line of a lesson shows come from.
+
+Nothing is run: an address is what was remembered when the value last held, or else is found in the
+recorded text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from msgspec import Struct
+
+from coursebuild.core.model import Course, Document, NumberBinding, Table, find_inlines
+from coursebuild.core.scripts.bindings import check_bindings
+from coursebuild.core.scripts.bound_places import bound_values, find_texts
+from coursebuild.core.scripts.compare import verify
+from coursebuild.core.scripts.extract import extract
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
+from coursebuild.core.scripts.provenance import describe_line
+from coursebuild.core.scripts.table_cells import table_rows
+from coursebuild.core.scripts.tables import row_values
+from coursebuild.core.text.source import Span
+from coursebuild.pipeline.address_record import read_addresses
+from coursebuild.pipeline.options import UsageError
+from coursebuild.report.text import location, visible
+from coursebuild.report.values import plural
+
+
+class ValueOrigin(Struct, frozen=True):
+    """Where a shown value comes from."""
+
+    text: str
+    script: str = ""
+    """Empty for one that its author gives."""
+    places: tuple[str, ...] = ()
+    """The printed line in words, and the place in it; several where the author chose none."""
+    recorded: tuple[str, ...] = ()
+    """Where these are recorded in the lesson."""
+    source: str = ""
+    """That of a given value."""
+
+
+def value_origins(root: Path, course: Course, path: str, line: int) -> tuple[ValueOrigin, ...]:
+    """The values that a line of a lesson or page shows."""
+    document = next((d for d in course.documents if d.source.path == path), None)
+    if document is None:
+        raise UsageError(f"{path} is no lesson or page of this course")
+    if line > len(document.source.line_starts):
+        raise UsageError(f"{path} has no line {line}")
+    paths = [extraction.path for extraction in extract(course).value]
+    addresses = read_addresses(root, [document])
+    outputs = PrintedOutputs(verify(course, (), addresses), (), paths)
+    check_bindings(document, outputs, addresses)
+
+    def is_there(span: Span) -> bool:
+        return span.line <= line <= span.end_line
+
+    origins = [*_given_values(document)]
+    for binding, value in bound_values(document, outputs):
+        at = addresses.get(value, ())
+        bound = find_texts(binding, outputs, at)
+        places = [place for texts in bound.groups for place in bound.look_up(texts)]
+        recorded = (p.window.line.locate for p in places)
+        spans = [
+            locate(place.window.numbers[0].start, place.window.numbers[-1].end)
+            for place, locate in zip(places, recorded, strict=True)
+            if locate is not None
+        ]
+        texts = tuple(f"number {a.place + 1} of {describe_line(a)}" for a in at)
+        origin = ValueOrigin(binding.text, value.script, texts, tuple(map(location, spans)))
+        origins.append((binding.span, origin))
+    for verdict in outputs.of_document(document):
+        body, filters = verdict.recording.body, verdict.comparison.filters
+        rows = table_rows(body, filters) if isinstance(body, Table) else ()
+        for row, value in zip(rows, row_values(document, verdict.recording, filters), strict=True):
+            at = addresses.get(value, ())
+            texts = tuple(f"number {a.place + 1} of {describe_line(a)}" for a in at)
+            span = row[0].cell.span.to(row[-1].cell.span)
+            origins.append((span, ValueOrigin(value.text, value.script, texts)))
+    return tuple(origin for span, origin in origins if is_there(span))
+
+
+def _given_values(document: Document) -> Iterator[tuple[Span, ValueOrigin]]:
+    for number in find_inlines(document, NumberBinding):
+        if number.source is not None:
+            source = number.source or "no source"
+            yield number.span, ValueOrigin(number.text, source=source)
+
+
+def origins_text(place: str, origins: tuple[ValueOrigin, ...]) -> str:
+    """What is known of the values on a line, as text for people."""
+    lines = [f"{visible(place)} shows {plural(len(origins), 'value') if origins else 'no value'}"]
+    for origin in origins:
+        if not origin.script:
+            given = f"given: {origin.source}" if origin.source else "bound to no script"
+            lines.append(f"  `{visible(origin.text)}` is {given}")
+            continue
+        known = origin.places or ("a line that is not known yet: run `coursebuild check`",)
+        lines.append(f"  `{visible(origin.text)}` is printed by {visible(origin.script)}")
+        lines += [f"    {visible(text)}" for text in known]
+        lines += [f"    recorded at {visible(at)}" for at in origin.recorded]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,103 @@
+"""The outputs of a course: what is recorded of each script, and what it printed in this run."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
+
+from coursebuild.core import model
+from coursebuild.core.model.results import Address, ScriptRun, Verdict
+from coursebuild.core.scripts.bound_numbers import PrintedLine, lines_of_run, printed_lines
+from coursebuild.core.scripts.provenance import PrintedText
+from coursebuild.core.scripts.table_cells import row_text
+from coursebuild.core.scripts.tables import TableMatcher, updated_row
+from coursebuild.core.text.numbers import point_decimals
+
+
+class PrintedOutputs:
+    """The recorded outputs of a course and the runs of its scripts."""
+
+    def __init__(
+        self, verdicts: Iterable[Verdict], runs: Iterable[ScriptRun], scripts: Iterable[str] = ()
+    ) -> None:
+        """`scripts` are the paths of all scripts of the course, run or not."""
+        self.runs = {run.path: run for run in runs}
+        self._by_script: dict[str, list[Verdict]] = {}
+        self._by_document: dict[str, list[Verdict]] = {}
+        self._texts: dict[tuple[str, int], PrintedText] = {}
+        self._run_texts: dict[tuple[str, tuple[model.Filter, ...], int | None], PrintedText] = {}
+        for verdict in verdicts:
+            recording = verdict.recording
+            if recording.script is not None:
+                self._by_script.setdefault(recording.script, []).append(verdict)
+                self._by_document.setdefault(recording.span.path, []).append(verdict)
+        for document_verdicts in self._by_document.values():
+            document_verdicts.sort(key=end_of_body)
+        self.scripts = frozenset({*scripts, *self.runs, *self._by_script})
+        """The paths of all scripts."""
+
+    def of_document(self, document: model.Document) -> Sequence[Verdict]:
+        """The recorded outputs of a document, in order."""
+        return self._by_document.get(document.source.path, ())
+
+    def of_binding(self, binding: model.NumberBinding) -> list[Verdict]:
+        """The recorded outputs that a binding depends on; in a caption, that of the caption."""
+        if binding.script is not None:
+            return self._by_script.get(binding.script, [])
+        verdicts = self._by_document.get(binding.span.path, [])
+        own = [v for v in verdicts if v.recording.caption_span.contains(binding.span)]
+        if own:
+            return own[:1]
+        after = bisect_left(verdicts, binding.span.start + 1, key=end_of_body)
+        return verdicts[after - 1 : after] if after else []
+
+    def script_of(self, binding: model.NumberBinding) -> str | None:
+        """The path of the script that a binding depends on."""
+        verdicts = self.of_binding(binding)
+        return binding.script or (verdicts[0].recording.script if verdicts else None)
+
+    def text(self, verdict: Verdict) -> PrintedText:
+        """The lines of a recorded output."""
+        key = recording_key(verdict.recording)
+        if key not in self._texts:
+            lines = printed_lines(verdict.recording, verdict.comparison.own_filters)
+            self._texts[key] = PrintedText(lines)
+        return self._texts[key]
+
+    def row_addresses(self, recording: model.Recording) -> tuple[tuple[Address, ...], ...]:
+        """Where the rows of a recorded table were printed, as far as that is known."""
+        key = recording_key(recording)
+        verdicts = self._by_document.get(recording.span.path, ())
+        return next((v.row_addresses for v in verdicts if recording_key(v.recording) == key), ())
+
+    def updated_text(self, verdict: Verdict) -> PrintedText:
+        """The lines of a recorded output as `update` writes it."""
+        recording, comparison = verdict.recording, verdict.comparison
+        if isinstance(body := recording.body, model.Table):
+            printed = self.runs[recording.script or ""].output_of(recording.part)
+            rows = TableMatcher(body, comparison, printed, verdict.row_addresses).match().rows
+            texts = [row_text(updated_row(row, comparison)) for row in rows]
+            lines = map(point_decimals, texts) if body.comma else texts
+            return PrintedText([PrintedLine(line) for line in lines])
+        return self.text_of_run(recording.script or "", comparison.own_filters, recording.part)
+
+    def text_of_run(
+        self, path: str, filters: Sequence[model.Filter], part: int | None = None
+    ) -> PrintedText:
+        """The lines that a script, or a part of it, printed in this run."""
+        key = path, tuple(filters), part
+        if key not in self._run_texts:
+            run = self.runs[path]
+            lines = lines_of_run(run.stdout if part is None else run.output_of(part), filters)
+            self._run_texts[key] = PrintedText(lines)
+        return self._run_texts[key]
+
+
+def end_of_body(verdict: Verdict) -> int:
+    """Where a recorded output ends."""
+    return verdict.recording.body_span.end
+
+
+def recording_key(recording: model.Recording) -> tuple[str, int]:
+    """A key that tells the recorded outputs of a course apart."""
+    return recording.span.path, recording.body_span.start

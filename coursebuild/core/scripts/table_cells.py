@@ -1,0 +1,110 @@
+"""The rows of recorded tables, cell by cell, as plain text with its places in the lesson."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from msgspec import Struct
+
+from coursebuild.core import model
+from coursebuild.core.scripts.lines import (
+    CanonicalText,
+    MappedText,
+    apply_filters,
+    canonicalize,
+)
+from coursebuild.core.text.numbers import Number, point_decimals
+from coursebuild.core.text.source import Span
+
+_RUN = re.compile(r"\s{2,}|[^\S ]")
+_ENDS = re.compile(r"\A\s+|\s+\Z")
+
+
+class RowCell(Struct, frozen=True):
+    """A cell of a recorded table."""
+
+    cell: model.Cell
+    column: int
+    mapped: MappedText
+    canonical: CanonicalText
+
+    def span(self, number: Number) -> Span:
+        """Where a number of the cell stands in the lesson."""
+        return Span(self.cell.span.source, *self.mapped.origin(number.start, number.end))
+
+
+ELISIONS = ("\u2026", "...")
+"""A cell that is left out; a row of such cells stands for any printed rows."""
+
+
+def table_rows(
+    table: model.Table, filters: Iterable[model.Filter] = ()
+) -> tuple[tuple[RowCell, ...], ...]:
+    """The body rows of a table; cells without text, or left out, and rows of such are not there."""
+    rules = tuple(filters)
+    rows = (
+        tuple(
+            RowCell(cell, column, mapped, _canonical_cell(table, mapped.text))
+            for column, cell in enumerate(row)
+            if (mapped := cell_text(cell, rules)).text not in ("", *ELISIONS)
+        )
+        for row in table.rows
+    )
+    return tuple(row for row in rows if row)
+
+
+def _canonical_cell(table: model.Table, text: str) -> CanonicalText:
+    """What the text of a cell says, its decimals behind a point."""
+    return canonicalize(point_decimals(text) if table.comma else text)
+
+
+def elides_rows(table: model.Table) -> bool:
+    """Whether a row of a table stands for printed rows that it does not show."""
+    return any(all(cell_text(c, ()).text in ELISIONS for c in row) for row in table.rows)
+
+
+def row_text(row: Iterable[RowCell]) -> str:
+    """The cells of a row as one line."""
+    return "  ".join(cell.mapped.text for cell in row)
+
+
+def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
+    """The plain text of a cell, filtered; origins are offsets in the lesson's source.
+
+    Marks of Markdown are gone, minus signs are hyphens, runs of white space are one space. A
+    stretch that Markdown changed (entities, escapes) stands for all of itself.
+    """
+    stretches: list[MappedText] = []
+    for inline in model.walk_inlines(cell.children):
+        span = inline.span
+        match inline:
+            case model.Text():
+                text = inline.text
+            case model.CodeSpan():
+                # Between the backticks, without padding
+                markdown, text = span.text, inline.text
+                edge = len(markdown) - len(markdown.lstrip("`"))
+                if len(markdown) - 2 * edge == len(text) + 2:
+                    edge += 1
+                span = Span(span.source, span.start + edge, span.end - edge)
+            case model.NumberBinding():
+                text, span = inline.text, inline.text_span
+            case model.Math():
+                text, span = inline.tex.text, inline.tex.span()
+            case model.Image():
+                text = inline.alt
+            case model.SoftBreak() | model.HardBreak():
+                text = " "
+            case model.RawInline():
+                text = " " if inline.html.startswith("<br") else ""
+            case _:
+                continue
+        stretches.append(
+            MappedText.copy(text, span.start)
+            if span.text == text
+            else MappedText.substitute_for(span.start, span.end, text)
+        )
+    mapped = apply_filters(MappedText.join(stretches), filters)
+    folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
+    return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)

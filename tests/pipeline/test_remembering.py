@@ -1,0 +1,120 @@
+"""What a lesson shows has an address, which is remembered, and follows a changed parameter."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from support.scratch_course import Folder, Make
+
+pytestmark = pytest.mark.site
+
+CUPS = """\
+scale = 1.0
+print("steel", 66.64, 10.59, 84.8)
+for cup, start, rate, tau in (("steel", 84.9, 0.0121, 83.5), ("glass", 86.9, 0.0131, 73.5)):
+    print(f"{cup}  T0 = {scale * start:.1f} \u00b0C", end="  ")
+    print(f"k = {rate:.4f} 1/min  tau = {scale * tau:.1f} min")
+print(f"mean of tau {scale * 78.5:.1f} min")
+print("limit 78.5 min")"""
+TABLE = """\
+Output, the fits:
+
+| cup | T\u2080 (\u00b0C) | k (1/min) | \u03c4 (min) |
+| --- | --- | --- | --- |
+| steel | 84.9 | 0.0121 | 83.5 |
+
+On average it takes `78.5 min`{out="mean of tau"}, and for glass `73.5`{out}.
+"""
+RECORD = "content/lessons/1.1-one.addresses.jsonl"
+
+
+def cups(folder: Folder) -> str:
+    return folder.text(folder.lesson()).partition("Output, the fits:")[2]
+
+
+def make_cups(make: Make) -> Folder:
+    script = f"```python file=examples/cups.py\n{CUPS}\n```\n\n"
+    folder = make(f"## Cups\n\n{script}{TABLE}")
+    result = folder.main("check")
+    assert result.status == 0, result.out
+    return folder
+
+
+def test_a_table_and_its_numbers_follow_a_changed_parameter(make: Make) -> None:
+    """The rates of the cups, and not the quartiles that are printed above them."""
+    folder = make_cups(make)
+    folder.replace(folder.lesson(), "scale = 1.0", "scale = 2.0")
+    result = folder.main("update")
+    assert result.status == 0, result.out
+    assert "| steel | 169.8 | 0.0121 | 167.0 |" in cups(folder)
+    assert '`157.0 min`{out="mean of tau"}, and for glass `147.0`{out}.' in cups(folder)
+    assert folder.main("check").status == 0
+    assert "every recorded output is up to date" in folder.main("update").out
+
+
+def test_addresses_survive_a_clone(make: Make) -> None:
+    folder = make_cups(make)
+    before = folder.text(RECORD)
+    shutil.rmtree(folder.root / ".coursebuild")
+    folder.replace(folder.lesson(), "scale = 1.0", "scale = 0.5")
+    assert folder.main("update").status == 0
+    assert "for glass `36.8`{out}." in cups(folder)
+    assert folder.text(RECORD) != before  # the shown texts, at the same addresses
+
+
+def test_a_line_that_is_gone_is_told_and_nothing_is_written(make: Make) -> None:
+    folder = make_cups(make)
+    text = folder.text(folder.lesson())
+    folder.write(folder.lesson(), text.replace('f"mean of tau', 'f"average', 1))
+    result = folder.main("update")
+    assert result.status != 0
+    assert "printed no number right after `mean of tau`" in result.out
+    assert '`78.5 min`{out="mean of tau"}' in cups(folder)
+
+
+def test_explain_says_where_the_numbers_of_a_line_come_from(make: Make) -> None:
+    folder = make_cups(make)
+    lines = folder.text(folder.lesson()).split("\n")
+    line = next(n for n, text in enumerate(lines, start=1) if text.startswith("| steel"))
+    result = folder.main("explain", f"{folder.lesson()}:{line}")
+    assert (
+        result.out
+        == f"""\
+{folder.lesson()}:{line} shows 1 value
+  `steel  84.9  0.0121  83.5` is printed by examples/cups.py
+    number 1 of `steel T0 = # \u00b0C k = # # /min tau = # min`
+    number 2 of `steel T0 = # \u00b0C k = # # /min tau = # min`
+    number 4 of `steel T0 = # \u00b0C k = # # /min tau = # min`
+"""
+    )
+    result = folder.main("explain", f"{folder.lesson()}:{line + 2}")
+    assert "number 1 of `mean of tau # min`" in result.out
+    assert folder.main("explain", f"{folder.lesson()}:999").status == 2
+
+
+def test_a_lesson_takes_its_addresses_along_when_it_is_renamed(make: Make) -> None:
+    folder = make_cups(make)
+    before = folder.text(RECORD)
+    assert folder.main("rename", "1.1", "1.7").status == 0
+    assert folder.text(RECORD.replace("1.1", "1.7")) == before
+    assert not (folder.root / RECORD).exists()
+
+
+def test_a_lesson_with_an_error_keeps_what_is_remembered(make: Make) -> None:
+    folder = make_cups(make)
+    before = folder.text(RECORD)
+    folder.replace(folder.lesson(), "scale = 1.0", "scale = 2.0")
+    assert folder.main("check").status == 1
+    assert folder.text(RECORD) == before
+
+
+def test_a_table_is_filled_below_its_header(make: Make) -> None:
+    script = f"```python file=examples/cups.py\n{CUPS}\n```\n\n"
+    rows = "| steel | 84.9 | 0.0121 | 83.5 |\n"
+    folder = make(f"## Cups\n\n{script}{TABLE.replace(rows, '')}")
+    assert folder.main("check").status == 1
+    assert folder.main("update").status == 0
+    assert f"{rows}| glass | 86.9 | 0.0131 | 73.5 |\n" in cups(folder)
+    assert folder.main("check").status == 0
