@@ -39,9 +39,14 @@ from coursebuild.pipeline.options import Options
 def with_provenance(
     runs: Mapping[str, ScriptRun], scripts: Iterable[Extraction], options: Options
 ) -> dict[str, ScriptRun]:
-    """The runs, by path, each with what it ran with here; a recorded one knows that already."""
+    """The runs, by path, each with what it ran with here.
+
+    One that was known before has it already, and one that the course keeps ran elsewhere.
+    """
     texts = {script.path: script.text for script in scripts}
-    new_runs = [run for run in runs.values() if run.did_run and not run.recorded]
+    new_runs = [
+        run for run in runs.values() if run.did_run and run.provenance is None and not run.recorded
+    ]
     imports_by_path = {run.path: find_imports(texts[run.path]) for run in new_runs}
     modules_by_path = {
         run.path: imports_by_path[run.path] if run.trace is None else frozenset(run.trace.modules)
