@@ -156,6 +156,18 @@ def test_a_line_in_a_fold_is_shown_and_marked(open_page: OpenPage) -> None:
     becomes(page, lambda: marked_ids(page), ["sub/wide.L4"])
 
 
+def test_a_hidden_part_is_shown_where_a_link_leads_to_it(open_page: OpenPage) -> None:
+    page = open_page()
+    for line in (1, 8):
+        code = page.locator(f"[id='walk.L{line}']")
+        expect(code).to_be_hidden()
+        page.evaluate(f"location.hash = '#walk.L{line}-L{line}'")
+        expect(code).to_be_in_viewport()
+        becomes(page, lambda line=line: marked_ids(page), [f"walk.L{line}"])
+    expect(page.locator("[hidden=until-found]")).to_have_count(0)
+    assert page.locator("[id='walk.py'] pre").first.inner_text().strip().endswith("steps = 3")
+
+
 def test_a_long_line_is_shown_from_its_beginning(open_page: OpenPage) -> None:
     page = open_page(at="#sub/wide.L5", width=800)
     becomes(page, lambda: marked_ids(page), ["sub/wide.L5"])
