@@ -160,7 +160,7 @@ def test_a_limit_is_known_as_far_as_spans_and_starts_agree() -> None:
     row = search(lambda start, step, _: start == 1 and step > 500, (1.0, 1000.0))
     assert row.largest is None and row.bracket == pytest.approx((500, 1000), rel=1e-2)
     row = search(lambda _, step, __: step > 25.4 and not 60 < step < 80, (1.0, 1000.0))
-    assert row.islands == pytest.approx((60, 80), rel=0.05)
+    assert row.islands is not None and 60 < row.islands[0] <= row.islands[1] < 80
 
 
 def test_what_grows_or_falls_farther_in_a_longer_time_is_not_lost() -> None:
