@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.text.units import UNITS, Unit, find_symbol
+from coursebuild.core.text.units import UNITS, find_symbol
 
 PAGE_TABLE = Path(__file__).parents[2] / "site/js/quiz/unit-table.js"
 HEAD = """\
@@ -27,19 +27,17 @@ _SYMBOLS |= {"substance": "mol", "luminosity": "cd", "angle": "rad"}
 
 
 def rows() -> Iterator[str]:
+    """A line for each unit; a revolution is an angle here."""
     for symbol, row in UNITS.items():
-        for unit in (
-            find_symbol(symbol)[-1:] if row.base.startswith("cycle") else find_symbol(symbol)[:1]
-        ):
-            powers = {_SYMBOLS.get(name, name): int(power) for name, power in unit.powers}
-            fields = [size_of(unit), powers, "*" in row.marks, float(unit.size * unit.zero)]
-            texts = json.dumps(fields[: 4 if fields[3] else 3])
-            yield f"  {json.dumps(symbol, ensure_ascii=False)}: {texts},\n"
-
-
-def size_of(unit: Unit) -> float:
-    """The size as the nearest number that a page computes with."""
-    return float(unit.size) * math.pi**unit.pi
+        units = find_symbol(symbol)
+        if not units:
+            continue  # a level has no size
+        unit = units[-1] if row.base.startswith("cycle") else units[0]
+        size = float(unit.size) * math.pi**unit.pi
+        powers = {_SYMBOLS.get(name, name): int(power) for name, power in unit.powers}
+        fields = [size, powers, "*" in row.marks, float(unit.size * unit.zero)]
+        texts = json.dumps(fields if unit.zero else fields[:3])
+        yield f"  {json.dumps(symbol, ensure_ascii=False)}: {texts},\n"
 
 
 def test_pages_have_the_units_of_the_table(request: pytest.FixtureRequest) -> None:

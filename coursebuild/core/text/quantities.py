@@ -192,7 +192,7 @@ def numbers_of_quantities(text: str, numbers: Iterable[Number]) -> tuple[Number,
 
 def unit_of_header(text: str) -> UnitText:
     """The unit in a label or the header of a column: `τ (min)`, `v [m/s]`, `t / s`, `time in s`."""
-    text = plain_unit(text)
+    text = plain_unit(text[-2 * _REACH :])
     bracket = _BRACKET.search(text)
     if bracket is not None:
         unit = read_unit(bracket["unit"])

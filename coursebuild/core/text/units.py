@@ -175,13 +175,17 @@ _PRODUCT_UNITS = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
 
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−", "0123456789--")
 _WORD = r"(?:°[ \u00a0\u202f]?[CF](?![^\W\d_])|[^\W\d_⁰¹²³⁴-⁹]+|[°%‰′″])"
-_POWER = r"(?:\^?[-−]?\d{1,2}|\^\{[-−]?\d{1,2}(?:/\d)?\}|\^\([-−]?\d{1,2}(?:/\d)?\)|[⁻⁰¹²³⁴-⁹]+)"
+_POWER = (
+    r"(?:\^?[-−]?\d{1,2}|\^\{[-−]?\d{1,2}(?:/[1-9])?\}|\^\([-−]?\d{1,2}(?:/[1-9])?\)"
+    "|⁻?[⁰¹²³⁴-⁹]{1,2})"
+)
 _GAP = "[ \u00a0\u202f]"
-_TOKEN = re.compile(
+_TOKEN = (
     rf"(?P<word>{_WORD})(?P<power>{_POWER})?|(?P<one>1)(?![\d.])|(?P<open>\()"
     rf"|(?P<close>\))(?P<group_power>{_POWER})?|(?P<sign>{_GAP}*[·⋅*×/.]{_GAP}*|{_GAP}+)"
 )
-_TWO_UNITS = re.compile(rf"(?<![^\W\d_])m([^\W\d_m])(?={_POWER})")
+"""Compiled when it is needed, as few pages do: it takes longer than the table."""
+_TWO_UNITS = rf"(?<![^\W\d_])m([^\W\d_m])(?={_POWER})"
 _PER = re.compile(r"\s+per\s+")
 _LONGEST = 100
 
@@ -279,8 +283,8 @@ def find_units(text: str) -> tuple[Unit, ...]:
     readings = _parse(source)
     if re.search(r"/[^()/]*[ ·⋅*.]", source):
         readings += _parse(source, is_wide=True)
-    if _TWO_UNITS.search(source):
-        readings += _parse(_TWO_UNITS.sub(r"m \1", source))
+    if re.search(_TWO_UNITS, source):
+        readings += _parse(re.sub(_TWO_UNITS, r"m \1", source))
     return tuple(dict.fromkeys(readings))
 
 
@@ -299,7 +303,7 @@ def _parse(
     stack: list[tuple[tuple[Unit, ...], int]] = []
     units: tuple[Unit, ...] = (ONE,)
     sign, end, expects_factor = 1, 0, True
-    for token in _TOKEN.finditer(source):
+    for token in re.finditer(_TOKEN, source):
         if token.start() != end:
             return ()
         end, kind = token.end(), token.lastgroup

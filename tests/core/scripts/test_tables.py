@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from coursebuild.core.model import Comparison, Filter
+from coursebuild.core.model import Comparison, Filter, Table
 from coursebuild.core.model.results import Verdict
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import update_body
@@ -126,6 +126,18 @@ def test_a_table_under_digits_keeps_its_decimals() -> None:
     assert table_after(rows, printed, tolerance("0.01")) == (
         "| Euler | +6.7021 | 9.12e-04 |\n| RK4 | −2.349 | 5 |"
     )
+
+
+def test_a_decimal_comma_stays_in_a_table_of_its_language() -> None:
+    rows = "| 0.5 | 0,71 | −2,5e-03 |"
+    recording = table(EDITED_HEAD + rows)
+    assert isinstance(recording.body, Table)
+    german = replace(recording, body=replace(recording.body, comma=True))
+    edit = update_body(german, EXACT, "a 0.5 0.82 -3.5e-03\n")
+    assert isinstance(edit, Edit)
+    assert edit.text == "0,82 | −3,5e-03"
+    assert compare(german, EXACT, "a 0.5 0.71 -2.5e-03\n").status == "verified"
+    assert compare(recording, EXACT, "a 0.5 0.71 -2.5e-03\n").status == "drift"
 
 
 CELLS = st.sampled_from(["Euler", "`RK4`", "**1.5 %**", "−2.50", "3.9e-11", "4", "x 7"])

@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import re
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.pages.materials import words_for
 from coursebuild.core.scripts.bindings import PrintedOutputs
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.findings import output_findings, unproven_units
 from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.numbers import scan
+from coursebuild.core.text.quantities import (
+    are_different,
+    printed_unit,
+    unit_behind,
+    unit_of_column,
+    unit_of_header,
+)
 from coursebuild.core.text.source import Source
 from coursebuild.features.arithmetic.symbol_values import check_formulas
 from support.fixture_cases import fixture_text
@@ -57,6 +68,25 @@ def judge(printed: str, text: str, words: Words) -> str:
     if any(finding.rule in ("binding-mismatch", "output-drift") for finding in findings):
         return "refused"
     return "not claimed" if any(unproven_units(small_course, runs, verdicts)) else "holds"
+
+
+PIECES = (
+    "m s kg N T in min max per a h d C ° °C % ms 1 2.0 / · ( ) [ ] = : , ^ ^2 ^(1/0) ² ⁻ ⁻¹ ²⁻ | ⏎"
+    r" \mathrm{m} \frac{m}{s} $ \, ^\circ rpm J/kg mm² 1/s - 3 0^0 e"
+).split()
+
+
+@given(
+    st.text(max_size=40) | st.lists(st.sampled_from((*PIECES, " ", "  ")), max_size=12).map("".join)
+)
+def test_any_text_can_be_read_for_units(text: str) -> None:
+    lines = text.replace("⏎", "\n").split("\n")
+    for unit in (unit_behind(text), unit_behind(text, len(text) // 2), unit_of_header(text)):
+        assert bool(unit) is bool(unit.readings)
+        assert not are_different(unit, unit)
+    for number in scan(lines[-1]):
+        printed_unit(lines[-1], number.start, number.end)
+        unit_of_column(lines[-1], number.start, lines[:-1])
 
 
 def test_each_sentence_has_its_verdict() -> None:
