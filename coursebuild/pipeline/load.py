@@ -45,6 +45,7 @@ from coursebuild.core.scripts.edit import check_source_parts, shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Source, Span
+from coursebuild.pipeline.address_record import record_path
 
 if TYPE_CHECKING:
     from coursebuild.pipeline.reader import Reader
@@ -343,7 +344,7 @@ class _Loader:
                 if closest is not None:
                     help = f"is it `{closest}`, which the map does not name?"
                     del unlisted[closest]
-                elif misnamed := next(self.root.glob(f"{lesson.path.removesuffix('.md')}.*"), None):
+                elif misnamed := self._find_misnamed(lesson.path):
                     help = f"is it `{misnamed.name}`? the file of a lesson ends with `.md`"
                 message = f"there is no file {lesson.path}"
                 self._report("lesson-missing", lesson.span, message, help)
@@ -353,6 +354,12 @@ class _Loader:
                 help = "lessons lie in content/lessons itself: move it there, or out of content/"
             message = f"the course map does not name {source.path}"
             self._report("lesson-unlisted", source.span(0, 0), message, help)
+
+    def _find_misnamed(self, path: str) -> Path | None:
+        """A file that has the name of a lesson, but for its ending."""
+        record = self.root / record_path(path)
+        files = self.root.glob(f"{path.removesuffix('.md')}.*")
+        return next((file for file in files if file != record), None)
 
     def _find_pages(self, course: Course) -> list[Source]:
         """Find the texts of the pages of the map, which may lie anywhere in the course's folder."""
@@ -410,10 +417,11 @@ class _Loader:
         self.diagnostics.append(diagnose(rule, span.first_line(), message, help=help))
 
     def _files_to_show(self, course: Course) -> tuple[str, ...]:
-        """The files that a page may show or link to: all but the map, the lessons and the pages."""
+        """The files that a page may show or link to: all but what the course is made of."""
         models = (f"models/{model.name}.xml" for model in self.files.models)
-        texts = (source.path for source in (*self.files.lessons, *self.files.pages))
-        excluded = {MAP, *texts, *(page.path for page in course.pages), *models}
+        texts = [source.path for source in (*self.files.lessons, *self.files.pages)]
+        texts += [page.path for page in course.pages]
+        excluded = {MAP, *texts, *map(record_path, texts), *models}
         return tuple(path for path in self.files.files if path not in excluded)
 
 
