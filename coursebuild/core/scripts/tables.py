@@ -160,7 +160,7 @@ class TableMatcher:
 
     def match(self) -> TableMatch:
         """The line of each row."""
-        layouts = self._common_layouts()
+        layouts = self._common_layouts() if self.rows else []
         if not layouts:
             return TableMatch(tuple(self._match_rows(None)))
         is_right = any(self._right_rows(layout) == len(self.rows) for layout in layouts)
@@ -186,23 +186,28 @@ class TableMatcher:
     # --- layouts
 
     def _common_layouts(self) -> list[Layout]:
-        """The layouts that all rows have, of which none is better in all than another."""
-        layouts = (
-            [
-                layout
-                for layout in dict.fromkeys(fit.layout for fit in self._fits_of_row(0))
-                if all(self._fits_in(row, layout) for row in range(len(self.rows)))
-            ]
-            if self.rows
-            else []
-        )
-        right = [layout for layout in layouts if self._right_rows(layout) == len(self.rows)]
-        scores = {layout: self._score(layout) for layout in right or layouts}
-        return [
+        """The layouts that all rows have and that are not worse than another; the likeliest first.
+
+        Where the numbers of some are right, also those that the header names better than these.
+        """
+        layouts = [
             layout
-            for layout, score in scores.items()
-            if not any(_dominates(rival, score) for rival in scores.values())
+            for layout in dict.fromkeys(fit.layout for fit in self._fits_of_row(0))
+            if all(self._fits_in(row, layout) for row in range(len(self.rows)))
         ]
+        right = [layout for layout in layouts if self._right_rows(layout) == len(self.rows)]
+        scores = {layout: self._score(layout) for layout in layouts}
+        best = [
+            layout
+            for layout in right or layouts
+            if not any(_dominates(scores[rival], scores[layout]) for rival in right or layouts)
+        ]
+        doubts = (
+            layout
+            for layout in (layouts if right else ())
+            if layout not in right and scores[layout][1:3] > scores[best[0]][1:3]
+        )
+        return [*best, *doubts]
 
     def _describe(self, layout: Layout) -> str:
         line = self.lines[self._fits_in(0, layout)[0].line]
