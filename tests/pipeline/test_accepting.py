@@ -195,7 +195,7 @@ def test_a_number_that_is_printed_twice_offers_its_words(make: Make) -> None:
     with serve_preview(folder) as preview, preview.events() as events:
         events.until(lambda page: any(p["choices"] for p in page.news["problems"]))
         (problem,) = events.news["problems"]
-        first, second = problem["choices"]
+        _, second = problem["choices"]
         assert second["text"].startswith('`{out="formula"}` chooses ')
         assert preview.accept_offer(second["offer"]) == (200, {"message": ""})
         events.wait_until_settled()

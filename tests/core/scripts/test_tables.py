@@ -58,8 +58,8 @@ def test_rows_stand_in_lines_with_whole_words_and_numbers() -> None:
 def test_a_table_is_the_lines_that_its_header_names() -> None:
     for printed, rows, status, count, is_doubtful in CASES["layouts"]:
         result = compare(table(rows), EXACT, printed)
-        shown, of = result.rows
-        assert (result.status, max(0, of - shown)) == (status, count), rows
+        row_count, printed_count = result.rows
+        assert (result.status, max(0, printed_count - row_count)) == (status, count), rows
         assert bool(result.rivals) is is_doubtful, rows
 
 
