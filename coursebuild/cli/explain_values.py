@@ -93,11 +93,11 @@ def origins_text(place: str, origins: tuple[ValueOrigin, ...]) -> str:
     lines = [f"{visible(place)} shows {plural(len(origins), 'value') if origins else 'no value'}"]
     for origin in origins:
         if not origin.script:
-            given = f"given: {origin.source}" if origin.source else "bound to no script"
-            lines.append(f"  `{visible(origin.text)}` is {given}")
+            answer = f"given: {origin.source}" if origin.source else "bound to no script"
+            lines.append(f"  `{visible(origin.text)}` is {answer}")
             continue
-        known = origin.places or ("a line that is not known yet: run `coursebuild check`",)
+        places = origin.places or ("a line that is not known yet: run `coursebuild check`",)
         lines.append(f"  `{visible(origin.text)}` is printed by {visible(origin.script)}")
-        lines += [f"    {visible(text)}" for text in known]
+        lines += [f"    {visible(text)}" for text in places]
         lines += [f"    recorded at {visible(at)}" for at in origin.recorded]
     return "\n".join(lines) + "\n"

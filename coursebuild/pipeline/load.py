@@ -46,6 +46,7 @@ from coursebuild.core.scripts.edit import check_source_parts, shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Source, Span
+from coursebuild.pipeline.address_record import addresses_path
 
 if TYPE_CHECKING:
     from coursebuild.pipeline.reader import Reader
@@ -361,8 +362,10 @@ class _Loader:
             self._report("lesson-unlisted", source.span(0, 0), message, help)
 
     def _find_misnamed(self, path: str) -> Path | None:
-        names = self.root.glob(f"{path.removesuffix('.md')}.*")
-        return next((name for name in names if not name.name.endswith(ENDING)), None)
+        """A file that has the name of a lesson, but for its ending."""
+        records = [self.root / path_of(path) for path_of in (record_path, addresses_path)]
+        files = self.root.glob(f"{path.removesuffix('.md')}.*")
+        return next((file for file in files if file not in records), None)
 
     def _find_pages(self, course: Course) -> list[Source]:
         """Find the texts of the pages of the map, which may lie anywhere in the course's folder."""
@@ -422,14 +425,12 @@ class _Loader:
         self.diagnostics.append(diagnose(rule, span.first_line(), message, help=help))
 
     def _files_to_show(self, course: Course) -> tuple[str, ...]:
-        """The files that a page may show or link to.
-
-        They are all but the map, the lessons and pages with their records, and the models.
-        """
+        """The files that a page may show or link to: all but what the course is made of."""
         models = (f"models/{model.name}.xml" for model in self.files.models)
         texts = [source.path for source in (*self.files.lessons, *self.files.pages)]
-        texts += (page.path for page in course.pages)
-        excluded = {MAP, *texts, *map(record_path, texts), *models}
+        texts += [page.path for page in course.pages]
+        records = {*map(record_path, texts), *map(addresses_path, texts)}
+        excluded = {MAP, *texts, *records, *models}
         return tuple(path for path in self.files.files if path not in excluded)
 
 

@@ -292,9 +292,9 @@ def new_output(
     results, addresses = library.results, dict(session.runs.addresses)
     outputs = PrintedOutputs(results.verdicts, results.runs, library.scripts)
 
-    def text_after(other: Verdict) -> PrintedText:
-        is_new = other.recording == recording
-        return outputs.updated_text(other) if is_new else outputs.text(other)
+    def text_after(output: Verdict) -> PrintedText:
+        is_new = output.recording == recording
+        return outputs.updated_text(output) if is_new else outputs.text(output)
 
     edits = [edit]
     for document in course.documents:

@@ -118,3 +118,9 @@ def test_a_table_is_filled_below_its_header(make: Make) -> None:
     assert folder.main("update").status == 0
     assert f"{rows}| glass | 86.9 | 0.0131 | 73.5 |\n" in cups(folder)
     assert folder.main("check").status == 0
+
+
+def test_what_is_remembered_is_not_published(make: Make) -> None:
+    folder = make_cups(make)
+    assert folder.main("build").status == 0
+    assert [path for path in folder.tree("public") if "addresses.jsonl" in path] == []

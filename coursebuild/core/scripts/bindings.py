@@ -31,7 +31,7 @@ from coursebuild.core.scripts.bound_numbers import (
 )
 from coursebuild.core.scripts.bound_places import (
     BoundNumber,
-    Place,
+    PrintedPlace,
     bound_values,
     document_bindings,
     find_texts,
@@ -113,7 +113,7 @@ def _with_likely_scripts(
     return finding
 
 
-_Finding: TypeAlias = tuple[Diagnostic | None, Sequence[Place]]
+_Finding: TypeAlias = tuple[Diagnostic | None, Sequence[PrintedPlace]]
 
 
 def _check(
@@ -157,7 +157,7 @@ def _check(
     return _mismatch(bound), ()
 
 
-def _ambiguous(bound: BoundNumber, places: Sequence[Place]) -> Diagnostic:
+def _ambiguous(bound: BoundNumber, places: Sequence[PrintedPlace]) -> Diagnostic:
     """The diagnostic of a binding that may be any of several printed numbers."""
     binding = bound.binding
     message = f"`{bound.path}` printed `{binding.text}` at {len(places)} places"

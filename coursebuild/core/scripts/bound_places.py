@@ -84,7 +84,7 @@ def _words_before(binding: model.NumberBinding) -> str:
     return " ".join(masked(_MARKUP.sub("", paragraph)).split()[-_CONTEXT:])
 
 
-class Place(NamedTuple):
+class PrintedPlace(NamedTuple):
     """Printed numbers, and the output that they stand in."""
 
     text: PrintedText
@@ -121,7 +121,7 @@ class BoundNumber(Struct, frozen=True):
     addresses: tuple[Address, ...]
     """Where it held before; none where that is not known."""
 
-    def places(self) -> list[Place]:
+    def places(self) -> list[PrintedPlace]:
         """Where it holds: in recorded text, or else in the run."""
         for texts in self.groups:
             places = self.look_up(texts)
@@ -129,25 +129,27 @@ class BoundNumber(Struct, frozen=True):
                 return places
         return []
 
-    def look_up(self, texts: Sequence[PrintedText]) -> list[Place]:
+    def look_up(self, texts: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers at its addresses; those that it may mean where none is known.
 
         None where one of the addresses is gone.
         """
         count, words = len(self.text.numbers), self.binding.words
         if words:
-            return [Place(text, w) for text in texts for w in text.find_words(words, count)]
+            return [PrintedPlace(text, w) for text in texts for w in text.find_words(words, count)]
         if self.addresses:
             places = [_find(address, texts, count) for address in self.addresses]
             return [place for place in places if place is not None] if all(places) else []
         by_line = {id(line): text for text in texts for line in text.lines}
         lines = [line for text in texts for line in text.lines]
         windows = self.text.candidates(lines, following_text(self.binding))
-        return [Place(by_line[id(window.line)], window) for window in windows]
+        return [PrintedPlace(by_line[id(window.line)], window) for window in windows]
 
 
-def _find(address: Address, texts: Iterable[PrintedText], count: int) -> Place | None:
-    places = (Place(text, w) for text in texts if (w := text.find(address, count)) is not None)
+def _find(address: Address, texts: Iterable[PrintedText], count: int) -> PrintedPlace | None:
+    places = (
+        PrintedPlace(text, w) for text in texts if (w := text.find(address, count)) is not None
+    )
     return next(places, None)
 
 

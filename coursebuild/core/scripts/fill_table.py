@@ -70,15 +70,15 @@ def _candidates(titles: Sequence[ColumnTitle], stdout: str) -> Iterator[_Candida
             continue
         words = tuple(line[: numbers[0].start].split())
         rest = masked(line[numbers[0].start :])
-        for named, columns in ((False, titles), (True, titles[1:])):
+        for has_name, columns in ((False, titles), (True, titles[1:])):
             places = [title.best_places(row) for title in columns]
-            chosen = tuple(numbers)
+            row_numbers = tuple(numbers)
             if len(numbers) > len(columns) and all(len(place) == 1 for place in places):
-                chosen = tuple(row.numbers[place[0]] for place in places)
-            if len(chosen) == len(columns) == len({*chosen}) and (words or not named):
-                kind = (text.heading(index), rest, "" if named else " ".join(words))
-                units = tuple(unit_of_printed(line, number, lines[:index]) for number in chosen)
-                yield _Candidate(kind, words if named else None, chosen, units, row)
+                row_numbers = tuple(row.numbers[place[0]] for place in places)
+            if len(row_numbers) == len(columns) == len({*row_numbers}) and (words or not has_name):
+                kind = (text.heading(index), rest, "" if has_name else " ".join(words))
+                units = tuple(unit_of_printed(line, n, lines[:index]) for n in row_numbers)
+                yield _Candidate(kind, words if has_name else None, row_numbers, units, row)
 
 
 def _score(titles: Sequence[ColumnTitle], candidate: _Candidate) -> tuple[int, int]:

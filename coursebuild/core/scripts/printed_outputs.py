@@ -45,9 +45,9 @@ class PrintedOutputs:
         if binding.script is not None:
             return self._by_script.get(binding.script, [])
         verdicts = self._by_document.get(binding.span.path, [])
-        own = [v for v in verdicts if v.recording.caption_span.contains(binding.span)]
-        if own:
-            return own[:1]
+        for verdict in verdicts:
+            if verdict.recording.caption_span.contains(binding.span):
+                return [verdict]
         after = bisect_left(verdicts, binding.span.start + 1, key=end_of_body)
         return verdicts[after - 1 : after] if after else []
 

@@ -53,7 +53,7 @@ RowAddresses = tuple[tuple[Address, ...], ...]
 """For each row of a table the addresses of its numbers; none where they are not known."""
 
 
-class Layout(NamedTuple):
+class LineLayout(NamedTuple):
     """What is left of a line without the cells of a row."""
 
     heading: str
@@ -67,7 +67,7 @@ class Fit(NamedTuple):
 
     line: int
     places: tuple[int, ...]
-    layout: Layout
+    layout: LineLayout
     is_right: bool
     """Whether its numbers match, too."""
 
@@ -117,7 +117,7 @@ def compare_table(
                 span = cell.span(old)
                 changes.append(number_change(span, span.text, new.text, (old, new)))
     changes += [] if changes else matcher.header_changes(match)
-    shown = (len(match.rows), 0 if elides_rows(table) else match.printed)
+    counts = (len(match.rows), 0 if elides_rows(table) else match.printed)
     return Verdict(
         recording,
         comparison,
@@ -125,7 +125,7 @@ def compare_table(
         tuple(changes),
         addresses if changes else matcher.addresses(match),
         match.rivals,
-        shown,
+        counts,
     )
 
 
@@ -162,7 +162,7 @@ class TableMatcher:
 
     def match(self) -> TableMatch:
         """The line of each row."""
-        layouts = self._common_layouts()
+        layouts = self._common_layouts() if self.rows else []
         if not layouts:
             return TableMatch(tuple(self._match_rows(None)))
         is_right = any(self._right_rows(layout) == len(self.rows) for layout in layouts)
@@ -191,37 +191,42 @@ class TableMatcher:
 
     # --- layouts
 
-    def _common_layouts(self) -> list[Layout]:
-        """The layouts that all rows have, of which none is better in all than another."""
-        layouts = (
-            [
-                layout
-                for layout in dict.fromkeys(fit.layout for fit in self._fits_of_row(0))
-                if all(self._fits_in(row, layout) for row in range(len(self.rows)))
-            ]
-            if self.rows
-            else []
-        )
-        right = [layout for layout in layouts if self._right_rows(layout) == len(self.rows)]
-        scores = {layout: self._score(layout) for layout in right or layouts}
-        return [
-            layout
-            for layout, score in scores.items()
-            if not any(_dominates(rival, score) for rival in scores.values())
-        ]
+    def _common_layouts(self) -> list[LineLayout]:
+        """The layouts that all rows have and that are not worse than another; the likeliest first.
 
-    def _describe(self, layout: Layout) -> str:
+        Where the numbers of some are right, also those that the header names better than these.
+        """
+        layouts = [
+            layout
+            for layout in dict.fromkeys(fit.layout for fit in self._fits_of_row(0))
+            if all(self._fits_in(row, layout) for row in range(len(self.rows)))
+        ]
+        right = [layout for layout in layouts if self._right_rows(layout) == len(self.rows)]
+        scores = {layout: self._score(layout) for layout in layouts}
+        best = [
+            layout
+            for layout in right or layouts
+            if not any(_dominates(scores[rival], scores[layout]) for rival in right or layouts)
+        ]
+        doubts = (
+            layout
+            for layout in (layouts if right else ())
+            if layout not in right and scores[layout][1:3] > scores[best[0]][1:3]
+        )
+        return [*best, *doubts]
+
+    def _describe(self, layout: LineLayout) -> str:
         line = self.lines[self._fits_in(0, layout)[0].line]
         return f"{layout.heading} / {line}" if layout.heading else line
 
-    def _fits_in(self, row: int, layout: Layout) -> list[Fit]:
+    def _fits_in(self, row: int, layout: LineLayout) -> list[Fit]:
         return [fit for fit in self._fits_of_row(row) if fit.layout == layout]
 
-    def _right_rows(self, layout: Layout) -> int:
+    def _right_rows(self, layout: LineLayout) -> int:
         rows = range(len(self.rows))
         return sum(any(fit.is_right for fit in self._fits_in(row, layout)) for row in rows)
 
-    def _score(self, layout: Layout) -> tuple[float, ...]:
+    def _score(self, layout: LineLayout) -> tuple[float, ...]:
         """How well a layout suits the table, in several respects."""
         fit = self._fits_in(0, layout)[0]
         numbers = [(cell.column, number) for cell, _, number in self._pairs(0, fit)]
@@ -233,7 +238,7 @@ class TableMatcher:
         share = len(numbers) / max(1, printed_row.count)
         return self._right_rows(layout), verdicts.count(True), -verdicts.count(False), share
 
-    def _count_lines(self, layout: Layout | None) -> int:
+    def _count_lines(self, layout: LineLayout | None) -> int:
         """How many printed lines have a layout, whatever text their cells hold."""
         if layout is None:
             return 0
@@ -264,7 +269,7 @@ class TableMatcher:
                 return (fit,)
         return tuple(fit for fit in fits if fit.is_right)
 
-    def _match_rows(self, layout: Layout | None) -> Iterator[RowMatch]:
+    def _match_rows(self, layout: LineLayout | None) -> Iterator[RowMatch]:
         """Each row with its line, in order; only lines of this layout where one is given."""
         fits = [
             self._fits_of_row(row) if layout is None else self._fits_in(row, layout)
@@ -283,8 +288,10 @@ class TableMatcher:
         matches: list[Fit | None] = []
         for row in range(len(self.rows)):
             at = line_of_row.get(row)
-            there = [fit for fit in fits[row] if at is not None and fit.line == lines[at]]
-            best = max(there, key=lambda fit: (fit.is_right, self._weight(row, fit)), default=None)
+            fits_there = [fit for fit in fits[row] if at is not None and fit.line == lines[at]]
+            best = max(
+                fits_there, key=lambda fit: (fit.is_right, self._weight(row, fit)), default=None
+            )
             matches.append(best)
         are_all = layout is not None and len(lines) == len(self.rows)
         are_named = all(
@@ -299,14 +306,14 @@ class TableMatcher:
     def _is_named(self, row: int, fit: Fit, fits: Iterable[Fit]) -> bool:
         """Whether the first number of a row is that of this line and of no other."""
         lines = {
-            other.line
-            for other in fits
-            for _, old, new in self._pairs(row, other)[:1]
+            candidate.line
+            for candidate in fits
+            for _, old, new in self._pairs(row, candidate)[:1]
             if self._numbers_match(old, new)
         }
         return lines == {fit.line}
 
-    def _nearest_fit(self, row: int, layouts: Sequence[Layout]) -> Fit:
+    def _nearest_fit(self, row: int, layouts: Sequence[LineLayout]) -> Fit:
         """The way in which the numbers of a row are nearest to the printed ones."""
 
         def distance(fit: Fit) -> float:
@@ -351,7 +358,7 @@ class TableMatcher:
                     at = place + len(cell.canonical.skeleton)
                 parts.append(canonical.skeleton[at:])
                 columns = tuple(cell.column for cell in cells)
-                layout = Layout(self.text.heading(line), tuple(parts), columns)
+                layout = LineLayout(self.text.heading(line), tuple(parts), columns)
                 yield Fit(line, way, layout, is_right)
 
     # --- the header
@@ -416,10 +423,10 @@ def updated_row(match: RowMatch, comparison: model.Comparison) -> tuple[RowCell,
 def _dominates(rival: Sequence[float], score: Sequence[float]) -> bool:
     """Whether a layout is better in something and worse in nothing; its share counts last."""
     *respects, share = rival
-    *others, other_share = score
-    if respects == others:
-        return share > other_share
-    return all(a >= b for a, b in zip(respects, others, strict=True))
+    *least, least_share = score
+    if respects == least:
+        return share > least_share
+    return all(a >= b for a, b in zip(respects, least, strict=True))
 
 
 def _is_word(character: str) -> bool:

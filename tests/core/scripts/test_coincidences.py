@@ -71,9 +71,8 @@ def make_world(seed: int) -> World:
             ),
         ]
 
-    shown = [*range(5)]
-    prose = " ".join(f'The {names[i]} is `{old[i]} m`{{out="{names[i]}"}}.' for i in shown[:3])
-    prose += " " + " ".join(f"And {names[i]}: `{old[i]}`{{out}}." for i in shown[3:])
+    prose = " ".join(f'The {names[i]} is `{old[i]} m`{{out="{names[i]}"}}.' for i in range(3))
+    prose += " " + " ".join(f"And {names[i]}: `{old[i]}`{{out}}." for i in range(3, 5))
     table = "| cup | T₀ (K) | k (Hz) | τ (s) |\n| --- | --- | --- | --- |\n" + "".join(
         f"| {cup} | {' | '.join(old[5 + 3 * i : 8 + 3 * i])} |\n" for i, cup in enumerate(cups[:2])
     )
@@ -81,7 +80,7 @@ def make_world(seed: int) -> World:
     text = "\n".join(before)
     lesson = f"```python file={PATH}\nprint(1)\n```\n\n```output\n{text}\n```\n\n{prose}\n\n"
     lesson += f"Output, in short:\n\n{table}\n"
-    quantities = [(old[i], new[i]) for i in shown]
+    quantities = [(old[i], new[i]) for i in range(5)]
     rows = {
         cup: (old[5 + 3 * i : 8 + 3 * i], new[5 + 3 * i : 8 + 3 * i])
         for i, cup in enumerate(cups[:2])
@@ -126,7 +125,7 @@ def shown_rows(page: Document) -> Iterator[list[str]]:
 @pytest.mark.parametrize("seeds", [range(60), pytest.param(range(1000), marks=pytest.mark.slow)])
 def test_no_value_ever_comes_from_another_quantity(seeds: range) -> None:
     counts: Counter[str] = Counter()
-    wrong: list[str] = []
+    mistakes: list[str] = []
     for seed in seeds:
         world, addresses = make_world(seed), Addresses()
         page = document(world.lesson)
@@ -144,11 +143,11 @@ def test_no_value_ever_comes_from_another_quantity(seeds: range) -> None:
             text = binding.text.removesuffix(" m")
             counts["followed" if text == new else "left"] += 1
             is_told = text == old and binding.text_span in told_places
-            wrong += [] if text == new or is_told else [f"{seed}: {text} for {new}, was {old}"]
+            mistakes += [] if text == new or is_told else [f"{seed}: {text} for {new}, was {old}"]
         for name, *values in shown_rows(new_page):
             old_row, new_row = world.rows[name]
             counts["rows followed" if values == new_row else "rows left"] += 1
-            wrong += [] if values in (old_row, new_row) else [f"{seed}: {name} {values}"]
-    assert wrong == []
+            mistakes += [] if values in (old_row, new_row) else [f"{seed}: {name} {values}"]
+    assert mistakes == []
     assert (counts["rows left"], counts["refused outputs"]) == (0, 0), counts
     assert counts["left"] < counts["followed"] / 5, counts  # those that were printed at two places

@@ -55,6 +55,14 @@ def test_rows_stand_in_lines_with_whole_words_and_numbers() -> None:
         assert verdict(row, comparison=MODES[mode]).status == status, row
 
 
+def test_a_table_is_the_lines_that_its_header_names() -> None:
+    for printed, rows, status, count, is_doubtful in CASES["layouts"]:
+        result = compare(table(rows), EXACT, printed)
+        row_count, printed_count = result.rows
+        assert (result.status, max(0, printed_count - row_count)) == (status, count), rows
+        assert bool(result.rivals) is is_doubtful, rows
+
+
 def test_the_number_that_drifted_is_named() -> None:
     result = verdict(ROWS.replace("6.641", "6.702"))
     (change,) = result.changes

@@ -92,7 +92,7 @@ def test_outputs_are_compared_while_typing(editor: Editor) -> None:
 
 
 def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
-    typed = FALL.replace("print(", 'print("a ball", ')
+    typed = FALL.replace("{data.qpos[2]:.3f} m", "{2 * data.qpos[2]:.3f} m")
     editor.write(FIRST_LESSON, typed)
     editor.until(FIRST_LESSON)  # what it prints now is not known yet
     editor.save(FIRST_LESSON)
@@ -105,7 +105,8 @@ def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
     action = editor.wait_for(lambda: editor.actions(FIRST_LESSON, "at 1.|000 m").get(accept))
     assert action.kind == types.CodeActionKind.QuickFix and action.diagnostics
     (new,) = editor.apply_edits(action.edit.changes).values()
-    assert new == ("A line more.\n\n" + typed).replace("\nafter", "\na ball after")
+    expected = typed.replace("at 1.000 m", "at 2.000 m").replace("`1.000`", "`2.000`")
+    assert new == f"A line more.\n\n{expected}"  # with the number that is bound to it
     editor.write(FIRST_LESSON, new)
     editor.until(FIRST_LESSON)
 
@@ -313,13 +314,25 @@ def test_a_number_that_was_printed_can_be_bound(editor: Editor) -> None:
 
 
 def test_a_proposal_of_a_diagnostic_is_a_quick_fix(editor: Editor) -> None:
-    text = FALL.replace("at `1.000`{out} m", "at `1.200 m`{out}")
+    text = FALL.replace("at `1.000`{out} m", 'at `1.200 m`{out="at"}')
     editor.write(FIRST_LESSON, text)
     editor.until(FIRST_LESSON, "binding-mismatch")
     (fix,) = editor.actions(FIRST_LESSON, "`1.2|00 m`").values()
     assert (fix.title, fix.kind) == ("Write `1.000 m`", types.CodeActionKind.QuickFix)
     assert not fix.is_preferred  # a number is for a human to decide
     assert editor.apply_edits(fix.edit.changes)[FIRST_LESSON] == text.replace("1.200", "1.000")
+
+
+def test_a_number_that_is_printed_twice_has_an_action_for_each_place(editor: Editor) -> None:
+    text = FALL.replace("at `1.000`{out} m", "at `0.002`{out}")
+    twice = text.replace("after 0.002 s at 1.000 m", "after 0.002 s at 0.002 m")
+    editor.write(FIRST_LESSON, twice)
+    editor.until(FIRST_LESSON, "output-drift", "output-ambiguous")
+    titles = [*editor.actions(FIRST_LESSON, "`0.0|02`{out}")]
+    assert [title.partition(" chooses ")[0] for title in titles] == [
+        '`{out="after"}`',
+        '`{out="at"}`',
+    ]
 
 
 def test_all_mistakes_of_a_file_are_fixed_together(editor: Editor) -> None:
