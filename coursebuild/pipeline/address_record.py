@@ -15,7 +15,7 @@ from msgspec import Struct
 from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model import Document
-from coursebuild.core.model.results import Address
+from coursebuild.core.model.lesson_record import Address
 from coursebuild.core.scripts.bound_places import document_values
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.scripts.provenance import Addresses, ShownValue

@@ -28,7 +28,7 @@ from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.findings import unproven_units
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
-from coursebuild.pipeline.address_record import write_addresses
+from coursebuild.pipeline.address_record import addresses_path, write_addresses
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.proofs import remarks_on_proofs
@@ -351,7 +351,8 @@ def depends_on(
     if "." in packages:
         return None
     pages = [page.path for page in course.pages]
-    files = {*pages, *map(record_path, pages), *shown_files(course), *packages}
+    records = {*map(record_path, pages), *map(addresses_path, pages)}
+    files = {*pages, *records, *shown_files(course), *packages}
     if interpreter is not None:
         files |= {interpreter.python, f"{interpreter.prefix}/pyvenv.cfg", *interpreter.packages}
     for run in results.runs:

@@ -48,6 +48,18 @@ _MOST_NAMED = 3
 """The most packages that a message names of those that others brought along."""
 
 
+class Address(Struct, frozen=True, omit_defaults=True):
+    """Where in an output a value was printed; numbers in words are written `#`."""
+
+    line: str
+    place: int
+    """The index of the first of its numbers in the line."""
+    heading: str = ""
+    name: str = ""
+    names: tuple[str, ...] = ()
+    """The numbers that tell the line from others with its words, and those of all such lines."""
+
+
 class Provenance(Struct, frozen=True):
     """What a script ran with."""
 

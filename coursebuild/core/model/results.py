@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from msgspec import Meta, Struct, field
 
 from coursebuild.core.model import Comparison, Limits, Recording
-from coursebuild.core.model.lesson_record import Provenance
+from coursebuild.core.model.lesson_record import Address, Provenance
 from coursebuild.core.text.source import Span
 
 
@@ -213,18 +213,6 @@ class Change(Struct, frozen=True):
     relative_error: float | None = None
     digits: int | None = None
     """Leading significant digits that agree."""
-
-
-class Address(Struct, frozen=True, omit_defaults=True):
-    """Where in an output a value was printed; numbers in words are written `#`."""
-
-    line: str
-    place: int
-    """The index of the first of its numbers in the line."""
-    heading: str = ""
-    name: str = ""
-    names: tuple[str, ...] = ()
-    """The numbers that tell the line from others with its words, and those of all such lines."""
 
 
 class Verdict(Struct, frozen=True):

@@ -20,7 +20,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.results import Address, Change, DriftKind, Outcome, Verdict
+from coursebuild.core.model.lesson_record import Address
+from coursebuild.core.model.results import Change, DriftKind, Outcome, Verdict
 from coursebuild.core.scripts.bound_numbers import (
     BoundText,
     PrintedLine,

@@ -19,7 +19,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.results import Address, Outcome, Verdict
+from coursebuild.core.model.lesson_record import Address
+from coursebuild.core.model.results import Outcome, Verdict
 from coursebuild.core.scripts.bound_numbers import BoundText, Window
 from coursebuild.core.scripts.column_titles import ColumnTitle
 from coursebuild.core.scripts.lines import plain_text

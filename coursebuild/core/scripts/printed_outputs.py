@@ -6,7 +6,8 @@ from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 
 from coursebuild.core import model
-from coursebuild.core.model.results import Address, ScriptRun, Verdict
+from coursebuild.core.model.lesson_record import Address
+from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.scripts.bound_numbers import PrintedLine, lines_of_run, printed_lines
 from coursebuild.core.scripts.provenance import PrintedText
 from coursebuild.core.scripts.table_cells import row_text

@@ -17,7 +17,7 @@ from typing import TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.model.results import Address
+from coursebuild.core.model.lesson_record import Address
 from coursebuild.core.scripts.bound_numbers import PrintedLine, Window
 from coursebuild.core.scripts.lines import MARK, canonicalize, plain_text
 from coursebuild.core.text.numbers import scan

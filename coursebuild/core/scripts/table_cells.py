@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 
 from msgspec import Struct
 
@@ -11,8 +11,10 @@ from coursebuild.core import model
 from coursebuild.core.scripts.lines import (
     CanonicalText,
     MappedText,
+    SameNumber,
     apply_filters,
     canonicalize,
+    numbers_fit,
 )
 from coursebuild.core.text.numbers import Number, point_decimals
 from coursebuild.core.text.source import Span
@@ -108,3 +110,36 @@ def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
     mapped = apply_filters(MappedText.join(stretches), filters)
     folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
     return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)
+
+
+def _is_word(character: str) -> bool:
+    return character.isalnum() or character == "_"
+
+
+def _find_places(
+    cell: CanonicalText, line: CanonicalText, start: int, numbers_match: SameNumber
+) -> Iterator[int]:
+    """Offsets from `start` on at which a cell stands in a line, whole words and numbers only."""
+    text, cell_text = line.skeleton, cell.skeleton
+    place = text.find(cell_text, start)
+    while place >= 0:
+        end = place + len(cell_text)
+        splits_word = (place > 0 and _is_word(cell_text[0]) and _is_word(text[place - 1])) or (
+            end < len(text) and _is_word(cell_text[-1]) and _is_word(text[end])
+        )
+        if not splits_word and numbers_fit(cell, line, place, numbers_match):
+            yield place
+        place = text.find(cell_text, place + 1)
+
+
+def find_rows(
+    row: Sequence[RowCell], line: CanonicalText, start: int, numbers_match: SameNumber
+) -> Iterator[tuple[int, ...]]:
+    """The ways in which the cells stand in a line in order, each after the one before."""
+    if not row:
+        yield ()
+        return
+    cell = row[0].canonical
+    for place in _find_places(cell, line, start, numbers_match):
+        for rest in find_rows(row[1:], line, place + len(cell.skeleton), numbers_match):
+            yield (place, *rest)

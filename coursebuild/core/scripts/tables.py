@@ -24,24 +24,28 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.results import Address, Change, DriftKind, Verdict
+from coursebuild.core.model.lesson_record import Address
+from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.bound_numbers import PrintedLine, Window
 from coursebuild.core.scripts.column_titles import ColumnTitle, PrintedRow, swapped_columns
 from coursebuild.core.scripts.diff import number_change
 from coursebuild.core.scripts.lines import (
     MARK,
-    CanonicalText,
-    SameNumber,
     Side,
     always_match,
     canonicalize,
-    numbers_fit,
     plain_text,
     same_number,
 )
 from coursebuild.core.scripts.provenance import PrintedText, ShownValue, shown_values
-from coursebuild.core.scripts.table_cells import RowCell, elides_rows, row_text, table_rows
+from coursebuild.core.scripts.table_cells import (
+    RowCell,
+    elides_rows,
+    find_rows,
+    row_text,
+    table_rows,
+)
 from coursebuild.core.text.numbers import Number, relative_error, round_like
 from coursebuild.core.text.quantities import UnitText, are_different, unit_of_printed
 from coursebuild.core.text.source import Span
@@ -348,8 +352,8 @@ class TableMatcher:
         cells = self.rows[row]
         for line in range(len(self.lines)):
             canonical = self._canonical_line(line)
-            places = dict.fromkeys(_find_rows(cells, canonical, 0, self._numbers_match), True)
-            for way in islice(_find_rows(cells, canonical, 0, always_match), _PLACES):
+            places = dict.fromkeys(find_rows(cells, canonical, 0, self._numbers_match), True)
+            for way in islice(find_rows(cells, canonical, 0, always_match), _PLACES):
                 places.setdefault(way, False)
             for way, is_right in places.items():
                 parts, at = [], 0
@@ -427,36 +431,3 @@ def _dominates(rival: Sequence[float], score: Sequence[float]) -> bool:
     if respects == least:
         return share > least_share
     return all(a >= b for a, b in zip(respects, least, strict=True))
-
-
-def _is_word(character: str) -> bool:
-    return character.isalnum() or character == "_"
-
-
-def _find_places(
-    cell: CanonicalText, line: CanonicalText, start: int, numbers_match: SameNumber
-) -> Iterator[int]:
-    """Offsets from `start` on at which a cell stands in a line, whole words and numbers only."""
-    text, cell_text = line.skeleton, cell.skeleton
-    place = text.find(cell_text, start)
-    while place >= 0:
-        end = place + len(cell_text)
-        splits_word = (place > 0 and _is_word(cell_text[0]) and _is_word(text[place - 1])) or (
-            end < len(text) and _is_word(cell_text[-1]) and _is_word(text[end])
-        )
-        if not splits_word and numbers_fit(cell, line, place, numbers_match):
-            yield place
-        place = text.find(cell_text, place + 1)
-
-
-def _find_rows(
-    row: Sequence[RowCell], line: CanonicalText, start: int, numbers_match: SameNumber
-) -> Iterator[tuple[int, ...]]:
-    """The ways in which the cells stand in a line in order, each after the one before."""
-    if not row:
-        yield ()
-        return
-    cell = row[0].canonical
-    for place in _find_places(cell, line, start, numbers_match):
-        for rest in _find_rows(row[1:], line, place + len(cell.skeleton), numbers_match):
-            yield (place, *rest)
