@@ -285,8 +285,8 @@ def _update_table(
                 continue
             span, text = cell.span(old), number_text(old, new, comparison)
             has_comma = table.comma and point_decimals(span.text) != span.text
-            shown = point_decimals(span.text) if has_comma else span.text
-            if shown.replace(MINUS, "-") != old.text:
+            pointed_text = point_decimals(span.text) if has_comma else span.text
+            if pointed_text.replace(MINUS, "-") != old.text:
                 reason = "a number written with an entity or an escape cannot be replaced"
                 return refusal(span, reason)
             # The minus signs of the old number stay: before it, and in its exponent.

@@ -371,9 +371,9 @@ class TableMatcher:
         """Units of the header that are not those of its numbers, and titles that are swapped."""
         for column, units in sorted(self._column_units(match).items()):
             title = self.titles[column]
-            other = next((unit for unit in units if are_different(title.unit, unit)), None)
-            if other is not None:
-                yield Change(DriftKind.TEXT, title.unit_span, title.unit.text, other.text)
+            unlike = next((unit for unit in units if are_different(title.unit, unit)), None)
+            if unlike is not None:
+                yield Change(DriftKind.TEXT, title.unit_span, title.unit.text, unlike.text)
         for row in match.rows[:1]:
             numbers = {cell.column: number for cell, _, number in reversed(row.pairs)}
             line = PrintedRow.of(self.lines[row.line], self.text.heading(row.line))

@@ -279,8 +279,8 @@ class _Counter:
                         source = None
                     self.formula(inline.tex, source, inline.span)
                 case model.Image():
-                    found = find_numbers(inline.alt, self.comma)
-                    numbers = {number.text: number for number in found}
+                    matches = find_numbers(inline.alt, self.comma)
+                    numbers = {number.text: number for number in matches}
                     self.alternatives += (_claim(n, inline.span) for n in numbers.values())
                 case model.Link(target=model.UrlTarget() | model.TermTarget() as target):
                     texts = (child for child in inline.children if isinstance(child, model.Text))
