@@ -25,10 +25,8 @@ _SECOND_READINGS = {
     "C": ("°C",),
     "F": ("°F",),
     "°": ("°C", "°F"),
-    "g": ("Gal",),
 }
-"""What text means besides: an acceleration in `2 g` is 981 Gal."""
-
+"""What a symbol means in text besides."""
 _MAGNITUDES = frozenset("BGMP")
 """In text they count billions and millions more often than they are units."""
 _SIGNS = frozenset(("/", "·", "⋅", "*", "per"))
