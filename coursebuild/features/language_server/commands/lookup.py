@@ -111,7 +111,7 @@ def label_titles(library: Library, owner: Owner | None, document: model.Document
         match block:
             case model.Table(caption=inlines) | model.Paragraph(children=inlines):
                 captions[label.id] = model.plain_text(inlines)
-            case model.Script(path=path):
+            case model.Script(path=path) | model.ScriptPart(path=path):
                 captions[label.id] = path
             case _:
                 captions[label.id] = block.span.first_line().text
