@@ -114,7 +114,7 @@ def label_titles(library: Library, owner: Owner | None, document: model.Document
                 captions[label.id] = model.plain_text(inlines)
             case model.Callout(title=inlines):
                 captions[label.id] = model.plain_text(inlines)
-            case model.Script(path=path):
+            case model.Script(path=path) | model.ScriptPart(path=path):
                 captions[label.id] = path
             case _:
                 captions[label.id] = block.span.first_line().text
