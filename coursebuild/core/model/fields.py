@@ -77,7 +77,7 @@ Orcid: TypeAlias = Annotated[
 class Author(Struct, frozen=True, forbid_unknown_fields=True):
     """Who wrote the course."""
 
-    name: Annotated[Text, describe("as it is to be cited")]
+    name: Annotated[str, Meta(pattern=NOT_BLANK), describe("as it is to be cited")]
     orcid: Annotated[Orcid | None, describe("their [ORCID iD](https://orcid.org)")] = None
 
     @property

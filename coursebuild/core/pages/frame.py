@@ -217,8 +217,8 @@ class PageFrame(Struct, frozen=True):
 def citation(
     course: Course | FrameInputs, words: Strings, address: str = "", part: str = ""
 ) -> str:
-    """How a course, or the part of this title, is to be cited; empty if it names no authors."""
-    if not course.authors:
+    """How a course, or the part of this title, is to be cited; empty without authors and DOI."""
+    if not (course.authors or course.doi):
         return ""
     link = f"https://doi.org/{course.doi}" if course.doi else address
     names = words.join(author.name for author in course.authors)
