@@ -14,7 +14,6 @@ import platform
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from importlib.metadata import Distribution, PathDistribution
 from pathlib import Path
 
@@ -253,8 +252,8 @@ _NAMES = ("model name", "Model", "Hardware", "cpu model", "uarch")
 _CAN_PIN = hasattr(os, "sched_setaffinity")
 
 
-def machine(*, pinned: bool = False, interpreter: Interpreter | None = None) -> Machine:
-    """Versions, system and processor; `pinned`: times are taken on one processor alone."""
+def machine(interpreter: Interpreter | None = None) -> Machine:
+    """Versions, system and processor."""
     return Machine(
         engine=engine_version() if interpreter is None else interpreter.engine,
         python=python_version() if interpreter is None else interpreter.version,
@@ -263,22 +262,7 @@ def machine(*, pinned: bool = False, interpreter: Interpreter | None = None) -> 
         cpu=cpu_name(),
         governor=_read(_GOVERNOR).strip(),
         processors=len(os.sched_getaffinity(0)) if _CAN_PIN else os.cpu_count() or 0,
-        pinned=pinned and _CAN_PIN,
     )
-
-
-@contextmanager
-def one_processor() -> Iterator[None]:
-    """Keep this thread on one of the processors that it may use, where the system can do that."""
-    if not _CAN_PIN:
-        yield
-        return
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {max(before)})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, before)
 
 
 def cpu_name() -> str:

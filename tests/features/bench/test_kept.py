@@ -14,7 +14,7 @@ import pytest
 from msgspec.structs import replace
 
 from coursebuild.features.bench.commands.bench import bench
-from coursebuild.features.bench.commands.measuring import Failure, Place
+from coursebuild.features.bench.commands.measuring import Failure, KeyPlace
 from coursebuild.pipeline.options import Progress
 from coursebuild.pipeline.scenes import CourseScene
 from samples.reports import swing
@@ -60,7 +60,7 @@ def test_model_that_does_not_compile_keeps_no_other_from_being_measured(course: 
 def test_a_scenario_that_cannot_be_measured_is_reported(course: Path) -> None:
     write(course / "models" / "arm.xml", BOX)
     write(course / "models" / "box.toml", TOML)
-    place = Place("models/box.toml", ("scenario", 0, "qvel"))
+    place = KeyPlace("models/box.toml", ("scenario", 0, "qvel"))
     measurement = bench(options(course), Fake(Failure("no way", "", place, "scenario")), ("box",))
     assert measurement.reports == ()
     (diagnostic,) = measurement.diagnostics

@@ -40,7 +40,7 @@ class Facts(Struct, frozen=True):
     problems: tuple[str, ...]
 
 
-class Place(Struct, frozen=True):
+class KeyPlace(Struct, frozen=True):
     """A file, and in TOML the keys that lead to a value."""
 
     path: str
@@ -52,7 +52,7 @@ class Failure(Struct, frozen=True):
 
     message: str
     help: str = ""
-    place: Place | None = None
+    place: KeyPlace | None = None
     """`None` where it is not about a model's files."""
     cause: Literal["scenario", "model", ""] = ""
     """What is wrong: the model, or what is declared beside it."""
@@ -216,12 +216,12 @@ def subject_of(root: Path, scene: CourseScene) -> dict[str, object]:
 
 def diagnostic_of(failure: Failure, scene: CourseScene) -> Diagnostic:
     """What mjbench says of a model, at its place in the course."""
-    place = failure.place or Place(scene.model.source.path)
+    place = failure.place or KeyPlace(scene.model.source.path)
     rule = "model-error" if failure.cause == "model" else "scenario-model"
     return diagnose(rule, _span(place, scene), failure.message, help=failure.help)
 
 
-def _span(place: Place, scene: CourseScene) -> Span:
+def _span(place: KeyPlace, scene: CourseScene) -> Span:
     declarations, model = scene.declarations, scene.model.source
     sources = {source.path: source for source in (model, declarations.source)}
     match place.keys:

@@ -1,0 +1,127 @@
+"""The command `mjbench`, and its answers to another program."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mjbench.cli import main
+from mjbench.reports.records import BENCH, DIET
+
+Capture = pytest.CaptureFixture[str]
+ARM = """\
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody>
+    <body name="bob" pos="0 0 1"><joint name="pivot" axis="0 1 0"/><geom size=".05" pos=".3 0 0"/>
+    </body>
+  </worldbody>
+  <sensor><clock name="time"/></sensor>
+</mujoco>
+"""
+SWING = '[[scenario]]\nname = "swing"\nduration = 0.1\nsample = 0.02\ntimesteps = [0.002]\n'
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    file = tmp_path / "arm.xml"
+    file.write_text(ARM)
+    file.with_suffix(".toml").write_text(SWING)
+    return file
+
+
+@pytest.mark.long
+def test_a_model_is_measured_recorded_and_checked(model: Path, capsys: Capture) -> None:
+    record = str(model.with_name("arm.bench.json"))
+    assert main([str(model), "--record", record]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("arm\n  MuJoCo ") and "  swing: swing\n" in out
+    assert ">" in out and "Euler at 2 ms" in out and "largest stable timestep" in out
+    report = BENCH.decode(Path(record).read_bytes())
+    assert report.card is not None and report.card.browser is None
+    assert main(["bench", str(model), "--check", record]) == 0
+    assert capsys.readouterr().out == "as recorded\n"
+    model.write_text(ARM.replace(".3 0 0", ".4 0 0"))
+    assert main(["bench", str(model), "--check", record]) == 1
+    assert "± 5 %" in capsys.readouterr().out
+
+
+def test_what_a_model_does_not_need_is_taken_out(model: Path, capsys: Capture) -> None:
+    record = str(model.with_name("arm.diet.json"))
+    assert main(["diet", str(model), "--quick"]) == 1
+    assert '    - <sensor><clock name="time"/></sensor>\n' in capsys.readouterr().out
+    code = model.with_name("use.py")
+    code.write_text('print(data.sensor("time").data)\n')
+    assert main(["diet", str(model), "--quick", "--code", str(code)]) == 0
+    capsys.readouterr()
+    assert main(["diet", str(model), "--quick", "--fix"]) == 0
+    assert capsys.readouterr().err == "changed arm.xml\n"
+    assert "sensor" not in model.read_text()
+    model.write_text(ARM)
+    keep = '[[keep]]\nfinding = "sensor-unread time"\nreason = "for the plot"\n'
+    model.with_suffix(".toml").write_text(SWING + keep)
+    assert main(["diet", str(model), "--record", record]) == 0
+    (finding, *_) = DIET.decode(Path(record).read_bytes()).findings
+    assert finding.kept == "for the plot"
+    model.with_suffix(".toml").write_text(SWING + keep.replace("time", "tone"))
+    assert main(["diet", str(model), "--quick"]) == 1
+    out = capsys.readouterr().out
+    assert "`sensor-unread tone` no longer keeps anything (arm.toml:7)" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "toml", "status", "message"),
+    [
+        (["{}.txt"], "", 2, "there is no file "),
+        (["{}", "--quick", "--record", "a"], "", 2, "--quick measures only a part"),
+        (["{}", "--engines", "mjocuo"], "", 2, "there is no engine `mjocuo`: known are mujoco, "),
+        (["stability", "nope"], "", 2, "no hard case is called `nope`: tumbling-box, "),
+        (["{}"], SWING.replace("0.1", "0.1001"), 1, "arm.toml: scenario.0.duration: `duration`"),
+        (["{}"], SWING + "hold = true\n", 1, "arm.toml: Expected `float | null`, got `bool`"),
+    ],
+)
+def test_mistakes_are_told_in_words(
+    arguments: list[str], toml: str, status: int, message: str, model: Path, capsys: Capture
+) -> None:
+    model.with_suffix(".toml").write_text(toml)
+    assert main([part.format(model) for part in arguments]) == status
+    assert f"mjbench: error: {message}" in capsys.readouterr().err
+
+
+def converse(lines: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The answers to requests, and to questions where they stand in between."""
+    text = "".join(json.dumps(line) + "\n" for line in lines)
+    command = [sys.executable, "-m", "mjbench", "jobs"]
+    run = subprocess.run(command, input=text, capture_output=True, text=True, check=True)
+    return [json.loads(line) for line in run.stdout.splitlines()]
+
+
+def test_another_program_is_asked_what_only_it_knows(model: Path) -> None:
+    subject = {
+        "folder": str(model.parent),
+        "path": "arm.xml",
+        "mjcf": ARM,
+        "name": "arm",
+        "digest": "a",
+        "declarations_path": "arm.toml",
+        "declarations": SWING,
+        "exact": "arm.exact.py",
+    }
+    scenario = {"job": "scenario", "subject": subject, "number": 0, "quick": True, "timed": False}
+    failure = {"output": "", "failure": "NameError: no"}
+    answers = converse([{"job": "about"}, scenario, failure])
+    assert "double-pendulum" in answers[0]["result"]["problems"]
+    (question,) = (line["ask"] for line in answers if "ask" in line)
+    script, path, query = question["exact"]
+    assert script.endswith("exact.py") and path == "arm.exact.py" and "times" in json.loads(query)
+    assert answers[-1]["failure"] == {
+        "message": "`arm.exact.py` gives no motion: NameError: no",
+        "help": "define `motion(time, qpos, qvel)` there, for the positions at a time in s",
+        "place": {"path": "arm.exact.py", "keys": []},
+        "cause": "scenario",
+    }
