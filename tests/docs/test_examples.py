@@ -47,7 +47,9 @@ UNTRIED = {
     r"pytest --coursebuild": "tried in cli/test_pytest_plugin.py",
     r"pytest tests": "tried in features/authoring/test_new.py",
     r"coursebuild (-C \S+ )?(serve|lsp)": "runs until it ends; tried in pipeline/test_serving.py",
-    r"coursebuild (-C \S+ )?(bench|stability|diet)": "measures for minutes; tried in features/bench/",
+    r"coursebuild (-C \S+ )?(bench|stability|diet)": (
+        "measures for minutes; tried in features/bench/"
+    ),
     r"coursebuild \w+ .*--sandbox": "needs a system with a sandbox; tried in core/run/",
     r"coursebuild export pdf": "needs a browser; tried in features/book/",
     r"coursebuild diff .*--base-site": "needs two built sites; tried in features/test_diff.py",
