@@ -143,7 +143,8 @@ def check(problems: list[Problem]) -> None:
 def prepare(names: list[str]) -> None:
     """Compile the modules, and check cases of these names, or all, as they are."""
     for file in FILES:
-        TREES[file] = ast.parse((ROOT / PACKAGE.replace(".", "/") / f"{file}.py").read_text())
+        path = ROOT / "mjbench" / PACKAGE.replace(".", "/") / f"{file}.py"
+        TREES[file] = ast.parse(path.read_text())
         CODES[file] = compile(TREES[file], file, "exec")
     problems = load(CODES)
     for problem in [shorten(problems[name]) for name in names or problems]:
