@@ -62,9 +62,10 @@ PRINTED: list[tuple[str, Sequence[str], Sequence[str]]] = [
     (
         "a copy of the process",
         [
-            "import os\nprint('a', flush=True)\nchild = os.fork()",
-            "if child: os.waitpid(child, 0)\nelse: print('c', flush=True)",
-            "if child: print('d')",
+            "import os\nprint('a', flush=True)",
+            "child = os.fork()\nif child:\n    os.waitpid(child, 0)\n"
+            "else:\n    print('c', flush=True)\n    os._exit(0)",
+            "print('d')",
         ],
         ["a|", "c|", "d|"],
     ),
