@@ -157,7 +157,7 @@ examples:
   coursebuild explain output-drift             a rule, as in error[output-drift]
   coursebuild explain 4.2                      would the scripts of a lesson run, and why?
   coursebuild explain models/pendulum.xml      what depends on this file?
-  coursebuild explain content/lessons/4.2-mass-and-inertia.md:570    where do its numbers come from?
+  coursebuild explain content/lessons/1.1-pendulum.md:8    where do its numbers come from?
 """
 
 
