@@ -19,8 +19,9 @@ from support.markdown_files import DOCS, fences
 from support.scratch_course import Folder
 
 CODE = [fence for fence in fences(DOCS / "how-to/features.md") if fence.kind == "python"]
-EXAMPLES = [fence.text for fence in CODE if not fence.words]
-STEPS = [fence.text for fence in CODE if fence.is_("fragment")]
+WALK = 5
+"""How many steps the walk through a first feature has."""
+STEPS, EXAMPLES = ([fence.text for fence in CODE[:WALK]], [fence.text for fence in CODE[WALK:]])
 
 SHOUT = fixture_text("scripts/shout_feature.txt")
 LESSON = "## Hello\n\n```shout\nlisten <now>\n```\n"

@@ -86,7 +86,7 @@ def test_explain_says_where_the_numbers_of_a_line_come_from(make: Make) -> None:
   `steel  84.9  0.0121  83.5` is printed by examples/cups.py
     number 1 of `steel T0 = # \u00b0C k = # # /min tau = # min`
     number 2 of `steel T0 = # \u00b0C k = # # /min tau = # min`
-    number 4 of `steel T0 = # \u00b0C k = # # /min tau = # min`
+    number 3 of `steel T0 = # \u00b0C k = # # /min tau = # min`
 """
     )
     result = folder.main("explain", f"{folder.lesson()}:{line + 2}")

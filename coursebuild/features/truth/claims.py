@@ -25,6 +25,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from itertools import groupby
+from math import isfinite
 from operator import itemgetter
 
 from msgspec import Struct
@@ -362,7 +363,9 @@ def _claim(number: Number, span: Span, unit_text: str = "") -> Claim:
     unit = find_unit(unit_text) if unit_text else None
     size = float(measure(unit)) if unit is not None else 1.0
     zero = float(unit.zero) if unit is not None else 0.0
-    value, step = float(number.value), 10.0**number.place
+    value, step = float(number.value), float(f"1e{number.place}")
+    if not (isfinite(value) and isfinite(step)):
+        return Claim(span, number.text)  # larger than any number of a script
     return Claim(span, number.text, ((value, step), ((value + zero) * size, step * size)))
 
 
