@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
                         candidates += _read_ids(Path(root))
                     case "MODEL" | "SCENE" if root is not None:
                         candidates += (path.stem for path in Path(root, "models").glob("*.xml"))
-                    case "RULE|PATH":
+                    case "RULE|PATH[:LINE]":
                         candidates += [*RULES, *(_read_ids(Path(root)) if root is not None else ())]
                     case "SCHEMA":
                         candidates += schema_roots()
