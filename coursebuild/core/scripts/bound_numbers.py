@@ -6,11 +6,13 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from decimal import Decimal
 from functools import cached_property
+from itertools import accumulate
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import Filter, Recording, Table
+from coursebuild.core.scripts.column_titles import ColumnTitle
 from coursebuild.core.scripts.lines import MappedText, Side, plain_text, replace_ranges
 from coursebuild.core.scripts.table_cells import RowCell, table_rows
 from coursebuild.core.text.numbers import (
@@ -47,6 +49,8 @@ class PrintedLine(Struct, frozen=True, dict=True):
     """Where `text[start:end]` stands in the lesson; `None` for what is not recorded."""
     is_grouped: bool = False
     """Whether commas between digits part thousands, as they all do in its output."""
+    columns: tuple[tuple[int, UnitText], ...] = ()
+    """Of a row of a table: the end of each cell, and the unit in the title of its column."""
 
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
@@ -64,20 +68,25 @@ def lines_of_run(stdout: str, filters: Iterable[Filter] = ()) -> list[PrintedLin
 def printed_lines(recording: Recording, filters: Iterable[Filter] = ()) -> tuple[PrintedLine, ...]:
     """The lines of a recorded output; without filters, as the author sees them."""
     if isinstance(recording.body, Table):
-        rows = [_join_cells(row) for row in table_rows(recording.body)]
-        texts = [point_decimals(r.text) if recording.body.comma else r.text for r in rows]
-        is_grouped = has_groups("\n".join(texts))
-        source = recording.body.span.source
-        return tuple(
-            PrintedLine(text, _locator_in_row(row, source), is_grouped)
-            for text, row in zip(texts, rows, strict=True)
-        )
+        return tuple(_lines_of_table(recording.body))
     side = Side.of(recording.body.text, filters)
     is_grouped = has_groups("\n".join(side.lines))
     return tuple(
         PrintedLine(line, _locator_in_fence(recording.body, side, index), is_grouped)
         for index, line in enumerate(side.lines)
     )
+
+
+def _lines_of_table(table: Table) -> Iterator[PrintedLine]:
+    rows, source = table_rows(table), table.span.source
+    units = [ColumnTitle.of(title).unit for title in table.header]
+    joined_rows = [_join_cells(row) for row in rows]
+    texts = [point_decimals(row.text) if table.comma else row.text for row in joined_rows]
+    is_grouped = has_groups("\n".join(texts))
+    for row, joined_row, text in zip(rows, joined_rows, texts, strict=True):
+        ends = accumulate(len(cell.mapped.text) + 1 for cell in row)
+        columns = tuple((end - 1, units[cell.column]) for end, cell in zip(ends, row, strict=True))
+        yield PrintedLine(text, _locator_in_row(joined_row, source), is_grouped, columns)
 
 
 def _locator_in_fence(body: Excerpt, side: Side, line: int) -> Locate:
@@ -114,7 +123,14 @@ class Window(Struct, frozen=True):
         """The units that are printed with them, the lines being all of their output."""
         index = next((i for i, line in enumerate(lines) if line is self.line), 0)
         above = [line.text for line in lines[:index]]
-        return [unit_of_printed(self.line.text, number, above) for number in self.numbers]
+        return [
+            unit_of_printed(self.line.text, number, above) or self._unit_of_title(number)
+            for number in self.numbers
+        ]
+
+    def _unit_of_title(self, number: Number) -> UnitText:
+        units = (unit for end, unit in self.line.columns if number.end <= end)
+        return next(units, NO_UNIT)
 
     @property
     def text(self) -> str:

@@ -19,6 +19,7 @@ from collections.abc import Iterator, Mapping
 
 from msgspec.structs import replace
 
+from coursebuild.core.text.units import LEVELS
 from coursebuild.features.arithmetic.evaluate import (
     ORDERS,
     UNDECIDED,
@@ -140,8 +141,8 @@ def _strip_unit(expression: Expression) -> Expression:
     kind, parts = expression.kind, expression.parts
     if kind == "-" and len(parts) == 1:
         return replace(expression, parts=(_strip_unit(parts[0]),))
-    has_unit = kind == "*" and parts[1].kind == "unit" and parts[1].text not in ("%", "deg")
-    return parts[0] if has_unit else expression
+    has_unit = kind == "*" and parts[1].kind == "unit"
+    return parts[0] if has_unit and parts[1].text not in ("%", "deg", *LEVELS) else expression
 
 
 def _find_mistake(left: Expression, right: Expression, relation: str) -> FormulaComparison | None:
