@@ -71,7 +71,8 @@ def with_provenance(
     def provenance(run: ScriptRun) -> Provenance:
         imports = {*imports_by_path[run.path]}
         for path in () if run.trace is None else run.trace.files:
-            imports |= imports_of(path) if path.endswith(".py") else frozenset()
+            is_of_course = path.endswith(".py") and not path.startswith("mjcourse/")  # our package
+            imports |= imports_of(path) if is_of_course else frozenset()
         imports |= {"mujoco"} if "mjcourse" in imports else set()
         all_packages = _versions(packages, modules_by_path[run.path])
         direct = _versions(packages, imports & modules_by_path[run.path])
