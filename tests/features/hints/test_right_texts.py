@@ -41,7 +41,7 @@ def this_repository() -> Iterator[tuple[str, str]]:
     """The lessons and the manual, which are right texts as well."""
     for folder in ("content", "docs"):
         for path in sorted((ROOT / folder).rglob("*.md")):
-            if "public" in path.relative_to(ROOT).parts:  # a built site
+            if {"public", ".coursebuild"} & {*path.relative_to(ROOT).parts}:  # a built site
                 continue
             yield path.relative_to(ROOT).as_posix(), path.read_text("utf-8")
 
