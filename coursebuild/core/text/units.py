@@ -266,8 +266,6 @@ def _read_table() -> tuple[dict[str, UnitRow], dict[str, str]]:
 
 
 UNITS, NAMES = _read_table()
-LEVELS = frozenset(symbol for symbol, row in UNITS.items() if row.sizes == ("?",))
-"""The units of logarithmic scales, with which nothing is computed."""
 
 
 @functools.lru_cache(maxsize=512)

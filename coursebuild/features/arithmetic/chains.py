@@ -19,7 +19,7 @@ from collections.abc import Iterator, Mapping
 
 from msgspec.structs import replace
 
-from coursebuild.core.text.units import LEVELS
+from coursebuild.core.text.units import UNITS
 from coursebuild.features.arithmetic.evaluate import (
     ORDERS,
     UNDECIDED,
@@ -128,6 +128,10 @@ def _is_of_numbers(side: FormulaSide, symbols: Mapping[str, SymbolQuantity]) -> 
     return not (side.expression.names() & symbols.keys())
 
 
+_LEVELS = frozenset(symbol for symbol, row in UNITS.items() if row.sizes == ("?",))
+"""The units of logarithmic scales, with which nothing is computed."""
+
+
 def _has_common_unit(sides: tuple[FormulaSide, ...]) -> bool:
     """Whether sides end in the same unit, and there is no other in all of them."""
     expressions = [s.expression for s in sides if isinstance(s.expression, Expression)]
@@ -142,7 +146,7 @@ def _strip_unit(expression: Expression) -> Expression:
     if kind == "-" and len(parts) == 1:
         return replace(expression, parts=(_strip_unit(parts[0]),))
     has_unit = kind == "*" and parts[1].kind == "unit"
-    return parts[0] if has_unit and parts[1].text not in ("%", "deg", *LEVELS) else expression
+    return parts[0] if has_unit and parts[1].text not in ("%", "deg", *_LEVELS) else expression
 
 
 def _find_mistake(left: Expression, right: Expression, relation: str) -> FormulaComparison | None:
