@@ -10,7 +10,8 @@ neither its place, nor its path, nor its settings from that folder:
 3. The environment is made of what its purpose needs of the user's (`environment`): the home, the
    language, proxies and mirrors stay; what would say to Python where code lies does not.
 4. Programs are found in the absolute places of PATH alone (`find_program`).
-5. Confinement, limits and what it has to end with are arguments.
+5. Confinement and what it has to end with are arguments. A limit of memory is set by whoever starts
+   it, once it has imported what it needs.
 
 The scripts of a course are the exception, as `docs/reference/scripts.md` says: their supervisor is
 started here like all else, with the environment of scripts, and only then enters the project.
