@@ -37,7 +37,7 @@ _MOST_NAMED = 2
 Point: TypeAlias = tuple[float | None, float | None]
 
 
-class Part(Struct, frozen=True, omit_defaults=True):
+class DrawnPart(Struct, frozen=True, omit_defaults=True):
     """A curve, or whatever else an axes draws."""
 
     kind: str
@@ -69,7 +69,7 @@ class Axes(Struct, frozen=True):
     ranges: tuple[float, float]
     """How long the axes are, in the coordinates of places."""
     legend: tuple[str, ...]
-    parts: tuple[Part, ...]
+    parts: tuple[DrawnPart, ...]
     """In the order in which they are drawn."""
 
 
@@ -192,7 +192,7 @@ def _part_differences(old: Axes, new: Axes) -> Iterator[str]:
             yield f"{lead} {difference}"
 
 
-def _part_difference(old: Part, new: Part, axes: Axes) -> str:
+def _part_difference(old: DrawnPart, new: DrawnPart, axes: Axes) -> str:
     if old.kind != new.kind:
         return f"is a {new.kind} where a {old.kind} is recorded"
     counts = [sum(map(len, part.paths)) for part in (old, new)]
@@ -219,7 +219,7 @@ def _part_difference(old: Part, new: Part, axes: Axes) -> str:
     return _value_difference(old, new) or _style_difference(old, new)
 
 
-def _value_difference(old: Part, new: Part) -> str:
+def _value_difference(old: DrawnPart, new: DrawnPart) -> str:
     low, high = map(_number, old.range)
     pairs = list(zip((*old.values, *old.range), (*new.values, *new.range), strict=True))
     different = [n for n, (a, b) in enumerate(pairs) if not _are_close(a, b, abs(high - low))]
@@ -234,7 +234,7 @@ def _value_difference(old: Part, new: Part) -> str:
     return ""
 
 
-def _style_difference(old: Part, new: Part) -> str:
+def _style_difference(old: DrawnPart, new: DrawnPart) -> str:
     for name, before in old.style.items():
         now = new.style.get(name, "")
         if before != now:

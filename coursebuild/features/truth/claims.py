@@ -60,7 +60,7 @@ _MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?
 _DIGIT = re.compile("[0-9]")
 
 
-class Claim(Struct, frozen=True):
+class StatedNumber(Struct, frozen=True):
     """A number that a document states."""
 
     span: Span
@@ -85,9 +85,9 @@ class Claim(Struct, frozen=True):
 class Claims(Struct, frozen=True):
     """The claims of a document that its scripts and formulas do not prove."""
 
-    open: tuple[Claim, ...]
+    open: tuple[StatedNumber, ...]
     """Those that name no source."""
-    sourced: tuple[Claim, ...] = ()
+    sourced: tuple[StatedNumber, ...] = ()
     """Those whose source is a part of the course."""
     inputs: tuple[float, ...] = ()
     """The numbers that are given, or computed with."""
@@ -173,7 +173,7 @@ def check_sources(
                 yield diagnose("given-source", claim.span, message, help=help)
 
 
-def unbound_results(course: model.Course) -> Iterator[tuple[model.Owner, tuple[Claim, ...]]]:
+def unbound_results(course: model.Course) -> Iterator[tuple[model.Owner, tuple[StatedNumber, ...]]]:
     """Yield the results that each lesson and page of the menu states, and nothing gives."""
     parts = _Parts(course)
     for owner, document in course.owned_documents:
@@ -207,12 +207,12 @@ class _Counter:
     ) -> None:
         """`comma`: whether one may stand before the decimals of a number."""
         self.comparisons, self.comma = comparisons, comma
-        self.open: list[Claim] = []
-        self.sourced: list[Claim] = []
+        self.open: list[StatedNumber] = []
+        self.sourced: list[StatedNumber] = []
         self.inputs: set[float] = set()
         self.marked: set[str] = set()
         """The texts that are bound or given."""
-        self.alternatives: list[Claim] = []
+        self.alternatives: list[StatedNumber] = []
 
     def blocks(self, blocks: Iterable[model.Block]) -> None:
         """Add the claims of blocks."""
@@ -250,13 +250,13 @@ class _Counter:
                 else:
                     self.inlines(cell.children)
 
-    def give(self, source: str, mark: Span, claims: Iterable[Claim]) -> None:
+    def give(self, source: str, mark: Span, claims: Iterable[StatedNumber]) -> None:
         """Give claims their source; a part of the course is kept with each of them."""
         names = tuple(name.strip() for name in source.split(","))
         claims = tuple(claims)
         self.inputs |= {value for claim in claims for value, _ in claim.values[:1]}
         if all(map(_PART.fullmatch, names)):
-            claims = claims or (Claim(mark, ""),)
+            claims = claims or (StatedNumber(mark, ""),)
             self.sourced += (replace(claim, sources=names, mark=mark) for claim in claims)
 
     def inlines(self, inlines: Iterable[model.Inline]) -> None:
@@ -311,7 +311,7 @@ class _Counter:
             return
         comparisons = self.comparisons.get(tex.span().start, ())
         proofs = [comparison for comparison in comparisons if comparison.kind == "holds"]
-        claims: list[Claim] = []
+        claims: list[StatedNumber] = []
         for statement in read_statements(tex.text, self.comma):
             first, last = statement.sides[0], statement.sides[-1]
             if any(first.start <= proof.start < last.end for proof in proofs):
@@ -343,7 +343,7 @@ def find_numbers(text: str, comma: bool = False) -> Iterator[Number]:
             yield number
 
 
-def _text_claims(inlines: Iterable[model.Inline], comma: bool) -> Iterator[Claim]:
+def _text_claims(inlines: Iterable[model.Inline], comma: bool) -> Iterator[StatedNumber]:
     places: list[tuple[int, str, Span]] = []
     text = ""
     for inline in inlines:
@@ -359,17 +359,17 @@ def _text_claims(inlines: Iterable[model.Inline], comma: bool) -> Iterator[Claim
         yield _claim(number, span, unit[1] if unit else "")
 
 
-def _claim(number: Number, span: Span, unit_text: str = "") -> Claim:
+def _claim(number: Number, span: Span, unit_text: str = "") -> StatedNumber:
     unit = find_unit(unit_text) if unit_text else None
     size = float(measure(unit)) if unit is not None else 1.0
     zero = float(unit.zero) if unit is not None else 0.0
     value, step = float(number.value), float(f"1e{number.place}")
     if not (isfinite(value) and isfinite(step)):
-        return Claim(span, number.text)  # larger than any number of a script
-    return Claim(span, number.text, ((value, step), ((value + zero) * size, step * size)))
+        return StatedNumber(span, number.text)  # larger than any number of a script
+    return StatedNumber(span, number.text, ((value, step), ((value + zero) * size, step * size)))
 
 
-def _side_claim(side: FormulaSide, tex: Excerpt) -> Claim:
+def _side_claim(side: FormulaSide, tex: Excerpt) -> StatedNumber:
     part = tex.text[side.start : side.end]
     place = tex.span(side.end - len(part.lstrip()), side.start + len(part.rstrip()))
     expression = side.expression if side.is_numeric else None
@@ -377,10 +377,10 @@ def _side_claim(side: FormulaSide, tex: Excerpt) -> Claim:
     with suppress(NotUnderstood):  # a unit may be a word
         numeral = read_numeral(expression) if isinstance(expression, Expression) else None
     if numeral is None:
-        return Claim(place, place.text)
+        return StatedNumber(place, place.text)
     step, size = float(numeral.step), float(numeral.unit_size)
     value = float(numeral.express(numeral.value))
-    return Claim(place, place.text, ((value, step / size), (float(numeral.value), step)))
+    return StatedNumber(place, place.text, ((value, step / size), (float(numeral.value), step)))
 
 
 def _is_claim(side: FormulaSide, tex: str) -> bool:

@@ -12,8 +12,8 @@ from PIL import Image
 from coursebuild.core.scripts.figure_data import (
     MOST_DATA,
     Axes,
+    DrawnPart,
     FigureData,
-    Part,
     png_chunk,
     read_figure_data,
     without_data,
@@ -24,7 +24,7 @@ NOTHING = ("",)
 
 
 def figure_data(y: float = 2.0, words: str = "a <b> & “c”", font: str = "Sans.ttf") -> FigureData:
-    part = Part(
+    part = DrawnPart(
         "curve", words, {"color": ["#000000ff"]}, paths=(((0.0, 0.0), (1.0, y), (None, None)),)
     )
     axes = Axes(
