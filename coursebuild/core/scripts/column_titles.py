@@ -25,8 +25,8 @@ from coursebuild.core.text.source import Span
 _PER = re.compile(r"/[^\W\d_]")
 _WORD = re.compile(r"[^\W_]+")
 HEADER_HELP = (
-    "write the unit that is printed, or put the columns in order; where it is not meant, mark it:"
-    ' `` `s`{given="…"} ``'
+    "write the unit that is printed, or put the columns in order; where a unit is not meant, mark "
+    'it: `` `s`{given="…"} ``'
 )
 
 
