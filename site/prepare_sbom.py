@@ -4,7 +4,7 @@
 
 `site/bundle.py` calls it with a file beside the licences that it has gathered: nothing of a package
 without a licence file is in the wheel. Python packages are not in the wheel; the bill names the
-versions of requirements.txt, with which it was tested.
+versions of requirements.lock, with which it was tested.
 """
 
 import base64
@@ -16,6 +16,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
+
+from locked import locked_requirements, needs
 
 SITE = Path(__file__).resolve().parent
 
@@ -37,7 +39,7 @@ def bundled_packages(licences: Path) -> Iterator[dict[str, Any]]:
 
 def python_packages() -> Iterator[dict[str, Any]]:
     """The Python packages, as they are locked."""
-    lock = (SITE.parent / "requirements.txt").read_text("utf-8")
+    lock = locked_requirements(needs())
     for name, version in re.findall(r"^([\w-]+)==([\w.]+)", lock, re.MULTILINE):
         yield {**_component("pypi", name, version), "isExternal": True}
 

@@ -3,8 +3,10 @@
 import importlib.metadata
 import json
 import re
+import subprocess
+import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 from packaging.requirements import Requirement
@@ -12,27 +14,32 @@ from packaging.utils import canonicalize_name
 
 EXACT = re.compile(r"\d+\.\d+\.\d+")
 LOCKED = re.compile(r"^(\S+ ?;?.*?) \\\n    --hash=sha256:[0-9a-f]{64}", re.MULTILINE)
-LOCKS = (
-    "requirements.txt",
-    "requirements-build.txt",
-    "requirements-course.txt",
-    "requirements-dev.txt",
-)
 
 
-def read_lock(root: Path, name: str) -> Iterator[Requirement]:
-    text = (root / name).read_text(encoding="utf-8")
-    for line in LOCKED.findall(text):
-        requirement = Requirement(line)
-        if requirement.marker is None or requirement.marker.evaluate():
-            yield requirement
-
-
-def versions(root: Path, name: str) -> dict[str, str]:
+def versions(lock: str) -> dict[str, str]:
+    """The locked versions that are for this machine."""
     return {
         requirement.name: next(iter(requirement.specifier)).version
-        for requirement in read_lock(root, name)
+        for requirement in map(Requirement, LOCKED.findall(lock))
+        if requirement.marker is None or requirement.marker.evaluate()
     }
+
+
+def transitive_needs(lines: Iterable[str]) -> set[str]:
+    """What these requirements need on this machine, by what is installed."""
+    seen, waiting = set(), [*map(Requirement, lines)]
+    while waiting:
+        requirement = waiting.pop()
+        for extra in ("", *requirement.extras):
+            if (requirement.name, extra) not in seen:
+                seen.add((requirement.name, extra))
+                needs = map(Requirement, importlib.metadata.requires(requirement.name) or ())
+                waiting += [
+                    need
+                    for need in needs
+                    if need.marker is None or need.marker.evaluate({"extra": extra})
+                ]
+    return {canonicalize_name(name) for name, _ in seen}
 
 
 def locked_requirements(root: Path, pyproject: dict) -> list[str]:
@@ -66,24 +73,28 @@ def test_packages_are_asked_for_between_two_bounds(pyproject: dict) -> None:
         assert operators in (["<", ">="], ["<=", ">="]), line
 
 
-def test_locks_hold_what_is_declared_and_what_is_installed(root: Path, pyproject: dict) -> None:
+def test_the_lock_holds_what_is_declared_and_what_is_installed(root: Path, pyproject: dict) -> None:
     """After a change of pyproject.toml: make lock."""
-    all_versions = versions(root, "requirements-dev.txt")
-    for name in LOCKS[:3]:
-        assert versions(root, name).items() <= all_versions.items()
+    all_versions = versions((root / "requirements.lock").read_text(encoding="utf-8"))
     for requirement in map(Requirement, locked_requirements(root, pyproject)):
         version = all_versions[canonicalize_name(requirement.name)]
         assert requirement.specifier.contains(version), requirement
         assert importlib.metadata.version(requirement.name) == version
-    runtime = {canonicalize_name(Requirement(x).name) for x in pyproject["project"]["dependencies"]}
-    assert runtime <= set(versions(root, "requirements.txt"))
 
 
-def test_locks_name_no_address(root: Path) -> None:
-    for name in LOCKS:
-        text = (root / name).read_text(encoding="utf-8")
-        assert "://" not in text
-        assert len(LOCKED.findall(text)) == len(re.findall(r"^\w", text, re.MULTILINE)), name
+def test_what_is_taken_from_the_lock_is_what_was_asked_for_and_what_that_needs(
+    root: Path, pyproject: dict
+) -> None:
+    declared = pyproject["project"]["dependencies"] + pyproject["dependency-groups"]["build"]
+    command = (sys.executable, "-I", "-S", str(root / "site/locked.py"), "build")
+    taken = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert {*versions(taken)} == transitive_needs(declared)
+
+
+def test_the_lock_names_no_address(root: Path) -> None:
+    text = (root / "requirements.lock").read_text(encoding="utf-8")
+    assert "://" not in text
+    assert len(LOCKED.findall(text)) == len(re.findall(r"^\w", text, re.MULTILINE))
 
 
 def test_npm_requirements_are_exact(root: Path) -> None:

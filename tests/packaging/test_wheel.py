@@ -56,8 +56,8 @@ def test_wheel_holds_packages_templates_and_scripts_and_nothing_beside_them(
     bundled = files_below(dist) - {"stamp.json", "coursebuild.cdx.json"}
     assert assets == {path: (dist / path).read_bytes() for path in bundled}
     assert {path for path in code if path.endswith(".js")} <= {*names}
-    lock = (root / "requirements.txt").read_bytes()
-    assert archive.read("coursebuild/locks/requirements.txt") == lock
+    lock = (root / "requirements.lock").read_bytes()
+    assert archive.read("coursebuild/locks/requirements.lock") == lock
     tops = {name.split("/")[0] for name in names}
     assert tops == {"coursebuild", "mjcourse", f"{full_name}.dist-info"}
     assert len(names) == len(set(names))

@@ -22,7 +22,8 @@ _EXPRESSION = re.compile(r"\$\{\{ (.*?) \}\}")
 _NOTING_PROGRAM = (
     '#!/bin/sh\necho "${0##*/} $*" >> "$NOTES"\n[ ! -d public ] || cp -R public/. "$SENT"\n'
 )
-_COURSEBUILD = f'#!/bin/sh\nexec {sys.executable} -m coursebuild "$@"\n'
+_PYTHON = f'#!/bin/sh\nexec {sys.executable} "$@"\n'
+_COURSEBUILD = _PYTHON.replace('"$@"', '-m coursebuild "$@"')
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +52,8 @@ class Runner:
         for name in ("bin", "home", "tmp", "sent", "artifacts", "pages"):
             (self.folder / name).mkdir(parents=True)
         programs = dict.fromkeys(("pip", "npx", "rsync", "sudo"), _NOTING_PROGRAM) | {
-            "coursebuild": _COURSEBUILD
+            "python": _PYTHON,
+            "coursebuild": _COURSEBUILD,
         }
         for name, text in programs.items():
             (self.folder / "bin" / name).write_text(text)

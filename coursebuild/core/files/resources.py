@@ -14,7 +14,8 @@ from __future__ import annotations
 import functools
 import json
 import os
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -39,10 +40,17 @@ def rules_page() -> str:
     return (folder / "rules.md").read_text(encoding="utf-8")
 
 
-def locked_requirements() -> str:
-    """The packages that the tool was tested with, each with its hashes, as pip reads them."""
+def locked_requirements(names: Iterable[str]) -> str:
+    """Packages and all that they need, as they were tested: with hashes, as pip reads them."""
     folder = _find_folder("locks", ".", "the locked requirements are missing")
-    return (folder / "requirements.txt").read_text(encoding="utf-8")
+    text = (folder / "requirements.lock").read_text(encoding="utf-8")
+    entries = re.findall(r"(?m)^(([\w.-]+)==.*\n(?:    --hash.*\n)+)((?:    #.*\n)*)", text)
+    # uv names below each package, in comments, those that it is locked for.
+    asked_by = {(entry, name): {*re.findall(r"[\w.-]+", via)} for entry, name, via in entries}
+    needed = {re.sub(r"[-_.]+", "-", name).lower() for name in names}
+    while more := {name for (_, name), via in asked_by.items() if via & needed} - needed:
+        needed |= more
+    return "".join(entry for entry, name in asked_by if name in needed)
 
 
 class Bundle(Mapping[str, bytes]):

@@ -234,7 +234,8 @@ def _settings() -> str:
 def _locked(requirement: str) -> str:
     """A requirement with the hashes of its files, as this tool was tested with it."""
     pattern = rf"^{re.escape(requirement)} (?:.*\\\n)+.*$"
-    match = re.search(pattern, locked_requirements(), re.MULTILINE)
+    locked = locked_requirements([requirement.partition("==")[0]])
+    match = re.search(pattern, locked, re.MULTILINE)
     if match is None:
         raise EffectError(f"this coursebuild brings no hashes of {requirement} along")
     return match[0]

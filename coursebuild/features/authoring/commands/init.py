@@ -59,7 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
     root = Path(folder).resolve()
     check_path(root)
     undo_changes(root, Progress().say)
-    _, requirements = re.split("(?m)^(?=[^#])", locked_requirements(), maxsplit=1)
+    needs = [line for line in requires("coursebuild") or () if "extra ==" not in line]
+    requirements = locked_requirements(re.split(r"[^\w.-]", line)[0] for line in needs)
     engine = re.findall(r"(?m)^mujoco==(\S+)", requirements)[0]
     files = {".vscode/course.schema.json": json_schema("course")}
     for file in sorted(_COURSE.rglob("*")):
