@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
+import sysconfig
 import tomllib
+import venv
 from pathlib import Path
 
 import pytest
 
 from support.fixture_cases import fixture_text
-from support.scratch_course import Folder
+from support.preview_process import serve_preview
+from support.scratch_course import GOOD, Folder
 
 LESSONS = tomllib.loads(fixture_text("documents/extras.toml"))
 
@@ -56,3 +60,30 @@ def test_lab_of_formulas_and_build_need_no_extra(
     result = folder.main("build")
     assert result.status == 0, result.out + result.err
     assert (folder.root / "public/index.html").is_file()
+
+
+@pytest.mark.site
+def test_a_course_without_models_needs_neither_mujoco_nor_numpy(
+    tmp_path: Path, stores: Path
+) -> None:
+    """In an environment with all packages of this one but these."""
+    venv.create(tmp_path / "environment", symlinks=True)
+    (packages,) = (tmp_path / "environment/lib").glob("python*/site-packages")
+    for path in Path(sysconfig.get_path("purelib")).iterdir():
+        if not path.name.startswith(("mujoco", "numpy")):
+            (packages / path.name).symlink_to(path)
+    python = tmp_path / "environment/bin/python"
+    attempt = "import importlib.util as u; print(u.find_spec('mujoco'), u.find_spec('numpy'))"
+    assert subprocess.check_output([python, "-c", attempt]) == b"None None\n"
+    words = [str(python), "-m", "coursebuild"]
+    start = f"import os, sys; os.execv({words[0]!r}, [*{words}, *sys.argv[1:]])"
+    folder = Folder(tmp_path / "course")
+    folder.fill([GOOD + "\nIn one step $1.5^2 = 2.25$.\n"], stores)
+    for command in ("check", "build"):
+        with folder.start(command, code=start, stdout=subprocess.PIPE) as process:
+            assert b"everything holds" in process.communicate()[0]
+            assert process.returncode == 0
+    assert b"<math" in (folder.root / "public/lessons/1.1-one.html").read_bytes()
+    with serve_preview(folder, code=start) as preview:
+        preview.wait_for_line("checked: ")
+        assert b"<math" in preview.get("/lessons/1.1-one.html")[2]

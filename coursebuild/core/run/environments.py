@@ -65,6 +65,9 @@ def check_other_version(text: str) -> str:
     """The version of MuJoCo that a text names; a `UsageError` where it is none, or that of here."""
     if not _VERSION.fullmatch(text):
         raise UsageError(f"--against: {text!r} is not a version of MuJoCo, such as 3.13.0")
+    if engine_version() == "none":
+        message = "MuJoCo is not installed for this Python"
+        raise EffectError(message, help="run `pip install coursebuild` again")
     if _without_zeros(text) == _without_zeros(engine_version()):
         raise UsageError(f"--against: MuJoCo {engine_version()} is the version installed here")
     return text
