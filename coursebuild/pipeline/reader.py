@@ -27,7 +27,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import check_formulas, document_formulas
-from coursebuild.core.engine.store import Store
+from coursebuild.core.engine.store import Store, value_reader
 from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import prepared_folder, template_texts
 from coursebuild.core.model import Course, Declarations, Document, document_scripts
@@ -303,7 +303,7 @@ class Reader:
         without_errors = {
             formula: html for formula, html in mathml_of_text.items() if isinstance(html, str)
         }
-        self._store.put(_MATHML, _formulas_key(path), encode(without_errors))
+        self._store.put_value(_MATHML, _formulas_key(path), without_errors)
         return mathml_of_text
 
     # --- pages
@@ -319,7 +319,7 @@ class Reader:
 
     def find_page(self, key: str) -> DrawnPage | None:
         """Return the page stored under a key, if there is one."""
-        return self._store.peek(_PAGES, key, lambda data: decode(data, DrawnPage))
+        return self._store.peek(_PAGES, key, value_reader(DrawnPage))
 
     def draw_page(self, request: PageRequest) -> DrawnPage:
         """Draw a page here, and store it."""
@@ -346,7 +346,7 @@ class Reader:
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
             page_record = replace(page_record, notes=tuple(digests))
             page = DrawnPage(head, page_record, notes, body.encode())
-            self._store.put(_PAGES, request.key, encode(page))
+            self._store.put_value(_PAGES, request.key, page)
             return page
 
     def page_context(self, request: PageRequest) -> PageContext:
@@ -425,8 +425,7 @@ _HEAVY = (
 
 def kept_formulas(store: Store, path: str) -> dict[Formula, str]:
     """The MathML of the formulas that the text at a path had when it was last read."""
-    key = _formulas_key(path)
-    return store.get(_MATHML, key, lambda data: decode(data, dict[Formula, str])) or {}
+    return store.get_value(_MATHML, _formulas_key(path), dict[Formula, str]) or {}
 
 
 def _formulas_key(path: str) -> str:

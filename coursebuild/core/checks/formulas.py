@@ -11,9 +11,12 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from itertools import groupby
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+
+from msgspec import Struct
 
 from coursebuild.core.model import (
     Block,
@@ -86,20 +89,17 @@ def check_formulas(
     uses = [*_formula_uses(document)]
     letters = {letter for _, _, tex in uses for letter in _LETTER.findall(tex.text)}
     in_features = feature_block_ids(document)
-    trees: dict[Formula, Element | None] = {}
     for _, group in groupby(uses, key=lambda use: id(use[0])):
-        typeset_ones: list[tuple[Excerpt, Element]] = []
+        typeset_ones: list[tuple[Excerpt, _Signs]] = []
         for block, formula, tex in group:
             result = typeset[formula]
             if isinstance(result, MathError):
                 diagnostics.append(_syntax_error(tex, result))
                 continue
-            if formula not in trees:
-                trees[formula] = _parse(result)
-            if (tree := trees[formula]) is not None:
-                typeset_ones.append((tex, tree))
+            if (signs := _read_signs(result)) is not None:
+                typeset_ones.append((tex, signs))
                 # In JSON a backslash may need another one, so that nothing is written there.
-                diagnostics += _check_letters(tex, tree, letters, id(block) not in in_features)
+                diagnostics += _check_letters(tex, signs, letters, id(block) not in in_features)
         diagnostics += _check_brackets(block, typeset_ones)
     return tuple(diagnostics)
 
@@ -120,14 +120,25 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
     return diagnose("math-syntax", span, message, help=help)
 
 
-def _parse(mathml: str) -> Element | None:
-    """The tree of a formula without its TeX."""
+class _Signs(Struct, frozen=True):
+    """What a formula shows that may be a mistake of its TeX."""
+
+    runs: tuple[str, ...]
+    """The letters that stand beside each other, two at least."""
+    brackets: tuple[tuple[int, ...], ...]
+    """What each of its brackets may be."""
+
+
+@lru_cache(maxsize=1024)
+def _read_signs(mathml: str) -> _Signs | None:
+    """Read the MathML of a formula without its TeX; many lessons have the same ones."""
     try:
         (semantics,) = ElementTree.fromstring(mathml)
     except ElementTree.ParseError:  # characters that XML does not have
         return None
     semantics.remove(semantics[-1])
-    return semantics
+    runs = (run for run in _letter_runs(semantics) if len(run) > 1)
+    return _Signs(tuple(runs), tuple(_brackets(semantics)))
 
 
 # --- letters
@@ -149,21 +160,20 @@ def _letter_runs(element: Element) -> Iterator[str]:
 
 
 def _check_letters(
-    tex: Excerpt, tree: Element, letters: set[str], can_write: bool
+    tex: Excerpt, signs: _Signs, letters: set[str], can_write: bool
 ) -> Iterator[Diagnostic]:
-    """Report commands without their backslash: the tree has a product of letters.
+    """Report commands without their backslash: the formula shows a product of letters.
 
     `letters` are those that stand alone in formulas of the document: of these `pi` is a product.
     """
     words = [*_LETTERS.finditer(tex.text)]
-    runs = [run for run in _letter_runs(tree) if len(run) > 1] if words else []
     for word in words:
         name, bracket, brace = word.groups()
         is_name = name in _GREEK and not letters >= {*name}
         is_call = name in _FUNCTIONS and (bracket or brace)
         if not (is_name or is_call or (name in _WITH_BRACES and brace)):
             continue
-        if sum(run.count(name) for run in runs) < sum(name == match[1] for match in words):
+        if sum(run.count(name) for run in signs.runs) < sum(name == match[1] for match in words):
             continue
         message = f"`{name}` would be shown as a product of letters"
         help = f"write `\\{name}`, or `\\mathrm{{{name}}}` for a name"
@@ -210,13 +220,13 @@ def _may_match(brackets: Iterable[tuple[int, ...]]) -> bool:
 
 
 def _check_brackets(
-    block: Block, formulas: Sequence[tuple[Excerpt, Element]]
+    block: Block, formulas: Sequence[tuple[Excerpt, _Signs]]
 ) -> Iterator[Diagnostic]:
     """Report brackets that have no other one in any formula of their block."""
     open_ones = [
-        (tex, brackets)
-        for tex, tree in formulas
-        if not _may_match(brackets := [*_brackets(tree)]) and not _NAMED_BRACKET.search(tex.text)
+        (tex, signs.brackets)
+        for tex, signs in formulas
+        if not _may_match(signs.brackets) and not _NAMED_BRACKET.search(tex.text)
     ]
     at = 0
     while at < len(open_ones):
@@ -226,7 +236,9 @@ def _check_brackets(
         at = (at if end is None else end) + 1
 
 
-def _joint_end(formulas: Sequence[tuple[Excerpt, list[tuple[int, ...]]]], at: int) -> int | None:
+def _joint_end(
+    formulas: Sequence[tuple[Excerpt, tuple[tuple[int, ...], ...]]], at: int
+) -> int | None:
     """The last one of several formulas that hold a set together, if it begins in this one."""
     joint = [*formulas[at][1]]
     for end in range(at + 1, len(formulas)):

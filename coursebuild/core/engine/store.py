@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import msgspec
+from markupsafe import Markup
 
 from coursebuild.core.engine.shared_place import SharedPlace, in_words
 from coursebuild.core.files import trust
@@ -156,12 +157,13 @@ class Store:
             self._fail(self.shared, f"no answer within {self._timeout:g} s")
 
     def get_value(self, kind: str, key: str, type: type[Value]) -> Value | None:
-        """A result that was kept as JSON, if it is of this type."""
-        return self.get(kind, key, functools.partial(msgspec.json.decode, type=type))
+        """A value that was kept, if it is of this type."""
+        return self.get(kind, key, value_reader(type))
 
     def put_value(self, kind: str, key: str, value: object) -> None:
-        """Keep a value as JSON."""
-        self.put(kind, key, msgspec.json.encode(value))
+        """Keep a value as MessagePack, unless it has a text that is no UTF-8."""
+        with contextlib.suppress(UnicodeEncodeError):
+            self.put(kind, key, msgspec.msgpack.encode(value, enc_hook=_markup_text))
 
     def group(self, kind: str, key: str) -> list[str]:
         """Return the keys `GROUP/KEY` of a group, newest first, and remove all but the newest."""
@@ -291,6 +293,23 @@ class Store:
             failed_before, self._shared_failed = self._shared_failed, True
         if not failed_before:
             self._say(f"the shared cache {shared.address} cannot be used: {cause}")
+
+
+def value_reader(type: type[Value]) -> Callable[[bytes], Value]:
+    """A function that reads the bytes of a value of this type."""
+    return functools.partial(msgspec.msgpack.decode, type=type, dec_hook=_make_markup)
+
+
+def _markup_text(value: object) -> str:
+    if isinstance(value, Markup):
+        return str(value)
+    raise TypeError(f"a {type(value).__qualname__} cannot be kept")
+
+
+def _make_markup(kind: type, value: object) -> Markup:
+    if kind is Markup and isinstance(value, str):
+        return Markup(value)
+    raise TypeError(f"no {kind.__qualname__} can be read")
 
 
 def _value(data: bytes | None, read: Callable[[bytes], Value | None]) -> Value | None:

@@ -99,8 +99,7 @@ def compile_or_recall(
             results[model] = result
             is_lasting = not result.timeout and not result.error.startswith(OWN_FAULT)
             if is_lasting and model_key(root, *model) == keys[model]:
-                with contextlib.suppress(UnicodeEncodeError):  # a name of a file that is no text
-                    store.put_value(_KIND, keys[model], result)
+                store.put_value(_KIND, keys[model], result)
     return tuple(results[model] for model in texts)
 
 
