@@ -12,6 +12,7 @@ from pathlib import Path
 from msgspec import Struct
 
 from coursebuild.core.model import Course, Document, NumberBinding, Table, find_inlines
+from coursebuild.core.model.lesson_record import known_addresses
 from coursebuild.core.scripts.bindings import check_bindings
 from coursebuild.core.scripts.bound_places import bound_values, find_texts
 from coursebuild.core.scripts.compare import verify
@@ -21,7 +22,6 @@ from coursebuild.core.scripts.provenance import describe_line
 from coursebuild.core.scripts.table_cells import table_rows
 from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.source import Span
-from coursebuild.pipeline.address_record import read_addresses
 from coursebuild.pipeline.options import UsageError
 from coursebuild.report.text import location, visible
 from coursebuild.report.values import plural
@@ -49,7 +49,7 @@ def value_origins(root: Path, course: Course, path: str, line: int) -> tuple[Val
     if line > len(document.source.line_starts):
         raise UsageError(f"{path} has no line {line}")
     paths = [extraction.path for extraction in extract(course).value]
-    addresses = read_addresses(root, [document])
+    addresses = known_addresses(course.records)
     outputs = PrintedOutputs(verify(course, (), addresses), (), paths)
     check_bindings(document, outputs, addresses)
 

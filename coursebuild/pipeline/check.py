@@ -5,6 +5,7 @@ In a report, silenced warnings are left out, the rest is sorted and counted.
 
 from __future__ import annotations
 
+import functools
 import posixpath
 import re
 import time
@@ -16,6 +17,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
+from coursebuild.core.files.write import change_files
 from coursebuild.core.model import Citation, Course, Script, document_scripts, find_inlines
 from coursebuild.core.model.lesson_record import record_path
 from coursebuild.core.model.results import Reports, Results, TrialLine
@@ -28,11 +30,12 @@ from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.findings import unproven_units
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
-from coursebuild.pipeline.address_record import addresses_path, write_addresses
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.proofs import remarks_on_proofs
 from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.recordings import read_recorded
+from coursebuild.pipeline.records import record_changes
 from coursebuild.pipeline.scenes import shown_reports
 from coursebuild.pipeline.scripts import measure_sensitivity
 from coursebuild.pipeline.shards import Shard, write_timings
@@ -90,8 +93,7 @@ def check(
             inventory = [*unproven(course), *unproven_units(course, runs, verdicts)]
         report = checked_course.report(diagnostics, inventory)
         if shard is None:
-            checked_course.remember_addresses()
-        if shard is None:
+            checked_course.write_records()
             remarks += remarks_on_proofs(
                 course,
                 options.store,
@@ -143,18 +145,22 @@ class CheckedCourse(Struct, frozen=True):
         depends = depends_on(self.course, verification.results, self.options.interpreter)
         return replace(report, depends=depends)
 
-    def remember_addresses(self) -> None:
-        """Keep where the shown values of documents without errors were printed."""
-        verification = self.verification
-        outputs = PrintedOutputs(verification.results.verdicts, verification.results.runs)
+    def write_records(self) -> None:
+        """Keep where the values of documents without errors were printed; records nothing."""
+        verification, root = self.verification, self.options.root
+        outputs = PrintedOutputs(verification.results.verdicts, ())
+        diagnostics = (*self.diagnostics, *verification.run_diagnostics)
+        broken = {diagnostic.span.path for diagnostic in diagnostics if diagnostic.is_error}
         documents = [
             document
             for document in self.course.documents
             if self.documents is None or document.source.path in self.documents
+            if document.source.path not in broken
         ]
-        diagnostics = (*self.diagnostics, *verification.run_diagnostics)
-        broken = {diagnostic.span.path for diagnostic in diagnostics if diagnostic.is_error}
-        write_addresses(self.options.root, documents, outputs, verification.addresses, broken)
+        read = functools.partial(read_recorded, root)
+        at = verification.addresses
+        if changes := list(record_changes(self.course, documents, outputs, at, root, read)):
+            change_files(root, changes, beside_commands=True)
 
 
 def read_and_verify(
@@ -351,8 +357,7 @@ def depends_on(
     if "." in packages:
         return None
     pages = [page.path for page in course.pages]
-    records = {*map(record_path, pages), *map(addresses_path, pages)}
-    files = {*pages, *records, *shown_files(course), *packages}
+    files = {*pages, *map(record_path, pages), *shown_files(course), *packages}
     if interpreter is not None:
         files |= {interpreter.python, f"{interpreter.prefix}/pyvenv.cfg", *interpreter.packages}
     for run in results.runs:

@@ -46,7 +46,6 @@ from coursebuild.core.scripts.edit import check_source_parts, shown_files
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Source, Span
-from coursebuild.pipeline.address_record import addresses_path
 
 if TYPE_CHECKING:
     from coursebuild.pipeline.reader import Reader
@@ -363,9 +362,8 @@ class _Loader:
 
     def _find_misnamed(self, path: str) -> Path | None:
         """A file that has the name of a lesson, but for its ending."""
-        records = [self.root / path_of(path) for path_of in (record_path, addresses_path)]
         files = self.root.glob(f"{path.removesuffix('.md')}.*")
-        return next((file for file in files if file not in records), None)
+        return next((file for file in files if file != self.root / record_path(path)), None)
 
     def _find_pages(self, course: Course) -> list[Source]:
         """Find the texts of the pages of the map, which may lie anywhere in the course's folder."""
@@ -429,8 +427,7 @@ class _Loader:
         models = (f"models/{model.name}.xml" for model in self.files.models)
         texts = [source.path for source in (*self.files.lessons, *self.files.pages)]
         texts += [page.path for page in course.pages]
-        records = {*map(record_path, texts), *map(addresses_path, texts)}
-        excluded = {MAP, *texts, *records, *models}
+        excluded = {MAP, *texts, *map(record_path, texts), *models}
         return tuple(path for path in self.files.files if path not in excluded)
 
 

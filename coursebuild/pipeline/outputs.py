@@ -20,10 +20,11 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import change_files, check_writable, write_atomic
 from coursebuild.core.model import Course, Document
+from coursebuild.core.model.lesson_record import known_addresses
 from coursebuild.core.model.results import Outcome, ScriptRun, TrialLine, Verdict
 from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.bindings import check_bindings
-from coursebuild.core.scripts.bound_places import document_values, follow_outputs
+from coursebuild.core.scripts.bound_places import carried_addresses, document_values, follow_outputs
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import adopt_file, apply_edits, block_text, update_body
 from coursebuild.core.scripts.extract import Extraction
@@ -34,7 +35,6 @@ from coursebuild.core.scripts.printed_outputs import PrintedOutputs, recording_k
 from coursebuild.core.scripts.provenance import PrintedText
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.pipeline.address_record import read_addresses, write_addresses
 from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
@@ -93,7 +93,7 @@ class _Updater:
         paths |= {figure.script for figure in find_figures(course, self.documents)}
         self.scripts = [e for e in self.extracted_scripts.runnable if e.path in paths]
         """The scripts that have an output or a figure to bring up to date."""
-        self.addresses = read_addresses(options.root, course.documents)
+        self.addresses = known_addresses(course.records)
 
     def update(self, began: float) -> Report:
         runs = run(self.course, self.scripts, self.options)
@@ -111,11 +111,11 @@ class _Updater:
             parsed_course = load(self.options.root)
             new_course = parsed_course.value or self.course
             read_diagnostics = parsed_course.diagnostics
-        record_remarks = [] if self.dry_run else self._write_records(new_course, runs)
         diagnostics = [*read_diagnostics, *self.extracted_scripts.diagnostics]
         diagnostics += [*refusals, *failures, *figure_failures]
         diagnostics += check_recorded_runs(self.scripts, self.options)
         diagnostics += self._diagnose_updated(new_course, runs)
+        record_remarks = [] if self.dry_run else self._write_records(new_course, runs)
         if not remarks and all(not d.is_error for d in diagnostics):
             remarks = ["every recorded output is up to date"]
         remarks += record_remarks
@@ -222,15 +222,10 @@ class _Updater:
     # --- the lessons as they are then
 
     def _write_records(self, new_course: Course, runs: Sequence[ScriptRun]) -> list[str]:
-        """Write what the outputs and figures were recorded with, beside the lessons."""
-        root = self.options.root
-        documents = [
-            document
-            for document in new_course.documents
-            if self.documents is None or document.source.path in self.documents
-        ]
-        read = functools.partial(read_recorded, root)
-        changes = list(record_changes(new_course, documents, runs, root, read))
+        """Write what the lessons were recorded with, and where values stand, beside them."""
+        root, documents = self.options.root, self._chosen_documents(new_course)
+        outputs, read = self._outputs(new_course, runs), functools.partial(read_recorded, root)
+        changes = list(record_changes(new_course, documents, outputs, self.addresses, root, read))
         if changes:
             change_files(root, changes, beside_commands=True)
         return [f"{'wrote' if change.new else 'removed'} {change.path}" for change in changes]
@@ -264,11 +259,6 @@ class _Updater:
             ),
             *figure_findings(new_course, runs, functools.partial(read_recorded, self.options.root)),
         ]
-        if not self.dry_run:
-            outputs = self._outputs(new_course, runs)
-            write_addresses(
-                self.options.root, self._chosen_documents(new_course), outputs, self.addresses
-            )
         # A drift that was not updated has its own diagnostic; a dry run leaves all drifts.
         return [d for d in diagnostics if d.rule not in ("output-drift", "figure-drift")]
 
@@ -277,14 +267,9 @@ class _Updater:
         before, now = self._outputs(self.course, runs), self._outputs(new_course, runs)
         new_documents = {document.source.path: document for document in new_course.documents}
         for document in self._chosen_documents(self.course):
-            new_document = new_documents.get(document.source.path)
-            old_values = document_values(document, before)
-            new_values = () if new_document is None else document_values(new_document, now)
-            if len(old_values) != len(new_values):
-                continue
-            for old, new in zip(old_values, new_values, strict=True):
-                if old in self.addresses:
-                    self.addresses[new] = self.addresses[old]
+            if (new_document := new_documents.get(document.source.path)) is not None:
+                old, new = document_values(document, before), document_values(new_document, now)
+                self.addresses |= carried_addresses(self.addresses, old, new)
 
 
 def changed_text(verb: str, source: Source, new: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -11,18 +11,17 @@ from msgspec.structs import replace
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import FileChange
-from coursebuild.core.model import Course, Document, Recording, find_blocks, output_numbers
+from coursebuild.core.model import Course, Document, output_numbers
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.lesson_record import (
     FIGURE,
+    Addresses,
     LessonRecord,
     Provenance,
     Recorded,
     Versions,
     data_digest,
     describe_comparison,
-    figure_heading,
-    output_heading,
     record_path,
     recording_digest,
 )
@@ -30,10 +29,12 @@ from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.run.packages import distributions
 from coursebuild.core.run.script_environment import conditions
-from coursebuild.core.scripts.compare import compare
+from coursebuild.core.scripts.bound_places import document_values
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.figures import ReadFile, compare_figure
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.recordings import read_recorded
 
 
 def with_provenance(
@@ -89,58 +90,59 @@ def _versions(packages: Mapping[str, tuple[str, str]], modules: Iterable[str]) -
 def record_changes(
     course: Course,
     documents: Iterable[Document],
-    runs: Sequence[ScriptRun],
+    outputs: PrintedOutputs,
+    addresses: Addresses,
     root: Path,
     read: ReadFile,
 ) -> Iterator[FileChange]:
-    """The changes of records by which they hold what was recorded from these runs.
+    """The changes of records by which they hold what is recorded, and where values were printed.
 
     The line of a recording that is unchanged stays as it is, whatever a script runs with now. One
     that has no line gets it where a run bears the recording out.
     """
-    by_path = {run.path: run for run in runs if run.outcome is Outcome.OK}
     for document in documents:
-        before = course.records.get(document.source.path, LessonRecord())
-        after = before.with_recordings(_recordings(course, document, by_path, before, read))
-        path = record_path(document.source.path)
-        old, name = _read(root, path), document.source.path.rpartition("/")[2]
-        new = after.text(name).encode() or None
+        path = document.source.path
+        before = course.records.get(path, LessonRecord())
+        recordings = tuple(_recordings(document, outputs, before, read))
+        values = document_values(document, outputs)
+        at = {replace(value, path=""): addresses[value] for value in values if value in addresses}
+        after = LessonRecord(recordings, at)
+        old, new = read_recorded(root, record_path(path)), after.text.encode() or None
         if after != before and new != old:
-            yield FileChange(path, old, new)
+            yield FileChange(record_path(path), old, new)
 
 
 def _recordings(
-    course: Course,
-    document: Document,
-    runs: Mapping[str, ScriptRun],
-    record: LessonRecord,
-    read: ReadFile,
-) -> Iterator[tuple[str, Recorded | None]]:
+    document: Document, outputs: PrintedOutputs, record: LessonRecord, read: ReadFile
+) -> Iterator[Recorded]:
     numbers = output_numbers(document)
-    for recording in find_blocks(document, Recording):
-        script = recording.script
-        if script is None or not recording.readable:
-            continue
-        digest, run = recording_digest(recording), runs.get(script)
-        recorded, comparison = record.find(script, digest), course.comparison_of(recording)
-        if recorded is None and run is not None and run.provenance is not None:
-            holds = compare(recording, comparison, run.stdout).status != "drift"
-            words = describe_comparison(comparison)
-            recorded = Recorded(digest, words, run.provenance) if holds else None
-        yield output_heading(script, numbers[recording.span.start]), recorded
+    for verdict in outputs.of_document(document):
+        recording, script = verdict.recording, verdict.recording.script or ""
+        digest, run = recording_digest(recording), outputs.runs.get(script)
+        holds = verdict.status in ("verified", "volatile")
+        name = f"{script} output {numbers[recording.span.start]}"
+        comparison = describe_comparison(verdict.comparison)
+        yield from _recorded(record, script, name, digest, comparison, run if holds else None)
     for figure in recorded_figures(document):
-        data, run = read(figure.path), runs.get(figure.script)
+        data, run = read(figure.path), outputs.runs.get(figure.script)
         if data is None:
             continue
-        recorded = record.find(figure.script, data_digest(data))
-        if recorded is None and run is not None and run.provenance is not None:
-            holds = next(compare_figure(figure, run, data, record), None) is None
-            recorded = Recorded(data_digest(data), FIGURE, run.provenance) if holds else None
-        yield figure_heading(figure.script, figure.name), recorded
+        name, digest = f"{figure.script} {figure.name}", data_digest(data)
+        if run is not None and record.find(figure.script, digest) is None:
+            run = run if next(compare_figure(figure, run, data, record), None) is None else None
+        yield from _recorded(record, figure.script, name, digest, FIGURE, run)
 
 
-def _read(root: Path, path: str) -> bytes | None:
-    try:
-        return read_bytes(root, path)
-    except EffectError:
-        return None
+def _recorded(
+    record: LessonRecord,
+    script: str,
+    name: str,
+    digest: str,
+    comparison: str,
+    run: ScriptRun | None,
+) -> Iterator[Recorded]:
+    """How a recording was made: as is known, or else as in the run that bears it out."""
+    if (known := record.find(script, digest)) is not None:
+        yield replace(known, of=name)
+    elif run is not None and run.outcome is Outcome.OK and run.provenance is not None:
+        yield Recorded(name, digest, comparison, run.provenance)

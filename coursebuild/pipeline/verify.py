@@ -19,6 +19,7 @@ from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.features import Trial, TrialContext, TrialOutcome, Trials
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course, Document, FeatureBlock, Owner, find_blocks
+from coursebuild.core.model.lesson_record import Addresses, known_addresses
 from coursebuild.core.model.results import (
     CompileResult,
     Outcome,
@@ -37,9 +38,7 @@ from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
-from coursebuild.core.scripts.provenance import Addresses
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.pipeline.address_record import read_addresses
 from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
 from coursebuild.pipeline.scripts import (
@@ -99,7 +98,7 @@ def verify(
     options.store.listen(options.progress.say)
     options = options.for_course(course)
     addresses = {} if addresses is None else addresses
-    addresses |= read_addresses(options.root, course.documents) | addresses
+    addresses |= known_addresses(course.records) | addresses
     is_preview = known_runs is not None
     # A preview holds the lock for no longer, so that other commands need not wait for its scripts.
     with project_lock(options.root) if is_preview else contextlib.nullcontext():

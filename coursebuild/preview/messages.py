@@ -31,7 +31,13 @@ from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.pages.library import Library
 from coursebuild.core.scripts.bindings import check_bindings
-from coursebuild.core.scripts.bound_places import document_bindings, follow_outputs
+from coursebuild.core.scripts.bound_places import (
+    carried_addresses,
+    document_bindings,
+    document_values,
+    follow_outputs,
+)
+from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.diff import diff_rows
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.figures import figure_difference, prepare_figure
@@ -136,8 +142,8 @@ def accept(session: Session, path: str, ids: str) -> str:
 
 
 def _change_records(session: Session, changes: Sequence[FileChange]) -> Iterator[FileChange]:
-    """Change the files that say what was recorded with what, as these changes record something."""
-    library = session.library
+    """Change the records of lessons in which these changes record something."""
+    library, addresses = session.library, session.runs.addresses
     new_files = {change.path: change.new for change in changes}
     for owner, document in () if library is None else library.course.owned_documents:
         figures = {figure.path for figure in recorded_figures(document)}
@@ -145,14 +151,22 @@ def _change_records(session: Session, changes: Sequence[FileChange]) -> Iterator
         new_text = new_files.get(path)
         if library is None or not new_files.keys() & {path, *figures}:
             continue
+        new_document = document
         if new_text is not None:
-            document = session.parse(owner, Source(path, new_text.decode())).value
+            new_document = session.parse(owner, Source(path, new_text.decode())).value
 
         def read(path: str) -> bytes | None:
             return new_files[path] if path in new_files else read_recorded(session.root, path)
 
-        runs = library.results.runs
-        yield from record_changes(library.course, [document], runs, session.root, read)
+        course, results = library.course, library.results
+        verdicts = [v for v in results.verdicts if v.recording.span.path != path]
+        verdicts += verify(course, results.runs, addresses, [new_document])
+        outputs = PrintedOutputs(verdicts, results.runs, library.scripts)
+        before = PrintedOutputs(results.verdicts, results.runs, library.scripts)
+        values = document_values(document, before), document_values(new_document, outputs)
+        addresses |= carried_addresses(addresses, *values)
+        check_bindings(new_document, outputs, addresses)
+        yield from record_changes(course, [new_document], outputs, addresses, session.root, read)
 
 
 def _collect_news(session: Session, path: str) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import TypeAlias
 from msgspec.structs import replace
 
 from coursebuild.core.model import Course
+from coursebuild.core.model.lesson_record import Addresses
 from coursebuild.core.model.results import (
     PublishedTrials,
     Results,
@@ -22,7 +23,6 @@ from coursebuild.core.model.results import (
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.scripts.compare import verify as compare
 from coursebuild.core.scripts.extract import extract, jobs
-from coursebuild.core.scripts.provenance import Addresses
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.verify import Verification
 from coursebuild.report import ScriptLine

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import platform
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,7 +18,8 @@ from support.workflows import git
 pytestmark = pytest.mark.site
 
 RECORD = "content/lessons/1.1-one.recorded.txt"
-NUMPY = f"numpy {version('numpy')}"
+NUMPY = f'["numpy","{version("numpy")}"]'
+OTHER_NUMPY = '["numpy","1.26.4"]'
 PYTHON = f"Python {platform.python_version()}"
 
 ARRAY = "import numpy as np\nprint(np.arange(3.0).sum())"
@@ -49,8 +52,10 @@ def three_scripts(numbers: str = "123") -> str:
     )
 
 
-def lines(text: str) -> list[str]:
-    return [line for line in text.splitlines() if line.startswith(("[", "recorded "))]
+def recordings(text: str) -> list[dict[str, Any]]:
+    """What a record says of outputs and figures."""
+    entries = [json.loads(line) for line in text.splitlines() if line.startswith("{")]
+    return [entry for entry in entries if entry["is"] == "recording"]
 
 
 def test_update_writes_what_a_recording_was_made_with(make: Make) -> None:
@@ -58,10 +63,10 @@ def test_update_writes_what_a_recording_was_made_with(make: Make) -> None:
     update = folder.main("update")
     assert update.status == 0, update.out
     assert f"wrote {RECORD}" in update.out
-    heading, line = lines(folder.text(RECORD))
-    assert heading == "[examples/total.py output 1]"
-    assert line.split("; ")[0].endswith(": exact") and line.split("; ")[1] == PYTHON
-    assert f"; imports {NUMPY}" in line
+    (recording,) = recordings(folder.text(RECORD))
+    assert recording["of"] == "examples/total.py output 1"
+    assert (recording["comparison"], recording["provenance"]["python"]) == ("exact", PYTHON)
+    assert recording["provenance"]["packages"] == [["numpy", version("numpy")]]
     before = folder.read(RECORD)
     assert folder.main("update").out.startswith("ok ")
     assert folder.read(RECORD) == before
@@ -74,7 +79,7 @@ def test_update_writes_what_a_recording_was_made_with(make: Make) -> None:
 def test_drift_begins_with_what_changed_in_the_environment(make: Make) -> None:
     folder = make(numpy_lesson())
     assert folder.main("update").status == 0
-    folder.replace(RECORD, NUMPY, "numpy 1.26.4")
+    folder.replace(RECORD, NUMPY, OTHER_NUMPY)
     assert folder.main("check").status == 0, "another version alone is no fault"
     recorded_elsewhere = folder.read(RECORD)
     assert folder.main("update").status == 0
@@ -84,7 +89,8 @@ def test_drift_begins_with_what_changed_in_the_environment(make: Make) -> None:
     assert f"error[output-drift]: {lead}" in folder.main("check").out
     assert folder.main("update").status == 0
     assert NUMPY in folder.text(RECORD), "it was recorded here"
-    folder.replace(RECORD, f"exact; {PYTHON}", "digits; Python 3.9.1")
+    folder.replace(RECORD, '"exact"', '"digits"')
+    folder.replace(RECORD, PYTHON, "Python 3.9.1")
     folder.replace(folder.lesson(), "arange(4.0)", "arange(5.0)")
     lead = f"recorded with Python 3.9.1 and comparison `digits`, this is {PYTHON[7:]} and `exact`"
     assert f"error[output-drift]: {lead}: " in folder.main("check").out
@@ -95,23 +101,18 @@ def test_nothing_is_refused_without_a_record(make: Make) -> None:
     assert folder.main("check").status == 0
     folder.replace(folder.lesson(), "\n3.0\n", "\n2.0\n")
     assert "error[output-drift]: recorded output differs" in folder.main("check").out
-    folder.write(RECORD, b"\xff\0[examples/total.py output 1]\nrecorded 0: what; is; this\n")
+    folder.write(RECORD, b'\xff\0{"is":"recording"}\n{"is":"what"}\n[]\n')
     assert "error[output-drift]: recorded output differs" in folder.main("check").out
     assert folder.main("update").status == 0
     assert NUMPY in folder.text(RECORD)
 
 
-def test_record_goes_with_its_last_recording_and_keeps_other_lines(make: Make) -> None:
+def test_record_goes_with_its_last_recording(make: Make) -> None:
     folder = make(numpy_lesson())
     assert folder.main("update").status == 0
-    folder.replace(RECORD, "output 1]\n", "output 1]\nvalue 3.0: first number\n")
-    folder.replace(folder.lesson(), "arange(3.0)", "arange(4.0)")
-    assert folder.main("update").status == 0
-    assert lines(folder.text(RECORD))[0] == "[examples/total.py output 1]"
-    assert "\nvalue 3.0: first number\n" in folder.text(RECORD)
     folder.write(folder.lesson(), GOOD)
     assert folder.main("update").status == 0
-    assert [line for line in lines(folder.text(RECORD)) if "total" in line] == []
+    assert "total" not in folder.text(RECORD)
     folder.write(folder.lesson(), "## Nothing runs\n\nHere.\n")
     update = folder.main("update")
     assert f"removed {RECORD}" in update.out
@@ -121,11 +122,10 @@ def test_record_goes_with_its_last_recording_and_keeps_other_lines(make: Make) -
 def test_renamed_lesson_takes_its_record_along(make: Make) -> None:
     folder = make(numpy_lesson())
     assert folder.main("update").status == 0
-    before = lines(folder.text(RECORD))
+    before = folder.text(RECORD)
     assert folder.main("rename", "1.1", "1.7").status == 0
     assert not (folder.root / RECORD).exists()
-    text = folder.text("content/lessons/1.7-one.recorded.txt")
-    assert (lines(text), "of 1.7-one.md " in text) == (before, True)
+    assert folder.text("content/lessons/1.7-one.recorded.txt") == before
 
 
 # --------------------------------------------------------------------------- git
@@ -164,8 +164,8 @@ def merge(folder: Folder) -> None:
     assert check.status == 0, check.out
     update = folder.main("update")
     assert update.status == 0, update.out
-    headings = [line for line in lines(text) if line.startswith("[")]
-    assert headings == [f"[examples/{name}.py output 1]" for name in "abc"]
+    of = [recording["of"] for recording in recordings(text)]
+    assert of == [f"examples/{name}.py output 1" for name in "abc"]
 
 
 def test_branches_that_record_other_outputs_merge(make: Make) -> None:
@@ -194,20 +194,20 @@ def test_branches_that_begin_a_record_merge_as_a_new_course_says(
     git(folder.root, "merge", "-q", "-m", "merged", "right")
     assert folder.main("check").status == 0
     assert folder.main("update").status == 0
-    assert len(lines(folder.text(RECORD))) == 6, "what the merge left over is gone"
+    assert len(recordings(folder.text(RECORD))) == 3, "what the merge left over is gone"
 
 
 def test_marks_of_a_conflict_in_a_record_harm_nothing(make: Make) -> None:
     folder = make(numpy_lesson())
     assert folder.main("update").status == 0
-    heading, line = lines(folder.text(RECORD))
-    conflict = f"<<<<<<< ours\n{line}\n=======\nrecorded 00: exact; X; Y\n>>>>>>> theirs\n"
-    folder.write(RECORD, f"{heading}\n{conflict}".replace(NUMPY, "numpy 1.26.4"))
+    line = folder.text(RECORD).replace(NUMPY, OTHER_NUMPY)
+    theirs = line.replace('"digest":"', '"digest":"00')
+    folder.write(RECORD, f"<<<<<<< ours\n{line}=======\n{theirs}>>>>>>> theirs\n")
     assert folder.main("check").status == 0
     folder.replace(folder.lesson(), "arange(3.0)", "arange(4.0)")
     assert "recorded with NumPy 1.26.4, this is" in folder.main("check").out
     assert folder.main("update").status == 0
-    assert len(lines(folder.text(RECORD))) == 2 and "<<<<" not in folder.text(RECORD)
+    assert len(recordings(folder.text(RECORD))) == 1 and "<<<<" not in folder.text(RECORD)
 
 
 # --------------------------------------------------------------------------- figures
@@ -216,11 +216,11 @@ def test_marks_of_a_conflict_in_a_record_harm_nothing(make: Make) -> None:
 def test_figure_of_another_version_is_compared_by_what_it_draws(make: Make) -> None:
     folder = make(drawing_lesson())
     assert folder.main("update").status == 0
-    version_here = f"matplotlib {version('matplotlib')}"
+    version_here = f'["matplotlib","{version("matplotlib")}"]'
     folder.write(folder.lesson(), drawing_lesson(font=17))
     check = folder.main("check")
     assert "the recorded figure differs" in check.out, "the same version draws the same"
-    folder.replace(RECORD, version_here, "matplotlib 3.9.0")
+    folder.replace(RECORD, version_here, '["matplotlib","3.9.0"]')
     assert folder.main("check").status == 0, "the layout of another version is not this one's"
     before = folder.read("content/lessons/fall.svg")
     assert folder.main("update").status == 0
@@ -248,7 +248,7 @@ def test_figure_recorded_before_gets_its_data(make: Make) -> None:
     assert folder.main("check").status == 0
     assert folder.main("update").status == 0
     assert folder.text("content/lessons/fall.svg") == with_data
-    assert "fall.svg]" in folder.text(RECORD)
+    assert 'fall.svg",' in folder.text(RECORD)
     assert folder.main("build").status == 0
     assert folder.text("public/files/lessons/fall.svg") == bare, "readers get the drawing alone"
 

@@ -27,7 +27,7 @@ Output, the fits:
 
 On average it takes `78.5 min`{out="mean of tau"}, and for glass `73.5`{out}.
 """
-RECORD = "content/lessons/1.1-one.addresses.jsonl"
+RECORD = "content/lessons/1.1-one.recorded.txt"
 
 
 def cups(folder: Folder) -> str:
@@ -123,4 +123,4 @@ def test_a_table_is_filled_below_its_header(make: Make) -> None:
 def test_what_is_remembered_is_not_published(make: Make) -> None:
     folder = make_cups(make)
     assert folder.main("build").status == 0
-    assert [path for path in folder.tree("public") if "addresses.jsonl" in path] == []
+    assert [path for path in folder.tree("public") if "recorded" in path] == []

@@ -1,25 +1,26 @@
-"""What the outputs and figures of a lesson were recorded with: the file `LESSON.recorded.txt`.
+"""What a lesson shows, with what it was recorded and where it was printed: `LESSON.recorded.txt`.
 
-It lies beside the lesson, is kept in Git with it, and is never published. Each recording has a
-heading and below it a line, whose first word says of what kind it is:
+The file lies beside the lesson, is kept in Git with it, and is never published. It has a line of
+JSON for each recording and each shown value, and an empty line after each, so that Git merges
+neighbouring lines of two branches:
 
-    [examples/heat.py output 1]
-    recorded 5d41402abc4b2a76: exact; Python 3.12.4; linux x86_64; imports scipy 1.17.1; with …
+    {"is":"recording","of":"examples/heat.py output 1","digest":"5d41402abc4b2a76",…}
+    {"is":"value","value":{"text":"2.52",…},"at":[{"line":"it cools in # s","place":0}]}
 
-A line is found by the hash of what is recorded. So one that Git has merged with another, or that
-was left by an edit by hand, says nothing of any other text; and a recording without a line is one
-of which nobody knows what it was made with. The headings and the empty lines between them never
-change, so that Git merges the lines of two branches. Lines of kinds that are not known here stay.
+A recording is found by the hash of what is recorded, a value by its text and the words around. So a
+line that Git has merged with others, or that was left by an edit by hand, says nothing of any other
+text. Nothing is known of what has no line; a line that cannot be read counts for nothing.
 """
 
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
 
+import msgspec
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from coursebuild.core.model.blocks import Comparison, Mode, Recording
 from coursebuild.core.text.source import Excerpt
@@ -31,12 +32,9 @@ ENDING = ".recorded.txt"
 FIGURE = "figure"
 """How a figure is compared."""
 _HEAD = """\
-# What the outputs and figures of {name} were recorded with.
-# `coursebuild update` writes a line where it records one. Keep this file in Git, beside the lesson.
+# With what the lesson beside this was recorded, and where its numbers were printed. `coursebuild`
+# keeps a line for each when it updates the lesson, or finds it right. Keep this file in Git.
 """
-_HEADING = re.compile(r"\[(.+)\]")
-_LINE = re.compile(r"[a-z]+ .*")
-_RECORDED = re.compile(r"recorded ([0-9a-f]+): (.*)")
 _PROPER_NAMES = {
     "matplotlib": "Matplotlib",
     "mujoco": "MuJoCo",
@@ -58,6 +56,26 @@ class Address(Struct, frozen=True, omit_defaults=True):
     name: str = ""
     names: tuple[str, ...] = ()
     """The numbers that tell the line from others with its words, and those of all such lines."""
+
+
+class ShownValue(Struct, frozen=True, omit_defaults=True):
+    """What a lesson shows, and where: known again wherever its line has moved."""
+
+    script: str
+    before: str
+    """The words before it, with `#` for numbers."""
+    text: str
+    nth: int = 0
+    """Its index among those of the lesson that are the same in all of this."""
+    count: int = 1
+    """How many there are: with one more or less, it is uncertain which is which."""
+    path: str = ""
+    """That of the lesson; empty in its own record."""
+
+
+Addresses: TypeAlias = dict[ShownValue, tuple[Address, ...]]
+"""Where values were printed when they last held: each at all places that it may mean, which are
+several where its author has chosen none."""
 
 
 class Provenance(Struct, frozen=True):
@@ -86,41 +104,15 @@ def shown_versions(provenances: Iterable[Provenance | None]) -> tuple[str, ...]:
     return (*sorted(packages), *sorted(pythons))
 
 
-class Recorded(Struct, frozen=True):
+class Recorded(Struct, frozen=True, tag_field="is", tag="recording"):
     """How something was recorded."""
 
+    of: str
+    """The script, and which of its outputs or figures it is."""
     digest: str
     comparison: str
     """How it was to be compared, as its fence says it; for a figure, `figure`."""
     provenance: Provenance
-
-    @property
-    def line(self) -> str:
-        """It as a line of the file."""
-        made_with = self.provenance
-        parts = [self.comparison, made_with.python, made_with.platform]
-        for word, versions in (
-            ("imports", made_with.packages),
-            ("with", made_with.requirements),
-        ):
-            if versions:
-                parts.append(f"{word} " + ", ".join(map(" ".join, versions)))
-        return f"recorded {self.digest}: {'; '.join(parts)}"
-
-    @classmethod
-    def of_line(cls, line: str) -> Recorded | None:
-        """What a line says; `None` where it is no such line."""
-        match = _RECORDED.fullmatch(line)
-        parts = match[2].split("; ") if match is not None else []
-        if match is None or len(parts) < 3:
-            return None
-        comparison, python, platform, *lists = parts
-        words = (text.partition(" ") for text in lists)
-        versions = {word: _versions(text) for word, _, text in words}
-        made_with = Provenance(
-            python, platform, versions.get("imports", ()), versions.get("with", ())
-        )
-        return cls(match[1], comparison, made_with)
 
     def change(self, now: Provenance, comparison: str = FIGURE) -> str:
         """What is different now, as the beginning of a message; empty where nothing is."""
@@ -141,71 +133,61 @@ class Recorded(Struct, frozen=True):
         return f"recorded with {old}, this is {new}"
 
 
-class LessonRecord(Struct, frozen=True):
-    """A file: its lines by their headings, in order."""
+class _Bound(Struct, frozen=True, tag_field="is", tag="value"):
+    """The line of a value."""
 
-    sections: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    value: ShownValue
+    at: tuple[Address, ...]
+
+
+class LessonRecord(Struct, frozen=True):
+    """What such a file says, in the order of the lesson."""
+
+    recordings: tuple[Recorded, ...] = ()
+    addresses: Mapping[ShownValue, tuple[Address, ...]] = field(default_factory=dict)
 
     @classmethod
     def parse(cls, text: str) -> LessonRecord:
-        """The record in a text; what is neither a heading nor a line of any kind is left out."""
-        sections: dict[str, tuple[str, ...]] = {}
-        heading = ""
-        for line in map(str.strip, text.splitlines()):
-            if match := _HEADING.fullmatch(line):
-                heading = match[1]
-                sections.setdefault(heading, ())
-            elif heading and _LINE.fullmatch(line) and line not in sections[heading]:
-                sections[heading] += (line,)
-        return cls(sections)
+        """The record in a text."""
+        recordings: list[Recorded] = []
+        addresses: Addresses = {}
+        for line in text.split("\n"):
+            try:
+                entry = msgspec.json.decode(line, type=Recorded | _Bound)
+            except (msgspec.DecodeError, UnicodeEncodeError):
+                continue
+            if isinstance(entry, Recorded):
+                recordings.append(entry)
+            else:  # two branches may have given it places: it may mean any
+                places = (*addresses.get(entry.value, ()), *entry.at)
+                addresses[entry.value] = tuple(dict.fromkeys(places))
+        return cls(tuple(recordings), addresses)
 
-    def text(self, name: str) -> str:
-        """The file beside the lesson of this name; empty where it would say nothing."""
-        parts = [
-            f"[{heading}]\n" + "".join(f"{line}\n" for line in lines)
-            for heading, lines in self.sections.items()
-        ]
-        return "\n".join((_HEAD.format(name=name), *parts)) if parts else ""
+    @property
+    def text(self) -> str:
+        """The file; empty where it would say nothing."""
+        entries = (*self.recordings, *(_Bound(*item) for item in self.addresses.items()))
+        lines = [f"\n{msgspec.json.encode(entry).decode()}\n" for entry in entries]
+        return "".join((_HEAD, *lines)) if lines else ""
 
     def find(self, script: str, digest: str) -> Recorded | None:
         """How something of a script was recorded that has this hash now."""
-        for heading, lines in self.sections.items():
-            if heading.startswith(f"{script} "):
-                recordings = (Recorded.of_line(line) for line in lines)
-                if match := next(
-                    (r for r in recordings if r is not None and r.digest == digest), None
-                ):
-                    return match
-        return None
+        of_script = (r for r in self.recordings if r.of.startswith(f"{script} "))
+        return next((r for r in of_script if r.digest == digest), None)
 
-    def with_recordings(self, recordings: Iterable[tuple[str, Recorded | None]]) -> LessonRecord:
-        """The record of a lesson whose recordings, in order, have these headings.
 
-        With `None`, nothing is known of one but what is here already.
-        """
-        sections: dict[str, tuple[str, ...]] = {}
-        for heading, recorded in recordings:
-            lines = self.sections.get(heading, ())
-            further_lines = tuple(line for line in lines if Recorded.of_line(line) is None)
-            new_lines = (() if recorded is None else (recorded.line,)) + further_lines
-            if new_lines:
-                sections[heading] = new_lines
-        return LessonRecord(sections)
+def known_addresses(records: Mapping[str, LessonRecord]) -> Addresses:
+    """The addresses in records by the path of their lesson."""
+    return {
+        replace(value, path=path): at
+        for path, record in records.items()
+        for value, at in record.addresses.items()
+    }
 
 
 def record_path(document: str) -> str:
     """The path of the record of a lesson or page, given its own."""
     return document.removesuffix(".md") + ENDING
-
-
-def output_heading(script: str, number: int) -> str:
-    """The heading of an output of a script; they are numbered from 1."""
-    return f"{script} output {number}"
-
-
-def figure_heading(script: str, name: str) -> str:
-    """The heading of a figure of a script, or of its data."""
-    return f"{script} {name}"
 
 
 def recording_digest(recording: Recording) -> str:
@@ -235,11 +217,6 @@ def describe_comparison(comparison: Comparison) -> str:
 def proper_name(package: str) -> str:
     """A package as a text names it."""
     return _PROPER_NAMES.get(package, package)
-
-
-def _versions(text: str) -> Versions:
-    pairs = (part.rpartition(" ") for part in text.split(", ") if part)
-    return tuple((name, version) for name, _, version in pairs)
 
 
 def _changed(before: Provenance, now: Provenance, field: str) -> Iterator[tuple[str, str, str]]:

@@ -20,7 +20,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.lesson_record import Address
+from coursebuild.core.model.lesson_record import Address, Addresses
 from coursebuild.core.model.results import Change, DriftKind, Outcome, Verdict
 from coursebuild.core.scripts.bound_numbers import (
     BoundText,
@@ -40,7 +40,7 @@ from coursebuild.core.scripts.bound_places import (
 )
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body, recording_key
-from coursebuild.core.scripts.provenance import Addresses, describe_line
+from coursebuild.core.scripts.provenance import describe_line
 from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean
 from coursebuild.core.text.near import nearest

@@ -19,19 +19,13 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.lesson_record import Address
+from coursebuild.core.model.lesson_record import Address, Addresses, ShownValue
 from coursebuild.core.model.results import Outcome, Verdict
 from coursebuild.core.scripts.bound_numbers import BoundText, Window
 from coursebuild.core.scripts.column_titles import ColumnTitle
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.provenance import (
-    Addresses,
-    PrintedText,
-    ShownValue,
-    masked,
-    shown_values,
-)
+from coursebuild.core.scripts.provenance import PrintedText, masked, shown_values
 from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.diagnostics import Edit, Note
 
@@ -72,6 +66,14 @@ def document_values(document: model.Document, outputs: PrintedOutputs) -> tuple[
         for value in row_values(document, verdict.recording, verdict.comparison.filters)
     )
     return (*(value for _, value in bound_values(document, outputs)), *rows)
+
+
+def carried_addresses(
+    addresses: Addresses, before: Sequence[ShownValue], now: Sequence[ShownValue]
+) -> Addresses:
+    """The addresses of the values of a lesson that was written anew, value by value."""
+    pairs = zip(before, now, strict=True) if len(before) == len(now) else ()
+    return {new: addresses[old] for old, new in pairs if old in addresses}
 
 
 _MARKUP = re.compile(r"\{[^{}]*\}|[`*_$]")

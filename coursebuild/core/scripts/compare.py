@@ -20,6 +20,7 @@ from typing import Literal, TypeAlias
 from msgspec import Struct
 
 from coursebuild.core import model
+from coursebuild.core.model.lesson_record import Addresses
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.core.scripts.diff import (
@@ -31,16 +32,18 @@ from coursebuild.core.scripts.diff import (
 )
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher, Side
-from coursebuild.core.scripts.provenance import Addresses
 from coursebuild.core.scripts.tables import RowAddresses, compare_table, row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 
 def verify(
-    course: model.Course, runs: Iterable[ScriptRun], addresses: Addresses | None = None
+    course: model.Course,
+    runs: Iterable[ScriptRun],
+    addresses: Addresses | None = None,
+    documents: Iterable[model.Document] | None = None,
 ) -> tuple[Verdict, ...]:
-    """A verdict for every recording of the course that has a script, in order.
+    """A verdict for every recording of the course, or of some documents, that has a script.
 
     `addresses` holds those where rows of tables held before.
 
@@ -50,7 +53,7 @@ def verify(
     by_path = {run.path: run for run in runs if run.outcome is Outcome.OK}
     paths: set[str] = set()
     verdicts: list[Verdict] = []
-    for document in course.documents:
+    for document in course.documents if documents is None else documents:
         is_repeated = False
         for block in model.document_blocks(document):
             if isinstance(block, model.Script):

@@ -18,7 +18,12 @@ from coursebuild.core.model import (
     document_scripts,
 )
 from coursebuild.core.model.addresses import recorded_figures
-from coursebuild.core.model.lesson_record import LessonRecord, describe_comparison, recording_digest
+from coursebuild.core.model.lesson_record import (
+    Addresses,
+    LessonRecord,
+    describe_comparison,
+    recording_digest,
+)
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts import bindings, failures
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
@@ -29,7 +34,6 @@ from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.lines import ELLIPSIS, Side
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.provenance import Addresses
 from coursebuild.core.scripts.table_cells import cell_text, table_rows
 from coursebuild.core.scripts.tables import TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose

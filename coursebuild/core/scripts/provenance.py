@@ -17,29 +17,10 @@ from typing import TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.core.model.lesson_record import Address
+from coursebuild.core.model.lesson_record import Address, ShownValue
 from coursebuild.core.scripts.bound_numbers import PrintedLine, Window
 from coursebuild.core.scripts.lines import MARK, canonicalize, plain_text
 from coursebuild.core.text.numbers import scan
-
-
-class ShownValue(Struct, frozen=True):
-    """What a lesson shows, and where: known again wherever its line has moved."""
-
-    path: str
-    script: str
-    before: str
-    """The words before it, with `#` for numbers."""
-    text: str
-    nth: int
-    """Its index among those of the lesson that are the same in all of this."""
-    count: int
-    """How many there are: with one more or less, it is uncertain which is which."""
-
-
-Addresses: TypeAlias = dict[ShownValue, tuple[Address, ...]]
-"""Where the values of a course were printed when they last held: each at all places that it may
-mean, which are several where its author has chosen none."""
 
 
 def describe_line(address: Address) -> str:
@@ -53,7 +34,8 @@ def shown_values(texts: Iterable[tuple[str, str, str, str]]) -> Iterator[ShownVa
     values = list(texts)
     counts, earlier = Counter(values), Counter[tuple[str, str, str, str]]()
     for value in values:
-        yield ShownValue(*value, earlier[value], counts[value])
+        path, script, before, text = value
+        yield ShownValue(script, before, text, earlier[value], counts[value], path)
         earlier[value] += 1
 
 

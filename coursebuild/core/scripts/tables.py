@@ -24,7 +24,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.lesson_record import Address
+from coursebuild.core.model.lesson_record import Address, ShownValue
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.bound_numbers import PrintedLine, Window
@@ -38,7 +38,7 @@ from coursebuild.core.scripts.lines import (
     plain_text,
     same_number,
 )
-from coursebuild.core.scripts.provenance import PrintedText, ShownValue, shown_values
+from coursebuild.core.scripts.provenance import PrintedText, shown_values
 from coursebuild.core.scripts.table_cells import (
     RowCell,
     elides_rows,

@@ -7,13 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison
+from coursebuild.core.model.lesson_record import Addresses
 from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.scripts.bindings import check_bindings
 from coursebuild.core.scripts.compare import compare, verify
 from coursebuild.core.scripts.diff import diff_rows
 from coursebuild.core.scripts.findings import drift_diagnostic
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.provenance import Addresses
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.report.text import Style, diagnostic_text
 from support.fixture_cases import fixture_tables

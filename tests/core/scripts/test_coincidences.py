@@ -15,13 +15,14 @@ import pytest
 from msgspec import Struct
 
 from coursebuild.core.model import Document, Recording, find_blocks
+from coursebuild.core.model.lesson_record import Addresses
 from coursebuild.core.model.results import Verdict
 from coursebuild.core.scripts.bindings import check_bindings
 from coursebuild.core.scripts.bound_places import document_bindings, follow_outputs
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.provenance import Addresses, PrintedText
+from coursebuild.core.scripts.provenance import PrintedText
 from coursebuild.core.scripts.table_cells import table_rows
 from coursebuild.core.text.diagnostics import Edit
 from support.sample_lessons import course, document, make_run

@@ -14,7 +14,7 @@ from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.files.write import FileChange
 from coursebuild.core.model import Lesson
-from coursebuild.core.model.lesson_record import LessonRecord, record_path
+from coursebuild.core.model.lesson_record import record_path
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.text.diagnostics import Edit, did_you_mean
 from coursebuild.core.text.source import Source
@@ -24,7 +24,6 @@ from coursebuild.features.authoring.course_map import (
     rename_references,
     with_lesson_renamed,
 )
-from coursebuild.pipeline.address_record import addresses_path
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import documents_by_name
 from coursebuild.report.text import location, visible
@@ -46,16 +45,11 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def _move_record(root: Path, old: str, new: str) -> list[FileChange]:
     """Let what is remembered of a lesson follow it from one path to another."""
-    changes: list[FileChange] = []
-    for path_of in (record_path, addresses_path):
-        if (root / path_of(old)).is_file():
-            data = new_data = read_bytes(root, path_of(old))
-            if path_of is record_path:  # which names its lesson
-                record = LessonRecord.parse(data.decode("utf-8", "replace"))
-                new_data = record.text(new.rpartition("/")[2]).encode()
-            changes.append(FileChange(path_of(new), None, new_data))
-            changes.append(FileChange(path_of(old), data, None))
-    return changes
+    old, new = record_path(old), record_path(new)
+    if not (root / old).is_file():
+        return []
+    data = read_bytes(root, old)
+    return [FileChange(new, None, data), FileChange(old, data, None)]
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -43,7 +43,6 @@ from coursebuild.features.names.claims import document_names
 from coursebuild.features.names.known_names import options_by_command
 from coursebuild.features.names.resolve import resolver_of
 from coursebuild.features.references import works_of
-from coursebuild.pipeline.address_record import addresses_path
 
 _NAME = r"[A-Za-z_]\w*"
 _SUBJECTS = (
@@ -293,9 +292,8 @@ def _lesson_name(texts: OpenTexts, lesson: model.Lesson, span: Span) -> _Name:
         file_edits = [types.TextDocumentEdit(identifier(uri), e) for uri, e in changes.items()]
         old, new = lesson.path, replace(lesson, id=id).path
         paths = [] if lesson.document is None else [(old, new)]
-        for path_of in (record_path, addresses_path):
-            if (texts.session.root / path_of(old)).exists():
-                paths.append((path_of(old), path_of(new)))
+        if (texts.session.root / record_path(old)).exists():
+            paths.append((record_path(old), record_path(new)))
         file_renames = [types.RenameFile(places.uri(a), places.uri(b)) for a, b in paths]
         return types.WorkspaceEdit(document_changes=[*file_edits, *file_renames])
 
