@@ -139,7 +139,7 @@ def test_dry_run_shows_the_difference_and_writes_nothing(make: Make) -> None:
     before = folder.tree()
     result = folder.main("update", "--dry-run")
     assert result.status == 1
-    assert result.out.endswith("\n2 lessons, 0 scripts run, 2 cached: 1 file to update\n")
+    assert result.out.endswith("\n2 lessons, 2 scripts run: 1 file to update\n")
     assert (
         f"would update {folder.lesson()}\n"
         f"--- {folder.lesson()}\n"
