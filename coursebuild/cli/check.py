@@ -14,7 +14,7 @@ from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.check import check
-from coursebuild.pipeline.fix import Answer, fix, propose
+from coursebuild.pipeline.fix import Answer, fix, proposals, propose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.shards import read_shard
 from coursebuild.report import Report
@@ -82,12 +82,11 @@ def run(arguments: argparse.Namespace) -> int:
             truth=arguments.truth,
         )
         safe = sum(diagnostic.safe for diagnostic in report.diagnostics)
-        proposals = sum(bool(d.edits) and not d.safe for d in report.diagnostics)
         remarks = [*report.remarks]
         if safe:
             remarks.append(f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}")
-        if proposals:
-            remarks.append(f"`coursebuild check --propose` has {plural(proposals, 'proposal')}")
+        if count := len(proposals(report.diagnostics)):
+            remarks.append(f"`coursebuild check --propose` has {plural(count, 'proposal')}")
         if arguments.hints:
             return replace(report, remarks=tuple(remarks), diagnostics=with_hints(report))
         if report.hints:

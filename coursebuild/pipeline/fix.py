@@ -83,6 +83,20 @@ def choose_fixes(
     return tuple(sorted(fixes, key=lambda d: d.order))
 
 
+def ways(diagnostic: Diagnostic) -> Iterator[Diagnostic]:
+    """The same diagnostic with the edits and the help of each way in which it can be mended."""
+    if diagnostic.edits:
+        yield diagnostic
+    for note in diagnostic.notes:
+        if note.edits:
+            yield replace(diagnostic, help=note.message, edits=note.edits)
+
+
+def proposals(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """What a human has to decide, one way after the other."""
+    return tuple(way for d in diagnostics if not d.safe for way in ways(d))
+
+
 def may_edit(root: Path, path: str) -> bool:
     """Whether fixes may change a file: one of the course's texts, itself and not behind a link."""
     try:
@@ -155,8 +169,8 @@ class _Fixer:
             report = self._verify()
             accepted: list[Diagnostic] = []
             answer = Answer.NO
-            for diagnostic in self._candidates(report.diagnostics):
-                if diagnostic.safe or answer is Answer.QUIT:
+            for diagnostic in self._candidates(proposals(report.diagnostics)):
+                if answer is Answer.QUIT:
                     continue
                 if len(choose_fixes([*accepted, diagnostic], proposals=True)) <= len(accepted):
                     continue  # it touches an accepted one, and is proposed again if need be
@@ -189,8 +203,8 @@ class _Fixer:
             mistakes, files = plural(len(self.fixed), "mistake"), plural(len(changes), "file")
             parts = [f"fixed {mistakes} in {files} ({names})"]
             parts.append(f"{left} left" if left else "nothing is left")
-        if proposals := sum(bool(d.edits) and not d.safe for d in report.diagnostics):
-            parts.append(f"`coursebuild check --propose` has {plural(proposals, 'proposal')}")
+        if count := len(proposals(report.diagnostics)):
+            parts.append(f"`coursebuild check --propose` has {plural(count, 'proposal')}")
         if self.fixed:
             parts.append("`coursebuild undo` takes it back" if can_undo else "it cannot be undone")
         return (*remarks, "; ".join(parts))

@@ -14,6 +14,8 @@ import functools
 import time
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
+from msgspec.structs import replace
+
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.examples import Obstacle
 from coursebuild.core.files.locks import project_lock
@@ -55,6 +57,8 @@ from coursebuild.pipeline.scripts import (
     script_lines,
 )
 from coursebuild.report import UNASKED, Report, ScriptLine
+
+_DRIFTS = ("output-drift", "figure-drift")
 
 
 def update(options: Options, names: tuple[str, ...] = (), *, dry_run: bool = False) -> Report:
@@ -114,8 +118,14 @@ class _Updater:
         diagnostics = [*read_diagnostics, *self.extracted_scripts.diagnostics]
         diagnostics += [*refusals, *failures, *figure_failures]
         diagnostics += check_recorded_runs(self.scripts, self.options)
-        diagnostics += self._diagnose_updated(new_course, runs)
+        told_paths = {d.span.path for d in diagnostics if d.rule == "output-not-updatable"}
+        diagnostics += [
+            d
+            for d in self._diagnose_updated(new_course, runs)
+            if d.rule not in _DRIFTS or not (self.dry_run or d.span.path in told_paths)
+        ]
         record_remarks = [] if self.dry_run else self._write_records(new_course, runs)
+        outdated = len(remarks) if self.dry_run else 0
         if not remarks and all(not d.is_error for d in diagnostics):
             remarks = ["every recorded output is up to date"]
         remarks += record_remarks
@@ -126,7 +136,7 @@ class _Updater:
         )
         reason = "update runs what is recorded"
         scripts, labs = _unasked_lines(self.course, unasked_scripts, self.documents, reason)
-        return judge(
+        report = judge(
             self.course,
             diagnostics,
             began,
@@ -135,6 +145,7 @@ class _Updater:
             documents=self.documents,
             remarks=tuple(remarks),
         )
+        return replace(report, outdated=outdated)
 
     # --- edits
 
@@ -259,8 +270,7 @@ class _Updater:
             ),
             *figure_findings(new_course, runs, functools.partial(read_recorded, self.options.root)),
         ]
-        # A drift that was not updated has its own diagnostic; a dry run leaves all drifts.
-        return [d for d in diagnostics if d.rule not in ("output-drift", "figure-drift")]
+        return diagnostics
 
     def _carry_addresses(self, new_course: Course, runs: Sequence[ScriptRun]) -> None:
         """Keep the addresses of numbers that were written anew."""

@@ -128,7 +128,13 @@ def run(
     direction of this number. `known_runs`: results, by path, that are known to hold.
     `only_recorded`: none runs of which nothing is recorded yet.
     """
-    extractions = tuple(scripts)
+    extractions, tell = tuple(scripts), options.on_result
+    if tell is not None:
+
+        def tell_provenance(run: ScriptRun) -> None:
+            tell(with_provenance({run.path: run}, extractions, options)[run.path])
+
+        options = replace(options, on_result=tell_provenance)
     run_store = options.run_store() if run_store is None else run_store
     all_jobs = jobs(extractions, perturbation)
     norun = (script.path for script in extractions if script.script.norun)

@@ -122,23 +122,31 @@ def accept(session: Session, path: str, ids: str) -> str:
         accepted_offers = [offers[id] for id in ids.split() if id in offers]
         if not accepted_offers or len(accepted_offers) < len(ids.split()):
             return "this is no longer what the page offers; look at it again"
-        edits: dict[Source, list[Edit]] = {}
-        for offer in accepted_offers:
-            for edit in offer.edits:  # two outputs of a script may offer the same number
-                edits_there = edits.setdefault(edit.span.source, [])
-                edits_there += [] if edit in edits_there else [edit]
-    changes = [
-        FileChange(s.path, s.text.encode(), apply_edits(s.text, edits_there).encode())
-        for s, edits_there in edits.items()
-    ]
-    changes += [FileChange(o.path, o.old, o.new) for o in accepted_offers if not o.edits]
-    with session.condition:
-        changes += _change_records(session, changes)
+        edits = [edit for offer in accepted_offers for edit in offer.edits]
+        drawings = [FileChange(o.path, o.old, o.new) for o in accepted_offers if not o.edits]
+        changes = changes_of(session, edits, drawings)
     try:  # if two browsers accept the same at once, the second one meets another text
         change_files(session.root, changes, keep=True, beside_commands=True)
     except EffectError as error:
         return error.message
     return ""
+
+
+def changes_of(
+    session: Session, edits: Iterable[Edit], drawings: Iterable[FileChange] = ()
+) -> list[FileChange]:
+    """The changes of files by what is accepted, and of those that say what it was recorded with."""
+    by_source: dict[Source, list[Edit]] = {}
+    for edit in edits:  # two outputs of a script may offer the same number
+        edits_there = by_source.setdefault(edit.span.source, [])
+        edits_there += [] if edit in edits_there else [edit]
+    changes = [
+        FileChange(s.path, s.text.encode(), apply_edits(s.text, edits_there).encode())
+        for s, edits_there in by_source.items()
+    ]
+    changes += drawings
+    with session.condition:
+        return [*changes, *_change_records(session, changes)]
 
 
 def _change_records(session: Session, changes: Sequence[FileChange]) -> Iterator[FileChange]:

@@ -75,17 +75,20 @@ class Summary(Struct, frozen=True):
     hints: int
     part: str
     """The part of the work that was done, as `2/8`; empty for all of it."""
+    outdated: int
+    """Files that are not what they would be after the command, which was only to say so."""
 
     @property
     def ok(self) -> bool:
         """Whether nothing is wrong, so that the command succeeds."""
-        return not (self.errors or self.failed)
+        return not (self.errors or self.failed or self.outdated)
 
     def verdict(self) -> str:
         """What was found, in words: all holds only where all was run and nothing is wrong."""
         counts = [plural(self.errors, "error")] if self.errors else []
         if self.failed and not self.errors:
             counts.append(f"{self.failed} failed")
+        counts += [f"{plural(self.outdated, 'file')} to update"] if self.outdated else []
         counts += [plural(self.warnings, "warning")] if self.warnings else []
         left_out = [_were_not(self.unproven, "script", "run")] if self.unproven else []
         left_out += [_were_not(self.untried, "lab", "tried")] if self.untried else []
@@ -129,6 +132,8 @@ class Report(Struct, frozen=True):
     """Which printed digits hold; `None` where that was not measured."""
     hints: tuple[Diagnostic, ...] = ()
     """What is likely a mistake, which changes nothing."""
+    outdated: int = 0
+    """How many files a command would change that was only to say so."""
     folder: str = ""
     """Where the course lies in the repository, for services that know only this: `lectures/`."""
 
@@ -160,6 +165,7 @@ class Report(Struct, frozen=True):
             unrepeated=sum(line.unrepeated for line in self.scripts),
             hints=len(self.hints),
             part=self.part,
+            outdated=self.outdated,
         )
 
     @property

@@ -158,6 +158,21 @@ def test_proposals_are_accepted_one_by_one(make: Make) -> None:
     assert folder.text(folder.lesson()) == text
 
 
+def test_a_number_printed_at_two_places_has_a_proposal_for_each(make: Make) -> None:
+    code = "print('before 1.25 J')\nprint('after 1.25 J')"
+    text = block("energy.py", code, "before 1.25 J\nafter 1.25 J") + "\nIt stays `1.25`{out} J.\n"
+    folder = make("## Energy\n\n" + text)
+    with terminal(folder, "check", "--propose") as window:
+        first = window.read(r"\[y/n/q\] ")
+        window.type(b"n\n")
+        window.read(r"(?s)\[y/n/q\] .*\[y/n/q\] ")
+        window.type(b"y\n")
+        window.read()
+        assert window.process.wait(120) == 0
+    assert '\n+It stays `1.25`{out="before"} J.\n' in screen(first)
+    assert '`1.25`{out="after"} J' in folder.text(folder.lesson())
+
+
 def test_the_live_line_fits_the_terminal(make: Make) -> None:
     names = [f"{'長い名前' * 4}_{n}.py" for n in range(3)]
     folder = make(

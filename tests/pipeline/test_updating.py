@@ -138,7 +138,8 @@ def test_dry_run_shows_the_difference_and_writes_nothing(make: Make) -> None:
     folder.main("extract")
     before = folder.tree()
     result = folder.main("update", "--dry-run")
-    assert result.status == 0
+    assert result.status == 1
+    assert result.out.endswith("\n2 lessons, 2 scripts run: 1 file to update\n")
     assert (
         f"would update {folder.lesson()}\n"
         f"--- {folder.lesson()}\n"

@@ -139,7 +139,8 @@ class Editor:
         texts = {}
         for uri, file_edits in edits.items():
             path = self.places.path(uri)
-            text = self.texts.get(path) or self.folder.text(path)
+            is_new = not (self.folder.root / path).exists()  # the client was told to make it
+            text = self.texts.get(path) or ("" if is_new else self.folder.text(path))
             source = Source(path, text)
             for edit in sorted(
                 file_edits, key=lambda e: (-e.range.start.line, -e.range.start.character)

@@ -182,8 +182,7 @@ class Script(Labelled, frozen=True):
     once: bool = False
     """Whether the course keeps its output, and it runs only on request."""
     figures: tuple[FigureName, ...] = ()
-    show: Show | None = None
-    """`None`: a long one folds by itself."""
+    show: Show = "open"
     parts: tuple[Script | ScriptPart, ...] = ()
     """The blocks of a whole script that stands in several."""
 

@@ -26,20 +26,11 @@ from coursebuild.core.pages.context import (
     ShownRun,
 )
 from coursebuild.core.pages.graph import drawings
-from coursebuild.core.pages.listings import Part, fold, highlight_lines
+from coursebuild.core.pages.listings import highlight_lines
 from coursebuild.core.pages.markup import SpecialBlock
 from coursebuild.core.pages.renderer import Renderer, Strings
 from coursebuild.core.registry import kind_of_block, model_parts, page_kind
 from coursebuild.core.text.characters import visible
-
-
-class CodePart(Struct, frozen=True):
-    """A stretch of a script's lines, as HTML."""
-
-    html: Markup
-    first: int
-    folded: bool
-    label: str
 
 
 class Receipt(Struct, frozen=True):
@@ -159,7 +150,7 @@ class PageWriter(PageContext, frozen=True):
     ) -> Markup:
         """A script or a part of one, and the outputs that belong to it, as one object."""
         script, first = self.script_places[block.span.start]
-        parts = self._code_parts(block, first, is_whole=not script.parts)
+        lines = highlight_lines("python", block.code.text.rstrip("\n"))
         receipt = None
         if isinstance(block, model.Script) and not recordings:
             receipt = script_receipt(self, block)
@@ -169,38 +160,16 @@ class PageWriter(PageContext, frozen=True):
             begins=isinstance(block, model.Script),
             label=block.label,
             number=self.number(block.label),
-            parts=parts,
-            is_hidden=block.show == "hidden",
+            first=first,
+            code=numbered_lines(lines, block.path, first),
+            lines=self._lines(first, first + len(lines) - 1),
+            show=block.show,
             anchor=model.listing_anchor(block.path),
             href=self.place.href(block.path),
             command=shlex.join(("python", block.path, *script.args)),
             outputs=tuple(map(self._output, recordings)),
             receipt=receipt,
         )
-
-    def _code_parts(
-        self, block: model.Script | model.ScriptPart, first: int, *, is_whole: bool
-    ) -> tuple[CodePart, ...]:
-        """The stretches of a block whose code begins at line `first` of its file."""
-        words, text, show = self.words, block.code.text.rstrip("\n"), block.show
-        lines = highlight_lines("python", text)
-        if show is None and isinstance(block, model.Script) and block.figures:
-            show = "folded"
-        if show is None and is_whole:
-            stretches = fold(text)
-        else:
-            stretches = (Part(1, len(lines), folded=show == "folded"),)
-        parts: list[CodePart] = []
-        for part in stretches:
-            holds = [words("code.docstring")] if part.docstring else []
-            holds += [words("code.imports")] if part.imports else []
-            holds += part.names
-            start, end = part.first + first - 1, part.last + first - 1
-            label = self._lines(start, end)
-            label += f": {', '.join(holds)}" if holds else ""
-            html = numbered_lines(lines[part.first - 1 : part.last], block.path, start)
-            parts.append(CodePart(html, start, part.folded, label))
-        return tuple(parts)
 
     def _lines(self, first: int, last: int) -> str:
         return self.words("code.lines" if first < last else "code.line", first=first, last=last)

@@ -114,7 +114,7 @@ def _build_part(
             message = f"`{word.key}` is said of the whole script"
             help = "write it on the block that begins the script"
             diagnostics.append(diagnose("fence-key-value", word.key_span, message, help=help))
-    show = _read_show(keys, diagnostics) or "open"
+    show = _read_show(keys, diagnostics)
     if not _check_path(fence, file, diagnostics):
         return None
     path, place, code = file.value or "", file.value_span, _code_of(fence)
@@ -134,14 +134,14 @@ def _check_path(fence: Fence, file: Word, diagnostics: list[Diagnostic]) -> bool
     return not mistake
 
 
-def _read_show(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Show | None:
+def _read_show(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Show:
     shows = [show for show in _SHOWS if keys.get(show) is not None]
     for show in shows[1:]:
         message = f"`{show}` contradicts `{shows[0]}`"
         place = keys.place(show)
         assert place is not None
         diagnostics.append(diagnose("fence-key-value", place, message))
-    return shows[0] if shows else None
+    return shows[0] if shows else "open"
 
 
 def _code_of(fence: Fence) -> Excerpt:

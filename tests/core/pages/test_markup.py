@@ -170,14 +170,13 @@ def test_a_keyframe_without_a_name_is_numbered(make: Make) -> None:
     assert "keyframe <code>1</code>" in make('```lab\n{"model": "box", "key": 1}\n```\n').html()
 
 
-def test_a_long_script_is_folded_and_loses_no_line(make: Make) -> None:
-    body = '"""Doc."""\n\nimport math\nimport sys\n\nA = 1\nB = 2\nC = 3\n\n'
-    body += "".join(f"def f{i}():\n" + "    return 1\n" * 12 + "\n\n" for i in range(8))
-    html = make(f"```python file=examples/a.py\n{body}```\n").html()
-    assert "<summary>lines 1–9: docstring, imports, A, B, C</summary>" in html
-    assert "<summary>lines 38–127: f2, f3, f4, f5, f6, f7</summary>" in html
-    code = "".join(findall(r"<code class=\"language-python\">(.*?)</code></pre>", html, flags=16))
-    assert unescape(sub(r"</?span[^>]*>", "", code)) == body.rstrip("\n") + "\n"
+def test_code_is_folded_by_the_word_of_its_author_alone(make: Make) -> None:
+    body = "".join(f"def f{i}():\n" + "    return 1\n" * 12 + "\n\n" for i in range(8))
+    for word, folds in (("", 0), ("open", 0), ("figure=a.svg", 0), ("folded", 1)):
+        html = make(f"```python file=examples/a.py {word}\n{body}```\n").html()
+        assert html.count("<details") == html.count("<summary>lines 1–118</summary>") == folds
+        (code,) = findall(r"<code class=\"language-python\">(.*?)</code></pre>", html, flags=16)
+        assert unescape(sub(r"</?span[^>]*>", "", code)) == body.rstrip("\n") + "\n"
 
 
 def test_control_characters_of_an_output_are_shown(make: Make) -> None:

@@ -106,8 +106,6 @@ def test_every_text_that_is_asked_for_exists_and_every_one_is_used(assets: Asset
         "overlay.",
         "promise.",
         "status.",
-        "code.docstring",
-        "code.imports",
         "theme.",
         "words.",
     )

@@ -184,6 +184,7 @@ def test_doctor_says_what_a_sandbox_lacks(tmp_path: Path) -> None:
         "         help: it needs Bubblewrap 0.8 or newer, and user namespaces: on Ubuntu, "
         "`sudo sysctl kernel.apparmor_restrict_unprivileged_userns=0` allows them; containers "
         "often forbid them\n"
+        "\nall that every course needs works\n"
     )
     assert result.status == 0
 
@@ -211,5 +212,6 @@ def test_doctor_fails_where_a_course_cannot_be_built(tmp_path: Path) -> None:
     assert re.search(probe, result.stdout, re.MULTILINE)
     help = "\n         help: install coursebuild again, into an environment of its own\n"
     assert help in result.stdout
+    assert result.stdout.endswith("\nbroken: 1 thing that every course needs\n")
     result = folder.main("doctor", "-C", "no/such")
     assert (result.status, result.err) == (2, "coursebuild: there is no folder no/such\n")

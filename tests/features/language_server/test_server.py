@@ -104,9 +104,12 @@ def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
     # offered once the script has run a second time
     action = editor.wait_for(lambda: editor.actions(FIRST_LESSON, "at 1.|000 m").get(accept))
     assert action.kind == types.CodeActionKind.QuickFix and action.diagnostics
-    (new,) = editor.apply_edits(action.edit.changes).values()
+    new_file, *changes = action.edit.document_changes
+    assert editor.places.path(new_file.uri) == "content/lessons/1.1-one.recorded.txt"
+    new, record = editor.apply_edits({c.text_document.uri: c.edits for c in changes}).values()
     expected = typed.replace("at 1.000 m", "at 2.000 m").replace("`1.000`", "`2.000`")
     assert new == f"A line more.\n\n{expected}"  # with the number that is bound to it
+    assert re.search("^recorded [0-9a-f]+: exact; Python .* imports mujoco", record, re.MULTILINE)
     editor.write(FIRST_LESSON, new)
     editor.until(FIRST_LESSON)
 

@@ -31,6 +31,7 @@ from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.pipeline.options import Progress
 from coursebuild.report.text import GREEN, RED, YELLOW, visible
+from coursebuild.report.values import plural
 
 EXAMPLES = """\
 examples:
@@ -69,13 +70,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Make each probe, and print its line at once."""
+    """Make each probe, and print its line at once; the last line says what the status says."""
     folder = Path(arguments.root or find_course_root(".") or ".").resolve()
     if not folder.is_dir():
         raise UsageError(f"there is no folder {arguments.root}")
     if arguments.install_engine:
         return _install_engine(folder)
-    style, status = style_of(sys.stdout), CLEAN
+    style, faults = style_of(sys.stdout), 0
     required = (_engines, _lab_engine, _fonts, _folder)
     for make_probes in (*required, _store, _locks, _disk, _rendering, _sandbox):
         for probe in make_probes(folder):
@@ -84,9 +85,12 @@ def run(arguments: argparse.Namespace) -> int:
                 word, colour = "ok", GREEN
             line = f"{style.paint(f'{word:<8}', colour)} {visible(probe.text)}\n"
             write(line if probe.ok else f"{line}         help: {visible(probe.cure)}\n", CLEAN)
-            if probe.is_required and not probe.ok:
-                status = FAILURE
-    return status
+            faults += probe.is_required and not probe.ok
+    verdict = f"broken: {plural(faults, 'thing')} that every course needs" if faults else ""
+    verdict = verdict or "all that every course needs works"
+    return write(
+        f"\n{style.paint(verdict, RED if faults else GREEN)}\n", FAILURE if faults else CLEAN
+    )
 
 
 def _install_engine(folder: Path) -> int:

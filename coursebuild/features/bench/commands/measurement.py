@@ -97,12 +97,20 @@ class Measurement(Struct, Generic[_T], frozen=True):
     remarks: tuple[str, ...] = ()
 
     @property
+    def faults(self) -> str:
+        """What is wrong, in words. Exit status and last line are both read from it."""
+        errors = len(self.failures) + sum(d.is_error for d in self.diagnostics)
+        figures = sum(len(check.departures) for check in self.checked)
+        reports = sum(not getattr(report, "ok", True) for report in self.reports)
+        counts = [plural(errors, "error")] if errors else []
+        counts += [f"{plural(figures, 'figure')} not as recorded"] if figures else []
+        counts += [f"faults in {plural(reports, 'report')}"] if reports else []
+        return ", ".join(counts)
+
+    @property
     def ok(self) -> bool:
         """Whether everything was measured and agrees with the record, and nothing is to be done."""
-        has_departures = any(check.departures for check in self.checked)
-        has_errors = any(diagnostic.is_error for diagnostic in self.diagnostics)
-        has_tasks = any(not getattr(report, "ok", True) for report in self.reports)
-        return not (has_errors or self.failures or has_departures or has_tasks)
+        return not self.faults
 
 
 def measurement_json(reports: Mapping[str, object], measurement: Measurement[_T]) -> str:
@@ -184,6 +192,7 @@ def run_measurement(
         text(measurement.reports, style),
         format_checks(measurement.checked, style),
         "".join(f"{visible(remark)}\n" for remark in measurement.remarks),
+        f"{style.paint(measurement.faults, RED)}\n" if measurement.faults else "",
     ]
     return write("\n".join(part for part in parts if part) or empty, status)
 

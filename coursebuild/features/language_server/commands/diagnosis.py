@@ -24,8 +24,8 @@ from coursebuild.core.text.rules import Severity, rule_address
 from coursebuild.core.text.source import Source, Span
 from coursebuild.features.language_server.commands.texts import OpenTexts, Places
 from coursebuild.pipeline.check import judge
-from coursebuild.pipeline.fix import choose_fixes
-from coursebuild.preview.messages import new_output
+from coursebuild.pipeline.fix import choose_fixes, ways
+from coursebuild.preview.messages import changes_of, new_output
 from coursebuild.preview.session import Session
 from coursebuild.report.values import with_hints
 
@@ -153,17 +153,11 @@ def actions(
         *(texts.places.offset(source, at) for at in (params.range.start, params.range.end))
     )
     diagnostics = [d for d in current_diagnostics(texts.session) if d.span.source == place.source]
+    nearby = [d for d in diagnostics if _overlap(d.span, place)]
     actions = [
-        _make_action(texts.places, d.help or f"write `{d.edits[0].text}`", d.edits, [d])
-        for d in diagnostics
-        if d.edits and _overlap(d.span, place)
-    ]
-    actions += [
-        _make_action(texts.places, note.message, note.edits, [d])
-        for d in diagnostics
-        if _overlap(d.span, place)
-        for note in d.notes
-        if note.edits
+        _make_action(texts.places, way.help or f"write `{way.edits[0].text}`", way.edits, [d])
+        for d in nearby
+        for way in ways(d)
     ]
     fixable = (d for d in diagnostics if all(edit.span.source == place.source for edit in d.edits))
     if safe_fixes := choose_fixes(fixable):
@@ -182,7 +176,12 @@ def actions(
                 drifts = (d for d in diagnostics if d.rule == "output-drift")
                 solved = [d for d in drifts if span.contains(d.span)]
                 title = f"accept what `{verdict.recording.script}` prints"
-                actions.append(_make_action(texts.places, title, new_edits, solved))
+                action = _make_action(texts.places, title, new_edits, solved)
+                texts_there = {edit.span.path for edit in new_edits}
+                changes = changes_of(texts.session, new_edits)
+                records = [change for change in changes if change.path not in texts_there]
+                action.edit = texts.places.change_files(new_edits, records)
+                actions.append(action)
     actions += _bind_numbers(texts, place)
     asked_kinds = tuple(str(getattr(kind, "value", kind)) for kind in params.context.only or ("",))
     kinds = [str(getattr(action.kind, "value", action.kind)) for action in actions]

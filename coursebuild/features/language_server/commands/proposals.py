@@ -287,15 +287,13 @@ def _lesson_name(texts: OpenTexts, lesson: model.Lesson, span: Span) -> _Name:
         except UsageError as error:
             raise JsonRpcInvalidParams(str(error)) from None
         text_edits = (edit for edit in edits if edit not in map_edits)
-        changes = places.changes([Edit(course.map.span(), new_map), *text_edits])
-        identifier = types.OptionalVersionedTextDocumentIdentifier
-        file_edits = [types.TextDocumentEdit(identifier(uri), e) for uri, e in changes.items()]
+        text_changes = places.document_edits([Edit(course.map.span(), new_map), *text_edits])
         old, new = lesson.path, replace(lesson, id=id).path
         paths = [] if lesson.document is None else [(old, new)]
         if (texts.session.root / record_path(old)).exists():
             paths.append((record_path(old), record_path(new)))
         file_renames = [types.RenameFile(places.uri(a), places.uri(b)) for a, b in paths]
-        return types.WorkspaceEdit(document_changes=[*file_edits, *file_renames])
+        return types.WorkspaceEdit(document_changes=[*text_changes, *file_renames])
 
     return _Name(span.source.span(start, start + len(lesson.id)), lesson.id, rename_lesson)
 

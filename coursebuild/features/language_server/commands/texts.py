@@ -11,7 +11,7 @@ checks against (`schema_roots`).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import chain
 from pathlib import Path
@@ -23,6 +23,7 @@ from pygls import uris
 
 from coursebuild.core.files.course_root import MAP
 from coursebuild.core.files.read import read_sources
+from coursebuild.core.files.write import FileChange
 from coursebuild.core.model import Document, Lesson, Owner
 from coursebuild.core.model.course import Words
 from coursebuild.core.pages.library import Library
@@ -93,6 +94,23 @@ class Places:
             file_edits = changes.setdefault(self.uri(edit.span.path), [])
             file_edits.append(types.TextEdit(self.range(edit.span), edit.text))
         return changes
+
+    def document_edits(self, edits: Iterable[Edit]) -> list[types.TextDocumentEdit]:
+        """Return the same in the form that can stand beside changes of files."""
+        identifier = types.OptionalVersionedTextDocumentIdentifier
+        changes = self.changes(edits).items()
+        return [types.TextDocumentEdit(identifier(uri), edits) for uri, edits in changes]
+
+    def change_files(
+        self, edits: Iterable[Edit], files: Sequence[FileChange]
+    ) -> types.WorkspaceEdit:
+        """Return edits together with whole new texts of other files, some of which may be new."""
+        sources = ((file, Source(file.path, (file.old or b"").decode())) for file in files)
+        new_texts = [Edit(source.span(), (file.new or b"").decode()) for file, source in sources]
+        new_files = [types.CreateFile(self.uri(file.path)) for file in files if file.old is None]
+        return types.WorkspaceEdit(
+            document_changes=[*new_files, *self.document_edits([*edits, *new_texts])]
+        )
 
 
 class OpenTexts(Struct, frozen=True):
