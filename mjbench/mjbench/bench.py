@@ -24,11 +24,14 @@ from mjbench.declarations import (
     Place,
     parse_declarations,
 )
+from mjbench.derive import derive_sweep
+from mjbench.fair import fair_declarations
 from mjbench.host import Host
 from mjbench.machine import one_processor, this_machine
 from mjbench.problem import Array
 from mjbench.pruning.comparison import watch
 from mjbench.pruning.reachability import possible_pairs
+from mjbench.reports import PartFailure
 from mjbench.reports.scene_report import (
     ScenarioReport,
     SceneCard,
@@ -86,6 +89,8 @@ class Subject(Struct, frozen=True):
     """The file of its exact motion; empty without one."""
     parts: int = 0
     """The size of the files that the model pulls in, bytes."""
+    fair: bool = False
+    """Whether fair scenarios are made for a model without declarations; else keyframes are."""
 
     @property
     def place(self) -> Place:
@@ -103,9 +108,21 @@ class Subject(Struct, frozen=True):
                 str(error), Place(self.declarations_path), cause="scenario"
             ) from None
 
+    @property
+    def file(self) -> str:
+        """The path of the model's file."""
+        return str(Path(self.folder, self.path))
+
+    @property
+    def is_binary(self) -> bool:
+        """Whether it is a compiled model, which has no source."""
+        return self.path.endswith(".mjb")
+
     def compile(self) -> Any:
         """Its `mjModel`."""
-        path = str(Path(self.folder, self.path))
+        path = self.file
+        if self.is_binary:
+            return mujoco.MjModel.from_binary_path(path)
         return mujoco.MjModel.from_xml_path(path, assets={path: self.mjcf.encode()})
 
 
@@ -118,18 +135,21 @@ class CompiledModel(Struct, frozen=True):
     declarations: Declarations
     scenarios: tuple[Scene, ...]
     spec: Any
-    """Its `mjSpec`, from which it can be compiled_model with other parameters."""
+    """Its `mjSpec`, from which it can be compiled with other parameters; `None` without source."""
 
 
 def compile_subject(subject: Subject, host: Host, *, quick: bool) -> CompiledModel:
     """Compile a model and find its scenarios; a `CannotMeasureError` where it cannot be done."""
     declarations = subject.read_declarations()
-    with report_errors(subject):
+    with report_errors(subject, "the model `{}` does not compile", ValueError):
         model = subject.compile()
+    with report_errors(subject):
+        if subject.fair and not subject.declarations_path:
+            declarations = fair_declarations(model, subject.path, quick=quick)
         exact = _exact_motion(subject, host)
         found_scenes = scenes(model, declarations, quick=quick)
         found_scenes = tuple(replace(scene, exact=exact) for scene in found_scenes)
-        spec = mujoco.MjSpec.from_file(str(Path(subject.folder, subject.path)))
+        spec = None if subject.is_binary else mujoco.MjSpec.from_file(subject.file)
         return CompiledModel(subject, model, declarations, found_scenes, spec)
 
 
@@ -168,6 +188,10 @@ def run_sweep(
     groups = {"all": (of_values, of_threads), "values": (of_values,), "threads": (of_threads,)}
     reports = []
     with report_errors(compiled_model.subject):
+        if compiled_model.spec is None:
+            raise SceneError(
+                "a compiled model has no parameters to sweep", sweep.variations[0].place
+            )
         for variations in filter(None, groups[part]):
             part_sweep = replace(sweep, variations=variations)
             # One processor, unless what is measured is how it goes on several.
@@ -187,15 +211,20 @@ def join_parts(
     *,
     quick: bool,
     card: bool,
+    failures: Sequence[PartFailure] = (),
 ) -> SceneReport:
-    """The report on a model of what was measured of it; with `card`, also what it is made of."""
+    """The report on a model of what was measured of it; with `card`, also what it is made of.
+
+    `failures`: what was not measured.
+    """
     report = SceneReport(
         model=compiled_model.subject.name,
         digest=compiled_model.subject.digest,
         quick=quick,
         machine=this_machine(pinned=True),
         scenarios=tuple(scenarios),
-        sweeps=tuple(sweeps),
+        sweeps=tuple(map(derive_sweep, sweeps)),
+        failures=tuple(failures),
     )
     return replace(report, card=_card(compiled_model, host)) if card and scenarios else report
 

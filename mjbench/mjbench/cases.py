@@ -18,6 +18,7 @@ from msgspec.structs import asdict, astuple
 from mjbench import simulation
 from mjbench.costs import Clock, scenario_job, time_jobs
 from mjbench.declarations import DeclaredScenario
+from mjbench.derive import derive_case
 from mjbench.detector import driving_force
 from mjbench.integrate import forward_motion
 from mjbench.linearization import find_rest, step_excess
@@ -91,7 +92,7 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
             names.append(integrator.value)
             counts.append(round(problem.scenario.duration / step))
     timings = time_jobs(jobs, 0, clock, quick=True) if jobs else ()
-    return CaseReport(
+    report = CaseReport(
         name=problem.name,
         title=problem.title,
         case=problem.case,
@@ -107,6 +108,7 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
             for name, count, line in zip(names, counts, timings, strict=True)
         ),
     )
+    return derive_case(report)
 
 
 def measure(problem: Problem, integrator: Integrator, timestep: float) -> ErrorLine:

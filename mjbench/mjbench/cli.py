@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import hashlib
+import runpy
+import shutil
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +24,12 @@ from mjbench.cases import DisagreementError, measure_case
 from mjbench.engines.engine_run import UnknownEngineError, chosen_engines, measure_engines
 from mjbench.host import LocalHost
 from mjbench.machine import one_processor, package_version, this_machine
+from mjbench.parts import Parts
 from mjbench.problems import all_problems
+from mjbench.reports import PartFailure
 from mjbench.reports.diet_report import DietReport, Keep
+from mjbench.reports.diet_text import diet_text
+from mjbench.reports.page import scene_page
 from mjbench.reports.records import (
     BENCH,
     DIET,
@@ -30,9 +39,12 @@ from mjbench.reports.records import (
     case_departures,
     scene_departures,
 )
+from mjbench.reports.scene_report import ScenarioReport, SceneReport
+from mjbench.reports.terminal import Style
 from mjbench.schemas import schema_text
+from mjbench.work_precision import StoppedError
 
-_COMMANDS = ("bench", "stability", "diet", "schema", "jobs")
+_COMMANDS = ("bench", "stability", "diet", "show", "schema", "jobs")
 _DESCRIPTION = """\
 Measures MuJoCo models: speed against error of every integrator and timestep, the largest stable
 timestep, and what a model could do without. `mjbench MODEL.xml` is `mjbench bench MODEL.xml`.
@@ -75,10 +87,13 @@ def _parser() -> argparse.ArgumentParser:
         return command
 
     command = add("bench", _bench, "measure speed against error")
-    command.add_argument("model", type=Path, help="a MJCF file; MODEL.toml beside it has scenarios")
+    help = "MJCF, URDF, MJB, or Python with `spec`; MODEL.toml beside it has scenarios"
+    command.add_argument("model", type=Path, help=help)
     help = "measure other engines instead: all, or some, as in mjx,warp"
     command.add_argument("--engines", nargs="?", const="", metavar="NAMES", help=help)
     command.add_argument("--quick", action="store_true", help="fewer settings and rough times")
+    help = "write a page with verdicts, plots and tables"
+    command.add_argument("--html", type=Path, metavar="FILE", help=help)
     _add_report_options(command)
     command = add("stability", _stability, "measure MuJoCo on hard cases and compare with theory")
     command.add_argument("problems", nargs="*", metavar="PROBLEM", help="default: all of them")
@@ -89,7 +104,12 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--code", type=Path, nargs="*", default=[], metavar="FILE", help=help)
     command.add_argument("--quick", action="store_true", help="short runs and rough times")
     command.add_argument("--fix", action="store_true", help="remove what changes no bit of it")
+    help = "look for findings of these kinds alone"
+    command.add_argument("--only", nargs="*", default=[], metavar="KIND", help=help)
     _add_report_options(command, check=False)
+    command = add("show", _show, "show a recorded report")
+    command.add_argument("report", type=Path, help="a file that --record has written")
+    command.add_argument("--html", type=Path, metavar="FILE", help="write a page instead")
     command = add("schema", _schema, "print the JSON Schema of a format")
     command.add_argument("format", choices=("reports", "scenarios"))
     add("jobs", _jobs, "answer requests of another program: lines of JSON")
@@ -98,6 +118,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add_report_options(command: argparse.ArgumentParser, *, check: bool = True) -> None:
     command.add_argument("--format", choices=("text", "json"), default="text")
+    help = "the same as --format json"
+    command.add_argument("--json", dest="format", action="store_const", const="json", help=help)
     command.add_argument("--record", type=Path, metavar="FILE", help="write the report to a file")
     if check:
         help = "compare with a recorded report; times are never compared"
@@ -108,27 +130,51 @@ def read_subject(file: Path) -> Subject:
     """A model file, with the declarations and the exact motion that lie beside it."""
     if not file.is_file():
         raise _UsageError(f"there is no file {file}")
-    folder, mjcf = file.parent.resolve(), file.read_bytes()
+    if file.suffix == ".py":
+        return _subject_of_python(file)
+    folder, data = file.parent.resolve(), file.read_bytes()
     declarations, exact = file.with_suffix(".toml"), file.with_suffix(".exact.py")
-    digest, parts = hashlib.sha256(mjcf), 0
+    digest, parts = hashlib.sha256(data), 0
     for file_beside in (declarations, exact):
         if file_beside.is_file():
             digest.update(file_beside.read_bytes())
-    for part in map(Path, mujoco.mju_getXMLDependencies(str(folder / file.name))):
+    is_mjcf = file.suffix == ".xml"
+    found = mujoco.mju_getXMLDependencies(str(folder / file.name)) if is_mjcf else []
+    for part in map(Path, found):
         if part.exists() and not part.samefile(file):
             digest.update(part.read_bytes())
             parts += part.stat().st_size
     return Subject(
         folder=str(folder),
         path=file.name,
-        mjcf=mjcf.decode("utf-8", "surrogatepass"),
+        mjcf="" if file.suffix == ".mjb" else data.decode("utf-8", "surrogatepass"),
         name=file.stem,
         digest=digest.hexdigest(),
         declarations_path=declarations.name if declarations.is_file() else "",
         declarations=declarations.read_text("utf-8") if declarations.is_file() else "",
         exact=exact.name if exact.is_file() else "",
         parts=parts,
+        fair=True,
     )
+
+
+def _subject_of_python(file: Path) -> Subject:
+    """The model that a program makes: its `spec` or `model`, or what a function so called gives."""
+    names = runpy.run_path(str(file))
+    made = names.get("spec", names.get("model"))
+    made = made() if callable(made) else made
+    if isinstance(made, mujoco.MjSpec):
+        made = made.compile()
+    if not isinstance(made, mujoco.MjModel):
+        raise _UsageError(f"{file} defines no `spec` or `model` of MuJoCo's")
+    folder = tempfile.TemporaryDirectory(prefix="mjbench-")
+    atexit.register(folder.cleanup)
+    compiled = Path(folder.name, f"{file.stem}.mjb")
+    mujoco.mj_saveModel(made, str(compiled))
+    table = file.with_suffix(".toml")
+    if table.is_file():
+        compiled.with_suffix(".toml").write_bytes(table.read_bytes())
+    return read_subject(compiled)
 
 
 def _host(subject: Subject) -> LocalHost:
@@ -150,26 +196,77 @@ def _bench(arguments: argparse.Namespace) -> int:
         names = [name.strip() for name in arguments.engines.split(",") if name.strip()]
         engines, remarks = chosen_engines(names)
         report = measure_engines(subject, engines, host, quick=quick)
-        _print(arguments, report, text.engines_text(report), remarks)
+        _print(arguments, report, text.engines_text(report, _style()), remarks)
         return _record(arguments, ENGINES.encode(report))
     timed = arguments.check is None
     recorded = None if timed else BENCH.decode(arguments.check.read_bytes())
     compiled_model = bench.compile_subject(subject, host, quick=quick)
-    scenarios = [
-        bench.run_scenario(compiled_model, number, host, quick=quick, timed=timed)
-        for number in range(len(compiled_model.scenarios))
-    ]
-    sweeps = [
-        bench.run_sweep(compiled_model, sweep.name, host, quick=quick, timed=timed)
-        for sweep in compiled_model.declarations.sweeps
-    ]
-    scene = bench.join_parts(compiled_model, scenarios, sweeps, host, quick=quick, card=True)
+    scene, stopped = _measure_scene(compiled_model, host, quick=quick, timed=timed)
     if recorded is not None:
         departures = scene_departures(recorded, scene, compiled_model.declarations.bench)
         _print(arguments, departures, text.departures_text(departures))
         return 1 if departures else 0
-    _print(arguments, scene, text.scene_text(scene))
+    _print(arguments, scene, text.scene_text(scene, _style()))
+    if arguments.html is not None:
+        arguments.html.write_text(scene_page(scene), "utf-8")
+    if stopped:
+        print("mjbench: stopped; this is what is known", file=sys.stderr)
+        return 130
+    if not scene.scenarios and scene.failures:
+        return 1
     return _record(arguments, BENCH.encode(scene))
+
+
+def _measure_scene(
+    compiled_model: bench.CompiledModel, host: LocalHost, *, quick: bool, timed: bool
+) -> tuple[SceneReport, bool]:
+    """A model in all of its scenarios and sweeps, and whether the user stopped it."""
+    scenarios: list[ScenarioReport] = []
+    parts = Parts()
+
+    def scenario(number: int) -> None:
+        try:
+            report = bench.run_scenario(compiled_model, number, host, quick=quick, timed=timed)
+        except StoppedError as error:
+            scenarios.append(error.report)
+            raise KeyboardInterrupt from None
+        except CannotMeasureError as error:
+            reason = f"{error.place}: {error}" + (f"; {error.help}" if error.help else "")
+            name = compiled_model.scenarios[number].name
+            parts.failures.append(PartFailure(f"the scenario {name}", reason))
+            return
+        scenarios.append(report)
+
+    for number, scene in enumerate(compiled_model.scenarios):
+        parts.run(f"the scenario {scene.name}", partial(scenario, number), None)
+    sweeps = []
+    for sweep in compiled_model.declarations.sweeps:
+        run = partial(bench.run_sweep, compiled_model, sweep.name, host, quick=quick, timed=timed)
+        report = parts.run(f"the sweep {sweep.name}", run, None)
+        sweeps += [] if report is None else [report]
+    join = partial(bench.join_parts, compiled_model, scenarios, sweeps, host, quick=quick)
+    return join(card=not parts.stopped, failures=parts.failures), parts.stopped
+
+
+def _style() -> Style:
+    return Style(shutil.get_terminal_size((100, 40)).columns, sys.stdout.isatty())
+
+
+def _show(arguments: argparse.Namespace) -> int:
+    """Show a report of any kind; what follows from its figures is derived anew."""
+    data, style = arguments.report.read_bytes(), _style()
+    for kind in (BENCH, DIET, ENGINES, STABILITY):
+        try:
+            report = kind.decode(data)
+        except RecordError as error:
+            problem = error
+            continue
+        if isinstance(report, SceneReport) and arguments.html is not None:
+            arguments.html.write_text(scene_page(report), "utf-8")
+            return 0
+        sys.stdout.write(text.report_text(report, style))
+        return 0
+    raise problem
 
 
 def _stability(arguments: argparse.Namespace) -> int:
@@ -191,7 +288,7 @@ def _stability(arguments: argparse.Namespace) -> int:
         departures = case_departures([c for c in recorded if c.name in cases], reports)
         _print(arguments, departures, text.departures_text(departures))
         return 1 if departures else 0
-    _print(arguments, reports, "\n".join(map(text.case_text, reports)))
+    _print(arguments, reports, "\n".join(text.case_text(r, _style()) for r in reports))
     return _record(arguments, STABILITY.encode(tuple(reports)))
 
 
@@ -206,7 +303,13 @@ def _diet(arguments: argparse.Namespace) -> int:
         subject = read_subject(arguments.model)
         keeps = tuple(_keeps(subject))
         result = diet.look_at(
-            subject, _host(subject), readers, modules=modules, keeps=keeps, quick=arguments.quick
+            subject,
+            _host(subject),
+            readers,
+            modules=modules,
+            keeps=keeps,
+            only=arguments.only,
+            quick=arguments.quick,
         )
         if not (arguments.fix and result.changes):
             break
@@ -214,7 +317,9 @@ def _diet(arguments: argparse.Namespace) -> int:
             Path(subject.folder, change.path).write_bytes(change.after)
             print(f"changed {change.path}", file=sys.stderr)
     report: DietReport = result.report
-    _print(arguments, report, text.diet_text(report))
+    command = f"mjbench diet {arguments.model}"
+    table = arguments.model.with_suffix(".toml").name
+    _print(arguments, report, diet_text(report, command, table, _style()))
     return _record(arguments, DIET.encode(report)) or (0 if report.ok else 1)
 
 

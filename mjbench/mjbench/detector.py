@@ -4,7 +4,8 @@
    end in its initial state, with no error at all. Only the warning counters and the clock tell.
 2. A slow growth raises no warning for a long time: the state is compared with what can be.
 3. A state may shoot up and come back: the peaks on the way count, not only the end.
-4. Bodies that were pushed deep into each other raise no warning either.
+4. Bodies that go through each other raise no warning either. Depth alone is no loss: what is soft
+   gives way, rests and rolls on. Lost is what comes out on the other side, or stays inside.
 5. Where nothing drives the motion, potential and kinetic energy together are conserved or fall: a
    run that has many times as much is lost, however finite it stays.
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -39,6 +41,8 @@ class RunStatus(enum.Enum):
     """How a run went, the worst last."""
 
     OK = "ok"
+    THROUGH = "through"
+    """Something went through something else, which does not happen in small steps."""
     SLOW_GROWTH = "slow-growth"
     """No warning, but the state left the range of what can be."""
     DIVERGED = "diverged"
@@ -91,8 +95,6 @@ class Peaks(Struct, frozen=True):
             and self.position <= setup.position_bound
             and self.velocity <= setup.velocity_bound
             and self.energy <= setup.energy_bound
-            and self.penetration <= setup.penetration_bound
-            and self.sunk <= setup.sunk_bound
         )
 
 
@@ -140,19 +142,23 @@ def _larger(before: float, values: Array) -> float:
 
 
 def judge(
-    model: Any, data: Any, elapsed: float, before: Peaks | None = None, setup: Setup = _UNBOUNDED
+    model: Any,
+    data: Any,
+    elapsed: float,
+    before: Peaks | None = None,
+    setup: Setup = _UNBOUNDED,
+    passages: Sequence[str] = (),
 ) -> RunJudgement:
     """The worst status of a run that has ended after `elapsed` s, with every reason for it.
 
-    `before` holds the peaks on the way, `setup` the bounds.
+    `before` holds the peaks on the way, `setup` the bounds, `passages` what went through what.
     """
     peaks = update_peaks(data, Peaks() if before is None else before)
     symptoms: list[tuple[RunStatus, str]] = []
     if not peaks.finite:
         symptoms.append((RunStatus.DIVERGED, "the state is not finite"))
-    for kind, subject in BAD_STATES.items():
-        if data.warning[kind].number:
-            symptoms.append((RunStatus.DIVERGED, f"MuJoCo warned of bad {subject}"))
+    if bad := [subject for kind, subject in BAD_STATES.items() if data.warning[kind].number]:
+        symptoms.append((RunStatus.DIVERGED, f"MuJoCo warned of bad {', '.join(bad)}"))
     if not abs(data.time - elapsed) <= model.opt.timestep / 2:
         text = f"the clock says {data.time:.6g} s after {elapsed:.6g} s: the state was reset"
         symptoms.append((RunStatus.RESET, text))
@@ -166,20 +172,78 @@ def judge(
     if peaks.finite and not peaks.energy <= setup.energy_bound:
         text = f"energy reached {peaks.energy:.3g} J, where {setup.energy_bound:.3g} J can be"
         symptoms.append((RunStatus.SLOW_GROWTH, text))
-    depth_ratio = max(peaks.penetration / setup.penetration_bound, peaks.sunk / setup.sunk_bound)
-    if not depth_ratio <= 1.0:
-        names, time = overlap_names(model, peaks), peaks.overlap[2]
-        share = f"{depth_ratio:.3g}" if depth_ratio >= 1.005 else "just over 1"
-        text = f"{names} lie {share} times as deep in each other as they may, at {time:.3g} s"
-        symptoms.append((RunStatus.DIVERGED, text))
+    symptoms += [(RunStatus.THROUGH, text) for text in passages]
     worst = max((status for status, _ in symptoms), key=list(RunStatus).index, default=RunStatus.OK)
     return RunJudgement(worst, tuple(text for _, text in symptoms))
 
 
-def overlap_names(model: Any, peaks: Peaks) -> str:
-    """What the two bodies are called that lie deepest in each other."""
-    geoms = peaks.overlap[:2]
-    return " and ".join(_body_of(model, geom) for geom in geoms) if max(geoms) >= 0 else "bodies"
+def pair_names(model: Any, pair: tuple[int, int]) -> str:
+    """What the two bodies are called that two geoms belong to."""
+    return " and ".join(_body_of(model, geom) for geom in pair)
+
+
+class Passages:
+    """Watches pairs of geoms that go deep into each other, and tells which went through.
+
+    Deep is what lies in the other by more than half the thickness of the thinner one, and than in
+    small steps. The side on which it entered is that of its contact's normal before.
+    """
+
+    def __init__(self, model: Any, setup: Setup = _UNBOUNDED) -> None:
+        self.model, self.setup = model, setup
+        self.thickness = thickness(model)
+        self.through: dict[tuple[int, int], float] = {}
+        """Pairs that parted on the other side, and when, s."""
+        self.inside: dict[tuple[int, int], Array] = {}
+        """Pairs that are deep in each other now, with the normal of their contact before."""
+        self._normals: dict[tuple[int, int], Array] = {}
+
+    def look(self, data: Any) -> None:
+        """Look at a state whose contacts are computed."""
+        if not (data.ncon or self.inside):
+            return
+        present: dict[tuple[int, int], tuple[float, Array]] = {}
+        geoms = data.contact.geom
+        shares = -data.contact.dist / self.thickness[geoms].min(axis=1) if data.ncon else ()
+        for number in np.flatnonzero(np.asarray(shares) > _DIPPING).tolist():
+            first, second = (int(geom) for geom in geoms[number])
+            share = float(shares[number])
+            if first >= 0 and share > present.get((first, second), (0.0,))[0]:
+                turn = data.geom_xmat[first].reshape(3, 3)
+                normal = turn.T @ data.contact.frame[number, :3]
+                present[first, second] = share, normal
+        for pair, (share, normal) in present.items():
+            if share > self.setup.sunk_bound:
+                self.inside.setdefault(pair, self._normals.get(pair, normal))
+                continue
+            side = self.inside.pop(pair, None)
+            if side is not None and side @ normal < 0:
+                self.through.setdefault(pair, float(data.time))
+            self._normals[pair] = normal
+        for pair in self.inside.keys() - present.keys():
+            turn = data.geom_xmat[pair[0]].reshape(3, 3)
+            way = turn.T @ (data.geom_xpos[pair[1]] - data.geom_xpos[pair[0]])
+            if way @ self.inside.pop(pair) < 0:
+                self.through.setdefault(pair, float(data.time))
+
+    def pairs(self) -> frozenset[tuple[int, int]]:
+        """All pairs that went through, or are inside each other now."""
+        return frozenset((*self.through, *self.inside))
+
+    def texts(self) -> tuple[str, ...]:
+        """What went through what, unless it does so in small steps too."""
+        sentences = {
+            pair: f"{pair_names(self.model, pair)} went through each other, at {time:.3g} s"
+            for pair, time in self.through.items()
+        }
+        for pair in self.inside:
+            names = pair_names(self.model, pair)
+            sentences.setdefault(pair, f"{names} stay inside each other at the end")
+        return tuple(text for pair, text in sentences.items() if pair not in self.setup.passing)
+
+
+_DIPPING = 0.25
+"""The share of half a thickness from which a contact is watched."""
 
 
 def _body_of(model: Any, geom: int) -> str:
@@ -191,6 +255,17 @@ def _body_of(model: Any, geom: int) -> str:
     if body:
         return f"{inner}{model.body(body).name}"
     return "a body without a name" if inner else "the world"
+
+
+def thickness(model: Any) -> Array:
+    """Half the thickness of every geom, and infinity for none (index -1): (ngeom + 1,) m.
+
+    Planes and height fields are infinitely thick: nothing is on their other side.
+    """
+    half = model.geom_aabb[:, 3:].min(axis=1)
+    planes = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+    bottomless = np.isin(model.geom_type, planes)
+    return np.append(np.where(bottomless | (half == 0), np.inf, half), np.inf)
 
 
 def deepest_contact(data: Any) -> float:

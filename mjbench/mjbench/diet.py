@@ -77,13 +77,15 @@ def look_at(
     modules: frozenset[str] = frozenset(),
     keeps: Sequence[Keep] = (),
     locked: Mapping[str, str] | None = None,
+    only: Sequence[str] = (),
     quick: bool,
     rerun: bool = False,
 ) -> DietResult:
     """Look at a model; a `CannotMeasureError` where it cannot be done.
 
     `modules`: those of Python that are among the readers; `locked`: files that must not be changed,
-    with the reason; `rerun`: whether the host runs programs with what is left.
+    with the reason; `only`: kinds of findings to look for, else all; `rerun`: whether the host runs
+    programs with what is left.
     """
     files: dict[str, bytes | None] = {}
     declarations = subject.read_declarations()
@@ -113,6 +115,7 @@ def look_at(
             locked=locked or {},
             numbered_kinds=frozenset(_numbered_kinds(declarations)),
             clock=time.thread_time_ns,
+            only=only,
             quick=quick,
             tell=host.tell,
             rerun=host.rerun if rerun else None,

@@ -29,9 +29,11 @@ from msgspec import Struct
 
 from mjbench.pilot import scales
 from mjbench.problem import Array, Integrator, Limit, Scenario
+from mjbench.reports import Reach
 from mjbench.simulation import (
     advance,
     initial_data,
+    with_converged_solver,
     with_integrator,
     without_sleep,
 )
@@ -50,8 +52,6 @@ MOST_STATES, _MOST_ORBIT_STATES = 120, 24
 """Numbers in a state up to which there is theory."""
 _RELAXING, _POLISHING, _GRID = 20_000, 30, 24
 """Steps and iterations to look for a rest, and timesteps tried in a decade."""
-_END = 1e-30
-"""The solver's tolerance: with none at all `discrete` divides nothing by nothing at a rest."""
 _WAYS, _KINK = 8, 0.02
 """Directions from a rest in which forces are compared with their derivative, and the difference,
 relative to the largest of them, from which on there is none."""
@@ -84,10 +84,7 @@ class FixedState(Struct, frozen=True, eq=False):
 
 def _converged(model: Any, integrator: Integrator, timestep: float) -> Any:
     """A copy of a model that is awake and whose solver goes to its end: differences are smooth."""
-    variant = without_sleep(with_integrator(model, integrator, timestep))
-    variant.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    variant.opt.iterations, variant.opt.tolerance = max(100, int(variant.opt.iterations)), _END
-    return variant
+    return with_converged_solver(without_sleep(with_integrator(model, integrator, timestep)))
 
 
 def _state_of(data: Any, *, period: float = 0.0) -> FixedState:
@@ -343,22 +340,18 @@ def _return_time(
     return middle, float(np.linalg.norm(gap))
 
 
-def orbit_limit(model: Any, orbit: FixedState, integrator: Integrator) -> float | None:
-    """The first timestep at which a periodic motion is not stable, s; infinite where there is none.
-
-    `None` where it is unstable by itself; 0 where it is stable at no timestep.
-    """
+def orbit_limit(model: Any, orbit: FixedState, integrator: Integrator) -> Reach | None:
+    """The largest timestep at which a periodic motion is stable; `None` if it is not by itself."""
     steps = np.geomspace(orbit.period / _LONGEST_ORBIT, orbit.period / 2, _ORBIT_GRID).tolist()
     if _grows(model, orbit, Integrator.RK4, steps[0]):
         return None
-    before = 0.0
-    for step in steps:
-        if _grows(model, orbit, integrator, step):
-            break
-        before = step
-    else:
-        return math.inf
-    while before and step / before > 1 + 1e-2:
+    growing = next((n for n, h in enumerate(steps) if _grows(model, orbit, integrator, h)), None)
+    if growing is None:
+        return "all"
+    if growing == 0:
+        return "none"
+    before, step = steps[growing - 1], steps[growing]
+    while step / before > 1 + 1e-2:
         middle = math.sqrt(before * step)
         before, step = (
             (before, middle) if _grows(model, orbit, integrator, middle) else (middle, step)
@@ -366,7 +359,7 @@ def orbit_limit(model: Any, orbit: FixedState, integrator: Integrator) -> float 
     # What grows exponentially, if slowly, at every timestep seems to have a limit that is the
     # shorter the longer one looks.
     below = _BELOW * before
-    return 0.0 if _grows(model, orbit, integrator, below, _SLOW_GROWTH, _LONG) else before
+    return "none" if _grows(model, orbit, integrator, below, _SLOW_GROWTH, _LONG) else before
 
 
 def _grows(
@@ -422,7 +415,7 @@ class Theory(Struct, frozen=True, eq=False):
             limit = None if timestep is None else Limit(timestep, AT_REST)
         return limit
 
-    def orbital(self, integrator: Integrator) -> float | None:
+    def orbital(self, integrator: Integrator) -> Reach | None:
         """The same along a periodic motion."""
         if self.orbit is None:
             return None
@@ -435,7 +428,13 @@ def find_theory(
     formula: Callable[[Integrator], Limit | None] | None,
     *,
     smooth: bool,
+    visits: Callable[[Array], bool] = lambda _: True,
 ) -> Theory:
-    """What theory says of a scene: at its rest, and along its motion where this is periodic."""
+    """What theory says of a scene: at its rest, and along its motion where this is periodic.
+
+    `visits`: whether the motion comes near to positions; of a rest that it never sees theory would
+    answer another question.
+    """
     rest = find_rest(model, scenario)
+    rest = None if rest is None or not visits(rest.qpos) else rest
     return Theory(formula, model, rest, find_orbit(model, scenario) if smooth else None)

@@ -60,23 +60,30 @@ def reference_motion(reference: Reference, times: tuple[float, ...]) -> Motion:
 
 def errors(motion: Motion, exact: Motion, floor: Sizes = _ZERO_SIZES) -> scene_report.Errors:
     """The errors of a motion against an exact one at the same times; none is below ten floors."""
-    displacements, speed_differences = (
-        motion.position - exact.position,
-        motion.velocity - exact.velocity,
-    )
+    sizes = error_sizes(motion, exact)
+
+    def pair(part: str) -> tuple[float, float] | None:
+        if part not in sizes:
+            return None
+        least = scene_report.FLOORS * float(getattr(floor, part))
+        return max(float(np.max(sizes[part])), least), max(float(sizes[part][-1]), least)
+
+    return scene_report.Errors(pair("position"), pair("attitude"), pair("velocity"))
+
+
+def error_sizes(motion: Motion, exact: Motion) -> dict[str, Array]:
+    """The errors at every sample (n,) of position, attitude and velocity, those that there are."""
+    displacements = motion.position - exact.position
+    speed_differences = motion.velocity - exact.velocity
     angles = angular_distance(exact.attitude, motion.attitude)
-
-    def pair(distances: Array, floor: float) -> tuple[float, float]:
-        least = scene_report.FLOORS * floor
-        return max(float(np.max(distances)), least), max(float(distances[-1]), least)
-
-    return scene_report.Errors(
-        pair(np.linalg.norm(displacements, axis=1), floor.position) if displacements.size else None,
-        pair(np.max(angles, axis=1), floor.attitude) if angles.size else None,
-        pair(np.linalg.norm(speed_differences, axis=1), floor.velocity)
-        if speed_differences.size
-        else None,
-    )
+    sizes = {}
+    if displacements.size:
+        sizes["position"] = np.linalg.norm(displacements, axis=1)
+    if angles.size:
+        sizes["attitude"] = np.max(angles, axis=1)
+    if speed_differences.size:
+        sizes["velocity"] = np.linalg.norm(speed_differences, axis=1)
+    return sizes
 
 
 def largest_errors(motion_errors: scene_report.Errors) -> Sizes:

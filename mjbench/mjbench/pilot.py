@@ -24,10 +24,10 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench import simulation
-from mjbench.detector import Peaks, driving_force, update_peaks
+from mjbench.detector import Passages, Peaks, driving_force, pair_names, thickness, update_peaks
 from mjbench.problem import STANDARD, Array, Integrator, Setup
 from mjbench.reports.scene_report import MeasuredSetting
-from mjbench.scene import Scene, SceneError, thickness
+from mjbench.scene import Scene, SceneError
 
 NUDGE = 1e-10
 """How far a twin's beginning is off: rad, or relative to the model's extent; velocities per s."""
@@ -68,6 +68,8 @@ class Pilot(Struct, frozen=True):
     """1/s, of the middle one of the twins that part; `None` where all stay near."""
     settles: bool = False
     """Whether it comes to rest."""
+    overlaps: str = ""
+    """What begins inside something else, with its depth, in words."""
 
     @property
     def horizon(self) -> float:
@@ -96,7 +98,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
         twins.append(twin)
         nudge_sizes.append(float(np.max(np.abs(position / errors), initial=0.0)))
     look = _Observer(variant)
-    peaks, half_thickness = Peaks(), thickness(variant)
+    peaks, half_thickness, passages = Peaks(), thickness(variant), Passages(variant)
     times, steps_per_sample = scenario.times, scenario.steps(step)
     gaps = np.full((len(twins), len(times)), np.nan)
     for index, command in enumerate(scenario.commands(scenario.sample)):
@@ -107,6 +109,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
             look(data)
             if number % _PEAK_INTERVAL == 0 or number == steps_per_sample - 1:
                 peaks = update_peaks(data, peaks, half_thickness)
+                passages.look(data)
         if not peaks.finite:
             raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
         for twin, gap in zip(twins, gaps, strict=True):
@@ -121,7 +124,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
             fine = simulation.with_integrator(variant, Integrator.RK4, step)
             kinetic = simulation.simulate(Setup(scenario=scenario), fine).energy[:, 1].max()
         peaks = replace(peaks, energy=energy, kinetic=float(np.fmin(kinetic, peaks.kinetic)))
-    setup = _bounds(variant, scene, peaks)
+    setup = replace(_bounds(variant, scene, peaks), passing=passages.pairs())
     if peaks.energy > energy + _EXCESS * peaks.kinetic:  # as of what a soft weld pulls
         setup = replace(setup, energy=math.inf)
     horizons, growth_rates = [], []
@@ -141,7 +144,27 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
         horizons=(min(horizons), max(horizons)),
         lyapunov=float(np.median(growth_rates)) if growth_rates else None,
         settles=float(data.energy[1]) < _SETTLED * peaks.kinetic,
+        overlaps=_initial_overlaps(variant, first, half_thickness),
     )
+
+
+_OVERLAP = 0.5
+"""The share of half a thickness from which something is said to begin inside something else."""
+_MOST_OVERLAPS = 3
+
+
+def _initial_overlaps(model: Any, data: Any, half_thickness: Array) -> str:
+    """What lies inside something else at the beginning, the deepest first, in words."""
+    mujoco.mj_fwdPosition(model, data)
+    depths: dict[tuple[int, int], float] = {}
+    for contact in data.contact[: data.ncon]:
+        pair, depth = (int(contact.geom[0]), int(contact.geom[1])), -float(contact.dist)
+        if min(pair) >= 0 and depth > _OVERLAP * half_thickness[list(pair)].min():
+            depths[pair] = max(depth, depths.get(pair, 0.0))
+    deepest = sorted(depths.items(), key=lambda item: -item[1])
+    parts = [f"{pair_names(model, pair)} by {depth:.3g} m" for pair, depth in deepest]
+    more = len(parts) - _MOST_OVERLAPS
+    return "; ".join(parts[:_MOST_OVERLAPS]) + (f"; and {more} more" if more > 0 else "")
 
 
 def position_distance(model: Any, first: Array, second: Array, units: Array | None = None) -> float:
@@ -272,7 +295,7 @@ def longer_setup(model: Any, pilot: Pilot, span: float) -> Setup:
     longer_scene = replace(scene, scenario=replace(scene.scenario, duration=duration))
     for integrator in (Integrator.RK4, simulation.integrator_of(model)):
         variant = simulation.with_integrator(model, integrator, min(scene.timesteps))
-        run = simulation.simulate(Setup(scenario=longer_scene.scenario), variant, thickness(model))
+        run = simulation.simulate(Setup(scenario=longer_scene.scenario), variant)
         position, velocity, kinetic = (
             float(np.abs(values).max(initial=0.0))
             for values in (run.states.qpos, run.states.qvel, run.energy[:, 1])
@@ -285,7 +308,8 @@ def longer_setup(model: Any, pilot: Pilot, span: float) -> Setup:
                 kinetic=max(kinetic, pilot.peaks.kinetic),
                 sunk=max(run.sunk, pilot.peaks.sunk),
             )
-            return _bounds(model, longer_scene, peaks)
+            passing = pilot.setup.passing | run.passing
+            return replace(_bounds(model, longer_scene, peaks), passing=passing)
     return pilot.setup
 
 

@@ -214,11 +214,12 @@ class Setup(Struct, frozen=True, kw_only=True):
     """The most potential and kinetic energy in small steps, J; infinite where something drives."""
     kinetic: float = 0.0
     """The most kinetic energy in small steps, J."""
-    penetration_bound: float = float("inf")
-    """Deepest contact of a run that is not lost, m."""
     sunk_bound: float = 1.0
-    """The same relative to the half thickness of the thinner body: more than 1 where contacts are
-    so soft that middles lie in each other in small steps too."""
+    """How deep bodies may lie in each other before it is watched whether they go through, relative
+    to the half thickness of the thinner one: more than 1 where they are that soft in small steps
+    too."""
+    passing: frozenset[tuple[int, int]] = frozenset()
+    """Pairs of geoms that go through each other in small steps too."""
 
 
 class Problem(Setup, frozen=True, kw_only=True):

@@ -187,17 +187,6 @@ def _check_fit(declarations: Declarations, model: Any) -> None:
                 raise SceneError(message, scenario.place("measure"))
 
 
-def thickness(model: Any) -> Array:
-    """Half the thickness of every geom, and infinity for none (index -1): (ngeom + 1,) m.
-
-    Planes and height fields are infinitely thick: nothing is on their other side.
-    """
-    half = model.geom_aabb[:, 3:].min(axis=1)
-    planes = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-    bottomless = np.isin(model.geom_type, planes)
-    return np.append(np.where(bottomless | (half == 0), np.inf, half), np.inf)
-
-
 def _scene(
     model: Any, declaration: DeclaredScenario, bench: BenchTable, steps: Sequence[float]
 ) -> Scene:

@@ -19,7 +19,14 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from mjbench.detector import Peaks, RunJudgement, deepest_contact, judge, update_peaks
+from mjbench.detector import (
+    Passages,
+    Peaks,
+    RunJudgement,
+    deepest_contact,
+    judge,
+    update_peaks,
+)
 from mjbench.problem import Array, Integrator, Motion, Scenario, Setup
 
 _CODE = {
@@ -85,6 +92,17 @@ def without_sleep(model: Any) -> Any:
     return model
 
 
+def with_converged_solver(model: Any) -> Any:
+    """A copy of a `mjModel` whose solver goes to its end.
+
+    With no tolerance at all `discrete` would divide nothing by nothing at a rest.
+    """
+    model = copy.copy(model)
+    model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    model.opt.iterations, model.opt.tolerance = max(100, int(model.opt.iterations)), 1e-30
+    return model
+
+
 def set_integrator(model: Any, integrator: Integrator, timestep: float) -> None:
     """Give a model this integrator and timestep (s)."""
     model.opt.integrator = int(_CODE[integrator])
@@ -124,14 +142,15 @@ def advance_watching(
     data: Any,
     steps: int,
     peaks: Peaks,
-    thickness: Array | None = None,
+    passages: Passages,
     *,
     interval: int = _LOOK_INTERVAL,
 ) -> tuple[Peaks, int]:
     """Make so many steps; stop once the state is not finite.
 
-    Returns the updated `peaks` and the number of steps made. Only one state per `interval` is
-    looked at, which suffices: what shoots up takes longer to come back.
+    `passages` watches what goes through what. Returns the updated `peaks` and the number of steps
+    made. Only one state per `interval` is looked at, which suffices: what shoots up takes longer to
+    come back.
     """
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     steps_made = 0
@@ -139,7 +158,8 @@ def advance_watching(
         part = min(interval, steps - steps_made)
         advance(model, data, part)
         steps_made += part
-        peaks = update_peaks(data, peaks, thickness)
+        peaks = update_peaks(data, peaks, passages.thickness)
+        passages.look(data)
     return peaks, steps_made
 
 
@@ -231,11 +251,13 @@ class Run(Struct, frozen=True):
     """Deepest contact at those times, m."""
     sunk: float
     """The same as `Peaks.sunk`."""
+    passing: frozenset[tuple[int, int]]
+    """Pairs of geoms that went through each other, or are inside each other at the end."""
     judgement: RunJudgement
 
 
-def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
-    """Run a scenario with a model under its own options; `thickness` as for `update_peaks`."""
+def simulate(setup: Setup, model: Any) -> Run:
+    """Run a scenario with a model under its own options."""
     scenario, step = setup.scenario, float(model.opt.timestep)
     steps_per_sample, times = scenario.steps(step), scenario.times
     data, scratch = initial_data(scenario, model), initial_data(scenario, model)
@@ -243,10 +265,11 @@ def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
     table = np.full((len(times) + 1, 5), np.nan)
     table[0] = invariants(model, scratch, data.qpos, data.qvel)
     peaks, steps = Peaks(penetration=deepest_contact(scratch)), 0
+    passages = Passages(model, setup)
     for index, command in enumerate(scenario.commands(scenario.sample)):
         if command:
             data.ctrl[:] = command
-        peaks, steps_made = advance_watching(model, data, steps_per_sample, peaks, thickness)
+        peaks, steps_made = advance_watching(model, data, steps_per_sample, peaks, passages)
         steps += steps_made
         if not peaks.finite:
             break
@@ -254,9 +277,17 @@ def simulate(setup: Setup, model: Any, thickness: Array | None = None) -> Run:
         table[index + 1] = invariants(model, scratch, data.qpos, data.qvel)
         # Where a step ends, its contacts are still those of its beginning.
         peaks = replace(peaks, penetration=max(peaks.penetration, deepest_contact(scratch)))
-    judgement = judge(model, data, steps * step, peaks, setup)
+    judgement = judge(model, data, steps * step, peaks, setup, passages.texts())
     states = EngineStates(times, qpos, qvel, act)
-    return Run(states, table[:, :2], table[:, 2:], peaks.penetration, peaks.sunk, judgement)
+    return Run(
+        states,
+        table[:, :2],
+        table[:, 2:],
+        peaks.penetration,
+        peaks.sunk,
+        passages.pairs(),
+        judgement,
+    )
 
 
 def run_steps(

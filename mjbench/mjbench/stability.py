@@ -1,12 +1,15 @@
-"""A laboratory of stability: largest stable timesteps by integrator, and what speaks against them.
+"""A laboratory of stability: largest timesteps by integrator, and what ends there.
 
-1. Stable is what stays within what can be over a simulated time that is the same for all timesteps,
-   by the judgement that every run gets: finite, within bounds, and where nothing drives the motion,
-   without much more energy than it has in small steps. What shoots up in the first steps and then
-   decays is a transient of the method and no loss.
+1. Three things can end, each at a timestep of its own. *Bounded* is what stays within what can be
+   over a simulated time that is the same for all timesteps: finite, within bounds, and where
+   nothing drives the motion, without much more energy than it has in small steps. What shoots up
+   in the first steps and then decays is a transient of the method and no loss. *Near* is what stays
+   near the motion that small steps keep, as long as that can be predicted. *Through* is what comes
+   out on the other side of something, or stays inside it: how deep it goes is no loss by itself.
 2. One limit has several answers, which need not agree: theory at rest and along a periodic motion;
    runs from the own start over the span, and over twice the span; runs from starts nearby. All are
-   kept, and only digits on which they agree are shown.
+   kept, and only digits on which they agree are shown. Theory at rest is asked only where the
+   scenario comes near to that rest.
 3. Stability need not be monotone. A grid, even in the logarithm, is tried down to a tenth of the
    shortest timestep that is lost, and about it from all starts; a bisection follows.
 4. Where nothing drives a scene, its energy cannot rise. The first timestep at which it does is a
@@ -26,6 +29,7 @@ from msgspec import Struct, field
 from msgspec.structs import asdict, replace
 
 from mjbench.detector import (
+    Passages,
     Peaks,
     RunStatus,
     driving_force,
@@ -34,7 +38,16 @@ from mjbench.detector import (
     update_peaks,
 )
 from mjbench.linearization import Theory, find_theory
-from mjbench.pilot import Pilot, longer_setup, nudges
+from mjbench.parts import Parts
+from mjbench.pilot import (
+    Pilot,
+    horizon_error,
+    horizon_errors,
+    longer_setup,
+    nudges,
+    position_distance,
+    position_distances,
+)
 from mjbench.problem import (
     STANDARD,
     Array,
@@ -43,11 +56,13 @@ from mjbench.problem import (
     Problem,
     Setup,
 )
+from mjbench.reports import Reach, reach
 from mjbench.reports.case_report import BoundaryLine
+from mjbench.reports.limits import limit_text, map_text
 from mjbench.reports.scene_report import StableRow
-from mjbench.reports.shown_errors import FEWEST_STEPS
-from mjbench.scene import thickness
+from mjbench.reports.shown_errors import FEWEST_STEPS, horizon_error_text
 from mjbench.simulation import (
+    EngineStates,
     advance,
     compile_model,
     initial_data,
@@ -94,11 +109,33 @@ class StabilityTrial(Struct, frozen=True):
     run was lost before."""
     energy: float = -math.inf
     """The most potential and kinetic energy on the way, J."""
+    reason: str = ""
+    """Why it was lost."""
+    astray: str = ""
+    """How it left the motion of small steps; empty where it did not, or nobody asked."""
+    through: str = ""
+    """What went through what."""
 
     @property
     def stable(self) -> bool:
         """Whether the run stayed within what can be."""
         return self.status is RunStatus.OK
+
+
+class KeptMotion(Struct, frozen=True, eq=False):
+    """The motion that small steps keep, as long as it can be predicted."""
+
+    states: EngineStates
+    units: Array
+    """What counts as far in each degree of freedom (nv,)."""
+    far: str
+    """The same in words."""
+
+    def distance(self, model: Any, data: Any, number: int) -> float:
+        """How far a state near the time of such a sample is from it, where 1 is far."""
+        qpos, qvel = self.states.qpos[number].copy(), self.states.qvel[number]
+        mujoco.mj_integratePos(model, qpos, qvel, data.time - float(self.states.times[number]))
+        return position_distance(model, qpos, data.qpos, self.units)
 
 
 class Laboratory(Struct, frozen=True, eq=False):
@@ -109,6 +146,10 @@ class Laboratory(Struct, frozen=True, eq=False):
     span: float
     """s."""
     starts: int = 1
+    watched: bool = False
+    """Whether runs are compared with the motion of small steps, and watched for passing through."""
+    shortest: float = math.inf
+    """The shortest timestep at which that is asked, s."""
     trials: dict[tuple[int, float], dict[int, StabilityTrial]] = field(default_factory=dict)
     """By start and timestep, and by the number of spans."""
 
@@ -175,7 +216,10 @@ def boundary(
     row = search_row(laboratory, integrator, search, problem, theory or Theory(problem.limit))
     trials = (laboratory.trial(0, step) for step in laboratory.own_steps())
     lost = next((trial for trial in trials if not trial.stable), None)
-    difference = row.largest / row.theory - 1 if row.largest and row.theory else None
+    limits = row.largest, row.theory
+    difference = None
+    if isinstance(limits[0], float) and isinstance(limits[1], float):
+        difference = limits[0] / limits[1] - 1
     return BoundaryLine(
         **asdict(row),
         difference=difference,
@@ -223,13 +267,21 @@ def search_row(
     bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
     limit, orbital = theory.limit(integrator, search), theory.orbital(integrator)
     gain = _first_gain(laboratory, grid, setup)
+    near_limit = _limit_of(laboratory, grid, resolution, "astray")
+    through_limit = _limit_of(laboratory, grid, resolution, "through")
     steps = laboratory.own_steps()
     stable_steps = [h for h in steps if h <= largest]
     islands = [h for h in steps if h > largest and not laboratory.is_lost(0, h)]
+    lost = [h for h in steps if laboratory.is_lost(0, h)]
     is_all = math.isinf(largest)
-    return StableRow(
+    row = StableRow(
         integrator=integrator.value,
-        largest=None if is_all else largest,
+        largest=reach(largest),
+        reason=laboratory.trial(0, lost[0]).reason if lost else "",
+        near=near_limit[0],
+        near_reason=near_limit[1],
+        through=through_limit[0],
+        through_reason=through_limit[1],
         searched=(steps[0], steps[-1]),
         islands=(islands[0], islands[-1]) if islands and not is_all else None,
         duration=laboratory.span,
@@ -237,13 +289,35 @@ def search_row(
         tried=len(stable_steps),
         energy=_finite(setup.energy_bound),
         bracket=None if min(largest, *estimates) == math.inf else (min(bounds), max(bounds)),
-        theory=None if limit is None else _finite(limit.timestep),
+        theory=None if limit is None else reach(limit.timestep),
         formula="" if limit is None else limit.source,
-        orbital=None if orbital is None else _finite(orbital),
-        periodic=orbital is not None,
+        orbital=orbital,
         gain=gain,
         tries=_tries(laboratory),
     )
+    return replace(row, shown=limit_text(row), map=map_text(row))
+
+
+def _limit_of(
+    laboratory: Laboratory, grid: Sequence[float], resolution: float, kind: str
+) -> tuple[Reach | None, str]:
+    """The largest timestep below which no run of the own start is `astray` or `through`, and why.
+
+    `None` where that is not asked. It is not looked for below the shortest that was tried to see
+    what is bounded, or that the scene is measured at.
+    """
+    if not laboratory.watched:
+        return None, ""
+    tried = laboratory.own_steps()
+    low = min(tried[0], laboratory.shortest)
+    steps = [h for h in grid if h >= low * (1 - 1e-9)] or [*tried]
+
+    def is_lost(step: float) -> bool:
+        return bool(getattr(laboratory.trial(0, step), kind))
+
+    largest = _bisect(is_lost, steps, max(resolution, _COARSE), math.inf)
+    lost = [h for h in laboratory.own_steps() if h > largest and is_lost(h)]
+    return reach(largest), getattr(laboratory.trial(0, lost[0]), kind) if lost else ""
 
 
 def _bisect(
@@ -333,13 +407,12 @@ def attempt(problem: Problem, integrator: Integrator, timestep: float) -> Stabil
 
 
 def run_trial(
-    setup: Setup, model: Any, span: float, thickness: Array | None = None, *, start: int = 0
+    setup: Setup, model: Any, span: float, motion: KeptMotion | None = None, *, start: int = 0
 ) -> StabilityTrial:
     """Run a model over a span (s) with its own timestep, or until it is lost.
 
-    `thickness` is as for `detector.update_peaks`; `start`: 0 for the scenario's own, else one near
-    it. A command changes with the first step that begins after its time: the timestep need not
-    divide the hold.
+    `motion`: to compare it with; `start`: 0 for the scenario's own, else one near it. A command
+    changes with the first step that begins after its time: the timestep need not divide the hold.
     """
     data = initial_data(setup.scenario, model)
     if start:
@@ -355,7 +428,12 @@ def run_trial(
         min(math.ceil(begin / timestep - 1e-9), steps): command
         for begin, _, command in setup.scenario.holds(span)
     }
-    stops = sorted({*range(1, _TRANSIENT + 1), *range(0, steps, interval), steps, *commands})
+    times = () if motion is None or start else motion.states.times.tolist()
+    samples = {round(time / timestep): number for number, time in enumerate(times)}
+    stops = sorted(
+        {*range(1, _TRANSIENT + 1), *range(0, steps, interval), steps, *commands, *samples}
+    )
+    passages, astray = Passages(model, setup), ""
     sizes: list[tuple[int, float]] = []
     limits, count, excess_end, energy, is_lost = setup, 0, 0.0, -math.inf, False
     peak_speed = 0.0
@@ -364,8 +442,10 @@ def run_trial(
             if stop > count:
                 advance(model, data, stop - count)
         except mujoco.FatalError:  # MuJoCo does not run it
-            return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan)
-        count, now = stop, update_peaks(data, Peaks(), thickness)
+            reason = "MuJoCo does not run it"
+            return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan, -math.inf, reason, reason)
+        count, now = stop, update_peaks(data, Peaks())
+        passages.look(data)
         if not count:  # before the first step MuJoCo has computed no energy: it says 0
             now = replace(now, energy=-math.inf)
         energy = max(energy, now.energy)
@@ -378,14 +458,21 @@ def run_trial(
         if is_lost or (count > max(commands) and now.velocity < _AT_REST * peak_speed):
             break
         peak_speed = max(peak_speed, now.velocity)
+        if motion is not None and count in samples and not astray:
+            distance = motion.distance(model, data, samples[count])
+            if not distance < 1:
+                astray = f"off by {motion.far} at {data.time:.3g} s"
         if commands.get(stop):
             data.ctrl[:] = commands[stop]
         sizes.append((count, math.hypot(*data.qvel.tolist())))
     is_lost = is_lost or excess_end > _DECAY * span  # it shot up, and has not come down
-    status = judge(model, data, count * timestep, now, setup if is_lost else limits).status
+    judgement = judge(model, data, count * timestep, now, setup if is_lost else limits)
+    status, reason = judgement.status, "; ".join(judgement.reasons)
     if is_lost and status is RunStatus.OK:
-        status = RunStatus.SLOW_GROWTH
-    return StabilityTrial(timestep, status, _growth(sizes), energy)
+        status, reason = RunStatus.SLOW_GROWTH, "what shot up in the first steps did not come down"
+    through = "; ".join(passages.texts())
+    astray = astray or ("it is lost" if is_lost else "")
+    return StabilityTrial(timestep, status, _growth(sizes), energy, reason, astray, through)
 
 
 def _growth(sizes: list[tuple[int, float]]) -> float:
@@ -403,24 +490,37 @@ _SEARCH = (0.25, 64.0)
 """The multiples of the model's timestep between which the largest stable one is searched for."""
 
 
-def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[StableRow, ...]:
+def stable_rows(
+    model: Any, pilot: Pilot, kept: EngineStates, parts: Parts, *, quick: bool = False
+) -> tuple[StableRow, ...]:
     """The largest stable timestep of every integrator, over the scenario.
 
     They are searched for as those of the hard cases. No timestep is tried of which the scenario
-    has fewer than 20: so few steps would say nothing.
+    has fewer than 20: so few steps would say nothing. `kept`: the motion that small steps keep.
     """
-    scene, half_thickness = pilot.scene, thickness(model)
+    scene = pilot.scene
     duration = scene.declaration.stable_for or scene.scenario.duration
     low, high = sorted(scene.declaration.search or [part * scene.timestep for part in _SEARCH])
     limits = scene.declaration.limits
     setup_over = cache(partial(longer_setup, model, pilot))
+    far = horizon_error_text(horizon_error(model, scene))
+    known = kept.head(int(np.sum(kept.times <= pilot.horizon * (1 + 1e-9))))
+    motion = KeptMotion(known, horizon_errors(model, scene), far)
 
     def declared_limit(integrator: Integrator) -> Limit | None:
         step = limits.get(integrator.value)  # type: ignore[call-overload]
         return None if step is None else Limit(step, "as the scenario declares")
 
-    theory = find_theory(
-        model, scene.scenario, declared_limit if limits else None, smooth=pilot.smooth
+    theory = parts.run(
+        f"{scene.name}: theory of stability",
+        lambda: find_theory(
+            model,
+            scene.scenario,
+            declared_limit if limits else None,
+            smooth=pilot.smooth,
+            visits=partial(_comes_near, motion, model),
+        ),
+        Theory(declared_limit if limits else None),
     )
 
     def row(integrator: Integrator) -> StableRow | None:
@@ -428,7 +528,7 @@ def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[Stabl
             is_longer = span > scene.scenario.duration and not pilot.settles
             setup = setup_over(span) if is_longer else pilot.setup
             variant = with_integrator(model, integrator, step)
-            return run_trial(setup, variant, span, half_thickness, start=start)
+            return run_trial(setup, variant, span, motion, start=start)
 
         span, limit = duration, theory.limit(integrator, (low, high))
         if pilot.settles and pilot.smooth and limit is not None and math.isfinite(limit.timestep):
@@ -436,7 +536,20 @@ def stable_rows(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[Stabl
         search = max(low, span / MOST_STEPS), min(high, span / FEWEST_STEPS)
         if search[1] <= search[0]:
             return None
-        laboratory = Laboratory(run, span, QUICK_STARTS if quick else STARTS)
+        starts, shortest = QUICK_STARTS if quick else STARTS, min(scene.timesteps)
+        laboratory = Laboratory(run, span, starts, watched=True, shortest=shortest)
         return search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
 
-    return tuple(filter(None, map(row, STANDARD)))
+    rows = (
+        parts.run(f"{scene.name}: stable timesteps of {i.value}", partial(row, i), None)
+        for i in STANDARD
+    )
+    return tuple(filter(None, rows))
+
+
+def _comes_near(motion: KeptMotion, model: Any, rest: Array) -> bool:
+    """Whether the motion of small steps comes near to a rest, with these positions."""
+    distances = position_distances(
+        model, motion.states.qpos, np.tile(rest, (len(motion.states.times), 1)), motion.units
+    )
+    return bool(distances.min(initial=math.inf) < 1)

@@ -43,7 +43,7 @@ from mjbench.reports.scene_report import (
     SweepReport,
     SweepRow,
 )
-from mjbench.scene import Scene, SceneError, thickness
+from mjbench.scene import Scene, SceneError
 from mjbench.simulation import (
     EngineStates,
     advance,
@@ -87,7 +87,7 @@ def measure_sweep(
     values = [(part, value) for part in parts for value in part.values]
     values = values if piece is None else values[piece]
     variants = [_variant(spec, scene.scenario, part, value) for part, value in values]
-    base_run = simulate(Setup(scenario=scene.scenario), base, thickness(base))
+    base_run = simulate(Setup(scenario=scene.scenario), base)
     states = base_run.states if base_run.judgement.ok else None
     chaotic = states is not None and _is_chaotic(scene, base, states)
     rows = [_measure_variant(scene, base, states, chaotic, row, model) for row, model in variants]
@@ -114,7 +114,7 @@ def _is_chaotic(scene: Scene, model: Any, states: EngineStates) -> bool:
         qpos = data.qpos.copy()
         mujoco.mj_integratePos(model, qpos, position, 1.0)
         twin = replace(scene.scenario, qpos=tuple(qpos), qvel=tuple(data.qvel + velocity))
-        run = simulate(Setup(scenario=twin), model, thickness(model))
+        run = simulate(Setup(scenario=twin), model)
         if run.judgement.ok and visible_error(model, scene, run.states, states) >= 1:
             return True
     return False
@@ -198,7 +198,7 @@ def _measure_variant(
 ) -> SweepRow:
     """Run a model and fill its row; `base_states` is `None` where the model as it is was lost."""
     try:
-        run = simulate(Setup(scenario=scene.scenario), model, thickness(model))
+        run = simulate(Setup(scenario=scene.scenario), model)
     except mujoco.FatalError as error:
         return replace(row, status="diverged", reasons=(f"MuJoCo does not run it: {error}",))
     judgement = run.judgement
@@ -379,7 +379,7 @@ def _reading_figures(scene: Scene, model: Any) -> dict[str, float]:
         message = "a quantity of a reading is expected, and `measure` names no sensor of one number"
         raise SceneError(message, scene.declaration.place("expected"))
     every_step = replace(scene.scenario, sample=float(model.opt.timestep))
-    run = simulate(Setup(scenario=every_step), model, thickness(model))
+    run = simulate(Setup(scenario=every_step), model)
     if not run.judgement.ok:
         return {}
     scene, data = replace(scene, scenario=every_step), initial_data(scene.scenario, model)

@@ -1,4 +1,7 @@
-"""Reports as text for a terminal; the JSON has all of it."""
+"""Reports as text for a terminal: the verdict first, then the table, then the plot.
+
+The JSON has all of it.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from mjbench.machine import Machine
 from mjbench.reports import Interval
 from mjbench.reports.case_report import CaseReport
-from mjbench.reports.diet_report import DietReport, Saving
+from mjbench.reports.diet_report import DietReport
+from mjbench.reports.diet_text import diet_text
 from mjbench.reports.engine_report import EngineReport
+from mjbench.reports.limits import reach_text
+from mjbench.reports.plot_text import plot_lines
 from mjbench.reports.records import Departure
 from mjbench.reports.scene_report import (
     MeasuredRun,
@@ -19,119 +25,195 @@ from mjbench.reports.scene_report import (
     SweepReport,
     WorkPrecisionRow,
 )
-from mjbench.reports.shown_errors import is_idle, seconds_text, setting_text, status_text
+from mjbench.reports.shown_errors import (
+    horizon_error_text,
+    seconds_text,
+    setting_text,
+    status_text,
+)
+from mjbench.reports.terminal import Style, fitted_table, indented
 
 _FIGURES = ("change", "penetration", "slip", "restitution", "residual", "iterations")
-_Row = Sequence[str]
+_PLAIN = Style()
+_HEADS = {
+    "step_error": "seen of steps",
+    "seen": "seen (1: just)",
+    "position": "position",
+    "attitude": "attitude",
+    "velocity": "velocity",
+}
+"""Short titles of errors; plots have the long ones."""
 
 
-def scene_text(report: SceneReport) -> str:
-    """A model: each scenario with its settings, its orders and stable timesteps; its sweeps."""
-    lines = [report.model + ("  (quick: fewer settings, rough times)" if report.quick else "")]
-    lines += [f"  {_machine_text(report.machine)}"]
-    if not report.scenarios:
+def scene_text(report: SceneReport, style: Style = _PLAIN) -> str:
+    """A model: the verdicts of all scenarios, then each with its table, plot and limits."""
+    quick = "  (quick: fewer settings, rough times)" if report.quick else ""
+    lines = [style.strong(report.model) + quick]
+    if not report.scenarios and not report.failures:
         lines.append("  nothing in it can move, so nothing was measured")
     for scenario in report.scenarios:
-        lines += ["", f"  {scenario.name}: {scenario.title}", *_indent(_scenario(scenario))]
+        lines += [f"  {style.strong(scenario.name)}: {scenario.title}"]
+        for line in scenario.verdict.lines:
+            lines += style.wrap(line, "    ")
+    for failure in report.failures:
+        lines += style.wrap(f"{failure.part} was not measured: {failure.reason}", "  ")
+    for scenario in report.scenarios:
+        lines += [
+            "",
+            f"  {style.strong(scenario.name)}",
+            *indented(scenario_lines(scenario, style.inner(4))),
+        ]
     for sweep in report.sweeps:
-        lines += ["", f"  {sweep.name}: {sweep.title}", *_indent(_sweep(sweep))]
+        title = f"  {style.strong(sweep.name)}: {sweep.title}"
+        lines += ["", title, *indented(_sweep(sweep, style))]
+    lines += ["", *style.wrap(_machine_text(report.machine), "  ")]
     return "\n".join(lines) + "\n"
 
 
-def _scenario(report: ScenarioReport) -> Iterator[str]:
-    yield f"{seconds_text(report.duration)}, against {report.source} (known to {report.floor:.1g})"
-    if report.horizon < report.duration:
-        yield f"chaotic: errors mean something for {seconds_text(report.horizon)}"
-    yield from report.notes
+def scenario_lines(report: ScenarioReport, style: Style, *, plot: bool = True) -> Iterator[str]:
+    """A scenario without its verdict: settings, the plot, limits, orders, what is known."""
+    yield from _settings(report, style)
+    for chart in report.charts[:1] if plot else ():
+        yield ""
+        yield from plot_lines(chart, style.width)
+    yield from _stable(report.stable, style)
+    yield from _orders(report.orders, style)
+    for line in report.figures:
+        exact = "" if line.exact is None else f", in theory {line.exact:.6g} ({line.source})"
+        yield f"{line.name} under {line.integrator}: {_number(line.measured)} {line.unit}{exact}"
     yield ""
-    visible_rows = [row for row in report.rows if not is_idle(row)]
-    head = ["", "setting", "cost", "error", "status"]
-    yield from _table(head, [_setting(row, report) for row in visible_rows])
-    yield "> the model's own   * on the Pareto front"
-    if report.verdict.text:
-        yield report.verdict.text
-    yield from _orders(report.orders)
-    yield from _stable(report.stable)
+    known = f"over {seconds_text(report.duration)}, against {report.source}"
+    known += f" (known to {report.floor:.1g}, velocities to {report.velocity_floor:.1g})"
+    for note in (known, *report.notes):
+        yield from style.wrap(note)
 
 
-def _setting(row: WorkPrecisionRow, report: ScenarioReport) -> _Row:
-    mark = (">" if row.own else " ") + ("*" if row.front else " ")
-    name = setting_text(row.setting, report.own_setting)
-    return mark, name, _interval(row.cost), _error(row), _status(row)
+def _settings(report: ScenarioReport, style: Style) -> Iterator[str]:
+    rows = [row for row in report.rows if not row.idle]
+    columns: list[tuple[str, list[str]]] = [
+        ("", [(">" if r.own else " ") + ("*" if r.front else " ") for r in rows]),
+        ("setting", [r.name for r in rows]),
+        ("cost", [_interval(r.cost) for r in rows]),
+    ]
+    for quantity in report.quantities:
+        if quantity.resolved:
+            cells = [_error(row, quantity.name, quantity.least) for row in rows]
+            columns.append((_HEADS.get(quantity.name, quantity.label), cells))
+    off = horizon_error_text(report.horizon_error)
+    columns += [
+        (
+            f"off by {off} at",
+            ["" if r.parted is None else seconds_text(r.parted, 3) for r in rows],
+        ),
+        ("energy drift", [_percent(r.energy_drift) for r in rows]),
+        ("creep (m)", ["" if not r.slip else f"{r.slip:.2g}" for r in rows]),
+        ("depth (m)", ["" if not r.penetration else f"{r.penetration:.2g}" for r in rows]),
+        ("× real time", ["" if r.realtime is None else f"{r.realtime:.3g}" for r in rows]),
+    ]
+    yield from fitted_table(columns, style.width)
+    yield "> the model's own   * nothing is better"
+    lost: dict[str, list[str]] = {}
+    for row in rows:
+        if row.status != "ok":
+            lost.setdefault(_status(row), []).append(row.name)
+    for reason, names in lost.items():
+        yield from style.wrap(f"{'; '.join(names)}: {reason}")
 
 
-def _error(row: WorkPrecisionRow) -> str:
-    """The first that is known of what is declared, seen, a position, an attitude, a velocity."""
-    if row.figure is not None:
-        return f"{row.figure[0]:.3g} (figure)"
-    if row.seen is not None:
-        return f"{row.seen:.3g} (1: visible)"
-    for name in ("position", "attitude", "velocity"):
-        if (pair := getattr(row, name)) is not None:
-            return f"{pair[0]:.3g} ({name})"
-    return ""
+def _error(row: WorkPrecisionRow, name: str, least: float) -> str:
+    if row.status != "ok":
+        return status_text(row.status)
+    value = getattr(row, name)
+    value = value[0] if isinstance(value, tuple) else value
+    if value is None:
+        return ""
+    return f"< {least:.2g}" if least and value <= least * (1 + 1e-9) else f"{value:.3g}"
+
+
+def _percent(value: float | None) -> str:
+    return "" if value is None else f"{100 * value:+.2g} %"
 
 
 def _status(run: MeasuredRun) -> str:
     return "" if run.status == "ok" else "; ".join((status_text(run.status), *run.reasons))
 
 
-def _orders(orders: Sequence[OrderRow]) -> Iterator[str]:
+def _orders(orders: Sequence[OrderRow], style: Style) -> Iterator[str]:
     rows = [row for row in orders if row.has_orders]
     if rows:
         yield ""
-        parts = ("position", "attitude", "velocity")
-        cells = [[row.integrator, *(_order(row, part) for part in parts)] for row in rows]
-        yield from _table(["order of", *parts], cells)
+        columns = [("order of", [row.integrator for row in rows])]
+        for part in ("position", "attitude", "velocity"):
+            fits = [getattr(row, part) for row in rows]
+            columns.append((part, ["" if fit is None else fit.text for fit in fits]))
+        yield from fitted_table(columns, style.width)
 
 
-def _order(row: OrderRow, part: str) -> str:
-    fit = getattr(row, part)
-    return "" if fit is None else str(fit.text)
-
-
-def _stable(rows: Sequence[StableRow]) -> Iterator[str]:
-    if rows:
-        yield ""
-        head = ["largest stable timestep", "measured", "theory", "stable again"]
-        yield from _table(head, [_limit(row) for row in rows])
-
-
-def _limit(row: StableRow) -> _Row:
-    largest = f"all to {seconds_text(row.searched[1], 3)}"
-    if row.largest is not None:
-        largest = seconds_text(row.largest, 4) if row.largest else "none"
-    islands = "" if row.islands is None else " to ".join(seconds_text(s, 3) for s in row.islands)
-    return row.integrator, largest, seconds_text(row.theory, 5) if row.theory else "", islands
-
-
-def _sweep(report: SweepReport) -> Iterator[str]:
-    names = [
-        name for name in _FIGURES if any(getattr(row, name) is not None for row in report.rows)
+def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
+    if not rows:
+        return
+    yield ""
+    columns = [
+        ("largest timestep", [row.integrator for row in rows]),
+        ("bounded", [row.shown for row in rows]),
+        ("near small steps", [reach_text(row.near, row.searched) for row in rows]),
+        ("nothing goes through", [reach_text(row.through, row.searched) for row in rows]),
+        ("theory", [reach_text(row.theory, row.searched, 5) for row in rows]),
+        ("of the orbit", [reach_text(row.orbital, row.searched) for row in rows]),
+        ("gains energy from", ["" if r.gain is None else seconds_text(r.gain[0], 2) for r in rows]),
+        ("stable again", [_again(row) for row in rows]),
     ]
-    rows = []
-    for row in report.rows:
-        figures = (getattr(row, name) for name in names)
-        cells = ["" if value is None else f"{value:.3g}" for value in figures]
-        rest = _interval(row.cost), _interval(row.throughput), _lost(row.status, row.reasons)
-        rows.append([">" if row.own else "", row.parameter, row.value, *cells, *rest])
-    yield from _table(["", "parameter", "value", *names, "cost", "× real time", "status"], rows)
+    yield from fitted_table(columns, style.width)
+    reasons: dict[str, list[str]] = {}
+    for row in rows:
+        for text in (row.reason, row.near_reason, row.through_reason):
+            if text:
+                reasons.setdefault(text, []).append(row.integrator)
+    for reason, names in reasons.items():
+        yield from style.wrap(f"beyond it {', '.join(dict.fromkeys(names))}: {reason}")
 
 
-def engines_text(report: EngineReport) -> str:
+def _again(row: StableRow) -> str:
+    return "" if row.islands is None else " to ".join(seconds_text(s, 3) for s in row.islands)
+
+
+def _sweep(report: SweepReport, style: Style) -> Iterator[str]:
+    rows = report.rows
+    columns: list[tuple[str, list[str]]] = [
+        ("", [">" if row.own else "" for row in rows]),
+        ("parameter", [row.parameter for row in rows]),
+        ("value", [row.value for row in rows]),
+    ]
+    for name in _FIGURES:
+        values = [getattr(row, name) for row in rows]
+        columns.append((name, ["" if value is None else f"{value:.3g}" for value in values]))
+    columns += [
+        ("cost", [_interval(row.cost) for row in rows]),
+        ("× real time", [_interval(row.throughput) for row in rows]),
+        ("status", [_lost(row.status, row.reasons) for row in rows]),
+    ]
+    yield from fitted_table(columns, style.width - 4)
+
+
+def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
     """A model in other engines."""
-    lines = [report.model, f"  {_machine_text(report.machine)}"]
+    lines = [style.strong(report.model), f"  {_machine_text(report.machine)}"]
     for scenario in report.scenarios:
-        rows = []
-        for row in scenario.rows:
-            costs = [f"{cost.worlds}: {_cost(cost.seconds, cost.remark)}" for cost in row.costs]
-            name = f"{row.title}, {row.bits} bits" if row.bits else row.title
-            apart = "" if row.apart is None else f"{row.apart:.2g}"
-            rows.append(
-                [name, row.device, apart, "; ".join(costs), _lost(row.status, (row.message,))]
-            )
-        head = ["engine", "device", "from MuJoCo", "a step by number of worlds", "status"]
-        lines += ["", f"  {scenario.name}: {scenario.title}", *_indent(_table(head, rows))]
+        rows = scenario.rows
+        costs = [
+            "; ".join(f"{c.worlds}: {_cost(c.seconds, c.remark)}" for c in r.costs) for r in rows
+        ]
+        columns = [
+            ("engine", [f"{r.title}, {r.bits} bits" if r.bits else r.title for r in rows]),
+            ("device", [row.device for row in rows]),
+            ("from MuJoCo", ["" if r.apart is None else f"{r.apart:.2g}" for r in rows]),
+            ("a step by number of worlds", ["; ".join(texts) for texts in costs]),
+            ("status", [_lost(row.status, (row.message,)) for row in rows]),
+        ]
+        lines += ["", f"  {style.strong(scenario.name)}: {scenario.title}"]
+        setting = f"{setting_text(scenario.setting)}, over {seconds_text(scenario.duration)}"
+        lines += style.wrap(f"{setting}, against {scenario.source}", "    ")
+        lines += indented(fitted_table(columns, style.width - 4))
     return "\n".join(lines) + "\n"
 
 
@@ -143,77 +225,56 @@ def _lost(status: str, reasons: Iterable[str]) -> str:
     return "" if status == "ok" else "; ".join(filter(None, (status_text(status), *reasons)))
 
 
-def case_text(report: CaseReport) -> str:
+def case_text(report: CaseReport, style: Style = _PLAIN) -> str:
     """A hard case."""
-    lines = [f"{report.name}: {report.title}", f"  {_machine_text(report.machine)}"]
+    number = f"case {report.case}: " if report.case else ""
+    lines = [f"{style.strong(report.name)}  {number}{report.title}"]
+    reached = [f"{name} {seconds_text(cost, 3)}" for name, cost in report.reached]
+    if reached:
+        text = f"to err by 0.001, a simulated second takes {', '.join(reached)}"
+        lines += style.wrap(text, "  ")
     reference = report.reference
-    lines.append(f"  against {reference.source}, and {reference.second}")
-    lines += [f"  {report.note}"] if report.note else []
-    parts = [*_orders(report.orders), *_stable(report.boundaries)]
-    figures = [
-        [line.name, line.integrator, _number(line.measured), _number(line.exact), line.source]
-        for line in report.figures
-    ]
+    lines += style.wrap(f"against {reference.source}, and {reference.second}", "  ")
+    lines += style.wrap(report.note, "  ") if report.note else []
+    inner = style.inner(4)
+    parts = [*_orders(report.orders, inner), *_stable(report.boundaries, inner)]
+    figures = report.figures
     if figures:
-        parts += ["", *_table(["quantity", "integrator", "measured", "exact", "source"], figures)]
-    errors = [
-        [run.integrator, seconds_text(run.timestep), *_case_errors(run), _status(run)]
-        for run in report.errors
+        columns = [
+            ("quantity", [line.name for line in figures]),
+            ("integrator", [line.integrator for line in figures]),
+            ("measured", [_number(line.measured) for line in figures]),
+            ("exact", [_number(line.exact) for line in figures]),
+            ("source", [line.source for line in figures]),
+        ]
+        parts += ["", *fitted_table(columns, inner.width)]
+    runs = report.errors
+    columns = [
+        ("integrator", [run.integrator for run in runs]),
+        ("timestep", [seconds_text(run.timestep) for run in runs]),
     ]
-    head = ["integrator", "timestep", "position", "attitude", "velocity", "status"]
-    return "\n".join([*lines, *_indent([*parts, "", *_table(head, errors)])]) + "\n"
-
-
-def _case_errors(run: MeasuredRun) -> list[str]:
-    pairs = (run.position, run.attitude, run.velocity)
-    return ["" if pair is None else f"{pair[0]:.3g}" for pair in pairs]
-
-
-def diet_text(report: DietReport) -> str:
-    """What a model holds that its scenarios do not need."""
-    names = ", ".join(scenario.name for scenario in report.scenarios if scenario.status == "ok")
-    lines = [report.model, f"  in {names or 'no scenario'}"]
-    for scenario in report.scenarios:
-        if scenario.status != "ok":
-            lost = _lost(scenario.status, scenario.reasons)
-            lines.append(f"  scenario {scenario.name}: {lost}; nothing is claimed from it")
-    for finding in report.findings:
-        lines += ["", f"  {finding.kind}: {finding.message}"]
-        lines.append(f"    {finding.label}; {_saving(finding.saving)}")
-        for reason, text in (("because", finding.proof), ("kept:", finding.kept)):
-            lines += [f"    {reason} {text}"] if text else []
-        lines += [f"    not a fault, because {finding.doubt}"] if finding.doubt else []
-        for edit in finding.edits:
-            lines.append(f"    {edit.path}:{edit.line}:{edit.column}")
-            for mark, part in (("-", edit.old), ("+", edit.new)):
-                lines += [
-                    f"    {mark} {line.strip()}" for line in part.splitlines() if line.strip()
-                ]
-    for entry in report.stale:
-        lines.append(f"  `{entry.finding}` no longer keeps anything ({entry.path}:{entry.line})")
-    if not report.findings:
-        lines += ["", "  nothing in it is proved useless"]
-    if report.slim is not None:
-        lines += ["", f"  without all of them: {_saving(report.slim)}"]
-    return "\n".join(lines) + "\n"
-
-
-def _saving(saving: Saving) -> str:
-    parts = []
-    if saving.time is not None:
-        parts.append(f"×{saving.time:.3g} as fast" if saving.certain else "no measurable time")
-    for count, place in ((saving.memory, "memory"), (saving.text, "text")):
-        parts += [f"{count:,} bytes of {place}"] if count else []
-    return ", ".join(parts) or "saves nothing measurable"
+    for name in ("position", "attitude", "velocity"):
+        pairs = [getattr(run, name) for run in runs]
+        columns.append((name, ["" if pair is None else f"{pair[0]:.3g}" for pair in pairs]))
+    columns.append(("status", [_status(run) for run in runs]))
+    parts += ["", *fitted_table(columns, inner.width), ""]
+    for chart in report.charts[:1]:
+        parts += plot_lines(chart, inner.width)
+    lines += style.wrap(_machine_text(report.machine), "  ")
+    return "\n".join([*lines, *indented(parts)]) + "\n"
 
 
 def departures_text(departures: Sequence[Departure]) -> str:
     """Figures that are not as they were recorded."""
     if not departures:
         return "as recorded\n"
-    rows = [[d.where, d.setting, d.figure, d.recorded, d.measured, d.band] for d in departures]
-    head = ["scenario", "setting", "figure", "recorded", "measured", "band"]
-    return "\n".join(_table(head, rows)) + "\n"
+    names = ("where", "setting", "figure", "recorded", "measured", "band")
+    columns = [(name, [getattr(d, name) for d in departures]) for name in names]
+    return "\n".join(fitted_table(columns, _WIDEST)) + "\n"
+
+
+_WIDEST = 1000
+"""Figures that differ are shown whole."""
 
 
 def _machine_text(machine: Machine) -> str:
@@ -232,16 +293,16 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.6g}"
 
 
-def _indent(lines: Iterable[str]) -> list[str]:
-    return [f"    {line}".rstrip() for line in lines]
-
-
-def _table(head: _Row, rows: Sequence[_Row]) -> list[str]:
-    """Columns as wide as their longest cell; those without any are left out."""
-    columns = [n for n in range(len(head)) if any(row[n].strip() for row in rows)]
-    cells = [[head[n] for n in columns], *([row[n] for n in columns] for row in rows)]
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in cells
-    ]
+def report_text(
+    report: SceneReport | EngineReport | DietReport | Sequence[CaseReport], style: Style
+) -> str:
+    """A report of any kind."""
+    match report:
+        case SceneReport():
+            return scene_text(report, style)
+        case EngineReport():
+            return engines_text(report, style)
+        case DietReport():
+            return diet_text(report, "mjbench diet MODEL", "MODEL.toml", style)
+        case _:
+            return "\n".join(case_text(case, style) for case in report)

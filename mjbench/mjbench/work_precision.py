@@ -9,7 +9,7 @@ far bodies are displaced or turned in a picture, where 1 is just visible.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -19,8 +19,11 @@ from msgspec import Struct
 from msgspec.structs import asdict, replace
 
 from mjbench import known_motion, measure, simulation
-from mjbench.costs import Clock, costs, mark_luck, verdict
-from mjbench.detector import driving_force, overlap_names
+from mjbench.columns import LOST, WHOLE, Column, columns_of, leasts_of, ratios
+from mjbench.costs import Clock, costs
+from mjbench.derive import derive_scenario
+from mjbench.detector import driving_force, pair_names
+from mjbench.parts import Parts
 from mjbench.pilot import (
     Pilot,
     horizon_error,
@@ -32,18 +35,14 @@ from mjbench.pilot import (
     settings,
     with_setting,
 )
-from mjbench.reports import scene_report
+from mjbench.reports import reach_bound, scene_report
 from mjbench.reports.shown_errors import (
-    FrontPoint,
-    Quantity,
-    compared_quantity,
-    front,
     horizon_error_text,
     is_idle,
     setting_text,
     solving_parts,
 )
-from mjbench.scene import Scene, thickness
+from mjbench.scene import Scene
 from mjbench.stability import run_trial, stable_rows
 from mjbench.sweep import measure_expected
 
@@ -102,23 +101,21 @@ def measure_scenario(
         strict=True,
     )
     basis = Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
-    measurements = _measure_settings(basis, settings(model, pilot, quick=quick), tell)
-    measured_rows = [row for row, _ in measurements]
-    noticeable = [sees for _, sees in measurements]
-    cost_of = None
-    if clock is not None:
-        tell(f"{scene.name}: times")
-        measured_rows, cost_of = _with_costs(basis, measured_rows, clock, quick)
-    tell(f"{scene.name}: stable timesteps")
-    largest = stable_rows(model, pilot, quick=quick)
-    limits = {row.integrator: row.largest for row in largest if row.largest is not None}
-    figure = Quantity("figure", measure.quantity_name(model, scene), basis.least_figure)
-    quantity = compared_quantity(measured_rows, figure, basis.least_seen)
-    rows = front(mark_luck(measured_rows, limits, quantity), quantity)
-    holds = partial(_holds, basis, rows, quantity, quick)
-    error = horizon_error(model, scene)
-    judgement = verdict(rows, noticeable, quantity, holds, horizon_error_text(error))
-    return scene_report.ScenarioReport(
+    parts = Parts(tell)
+    choices = settings(model, pilot, quick=quick)
+    rows = parts.collect(f"{scene.name}: settings", _measure_settings(basis, choices, tell))
+    rows.sort(key=lambda row: choices.index(row.setting))
+    cost_of, nothing = None, scene_report.RowVerdict(False, None, None, "")
+    if clock is not None and rows:
+        timed = partial(_with_costs, basis, rows, clock, quick)
+        result = parts.run(f"{scene.name}: times", timed, None)
+        rows, cost_of = (rows, None) if result is None else result
+    error_parts = parts.run(f"{scene.name}: errors apart", partial(_error_parts, basis), None)
+    known = reference.states
+    largest = stable_rows(model, pilot, known, parts, quick=quick)
+    figures = partial(measure_expected, model, scene, baseline)
+    expected = parts.collect(f"{scene.name}: what theory knows", figures())
+    report = scene_report.ScenarioReport(
         name=scene.name,
         title=scene.title,
         duration=scene.scenario.duration,
@@ -133,20 +130,72 @@ def measure_scenario(
         lyapunov=pilot.lyapunov,
         horizons=None if pilot.lyapunov is None else pilot.horizons,
         smooth=pilot.smooth,
-        notes=_notes(basis, largest, rows, cost_of, quantity),
+        notes=_notes(basis, largest, rows, cost_of),
         figure=measure.quantity_name(model, scene),
-        rows=rows,
-        orders=measure.fit_scene_orders(model, rows, baseline, reference.states, reference.floor)
+        rows=tuple(rows),
+        orders=measure.fit_scene_orders(model, rows, baseline, known, reference.floor)
         if pilot.smooth
         else (),
-        figures=tuple(measure_expected(model, scene, baseline)),
+        figures=tuple(expected),
         stable=largest,
-        verdict=judgement,
+        verdict=nothing,
         least_seen=basis.least_seen,
         least_figure=basis.least_figure,
         cost_of=cost_of,
-        horizon_error=error,
+        horizon_error=horizon_error(model, scene),
+        contact_model={name: cone.visible_model_error for name, cone in cones.items() if name},
+        parts=error_parts,
     )
+
+    def starts(number: int) -> Sequence[Mapping[Column, float]] | None:
+        near = partial(_nearby_ratios, basis, report, report.rows[number].setting, quick)
+        return parts.run(f"{scene.name}: starts nearby", near, None)
+
+    report = parts.run(f"{scene.name}: verdict", lambda: derive_scenario(report, starts), report)
+    report = replace(report, failures=tuple(parts.failures))
+    if parts.stopped:
+        raise StoppedError(report)
+    return report
+
+
+class StoppedError(Exception):
+    """The user stopped a measurement; `report` has what is known."""
+
+    def __init__(self, report: scene_report.ScenarioReport) -> None:
+        super().__init__(f"stopped in the scenario {report.name}")
+        self.report = report
+
+
+def _error_parts(basis: Basis) -> scene_report.ErrorParts | None:
+    """Where the error of the own setting comes from; `None` where it is lost or chaotic."""
+    model, pilot, cone = basis.model, basis.pilot, basis.cones[basis.baseline.cone]
+    if pilot.lyapunov is not None:
+        return None
+    scene, setup = pilot.scene, pilot.setup
+    own_model = with_setting(model, basis.baseline)
+    runs = [simulation.simulate(setup, own_model)]
+    if pilot.constrained:
+        runs.append(simulation.simulate(setup, simulation.with_converged_solver(own_model)))
+    data = simulation.initial_data(scene.scenario, model)
+    mujoco.mj_integratePos(model, data.qpos, nudges(model, 2, _LAST_DIGITS)[0][0], 1.0)
+    nudged = replace(setup, scenario=replace(setup.scenario, qpos=tuple(data.qpos)))
+    runs.append(simulation.simulate(nudged, own_model))
+    if not all(run.judgement.ok for run in runs):
+        return None
+    count = len(cone.reference.states.times)
+    own, *others = (run.states.head(count) for run in runs)
+    best = others[0] if pilot.constrained else own
+    return scene_report.ErrorParts(
+        timestep=measure.visible_error(model, scene, best, cone.reference.states),
+        solver=measure.visible_error(model, scene, own, best) if pilot.constrained else None,
+        contact_model=cone.visible_model_error if pilot.contact else None,
+        rounding=measure.visible_error(model, scene, own, others[-1]),
+        least=basis.least_seen,
+    )
+
+
+_LAST_DIGITS = 1e-15
+"""By how much a start differs whose last digits are others: rad, or relative to the extent."""
 
 
 def find_conserved(
@@ -179,12 +228,12 @@ def find_conserved(
 
 def _measure_settings(
     basis: Basis, choices: Sequence[scene_report.MeasuredSetting], tell: Callable[[str], None]
-) -> list[tuple[scene_report.WorkPrecisionRow, bool | None]]:
-    """The rows of settings, and what is noticed of each.
+) -> Iterator[scene_report.WorkPrecisionRow]:
+    """The rows of settings, the scene's own first.
 
     What changes no bit at the own timestep is not crossed with others.
     """
-    baseline, rows_by_setting, idle_solving = basis.baseline, {}, set()
+    baseline, idle_solving = basis.baseline, set()
     base_states: simulation.EngineStates | None = None
     # Other solvers come last, and of them those at the own timestep first.
     for setting in sorted(
@@ -198,7 +247,7 @@ def _measure_settings(
         if setting.solver_settings in idle_solving and setting.timestep != baseline.timestep:
             continue
         tell(f"{basis.pilot.scene.name}: {setting_text(setting)}")
-        row, sees, states = _measure_setting(basis, setting)
+        row, states = _measure_setting(basis, setting)
         base_states = states if row.own else base_states
         is_alike = setting == replace(setting, timestep=baseline.timestep)
         is_alike = is_alike and setting.integrator == baseline.integrator and not row.own
@@ -206,24 +255,25 @@ def _measure_settings(
             pairs = ((states.qpos, base_states.qpos), (states.qvel, base_states.qvel))
             row = replace(row, same=all(np.array_equal(a, b) for a, b in pairs))
             idle_solving |= {setting.solver_settings} if row.same else set()
-        rows_by_setting[setting] = row, sees
-    return [rows_by_setting[setting] for setting in choices if setting in rows_by_setting]
+        yield row
 
 
-def _holds(
+def _nearby_ratios(
     basis: Basis,
-    rows: Sequence[scene_report.WorkPrecisionRow],
-    quantity: Quantity,
+    report: scene_report.ScenarioReport,
+    other: scene_report.MeasuredSetting,
     quick: bool,
-    better: scene_report.MeasuredSetting,
-) -> bool:
-    """Whether another setting is better than the scene's own from starts nearby too."""
+) -> list[Mapping[Column, float]] | None:
+    """From starts nearby, how many times as large errors are under another setting.
+
+    `None` where nobody knows the motion from there.
+    """
     model, pilot = basis.model, basis.pilot
     scene, scenario = pilot.scene, pilot.scene.scenario
-    places = [next(row for row in rows if row.setting == s) for s in (better, basis.baseline)]
     starts = nudges(model, 2 * (_QUICK_STARTS if quick else _STARTS), _NEARBY)
-    part = max(better.timestep, basis.baseline.timestep) / (_PARTS * (len(starts) + 1))
+    part = max(other.timestep, basis.baseline.timestep) / (_PARTS * (len(starts) + 1))
     fine = simulation.without_sleep(with_setting(model, replace(basis.baseline, timestep=part)))
+    found: list[Mapping[Column, float]] = []
     for number, (position, velocity) in enumerate(starts, 1):
         data = simulation.initial_data(scenario, model)
         mujoco.mj_integratePos(model, data.qpos, position, 1.0)
@@ -234,27 +284,21 @@ def _holds(
         nudged_scenario = replace(scenario, **start)
         setup = replace(pilot.setup, scenario=nudged_scenario)
         near = replace(pilot, scene=replace(scene, scenario=nudged_scenario), setup=setup)
-        points = []
-        for row in places:
-            base = with_setting(model, replace(basis.baseline, cone=row.setting.cone))
-            reference = basis.cones[row.setting.cone].reference
-            exact = known_motion.find_nearby(base, near, reference, quick=quick)
+        pair = []
+        for setting in (basis.baseline, other):
+            base = with_setting(model, replace(basis.baseline, cone=setting.cone))
+            cone = basis.cones[setting.cone]
+            exact = known_motion.find_nearby(base, near, cone.reference, quick=quick)
             if exact is None:
-                return True
-            run = simulation.simulate(setup, with_setting(model, row.setting), thickness(model))
-            if not run.judgement.ok or row.cost is None:
-                return False
-            states = run.states.head(len(exact.times))
-            if quantity.name == "figure":
-                error = float(measure.quantity_errors(model, near.scene, states, exact).max())
-                error = max(error, quantity.least)
-            else:
-                error = max(measure.visible_error(model, scene, states, exact), quantity.least)
-                error += basis.cones[row.setting.cone].visible_model_error
-            points.append(FrontPoint(row.cost, error))
-        if not points[0].beats(points[1]):
-            return False
-    return True
+                return None
+            reference = replace(cone.reference, states=exact)
+            cones = {**basis.cones, setting.cone: replace(cone, reference=reference, sticks=None)}
+            row, _ = _measure_setting(replace(basis, pilot=near, cones=cones), setting)
+            if row.status != "ok":
+                return found if setting == basis.baseline else [*found, {(LOST, WHOLE): math.inf}]
+            pair.append(columns_of(row, report.contact_model))
+        found.append(ratios(pair[0], pair[1], leasts_of(report)))
+    return found
 
 
 _NEARBY, _PARTS = 1e-4, 8
@@ -270,16 +314,12 @@ def _notes(
     largest: Sequence[scene_report.StableRow],
     rows: Sequence[scene_report.WorkPrecisionRow],
     cost_of: scene_report.MeasuredSetting | None,
-    compared_quantity: Quantity,
 ) -> tuple[str, ...]:
     model, pilot, reference = basis.model, basis.pilot, basis.reference
     notes = [reference.note]
     if cost_of is not None:
         text = setting_text(cost_of)
         notes.append(f"costs are relative to {text}, as the scene's own setting does not run")
-    figure = measure.quantity_name(model, pilot.scene)
-    if figure and compared_quantity.name != "figure":
-        notes.append(f"no error of the {figure} is resolved: settings are compared by what is seen")
     idle = [", ".join(solving_parts(r.setting, basis.baseline)) for r in rows if is_idle(r)]
     if idle:
         notes.append(f"the same motion to the bit, and no time saved, with {'; '.join(idle)}")
@@ -302,8 +342,10 @@ def _notes(
         notes.append(f"no run that begins 1e-10 away comes to be off by {error}: it is not chaotic")
     if int(model.opt.enableflags) & mujoco.mjtEnableBit.mjENBL_SLEEP:
         notes.append("nothing sleeps in the reference, so errors hold what sleep changes")
-    if pilot.peaks.sunk > 1:
-        names = overlap_names(model, pilot.peaks)
+    if pilot.overlaps:
+        notes.append(f"it begins with one inside the other: {pilot.overlaps}")
+    elif pilot.peaks.sunk > 1:
+        names = pair_names(model, pilot.peaks.overlap[:2])
         notes.append(f"{names} are so soft that the middle of one comes to lie in the other")
     if drivers := driving_force(model, pilot.scene.scenario):
         notes.append(f"energy is not judged: {drivers}")
@@ -312,9 +354,7 @@ def _notes(
         notes.append("the state holds subnormal numbers, with which processors are slow")
     limit = simulation.refsafe_from(model, contact=pilot.contact)
     refsafe_limit = limit if pilot.constrained else math.inf
-    if any(
-        (row.searched[1] if row.largest is None else row.largest) > refsafe_limit for row in largest
-    ):
+    if any(min(reach_bound(row.largest), row.searched[1]) > refsafe_limit for row in largest):
         notes.append(
             f"beyond {refsafe_limit:.6g} s refsafe softens constraints: stable, but another model"
         )
@@ -347,11 +387,10 @@ def _with_costs(
 
 def _measure_setting(
     basis: Basis, setting: scene_report.MeasuredSetting
-) -> tuple[scene_report.WorkPrecisionRow, bool | None, simulation.EngineStates | None]:
+) -> tuple[scene_report.WorkPrecisionRow, simulation.EngineStates | None]:
     """Run a scene under a setting and compare it with its reference; the cost is added later.
 
-    The flag says whether a learner sees the error, for the scene's own setting with that of its
-    cone; `None` where the reference is not known well enough. The states are those of the run.
+    The states are those of the run; `None` where it was lost.
     """
     model, pilot, cone = basis.model, basis.pilot, basis.cones[setting.cone]
     variant = with_setting(model, setting)
@@ -365,15 +404,16 @@ def _measure_setting(
         "refsafe": pilot.constrained and simulation.refsafe_active(variant, contact=pilot.contact),
         "steps": steps,
         "evaluations": steps * scene_report.step_evaluations(setting.integrator),
-        "lucky": "",
         "own": setting == basis.baseline,
-        **dict.fromkeys(("front", "same"), False),
+        "halves": {},
+        **dict.fromkeys(("lucky", "name"), ""),
+        **dict.fromkeys(("front", "same", "idle"), False),
     }
     row = scene_report.WorkPrecisionRow(**figures)
     try:
-        run = simulation.simulate(pilot.setup, variant, thickness(model))
+        run = simulation.simulate(pilot.setup, variant)
     except mujoco.FatalError as error:
-        return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None, None
+        return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None
     row = replace(
         row,
         status=run.judgement.status.value,
@@ -387,27 +427,21 @@ def _measure_setting(
         variant = with_setting(model, setting)
         growth = run_trial(pilot.setup, variant, pilot.setup.scenario.duration).growth
         has_grown = math.isfinite(growth) and growth > 1
-        return replace(row, growth=growth if has_grown else None), None, None
+        return replace(row, growth=growth if has_grown else None), None
     if pilot.constrained:
         # A step of RK4 has four times the iterations of its last evaluation.
         count = simulation.count_iterations(with_setting(model, setting), pilot.scene.scenario)
         row = replace(row, iterations=count * row.evaluations / steps)
-    return *_with_errors(basis, row, run), run.states
+    return _with_errors(basis, row, run), run.states
 
 
 def _with_errors(
     basis: Basis, row: scene_report.WorkPrecisionRow, run: simulation.Run
-) -> tuple[scene_report.WorkPrecisionRow, bool | None]:
+) -> scene_report.WorkPrecisionRow:
     model, scene, cone = basis.model, basis.pilot.scene, basis.cones[row.setting.cone]
     reference = cone.reference
     states = run.states.head(len(reference.states.times))
-    exact = simulation.motion_of(model, reference.states)
-    run_errors = measure.errors(simulation.motion_of(model, states), exact, reference.floor)
-    floor = basis.least_seen
-    visible = measure.visible_error(model, scene, states, reference.states)
-    noticeable = None if max(1, visible) <= floor else visible >= 1
-    if row.own and cone.visible_model_error >= 1:
-        noticeable = True
+    motion, exact = (simulation.motion_of(model, s) for s in (states, reference.states))
     creep = None if cone.sticks is None else measure.measure_slip(model, scene, states, cone.sticks)
     if basis.pilot.lyapunov is not None:
         unit = horizon_errors(model, scene)
@@ -415,17 +449,35 @@ def _with_errors(
         far = np.flatnonzero(gaps >= 1)
         if far.size:
             # How far apart they are later depends on the last digit of the start.
-            return replace(row, parted=float(states.times[far[0]]), slip=creep), noticeable
-    figure = None
+            return replace(row, parted=float(states.times[far[0]]), slip=creep)
+    sizes = measure.error_sizes(motion, exact)
+    sizes["step_error"] = measure.visible_errors(model, scene, states, reference.states)
+    leasts = {
+        "position": scene_report.FLOORS * reference.floor.position,
+        "attitude": scene_report.FLOORS * reference.floor.attitude,
+        "velocity": scene_report.FLOORS * reference.floor.velocity,
+        "step_error": basis.least_seen,
+        "figure": basis.least_figure,
+    }
     if measure.quantity_name(model, scene):
-        distances = measure.quantity_errors(model, scene, states, reference.states)
-        sizes = np.maximum([distances.max(), distances[-1]], basis.least_figure)
-        figure = float(sizes[0]), float(sizes[1])
-    row = replace(
+        sizes["figure"] = measure.quantity_errors(model, scene, states, reference.states)
+    middle = (len(states.times) + 1) // 2
+    halves = {
+        name: tuple(max(float(part.max()), leasts[name]) for part in (row[:middle], row[middle:]))
+        for name, row in sizes.items()
+        if len(row) > 1
+    }
+    step_error = max(float(sizes["step_error"].max(initial=0.0)), basis.least_seen)
+    figure = None
+    if "figure" in sizes:
+        ends = np.maximum([sizes["figure"].max(), sizes["figure"][-1]], basis.least_figure)
+        figure = float(ends[0]), float(ends[1])
+    return replace(
         row,
-        **asdict(run_errors),
+        **asdict(measure.errors(motion, exact, reference.floor)),
         figure=figure,
-        seen=max(visible, floor) + cone.visible_model_error,
+        step_error=step_error,
+        seen=step_error + cone.visible_model_error,
         slip=creep,
+        halves=halves,
     )
-    return row, noticeable

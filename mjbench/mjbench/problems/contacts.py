@@ -212,7 +212,6 @@ def _slope_problem(
         scenario=_SCENARIO,
         position_bound=20.0,
         velocity_bound=20.0,
-        penetration_bound=0.025,
         reference=reference,
         second=RIGID,
         timesteps=(2e-3, 1e-3, 5e-4),
@@ -322,6 +321,5 @@ def _stack_problem(ratio: float) -> Problem:
             ),
         ),
         smooth=False,
-        penetration_bound=0.05,
         note="rigid bodies would not sink at all: the depth is the error of the soft model",
     )

@@ -55,10 +55,13 @@ class FindingKind(Struct, frozen=True):
     """Fields of the compiled model that differ without it, beside those of its view."""
     numbered: str = ""
     """Why such things stay where scenarios give them by number."""
+    interface: bool = False
+    """Whether such things are there for whoever drives the model, whose code may be elsewhere."""
 
 
-_UNUSED = "no motion is computed of it, nothing refers to it, and no code can notice"
-_BESIDE = "it is computed beside the motion, and no code can notice"
+_UNMOVED = "no motion is computed of it, and nothing refers to it"
+_UNUSED = f"{_UNMOVED}, nor does the code that was looked at"
+_BESIDE = "it is computed beside the motion, and no code that was looked at reads it"
 KINDS = {
     "energy-flag": FindingKind(
         "energy is computed in every step, and nothing reads it",
@@ -74,7 +77,8 @@ KINDS = {
         "nothing reads the {}",
         "sensor",
         "Sensor",
-        "what a sensor says moves nothing, and no code can notice",
+        "what a sensor says moves nothing",
+        interface=True,
     ),
     "actuator-idle": FindingKind(
         "nothing commands the {}",
@@ -98,7 +102,7 @@ KINDS = {
         _UNUSED,
         numbered="scenarios give keyframes by number: another would have the number",
     ),
-    "unused-site": FindingKind("nothing uses the {}", "site", "Site", _UNUSED),
+    "unused-site": FindingKind("nothing uses the {}", "site", "Site", _UNMOVED, interface=True),
     "unused-material": FindingKind("nothing uses the {}", "material", "Material", _UNUSED),
     "unused-texture": FindingKind("nothing uses the {}", "texture", "Texture", _UNUSED),
     "unused-mesh": FindingKind("nothing uses the {}", "mesh", "Mesh", _UNUSED, "npolygonmax"),

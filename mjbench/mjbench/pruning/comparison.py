@@ -23,10 +23,10 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from mjbench.declarations import Declarations, DeclaredScenario, Place
-from mjbench.detector import Peaks, RunJudgement, judge, update_peaks
-from mjbench.pilot import DEEPER, NUDGE, nudges
+from mjbench.detector import Passages, Peaks, RunJudgement, judge, update_peaks
+from mjbench.pilot import NUDGE, nudges
 from mjbench.problem import Array, Scenario, Setup
-from mjbench.scene import Scene, scenes, thickness
+from mjbench.scene import Scene, scenes
 from mjbench.simulation import (
     STATE,
     advance,
@@ -201,7 +201,7 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
     displacements, speeds = np.zeros(model.nv), np.zeros(model.nv)
     steps_made, horizon = 0, math.inf
     touching: set[tuple[int, int]] = set()
-    peaks, constrained, half_thickness = Peaks(), False, thickness(model)
+    peaks, constrained, passages = Peaks(), False, Passages(model)
     gauge = _Gauge(model, model, index_map(model, {}), scene)
     for command in scene.scenario.commands(scene.timestep):
         if command:
@@ -212,7 +212,8 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
         if data.ncon:
             pairs = data.contact.geom[data.contact.exclude == 0]  # none has a force within its gap
             touching |= {(min(p), max(p)) for p in pairs.tolist() if min(p) >= 0}
-        peaks = update_peaks(data, peaks, half_thickness)
+        peaks = update_peaks(data, peaks, passages.thickness)
+        passages.look(data)
         if not peaks.finite:
             break
         mujoco.mj_differentiatePos(model, change, 1.0, start, data.qpos)
@@ -222,9 +223,12 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
             advance(model, twin)
             gauge.look(data, twin)
             horizon = float(data.time) if gauge.seen > ALIKE else horizon
-    bound = _sunk_bound(model, scene) if peaks.sunk > 1 else 1.0
-    setup = Setup(scenario=scene.scenario, sunk_bound=bound)
-    judgement = judge(model, data, steps_made * scene.timestep, peaks, setup)
+    setup = Setup(scenario=scene.scenario)
+    if passages.texts():  # unless that is so in small steps too
+        setup = replace(setup, passing=_passing_pairs(model, scene))
+        passages.setup = setup
+    elapsed = steps_made * scene.timestep
+    judgement = judge(model, data, elapsed, peaks, setup, passages.texts())
     observations = frozenset(touching), constrained, displacements, speeds, horizon
     return WatchedRun(scene, judgement, *observations)
 
@@ -233,18 +237,18 @@ _FINER = 8
 """How many times shorter the steps are that tell a soft contact from a lost run."""
 
 
-def _sunk_bound(model: Any, scene: Scene) -> float:
-    """How deep bodies may lie in each other, as `Peaks.sunk`: little deeper than in small steps."""
+def _passing_pairs(model: Any, scene: Scene) -> frozenset[tuple[int, int]]:
+    """The pairs of geoms that go through each other in small steps."""
     step = scene.timestep / _FINER
     fine = without_sleep(with_integrator(model, integrator_of(model), step))
-    data, peaks, half_thickness = initial_data(scene.scenario, fine), Peaks(), thickness(fine)
+    data, peaks, passages = initial_data(scene.scenario, fine), Peaks(), Passages(fine)
     for command in scene.scenario.commands(scene.timestep):
         if command:
             data.ctrl[:] = command
-        peaks, _ = advance_watching(fine, data, _FINER, peaks, half_thickness, interval=_FINER)
+        peaks, _ = advance_watching(fine, data, _FINER, peaks, passages, interval=_FINER)
         if not peaks.finite:
-            return 1.0
-    return max(1.0, DEEPER * peaks.sunk)
+            return frozenset()
+    return passages.pairs()
 
 
 def nearby_scenes(model: Any, run: WatchedRun, count: int) -> Iterator[Scene]:

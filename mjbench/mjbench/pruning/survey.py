@@ -47,6 +47,7 @@ from mjbench.pruning.readers import ModelReader, difference, unrelated_fields
 from mjbench.pruning.trials import PrunedModel, PruningTrials, largest_subset
 from mjbench.pruning.xml_edits import ModelEdit, place_of
 from mjbench.reports.diet_report import (
+    INTERFACE_LABEL,
     MEASURED_LABEL,
     PROVED_LABEL,
     DietReport,
@@ -107,6 +108,8 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     quick: bool
     tell: Callable[[str], None]
     """Gets a line about each stage."""
+    only: Collection[str] = ()
+    """The kinds of findings that are looked for; all if none is named."""
     rerun: Rerun | None = None
     """`None`: scripts and labs do not run."""
     good_runs: tuple[WatchedRun, ...] = ()
@@ -180,15 +183,15 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         self.tell("all together")
         fixable = [item for group in groups if group.finding.fixable for item in group.items]
         fixed = self.trials.prune(largest_subset(fixable, self._is_needless)) if fixable else None
-        slim, slim_difference = self._save_most(
-            [group for group in groups if not group.finding.kept]
-        )
+        slim, slim_difference = self._save_most([g for g in groups if _goes(g.finding)])
         used_keys = {group.finding.kind for group in groups}
         used_keys |= {f"{item.kind} {item.name}" for group in groups for item in group.items}
         stale = {key: keep for key, keep in self.keeps.items() if key not in used_keys}
         report = replace(
             report,
-            findings=tuple(group.finding for group in groups),
+            findings=tuple(
+                sorted((group.finding for group in groups), key=lambda f: -(f.saving.time or 0.0))
+            ),
             tried=tuple(self.rejected),
             fixed=None
             if fixed is None
@@ -202,7 +205,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     def _settle(self, groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
         """Confirm groups, and try the rest without them, but for what is kept."""
         groups = self._confirm(groups) if groups else []
-        unkept = [group for group in groups if not group.finding.kept]
+        unkept = [group for group in groups if _goes(group.finding)]
         self.trials.absences += tuple(item for group in unkept for item in group.items)
         return groups
 
@@ -227,29 +230,43 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         items = unread_elements(self.text, [run.scene.scenario for run in self.good_runs])
         if not any(reader.touches(PREMISES) for reader in self.readers):
             items += unreachable_contacts(self.text)
-        items = [item for item in items if self._is_unread(item)]
+        items = [item for item in items if self._is_asked(item) and self._is_unread(item)]
         unkept = [item for item in items if not self._keep_reason(item)]
-        removable = largest_subset(unkept, self._is_needless)
+        own_items = [item for item in unkept if not KINDS[item.kind].interface]
+        removable = largest_subset(own_items, self._is_needless)
+        # What the model offers to whoever drives it is looked at on top, and is never taken out.
+        offered = largest_subset(
+            [item for item in unkept if KINDS[item.kind].interface],
+            lambda items: self._is_needless([*removable, *items]),
+        )
         kept_items = [
             item
             for item in items
             if self._keep_reason(item) and self._is_needless([*removable, item])
         ]
         for item in unkept:
-            if item not in removable:
+            if item not in removable and item not in offered:
                 self._reject([item], None, "something needs it, or code may")
-        elements = {item.element for item in removable}
+        elements = {item.element for item in (*removable, *offered)}
         outer = [
             item
-            for item in removable
+            for item in (*removable, *offered)
             if not item.element or elements.isdisjoint(item.element.ancestors())
         ]
         groups = self._group_items([*outer, *kept_items])
         no_difference = MotionComparison(True, 0.0)
         return [
-            self._make_group(similar, reason, PROVED_LABEL, no_difference)
+            self._make_group(
+                similar,
+                reason,
+                INTERFACE_LABEL if KINDS[similar[0].kind].interface else PROVED_LABEL,
+                no_difference,
+            )
             for reason, similar in groups
         ]
+
+    def _is_asked(self, item: Item) -> bool:
+        return not self.only or item.kind in self.only
 
     def _is_unread(self, item: Item) -> bool:
         names = {item.name} | {node.get("class") or "" for e in item.removals for node in e.walk()}
@@ -293,6 +310,8 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         edits = {edit for item in self.trials.absences for edit in item.edits}
 
         def is_left(item: Item) -> bool:
+            if not self._is_asked(item):
+                return False
             if item.element is None:
                 return True
             is_whole = absences.isdisjoint((item.element, *item.element.ancestors()))
@@ -396,6 +415,8 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         """Why `--fix` does not act on a finding; empty where it does."""
         if keep_reason:
             return "it is kept"
+        if label == INTERFACE_LABEL:
+            return "whoever drives the model may read it"
         if label != PROVED_LABEL:
             return f"only what is {PROVED_LABEL} is changed"
         if kind in self.numbered_kinds:
@@ -443,6 +464,11 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             return None, None
         saving = self.trials.measure_saving(trial.edits, trial, self.trials.whole)
         return saving, result.difference
+
+
+def _goes(finding: Finding) -> bool:
+    """Whether a finding is about something that is to go."""
+    return not finding.kept and finding.label != INTERFACE_LABEL
 
 
 def _views(items: Iterable[Item]) -> frozenset[str]:

@@ -3,8 +3,33 @@
 from __future__ import annotations
 
 import math
+from typing import Literal, TypeAlias
 
 from msgspec import Struct
+
+Reach: TypeAlias = float | Literal["all", "none"]
+"""The largest timestep at which something holds, s: or it holds at all of them, or at none."""
+
+
+def reach(timestep: float) -> Reach:
+    """The same of an extended number: infinite for all timesteps, 0 for none."""
+    if math.isinf(timestep):
+        return "all"
+    return timestep or "none"
+
+
+def reach_bound(limit: Reach) -> float:
+    """The number again, which limits are compared by."""
+    if isinstance(limit, float | int):
+        return float(limit)
+    return math.inf if limit == "all" else 0.0
+
+
+class PartFailure(Struct, frozen=True, forbid_unknown_fields=True):
+    """A part of a measurement that there is not, and why."""
+
+    part: str
+    reason: str
 
 
 class Record(Struct, frozen=True, forbid_unknown_fields=True):

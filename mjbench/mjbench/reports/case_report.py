@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from mjbench.machine import Machine
 from mjbench.reports import Interval, Record, scene_report
+from mjbench.reports.charts import Chart
+
+RIGHT = 1e-3
+"""m or rad: the error at which costs are compared."""
 
 
 class BoundaryLine(scene_report.StableRow, frozen=True):
@@ -64,3 +68,14 @@ class CaseReport(Record, frozen=True):
     orders: tuple[scene_report.OrderRow, ...]
     errors: tuple[ErrorLine, ...]
     costs: tuple[StepCost, ...]
+    charts: tuple[Chart, ...] = ()
+    """Each error against processor time, and evaluations."""
+    main: str = ""
+    """The name of the error that is drawn first; empty where none is resolved."""
+    least: float = 0.0
+    """Such errors that are not larger are not resolved."""
+    reached: tuple[tuple[str, float], ...] = ()
+    """Processor time for a simulated second, s, by integrator, with the timestep that errs by
+    `RIGHT`; those that do not come so near are left out."""
+    missed: tuple[float, float] | None = None
+    """As of a `ScenarioReport`."""

@@ -9,6 +9,8 @@ from mjbench.reports import Record
 
 PROVED_LABEL = "proved"
 """The label of a finding without which every bit is the same in every state, by a stated proof."""
+INTERFACE_LABEL = "interface"
+"""The label of what no code that was looked at reads, and whoever drives the model may."""
 MEASURED_LABEL = "the same in what was run"
 """The label of a finding without which scenarios, scripts and labs gave the same, unproved."""
 
@@ -75,7 +77,7 @@ class Finding(Record, frozen=True):
     places: tuple[ModelPlace, ...]
     """Empty where it is about the model as a whole."""
     label: str
-    """`PROVED_LABEL` or `MEASURED_LABEL`."""
+    """`PROVED_LABEL`, `INTERFACE_LABEL` or `MEASURED_LABEL`."""
     difference: float
     """The largest of what is seen without it, where 1 is just visible; 0 where all bits are the
     same."""

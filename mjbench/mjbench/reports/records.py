@@ -28,7 +28,7 @@ from mjbench.reports.diet_report import DietReport
 from mjbench.reports.engine_report import EngineReport
 from mjbench.reports.shown_errors import seconds_text, setting_text, status_text
 
-VERSION = 3
+VERSION = 4
 """Goes up when files that were written before cannot be read any more."""
 
 _T = TypeVar("_T")
@@ -270,11 +270,10 @@ def _orders(rows: Sequence[scene_report.OrderRow], band: float) -> _Table:
 
 
 def _largest(row: scene_report.StableRow) -> _Figures:
-    largest = "all" if row.largest is None else row.largest
     low, high = row.bracket or (1.0, 1.0)
     is_sharp = row.monotone and high <= low * (1 + _STABLE)
     return {
-        "largest stable timestep": _Figure(largest, _STABLE if is_sharp else _FUZZY),
+        "largest stable timestep": _Figure(row.largest, _STABLE if is_sharp else _FUZZY),
         "monotone": _Figure(row.monotone),
     }
 

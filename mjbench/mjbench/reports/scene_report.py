@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from mjbench.machine import Machine
-from mjbench.reports import Interval, Record
+from mjbench.reports import Interval, PartFailure, Reach, Record
+from mjbench.reports.charts import Chart
 
 
 class SweepRow(Record, frozen=True):
@@ -50,7 +51,7 @@ class SweepReport(Record, frozen=True):
     title: str
     scenario: str
     show: tuple[str, ...]
-    """The figures to show; empty: those that differ."""
+    """The figures to show: those that are declared, else those that differ."""
     rows: tuple[SweepRow, ...]
 
 
@@ -154,6 +155,16 @@ class WorkPrecisionRow(MeasuredRun, frozen=True):
     """Why its error says nothing of what the setting does; empty where it does."""
     same: bool = False
     """Whether the motion is that of the scene's own setting, to the bit."""
+    step_error: float | None = None
+    """What of `seen` comes from timestep and solver, and not from the model of contacts; `None`
+    where that was not measured apart."""
+    halves: Mapping[str, tuple[float, float]] = {}
+    """The largest errors in the first and in the second half of the horizon, by their fields; empty
+    where these were not measured."""
+    idle: bool = False
+    """Whether it changes no bit of the motion and saves no time: it is not shown."""
+    name: str = ""
+    """The setting in words; solver, iterations and cone only where they are not the scene's own."""
 
     @property
     def realtime(self) -> float | None:
@@ -204,8 +215,8 @@ class StableRow(Record, frozen=True):
     """The largest stable timestep of an integrator in a scenario."""
 
     integrator: str
-    largest: float | None
-    """s: all that were tried up to it are stable. 0 where none is, `None` where all are."""
+    largest: Reach
+    """s: at all timesteps that were tried up to it runs stay bounded."""
     searched: tuple[float, float]
     """The shortest and the longest timestep that was tried, s."""
     islands: tuple[float, float] | None
@@ -222,19 +233,29 @@ class StableRow(Record, frozen=True):
     bracket: tuple[float, float] | None = None
     """s: the least and the most of what the own start over the duration, over twice the duration,
     and the start nearby that is lost first say; `None` where all is stable, or it is not known."""
-    theory: float | None = None
-    """s, as `largest`: of linear theory; `None` also where there is none and so no formula."""
+    theory: Reach | None = None
+    """As `largest`, of linear theory; `None` where there is none for what the scenario visits."""
     formula: str = ""
     """Where the theory comes from; empty where there is none."""
-    orbital: float | None = None
-    """s: the largest timestep with which a periodic motion is stable; `None` where all are."""
-    periodic: bool = False
-    """Whether the motion is periodic, so that `orbital` is known."""
+    orbital: Reach | None = None
+    """As `largest`, of a periodic motion; `None` where it is not periodic, or not known."""
     gain: tuple[float, float] | None = None
     """The first timestep (s) with which a scene that nothing drives gains energy, and how much (J);
     `None` where none does, or something drives it."""
     tries: tuple[tuple[float, int, int], ...] = ()
     """The map: by timestep (s), how many runs there were, and how many of them were lost."""
+    reason: str = ""
+    """Why the first timestep beyond the largest is lost."""
+    near: Reach | None = None
+    """As `largest`, of runs that stay near the motion of small steps; `None`: not measured."""
+    near_reason: str = ""
+    through: Reach | None = None
+    """As `largest`, of runs in which nothing goes through anything; `None`: not measured."""
+    through_reason: str = ""
+    shown: str = ""
+    """The largest stable timestep in words, with the digits on which all runs agree."""
+    map: str = ""
+    """A sign for each timestep that was tried from all starts; see `limits.map_text`."""
 
     @property
     def monotone(self) -> bool:
@@ -257,20 +278,57 @@ class FigureLine(Record, frozen=True):
     """Of an ensemble, the range of its middle eight tenths; `measured` is the median then."""
 
 
+class ErrorParts(Record, frozen=True):
+    """Where the error of the own setting comes from, as a learner sees it (1: just visible).
+
+    `None` for what was not measured, or does not apply.
+    """
+
+    timestep: float | None
+    """Against small steps, with a solver that goes to its end."""
+    solver: float | None
+    """Against the same with a solver that goes to its end: iterations and tolerance."""
+    contact_model: float | None
+    """Of small steps against the closed form, or of a pyramid against the cone: no timestep mends
+    it."""
+    rounding: float | None
+    """Against the same from a start whose last digits are others."""
+    least: float
+    """Below this nothing is known of them."""
+    dominant: str = ""
+    """The field that is the largest; empty where none is known to be."""
+    mend: str = ""
+    """What makes that smaller, and what it costs; empty where no setting that was measured does."""
+
+
 class RowVerdict(Record, frozen=True):
     """Whether a scene's own setting is a good choice."""
 
     on_front: bool
     better: int | None
-    """The row that dominates it; `None` where none does."""
-    cost_ratio: float | None
-    """Cost of the better one, relative to the own."""
-    error_ratio: float | None
-    """Error of the better one, relative to the own."""
+    """The row that is better in no column worse, from starts nearby too; `None` where none is."""
     noticeable: bool | None
     """Whether a learner would see the own setting's error; `None` where it is not known."""
     text: str
     """The same in a sentence or two."""
+    worse: tuple[str, ...] = ()
+    """In which errors, and when, the setting is worse that would else be better."""
+    lines: tuple[str, ...] = ()
+    """The whole in at most five lines: speed, error, what is better, stability, what is not
+    known."""
+
+
+class ErrorQuantity(Record, frozen=True):
+    """An error that rows have, in the order in which they are shown."""
+
+    name: str
+    """The field of a row: `figure`, `step_error`, `seen`, `position`, `attitude` or `velocity`."""
+    label: str
+    """What it is, with its unit."""
+    least: float
+    """Errors that are not larger are not resolved by the reference."""
+    resolved: bool
+    """Whether any row has a larger one."""
 
 
 class ScenarioReport(Record, frozen=True):
@@ -324,6 +382,29 @@ class ScenarioReport(Record, frozen=True):
     """The errors at which predictions end, by unit. Empty in older reports, where it is a tenth of
     a radian or of the model's extent."""
 
+    contact_model: Mapping[str, float] = {}
+    """What the model of contacts errs by, as it is seen, by cone; empty where it was not measured
+    apart, or nothing touches."""
+    parts: ErrorParts | None = None
+    """`None` where the error was not taken apart."""
+    failures: tuple[PartFailure, ...] = ()
+    """What was not measured."""
+    quantities: tuple[ErrorQuantity, ...] = ()
+    main: str = ""
+    """The name of the error that settings are compared by first, and that is drawn."""
+    charts: tuple[Chart, ...] = ()
+    """Error against cost, evaluations, and iterations of the solver."""
+    missed: tuple[float, float] | None = None
+    """Islands of lost timesteps can be missed where they are narrower: relative to the timestep,
+    above half the largest stable one, and in all; `None` without a search."""
+    cut_short: bool = False
+    """Whether the search for stable timesteps ended because of the scenario's duration."""
+
+    @property
+    def own_row(self) -> WorkPrecisionRow | None:
+        """The row of the scene's own setting; `None` where it was not measured."""
+        return next((row for row in self.rows if row.own), None)
+
     @property
     def own_setting(self) -> MeasuredSetting | None:
         """The scene's own setting; `None` where there are no rows."""
@@ -362,6 +443,8 @@ class SceneReport(Record, frozen=True):
     """Whether only a part was measured, and in less time."""
     machine: Machine
     scenarios: tuple[ScenarioReport, ...]
+    failures: tuple[PartFailure, ...] = ()
+    """Scenarios and sweeps that were not measured."""
     card: SceneCard | None = None
     """`None` in a report that is about speed and error alone."""
     sweeps: tuple[SweepReport, ...] = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeAlias
 
 from msgspec import Struct
@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from mjbench.reports import Interval
 from mjbench.reports.scene_report import (
+    FLOORS,
     MeasuredRun,
     MeasuredSetting,
     WorkPrecisionRow,
@@ -26,7 +27,7 @@ class Quantity(Struct, frozen=True):
     """An error that can be drawn."""
 
     name: str
-    """The field of a row: `figure`, `seen`, `position`, `attitude` or `velocity`."""
+    """The field of a row, as of an `ErrorQuantity`."""
     label: str
     """What it is, with its unit."""
     least: float = 0.0
@@ -48,11 +49,36 @@ SEEN = Quantity("seen", "what is seen (1: just visible)")
 """What a learner sees: it is compared where no other error is declared and resolved."""
 
 
-def compared_quantity(rows: Iterable[MeasuredRun], figure: Quantity, least_seen: float) -> Quantity:
-    """The error to compare by: the declared one, if it has a label, unless only `SEEN` is known."""
-    rows, visible = tuple(rows), replace(SEEN, least=least_seen)
-    is_compared = figure.is_resolved(rows) or not visible.is_resolved(rows)
-    return figure if figure.label and is_compared else visible
+STEPPED = Quantity("step_error", "what is seen of steps (1: just visible)")
+"""The same without the error of the model of contacts, which no timestep mends."""
+
+
+def quantities(
+    rows: Sequence[WorkPrecisionRow],
+    figure: Quantity,
+    least_seen: float,
+    floors: tuple[float, float],
+) -> tuple[Quantity, ...]:
+    """The errors that some row has, what the scenario declares to be measured first.
+
+    `floors`: those of the reference, of places and velocities.
+    """
+    place, speed = (FLOORS * floor for floor in floors)
+    candidates = (
+        figure,
+        replace(STEPPED, least=least_seen),
+        replace(SEEN, least=least_seen),
+        Quantity("position", "position (m or rad)", place),
+        Quantity("attitude", "attitude (rad)", place),
+        Quantity("velocity", "velocity (m/s or rad/s)", speed),
+    )
+    return tuple(q for q in candidates if any(q.value_of(row) is not None for row in rows))
+
+
+def main_quantity(present: Sequence[Quantity], rows: Sequence[MeasuredRun]) -> Quantity | None:
+    """The first error that is resolved, else the first; `None` where no row has an error."""
+    resolved = (quantity for quantity in present if quantity.is_resolved(rows))
+    return next(resolved, next(iter(present), None))
 
 
 def is_idle(row: WorkPrecisionRow) -> bool:
@@ -95,8 +121,8 @@ def front_point(row: WorkPrecisionRow, quantity: Quantity) -> FrontPoint | None:
     return None if row.cost is None or error is None else FrontPoint(row.cost, error)
 
 
-def front(rows: Rows, quantity: Quantity = SEEN) -> tuple[WorkPrecisionRow, ...]:
-    """Rows that say whether they are on the front, and otherwise which row dominates them.
+def front(rows: Rows, quantity: Quantity) -> tuple[WorkPrecisionRow, ...]:
+    """Rows that say whether they are on the front of cost and an error, and what is better there.
 
     A row is dominated where another costs no more and errs no more, and is clearly better in one of
     the two. A lucky row is on no front, and dominates none. Where none errs there is no front.
@@ -105,18 +131,26 @@ def front(rows: Rows, quantity: Quantity = SEEN) -> tuple[WorkPrecisionRow, ...]
     places = {n: point for n, point in points if point is not None}
     if not any(place.error for place in places.values()):
         places = {}
-    better = {
-        n: [m for m, rival in places.items() if not rows[m].lucky and rival.beats(own_place)]
-        for n, own_place in places.items()
-    }
+    return mark_front(
+        rows,
+        {n: place.cost.value * place.error for n, place in places.items()},
+        lambda rival, own: places[rival].beats(places[own]),
+    )
 
-    def worth(n: int) -> tuple[float, int]:
-        return places[n].cost.value * places[n].error, n
 
+def mark_front(
+    rows: Rows, worth: Mapping[int, float], beats: Callable[[int, int], bool]
+) -> tuple[WorkPrecisionRow, ...]:
+    """Rows that say whether another beats them, and which: of those the one worth least.
+
+    `worth`: of the rows that are compared, by number; `beats`: whether one beats another.
+    """
+    better = {n: [m for m in worth if m != n and not rows[m].lucky and beats(m, n)] for n in worth}
     placed_rows = []
     for n, row in enumerate(rows):
         rivals = better.get(n, [])
-        best = min([m for m in rivals if not better[m]] or rivals, key=worth, default=None)
+        unbeaten = [m for m in rivals if not better[m]] or rivals
+        best = min(unbeaten, key=lambda m: (worth[m], m), default=None)
         on_front = n in better and not rivals and not row.lucky
         placed_rows.append(replace(row, front=on_front, dominated_by=best))
     return tuple(placed_rows)
@@ -157,3 +191,9 @@ def solving_parts(setting: MeasuredSetting, like: MeasuredSetting | None = None)
 def status_text(status: str) -> str:
     """How a run went, in words."""
     return "grew" if status == "slow-growth" else status
+
+
+def interval_text(value: Interval) -> str:
+    """A figure in three digits with half the width of its interval, in per cent."""
+    share = 100 * value.half_width
+    return f"{value.value:.3g}" + (f" ± {share:.2g} %" if 0.05 <= share < math.inf else "")

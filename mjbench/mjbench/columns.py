@@ -1,0 +1,175 @@
+"""The errors of settings by columns, and which setting is worse in which of them.
+
+A column is an error of one thing over a stretch of time: the whole run, and its halves where these
+were measured. Errors of timestep and solver stand apart from those of the model of contacts. One
+maximum over all of them would hide that a longer timestep doubles the rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TypeAlias
+
+from msgspec import Struct
+
+from mjbench.reports.scene_report import FLOORS, ScenarioReport, WorkPrecisionRow
+from mjbench.reports.shown_errors import ERROR_SLACK, FrontPoint, Rows, mark_front
+
+Column: TypeAlias = tuple[str, str]
+"""The name of an error, and a stretch of time in words."""
+Columns: TypeAlias = Mapping[Column, float]
+
+WHOLE, HALVES, END = "over the whole run", ("in its first half", "in its second half"), "at its end"
+LOST = "lost"
+"""The column of a run that is lost, which has no errors."""
+_ROUNDED = 1e-9
+"""Relative changes of what is conserved below this are those of rounding."""
+LABELS = {
+    "step_error": "what is seen",
+    "seen": "what is seen",
+    "position": "the error of position",
+    "attitude": "the error of attitude",
+    "velocity": "the error of velocity",
+    "energy_drift": "the drift of energy",
+    "momentum_drift": "the drift of momentum",
+    "slip": "creep",
+    "contact_model": "the error of the model of contacts",
+}
+"""What columns are called in sentences; `figure` is called as the scenario says."""
+
+
+def columns_of(row: WorkPrecisionRow, contact_model: Mapping[str, float]) -> Columns:
+    """The errors of a row; none where it was lost."""
+    values: dict[Column, float] = {}
+    if row.status != "ok":
+        return values
+    for name in ("figure", "position", "attitude", "velocity"):
+        if (pair := getattr(row, name)) is not None:
+            values[name, WHOLE] = pair[0]
+            if name not in row.halves:
+                values[name, END] = pair[1]
+    seen = "seen" if row.step_error is None else "step_error"
+    for name in (seen, "energy_drift", "momentum_drift", "slip"):
+        if (value := getattr(row, name)) is not None:
+            values[name, WHOLE] = abs(value)
+    for name, halves in row.halves.items():
+        values |= {(name, span): value for span, value in zip(HALVES, halves, strict=True)}
+    if contact_model:
+        values["contact_model", WHOLE] = contact_model.get(row.setting.cone, 0.0)
+    return {column: value for column, value in values.items() if math.isfinite(value)}
+
+
+def leasts_of(report: ScenarioReport) -> dict[str, float]:
+    """Below which errors mean nothing, by the name of a column."""
+    place, speed = FLOORS * report.floor, FLOORS * report.velocity_floor
+    return {
+        "figure": report.least_figure,
+        "seen": report.least_seen,
+        "step_error": report.least_seen,
+        "contact_model": report.least_seen,
+        "position": place,
+        "attitude": place,
+        "velocity": speed,
+        "slip": place,
+        "energy_drift": _ROUNDED,
+        "momentum_drift": _ROUNDED,
+    }
+
+
+def ratios(own: Columns, other: Columns, leasts: Mapping[str, float]) -> dict[Column, float]:
+    """How many times as large other errors are, by columns that both have; 1 where none is known.
+
+    Two errors that the reference does not resolve are alike.
+    """
+    result: dict[Column, float] = {}
+    for column in own.keys() & other.keys():
+        least = leasts.get(column[0], 0.0) * (1 + 1e-9)
+        before, now = (max(values[column], least) for values in (own, other))
+        result[column] = now / before if before else (math.inf if now else 1.0)
+    return result
+
+
+class Spread(Struct, frozen=True):
+    """How many times as large an error is as another, from several starts."""
+
+    column: Column
+    low: float
+    high: float
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether it is larger from every start."""
+        return self.low > 1 + ERROR_SLACK
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether it is larger from some starts and not from others."""
+        return self.high > 1 + ERROR_SLACK and not self.is_worse
+
+    def text(self, figure: str) -> str:
+        """In words: what is how many times as large, and when."""
+        name, span = self.column
+        if name == LOST:
+            return "it is lost"
+        label = figure.partition(" [")[0] or "the figure" if name == "figure" else LABELS[name]
+        return f"{label} is {times_text(self.low, self.high)} as large {span}"
+
+
+def spreads(starts: Sequence[Mapping[Column, float]]) -> list[Spread]:
+    """The ratios of all starts together, the worst column first."""
+    columns = {column for start in starts for column in start}
+    found = []
+    for column in columns:
+        values = [start[column] for start in starts if column in start]
+        found.append(Spread(column, min(values), max(values)))
+    return sorted(found, key=lambda spread: (-spread.low, -spread.high, spread.column))
+
+
+def times_text(low: float, high: float) -> str:
+    """A factor, or the factors between which it lies, in words."""
+    least, most = number_text(low), number_text(high)
+    return f"{least} times" if least == most else f"{least} to {most} times"
+
+
+def number_text(number: float) -> str:
+    """A factor with two digits and no exponent where zeros do: `610`."""
+    return f"{float(f'{number:.2g}'):g}" if number < 1e4 else "over 10000"
+
+
+def mark_dominated(report: ScenarioReport) -> Rows:
+    """Rows that say whether another is better in cost or an error, and in no column worse.
+
+    Where none errs there is no front.
+    """
+    rows, leasts = report.rows, leasts_of(report)
+    columns = [columns_of(row, report.contact_model) for row in rows]
+    present = {n for n, row in enumerate(rows) if row.cost is not None and columns[n]}
+    if not any(value for n in present for value in columns[n].values()):
+        present = set()
+
+    def worth(n: int) -> float:
+        seen = columns[n].get((report.main, WHOLE), 0.0)
+        cost = rows[n].cost
+        return (0.0 if cost is None else cost.value) * max(seen, leasts.get(report.main, 0.0))
+
+    def beats(rival: int, own: int) -> bool:
+        prices = [FrontPoint(cost, 0.0) for n in (rival, own) if (cost := rows[n].cost)]
+        changes = ratios(columns[own], columns[rival], leasts).values()
+        if any(change > 1 + ERROR_SLACK for change in changes):
+            return False
+        is_nearer = any(change * (1 + ERROR_SLACK) < 1 for change in changes)
+        return prices[0].is_cheaper(prices[1]) or (
+            is_nearer and not prices[1].is_cheaper(prices[0])
+        )
+
+    return mark_front(rows, {n: worth(n) for n in sorted(present)}, beats)
+
+
+def worse_columns(spread: Iterable[Spread]) -> Iterator[Spread]:
+    """Columns that are worse, or not known to be no worse; one for each error, the worst."""
+    named: set[str] = set()
+    for part in spread:
+        if (part.is_worse or part.is_doubtful) and part.column[0] not in named:
+            named.add(part.column[0])
+            yield part

@@ -1,0 +1,132 @@
+"""What a report says, from what was measured: verdicts, fronts, charts, limits in words.
+
+It is made once, stands in the report, and needs nothing but the report: one that was recorded can
+be judged anew without measuring.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from msgspec.structs import replace
+
+from mjbench.columns import mark_dominated
+from mjbench.judge import Starts, find_parts, five_lines, judge_setting, largest_of, mark_luck
+from mjbench.reports import Interval
+from mjbench.reports.case_report import RIGHT, CaseReport
+from mjbench.reports.limits import limit_text, map_text, widest_gaps
+from mjbench.reports.scene_report import ErrorQuantity, ScenarioReport, StableRow, SweepReport
+from mjbench.reports.shown_errors import (
+    FEWEST_STEPS,
+    INTEGRATORS,
+    Quantity,
+    is_idle,
+    main_quantity,
+    quantities,
+    setting_text,
+)
+from mjbench.reports.work_charts import case_charts, case_quantities, scenario_charts, step_cost
+
+FIGURES = (
+    *("change", "parted", "figure", "penetration", "slip", "restitution", "residual"),
+    *("iterations", "cost", "throughput"),
+)
+"""The figures that a sweep has of every value."""
+
+
+def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
+    """The report with all that follows from what was measured; `starts` as for `judge_setting`."""
+    own = report.own_setting
+    rows = tuple(
+        replace(row, name=setting_text(row.setting, own), idle=is_idle(row)) for row in report.rows
+    )
+    figure = Quantity("figure", report.figure or "figure", report.least_figure)
+    floors = report.floor, report.velocity_floor
+    present = quantities(rows, figure, report.least_seen, floors)
+    main = main_quantity(present, rows)
+    stable = tuple(replace(r, shown=limit_text(r), map=map_text(r)) for r in report.stable)
+    report = replace(
+        report,
+        rows=rows,
+        stable=stable,
+        quantities=tuple(
+            ErrorQuantity(q.name, q.label, q.least, q.is_resolved(rows)) for q in present
+        ),
+        main="" if main is None else main.name,
+        missed=_missed(stable),
+        cut_short=_is_cut_short(report),
+    )
+    if main is not None:
+        report = replace(report, rows=mark_luck(rows, largest_of(stable), main))
+    report = replace(report, rows=tuple(mark_dominated(report)))
+    if report.parts is not None:
+        report = replace(report, parts=find_parts(report, report.parts))
+    if report.own_row is not None:
+        report = replace(report, verdict=judge_setting(report, starts))
+        lines = five_lines(report)
+        report = replace(report, verdict=replace(report.verdict, lines=lines))
+    return replace(report, charts=scenario_charts(report))
+
+
+def _missed(rows: tuple[StableRow, ...]) -> tuple[float, float] | None:
+    near, far = widest_gaps(rows)
+    return (near - 1, far - 1) if near > 1 else None
+
+
+def _is_cut_short(report: ScenarioReport) -> bool:
+    longest = report.duration / FEWEST_STEPS
+    return any(math.isclose(row.searched[1], longest, rel_tol=1e-9) for row in report.stable)
+
+
+def derive_case(report: CaseReport) -> CaseReport:
+    """The report on a hard case with all that follows from what was measured."""
+    main = next(iter(case_quantities(report)), None)
+    costs = ((name, _cost_to(report, name, RIGHT)) for name in INTEGRATORS)
+    lines = tuple(replace(r, shown=limit_text(r), map=map_text(r)) for r in report.boundaries)
+    return replace(
+        report,
+        boundaries=lines,
+        charts=case_charts(report),
+        main="" if main is None else main.name,
+        least=0.0 if main is None else main.least,
+        reached=tuple((name, cost) for name, cost in costs if cost is not None),
+        missed=_missed(lines),
+    )
+
+
+def _cost_to(report: CaseReport, integrator: str, error: float) -> float | None:
+    """Processor time for a simulated second, s, with the timestep that has a given error, m or rad.
+
+    `None` where no run is as good. Between two runs the cost follows a power of the error. Nothing
+    is extrapolated.
+    """
+    runs = sorted(
+        (cost.value, max(pair[0] for pair in places))
+        for line in report.errors
+        if line.integrator == integrator and (cost := step_cost(report, line)) is not None
+        if (places := [pair for pair in (line.position, line.attitude) if pair is not None])
+    )
+    if runs and runs[0][1] <= error:
+        return runs[0][0]
+    for (low_cost, high_error), (high_cost, low_error) in pairwise(runs):
+        if low_error <= error < high_error:
+            part = math.log(high_error / error) / math.log(high_error / low_error)
+            return float(low_cost * (high_cost / low_cost) ** part)
+    return None
+
+
+def derive_sweep(report: SweepReport) -> SweepReport:
+    """The report on a sweep with the figures to show."""
+    if report.show:
+        return report
+    shown = []
+    for name in FIGURES:
+        values = []
+        for row in report.rows:
+            value: Interval | float | None = getattr(row, name)
+            if value is not None:
+                values.append(value.value if isinstance(value, Interval) else value)
+        if values and max(values) > 1.01 * min(values):
+            shown.append(name)
+    return replace(report, show=tuple(shown))

@@ -1,0 +1,125 @@
+"""A fair scenario for a model whose author declares none.
+
+It begins in a keyframe (`home`, or else the first), or where the model comes to rest under no
+command, or in its own state if it does not. Then smooth random commands follow, within their
+ranges, from several seeds: what hangs still or lies about would say nothing. A model without
+actuators that would not move gets random velocities.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjbench.declarations import MOST_STEPS, Declarations, DeclaredScenario, Place
+from mjbench.problem import Array
+from mjbench.simulation import advance, without_sleep
+
+SEEDS, QUICK_SEEDS = (1, 2, 3), (1, 2)
+_SECONDS, _SETTLING = 2.0, 4.0
+"""How long a scenario is, and how long a model may take to come to rest, s."""
+_HOLD = 16
+"""Timesteps for which a command holds; the longer timesteps that are tried divide it."""
+_SHARE, _FREE = 0.2, 0.3
+"""How far commands go from where they begin: as a part of their range, or without a range."""
+_WAVES, _SLOWEST = 3, 1.0
+"""How many sine waves a command is made of, and the period of the first, s; each is shorter."""
+_STILL = 1e-3
+"""The speed, in m/s or rad/s, below which a model has come to rest."""
+
+
+def fair_declarations(model: Any, path: str, *, quick: bool) -> Declarations:
+    """The scenarios of a model (`mjModel`) that nobody declared; none if nothing can move."""
+    if not model.nv:
+        return Declarations(path)
+    keyframe, words, data = _begin(model)
+    seeds = QUICK_SEEDS if quick else SEEDS
+    qpos = () if keyframe is not None else tuple(data.qpos.tolist())
+    if not model.nu:
+        return Declarations(path, (_passive(model, path, words, qpos, keyframe, data),))
+    step = float(model.opt.timestep)
+    hold = _HOLD * step
+    count = max(1, math.ceil(min(_SECONDS, MOST_STEPS * step) / hold - 1e-9))
+    scenarios = []
+    for seed in seeds:
+        rows = _commands(model, np.array(data.ctrl), seed, hold * np.arange(count, dtype=float))
+        scenarios.append(
+            DeclaredScenario(
+                name=f"seed-{seed}",
+                title=f"{words}, then smooth random commands within their ranges, seed {seed}",
+                keyframe=keyframe,
+                qpos=qpos,
+                controls=tuple(tuple(row) for row in rows.tolist()),
+                hold=float(f"{hold:.12g}"),
+                duration=float(f"{count * hold:.12g}"),
+                table=Place(path),
+            )
+        )
+    return Declarations(path, tuple(scenarios))
+
+
+def _begin(model: Any) -> tuple[int | None, str, Any]:
+    """The keyframe to begin in, what that is called, and `mjData` of it."""
+    data = mujoco.MjData(model)
+    names = [str(model.key(number).name) for number in range(int(model.nkey))]
+    if names:
+        number = names.index("home") if "home" in names else 0
+        mujoco.mj_resetDataKeyframe(model, data, number)
+        data.ctrl[:] = _within(model, data.ctrl)
+        return number, f"from the keyframe {names[number] or number}", data
+    data.ctrl[:] = _within(model, data.ctrl)
+    variant = without_sleep(model)
+    variant.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    steps = min(round(_SETTLING / float(model.opt.timestep)), MOST_STEPS)
+    for _ in range(0, steps, _HOLD):
+        advance(variant, data, _HOLD)
+        if not np.isfinite(data.qpos).all():
+            break
+    else:
+        if np.abs(data.qvel).max(initial=0.0) < _STILL:
+            data.qvel[:] = 0.0
+            return None, "from where it comes to rest under no command", data
+    mujoco.mj_resetData(model, data)
+    data.ctrl[:] = _within(model, data.ctrl)
+    return None, "from the model's own state", data
+
+
+def _within(model: Any, commands: Array) -> Array:
+    limited = model.actuator_ctrllimited != 0
+    low, high = np.where(limited[:, None], model.actuator_ctrlrange, (-np.inf, np.inf)).T
+    clipped: Array = np.clip(commands, low, high)
+    return clipped
+
+
+def _commands(model: Any, middle: Array, seed: int, times: Array) -> Array:
+    """Commands (n, nu) at times (n,): sine waves about where they begin, within their ranges."""
+    random = np.random.default_rng(seed)
+    limited = model.actuator_ctrllimited != 0
+    spans = np.ptp(model.actuator_ctrlrange, axis=1)
+    sizes = np.where(limited, _SHARE * spans, _FREE)
+    rows = np.tile(middle, (len(times), 1))
+    for wave in range(1, _WAVES + 1):
+        phases = random.uniform(0, 2 * math.pi, model.nu)
+        parts = np.sin(2 * math.pi * wave / _SLOWEST * times[:, None] + phases) - np.sin(phases)
+        rows += sizes / _WAVES * random.uniform(0.5, 1.0, model.nu) * parts
+    return np.array([_within(model, row) for row in rows])
+
+
+def _passive(
+    model: Any,
+    path: str,
+    words: str,
+    qpos: tuple[float, ...],
+    keyframe: int | None,
+    data: Any,
+) -> DeclaredScenario:
+    mujoco.mj_forward(model, data)
+    qvel: tuple[float, ...] = ()
+    if max(np.abs(data.qvel).max(), np.abs(data.qacc).max()) < _STILL:
+        qvel = tuple(np.random.default_rng(SEEDS[0]).uniform(-1, 1, int(model.nv)).tolist())
+        words += ", with random velocities, since else nothing would move"
+    place = Place(path)
+    return DeclaredScenario("start", words, keyframe, qpos=qpos, qvel=qvel, table=place)

@@ -1,0 +1,396 @@
+"""The verdict on a scene's own setting, from a report on it.
+
+1. Only an error that falls as more work is done says what a setting does: one that is smaller than
+   that of a shorter timestep, or of more iterations, is luck, and so is one beyond the largest
+   stable timestep.
+2. Another setting is better where it costs less, or errs less, and no column is worse: over the
+   whole run and over its halves, from starts nearby too. Where that is not so, or is not known, the
+   sentence says in which.
+3. All is computed from the report, so that one that was recorded can be judged anew.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
+
+from msgspec.structs import replace
+
+from mjbench.columns import (
+    Column,
+    Spread,
+    columns_of,
+    leasts_of,
+    number_text,
+    ratios,
+    spreads,
+    times_text,
+    worse_columns,
+)
+from mjbench.reports import reach_bound
+from mjbench.reports.limits import reach_text
+from mjbench.reports.scene_report import (
+    ErrorParts,
+    RowVerdict,
+    ScenarioReport,
+    StableRow,
+    WorkPrecisionRow,
+)
+from mjbench.reports.shown_errors import (
+    ERROR_SLACK,
+    FrontPoint,
+    Quantity,
+    Rows,
+    front_point,
+    horizon_error_text,
+    seconds_text,
+    setting_text,
+)
+
+Starts: TypeAlias = Callable[[int], Sequence[Mapping[Column, float]] | None]
+"""The number of a row → how many times as large its errors are as the own setting's, from starts
+nearby; `None` where that was not measured."""
+_WORTH_SAYING = 0.1
+"""An advantage that is smaller in both respects is none on another day."""
+_NEGLIGIBLE = 0.01
+"""The share of the scene's own error below which others may rise, as those of rounding do."""
+
+
+def mark_luck(
+    rows: Rows, limits: Mapping[str, float], quantity: Quantity
+) -> tuple[WorkPrecisionRow, ...]:
+    """Rows that say where their errors are luck.
+
+    `limits`: the largest stable timesteps (s) under the scene's own solver, by integrator.
+    """
+    own_row = next(row for row in rows if row.own)
+    least = max(quantity.least, _NEGLIGIBLE * (quantity.value_of(own_row) or 0.0))
+    slack = 1 + ERROR_SLACK
+    marked_rows = []
+    for row in rows:
+        setting, place = row.setting, quantity.value_of(row)
+        limit = limits.get(setting.integrator, math.inf)
+        luck, is_usual = "", setting.solver_settings == own_row.setting.solver_settings
+        if place is not None and is_usual and setting.timestep > limit * (1 + 1e-9):
+            luck = "the shortest timestep that was tried is lost"
+            if limit:
+                luck = f"it is beyond its largest stable timestep, {seconds_text(limit, 3)}"
+        for rival in rows:
+            dear, error, work = rival.setting, quantity.value_of(rival), ""
+            if dear == replace(setting, timestep=dear.timestep):
+                work = "shorter timesteps" if dear.timestep < setting.timestep else ""
+            elif dear == replace(setting, iterations=dear.iterations):
+                work = "more iterations" if dear.iterations > setting.iterations else ""
+            elif dear == replace(setting, cone=own_row.setting.cone):
+                luck = luck or _luck_of_cone(row, rival, quantity)
+            if luck or not work or row.status != "ok":
+                continue
+            known_until = math.inf if row.parted is None else (1 - _WORTH_SAYING) * row.parted
+            if rival.parted is not None and rival.parted < known_until:
+                luck = f"with {work} it is off sooner"
+            elif place is not None and error is not None and error > max(place * slack, least):
+                luck = f"its error rises with {work}"
+        marked_rows.append(replace(row, lucky=luck))
+    return tuple(marked_rows)
+
+
+def _luck_of_cone(row: WorkPrecisionRow, rival: WorkPrecisionRow, quantity: Quantity) -> str:
+    """Why a smaller error than under the scene's own cone is luck; empty where it is none.
+
+    Where the model under that cone errs no less, it has cancelled with the error of the timestep.
+    """
+
+    def is_less(error: float | None, than: float | None) -> bool:
+        return error is not None and than is not None and error * (1 + ERROR_SLACK) < than
+
+    if row.model_error is None or not is_less(quantity.value_of(row), quantity.value_of(rival)):
+        return ""
+    is_nearer = rival.model_error is None or is_less(row.model_error, rival.model_error)
+    return "" if is_nearer else "in small steps that cone errs no less"
+
+
+def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
+    """The verdict on the scene's own setting, whose rows say what dominates them."""
+    quantity, rows = quantity_of(report), report.rows
+    own_index = next(number for number, row in enumerate(rows) if row.own)
+    row = rows[own_index]
+    seen = row.seen is not None and max(1.0, row.seen) > report.least_seen
+    noticeable = row.seen is not None and row.seen >= 1 if seen else None
+    if row.reasons:
+        return _verdict_of_lost(rows, row, quantity)
+    remark = "; whether the scene's own error can be seen is not known"
+    if noticeable is not None:
+        remark = _describe_error(report, row)
+    if row.parted is not None:
+        text = _verdict_of_chaos(rows, row, horizon_error_text(report.horizon_error))
+        return RowVerdict(False, None, noticeable, text)
+    if not any(map(quantity.value_of, rows)):
+        text = "no setting can be called better: none errs, as where nothing moves"
+        return RowVerdict(False, None, noticeable, text)
+    own_place = front_point(row, quantity)
+    if own_place is None:
+        text = "nothing was timed, so no setting can be called better"
+        return RowVerdict(False, None, noticeable, text + remark)
+    if row.dominated_by is None and row.lucky:
+        text = f"nothing can be said of the scene's own setting: {row.lucky}"
+        return RowVerdict(False, None, noticeable, text + remark)
+    if row.dominated_by is None:
+        text, worse = _describe_rival(report, own_place, quantity)
+        text = text or "no other setting is cheaper without being less accurate"
+        return RowVerdict(True, None, noticeable, text + remark, worse)
+    text, is_better, worse = _judge_rival(report, row.dominated_by, starts)
+    better = row.dominated_by if is_better else None
+    return RowVerdict(not is_better, better, noticeable, text + remark, worse)
+
+
+def quantity_of(report: ScenarioReport) -> Quantity:
+    """The error that settings are compared by first."""
+    for found in report.quantities:
+        if found.name == report.main:
+            return Quantity(found.name, found.label, found.least)
+    return Quantity("seen", "", report.least_seen)
+
+
+def _judge_rival(
+    report: ScenarioReport, number: int, starts: Starts
+) -> tuple[str, bool, tuple[str, ...]]:
+    """What is said of a row that is better here, whether it is, and in which columns it is not."""
+    own, rival = next(r for r in report.rows if r.own), report.rows[number]
+    leasts, figure, none = leasts_of(report), report.figure, "no difference that holds: "
+    pair = [columns_of(row, report.contact_model) for row in (own, rival)]
+    here = ratios(pair[0], pair[1], leasts)
+    resolved = [c for c in here if max(pair[0][c], pair[1][c]) > leasts[c[0]] * (1 + 1e-9)]
+    if not resolved and (own.seen is None or report.least_seen >= 1):
+        text = "no setting can be called better: the reference resolves no error of "
+        return f"{text}{rival.name}, or of the scene's own setting", False, ()
+    cost = rival.cost.value / own.cost.value if rival.cost and own.cost else 1.0
+    claim = f"{rival.name} {_advantage(cost, _gain([here]), figure)}"
+    if cost > 1 - _WORTH_SAYING and min(here.values()) > 1 - _WORTH_SAYING:
+        return f"{none}{claim} here, which is within what such runs differ by", False, ()
+    nearby = starts(number)
+    if nearby is None:
+        text = f"{claim} here; whether that holds from starts nearby was not measured"
+        return text, False, ()
+    everywhere = [here, *nearby]
+    gain, worse = _gain(everywhere), tuple(worse_columns(spreads(everywhere)))
+    if worse:
+        texts = tuple(part.text(figure) for part in worse)
+        return f"{none}{claim} here, but from starts nearby {texts[0]}", False, texts
+    if cost > 1 - _WORTH_SAYING and gain.high > 1 - _WORTH_SAYING:
+        return f"{none}{claim} here, but is no better from starts nearby", False, ()
+    text = f"{rival.name} is better: it {_advantage(cost, gain, figure)}"
+    quantity = quantity_of(report)
+    if not resolved:
+        text += ", as far as the reference resolves"
+    elif (value := quantity.value_of(rival)) is not None and value <= quantity.least:
+        text += ", or more: the reference resolves no more"
+    return text, True, ()
+
+
+def _gain(starts: Sequence[Mapping[Column, float]]) -> Spread:
+    """The column in which an error is smallest, relative to the other one, from all starts."""
+    found = [spread for spread in spreads(starts) if math.isfinite(spread.high)]
+    return min(found, key=lambda part: (part.high, part.column), default=Spread(("", ""), 1.0, 1.0))
+
+
+def _advantage(cost: float, gain: Spread, figure: str) -> str:
+    """What a setting costs, and how much less it errs where it errs least."""
+    cheap = "takes no more time" if cost <= 1.005 else "takes about as long"
+    if cost < 1 / 1.005:
+        cheap = f"takes {cost:.2g} of the time"
+    if gain.high >= 1 / (1 + ERROR_SLACK):
+        return f"{cheap} and errs no more in any column"
+    if gain.high < 1e-4:
+        return f"{cheap} and errs far less"
+    label = gain.text(figure).partition(" is ")[0]
+    less = times_text(1 / gain.high, 1 / max(gain.low, 1e-300))
+    return f"{cheap} and errs {less} less ({label} {gain.column[1]})"
+
+
+def _describe_rival(
+    report: ScenarioReport, own_place: FrontPoint, quantity: Quantity
+) -> tuple[str, tuple[str, ...]]:
+    """The cheapest setting that would be better by one number, and why it is not; empty if none."""
+    own = next(row for row in report.rows if row.own)
+    points = [
+        (point, row)
+        for row in report.rows
+        if row.status == "ok" and (point := front_point(row, quantity))
+    ]
+    cheaper = [(p, r) for p, r in points if p.is_cheaper(own_place) and p.beats(own_place)]
+    if not cheaper:
+        return "", ()
+    place, row = min(cheaper, key=lambda pair: pair[0].cost.value)
+    cost = f"{place.cost.value / own_place.cost.value:.2g}"
+    pair = [columns_of(r, report.contact_model) for r in (own, row)]
+    here = ratios(pair[0], pair[1], leasts_of(report))
+    texts = tuple(part.text(report.figure) for part in worse_columns(spreads([here])))
+    if row.lucky or not texts:
+        gain = _advantage(place.cost.value / own_place.cost.value, _gain([here]), report.figure)
+        reason = row.lucky or "that is within what such runs differ by"
+        return f"no difference that holds: {row.name} {gain} here, but {reason}", ()
+    return f"no setting is better: {row.name} takes {cost} of the time, but {texts[0]}", texts
+
+
+def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
+    text = f"the motion is chaotic: it is {error} from the exact one at {row.parted:.3g} s"
+    usable = [r for r in rows if r.status == "ok" and not r.lucky]
+    whole = [r for r in usable if r.parted is None and r.seen is not None]
+    if whole:
+        cheapest = min(whole, key=lambda r: r.cost.value if r.cost else float(r.evaluations))
+        return f"{text}; under {setting_text(cheapest.setting)} not before the horizon"
+    best = max(usable, key=lambda r: r.parted or 0.0, default=row)
+    if (best.parted or 0.0) > (row.parted or 0.0):
+        text += f", under {setting_text(best.setting)} at {best.parted:.3g} s"
+    return text
+
+
+def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> RowVerdict:
+    text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
+    text += "; ".join(row.reasons)
+    candidates = [(p, n) for n, r in enumerate(rows) if r.front and (p := front_point(r, quantity))]
+    if not candidates:
+        return RowVerdict(False, None, None, text)
+    better = min(candidates, key=lambda c: (c[0].error, c[0].cost.value, c[1]))[1]
+    text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
+    unseen = [(p.cost.value, n) for p, n in candidates if (rows[n].seen or 0.0) < 1]
+    cost, cheapest = min(unseen, default=(0.0, better))
+    if cheapest != better:
+        share = cost / next(p.cost.value for p, n in candidates if n == better)
+        text += f", {setting_text(rows[cheapest].setting)} the cheapest without an error that is "
+        text += f"seen, at {share:.2g} of its cost"
+    return RowVerdict(False, better, None, text)
+
+
+def _describe_error(report: ScenarioReport, own_row: WorkPrecisionRow) -> str:
+    """Whether the own error is seen, and where it is, the cheapest setting with one that is not."""
+    rows, error, least = report.rows, own_row.seen or 0.0, report.least_seen
+    if not error:
+        return "; the scene's own setting makes no error"
+    if error < 1:
+        size = f"{'less than ' if error <= least else ''}{error:.2g}"
+        return f"; the scene's own error cannot be seen: it is {size} of what an eye can tell"
+    text = "; the scene's own error can be seen: it is "
+    text += f"{number_text(error)} times what an eye can tell"
+    unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost and not r.lucky]
+    if own_row.cost is None:
+        return text
+    if unseen:
+        cost, first = min((r.cost.value, n) for n, r in enumerate(unseen) if r.cost)
+        times = cost / own_row.cost.value
+        share = f"{number_text(times)} times" if abs(times - 1) > ERROR_SLACK else "about"
+        text += f"; the cheapest without one that is seen is {unseen[first].name}, "
+        text += f"at {share} its cost"
+    elif all(r.seen >= 1 for r in rows if r.seen is not None):
+        text += ", and that of every other setting too"
+    return text
+
+
+def five_lines(report: ScenarioReport) -> tuple[str, ...]:
+    """The verdict in at most five lines: speed, error, what is better, stability, what is missing.
+
+    The report has its verdict already.
+    """
+    row = report.own_row
+    if row is None:
+        return ("the scene's own setting was not measured",)
+    quantity = quantity_of(report)
+    speed = f"{setting_text(row.setting)}: "
+    speed += "not timed" if row.realtime is None else f"{row.realtime:.3g} times real time"
+    error = "its error is not known"
+    if row.status != "ok":
+        error = f"it is lost: {'; '.join(row.reasons)}"
+    elif row.parted is not None:
+        off = horizon_error_text(report.horizon_error)
+        error = f"it is chaotic: off by {off} at {row.parted:.3g} s"
+    elif (value := quantity.value_of(row)) is not None:
+        is_known = value > quantity.least * (1 + 1e-9)
+        error = f"errs by {'' if is_known else 'less than '}{value:.2g} in {quantity.label}"
+        if row.seen is not None and row.seen > value:
+            error += f", and by {row.seen:.2g} with the model of contacts"
+    better, *_ = report.verdict.text.split("; the scene's own error")
+    lines = [speed, error + parts_text(report.parts), better, _stability_line(report)]
+    missing = [f"{failure.part}: {failure.reason}" for failure in report.failures]
+    if report.horizon < report.duration * (1 - 1e-9):
+        missing.append(f"nothing beyond {seconds_text(report.horizon, 3)} can be predicted")
+    if report.parts is None and row.parted is None and row.status == "ok":
+        missing.append("the error was not taken apart")
+    if missing:
+        lines.append("not known: " + "; ".join(missing))
+    return tuple(filter(None, lines))
+
+
+def parts_text(parts: ErrorParts | None) -> str:
+    """Which part of the error dominates, and what mends it."""
+    if parts is None or not parts.dominant:
+        return ""
+    name = {
+        "timestep": "the timestep's",
+        "solver": "the solver's",
+        "contact_model": "the model of contacts'",
+        "rounding": "rounding's",
+    }[parts.dominant]
+    return f"; most of what is seen is {name}" + (f": {parts.mend}" if parts.mend else "")
+
+
+def _stability_line(report: ScenarioReport) -> str:
+    """How long the timestep of the own integrator may be, and for what."""
+    own = report.own_setting
+    row = next((r for r in report.stable if own and r.integrator == own.integrator), None)
+    if row is None:
+        return ""
+    parts = [f"{row.integrator} stays bounded at {_upto(row, row.shown)}"]
+    for limit, words, reason in (
+        (row.near, "near the motion of small steps", row.near_reason),
+        (row.through, "with nothing going through", row.through_reason),
+    ):
+        if limit is not None:
+            text = reach_text(limit, row.searched)
+            parts.append(f"{words} at {_upto(row, text)}" + (f" ({reason})" if reason else ""))
+    return ", ".join(parts)
+
+
+def _upto(row: StableRow, text: str) -> str:
+    return f"steps to {text}" if text[:1].isdigit() else text
+
+
+def find_parts(report: ScenarioReport, parts: ErrorParts) -> ErrorParts:
+    """The same with what dominates, and the cheapest measured setting that halves it."""
+    names = ("timestep", "solver", "contact_model", "rounding")
+    sizes = {n: value for n in names if (value := getattr(parts, n)) is not None}
+    name = max(sizes, key=lambda n: sizes[n], default="")
+    own = report.own_row
+    if not name or sizes[name] <= parts.least * (1 + 1e-9) or own is None:
+        return parts
+    return replace(parts, dominant=name, mend=_mend(report, own, name))
+
+
+def _mend(report: ScenarioReport, own: WorkPrecisionRow, name: str) -> str:
+    def halves(row: WorkPrecisionRow) -> bool:
+        setting, mine = row.setting, own.setting
+        alike = setting.integrator == mine.integrator and setting.timestep == mine.timestep
+        is_kind = {
+            "timestep": setting.solver_settings == mine.solver_settings,
+            "solver": alike and setting.cone == mine.cone and not row.own,
+            "contact_model": alike and setting.cone != mine.cone,
+        }.get(name, False)
+        return is_kind and row.seen is not None and 2 * row.seen <= (own.seen or 0.0)
+
+    found = [row for row in report.rows if row.status == "ok" and not row.lucky and halves(row)]
+    priced = [row for row in found if row.cost is not None]
+    if not found or own.seen is None:
+        return ""
+    row = min(priced, key=lambda r: r.cost.value if r.cost else 0.0) if priced else found[0]
+    less = number_text(own.seen / row.seen) if row.seen else "far"
+    price = ""
+    if row.cost is not None and own.cost is not None:
+        times = row.cost.value / own.cost.value
+        same = abs(times - 1) <= ERROR_SLACK
+        price = " for as much time" if same else f" for {number_text(times)} times the time"
+    return f"{row.name} errs {less} times less in all{price}"
+
+
+def largest_of(rows: Sequence[StableRow]) -> dict[str, float]:
+    """The largest stable timesteps by integrator, of those that have one."""
+    return {r.integrator: reach_bound(r.largest) for r in rows if r.largest != "all"}

@@ -1,0 +1,64 @@
+"""Runs the parts of a measurement so that one that fails takes no other with it.
+
+An author's mistake, a `SceneError`, ends the whole: measuring the rest would not help them. Where
+the user stops (Ctrl-C), parts that have not begun are skipped, and what is known is reported.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TypeVar
+
+from mjbench.reports import PartFailure
+from mjbench.scene import SceneError
+
+STOPPED = "stopped before it was done"
+"""The reason of parts that the user did not wait for."""
+_T = TypeVar("_T")
+
+
+class Parts:
+    """The parts of a measurement, and those that there are not."""
+
+    def __init__(self, tell: Callable[[str], None] = lambda _: None) -> None:
+        self.tell = tell
+        self.failures: list[PartFailure] = []
+        self.stopped = False
+
+    def run(self, name: str, measure: Callable[[], _T], default: _T) -> _T:
+        """The result of a part, or `default` where it fails or the user has stopped."""
+        if self.stopped:
+            self.failures.append(PartFailure(name, STOPPED))
+            return default
+        self.tell(name)
+        try:
+            return measure()
+        except SceneError:
+            raise
+        except KeyboardInterrupt:
+            self.stopped = True
+            self.failures.append(PartFailure(name, STOPPED))
+        except Exception as error:
+            self.failures.append(PartFailure(name, describe(error)))
+        return default
+
+    def collect(self, name: str, results: Iterable[_T]) -> list[_T]:
+        """All results of a part that gives one after the other, or those until it failed."""
+        collected: list[_T] = []
+
+        def take() -> None:
+            for result in results:  # one by one: those until it failed are kept
+                collected.append(result)
+
+        self.run(name, take, None)
+        return collected
+
+
+def describe(error: Exception) -> str:
+    """An error, and where it arose."""
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
+    words = " ".join(str(error).split())
+    return f"{type(error).__name__}{f': {words}' if words else ''}{place}"

@@ -1,0 +1,86 @@
+"""Largest stable timesteps in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from itertools import pairwise
+
+from mjbench.reports import Reach, reach_bound
+from mjbench.reports.scene_report import StableRow
+from mjbench.reports.shown_errors import seconds_text
+
+_TOGETHER, _MOST_DIGITS = 0.1, 4
+"""How far theory at rest may be above runs, relative, and the most digits of a limit."""
+_SIGNS = "·∘•"
+"""Of a timestep in a map: none, some or all of its runs were lost."""
+
+
+def limit_text(row: StableRow) -> str:
+    """The largest stable timestep with the digits on which theory and all runs agree.
+
+    Theory at rest counts up to a tenth above: else the motion is lost far from rest. Where limits
+    have islands, no digit is finer than the gaps between timesteps that were tried. It is never
+    above them all: whoever takes it would lose the run. Where two digits do not hold, it is the
+    least limit, and what allows more is said.
+    """
+    if row.bracket is None:
+        return reach_text(row.largest, row.searched)
+    low, high = row.bracket
+    if row.islands is not None:
+        low = min(low, high / max(1.0, widest_gaps([row])[0]))
+    if isinstance(row.theory, float) and row.theory < high * (1 + _TOGETHER):
+        low, high = min(low, row.theory), max(high, row.theory)
+    if low <= 0:
+        return f"none from every start; from its own {reach_text(row.largest, row.searched)}"
+    least = max(high - low, low * 10.0**-_MOST_DIGITS)
+    digits = math.floor(math.log10(low)) - math.ceil(math.log10(least) - 1e-9) + 1
+    if digits < 2:
+        most = seconds_text(high, 2)
+        if row.theory == high:
+            why = f"theory allows {most}"
+        elif reach_bound(row.largest) >= high * (1 - 1e-9):
+            why = f"from its own start {most}"
+        else:
+            why = f"over another time, or from another start, {most}"
+        return f"{seconds_text(low, 2)}; {why}"
+    value = float(f"{low:.{digits}g}")
+    if value > high:
+        value -= 10.0 ** (math.floor(math.log10(low)) + 1 - digits)
+    return seconds_text(value, digits)
+
+
+def reach_text(limit: Reach | None, searched: tuple[float, float], digits: int = 2) -> str:
+    """A limit, and where it is none, what was tried; empty where it was not measured."""
+    if limit is None:
+        return ""
+    if limit == "all":
+        return f"all to {seconds_text(searched[1], 3)}"
+    if limit == "none":
+        return f"none from {seconds_text(searched[0], 3)} on"
+    assert isinstance(limit, float)
+    return seconds_text(limit, digits)
+
+
+def widest_gaps(rows: Iterable[StableRow]) -> tuple[float, float]:
+    """The largest ratios of timesteps that were tried next to each other: above half, and in all.
+
+    They count up to the largest stable one; 0 without any.
+    """
+    near, far = [0.0], [0.0]
+    for row in rows:
+        top = min(reach_bound(row.largest), row.searched[1])
+        steps = [step for step, _, _ in row.tries if step <= top * (1 + 1e-9)]
+        for step, following in pairwise(steps):
+            (near if step >= top / 2 else far).append(following / step)
+    return max(near), max(*near, *far)
+
+
+def map_text(row: StableRow) -> str:
+    """A sign for each timestep that was tried from all starts, from the shortest to the longest."""
+    most = max((runs for _, runs, _ in row.tries), default=0)
+    tries = [(step, runs, lost) for step, runs, lost in row.tries if 2 * runs > most > 2]
+    if not any(lost for _, _, lost in tries):
+        return ""
+    signs = "".join(_SIGNS[(lost > 0) + (lost == runs)] for _, runs, lost in tries)
+    return f"{seconds_text(tries[0][0], 2)} {signs} {seconds_text(tries[-1][0], 2)}"

@@ -1,0 +1,62 @@
+"""Text for a terminal: its width, and tables that fit."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+
+from msgspec import Struct
+
+
+class Style(Struct, frozen=True):
+    """How wide a terminal is, and whether it shows colours."""
+
+    width: int = 100
+    colour: bool = False
+
+    def strong(self, text: str) -> str:
+        """A text that stands out."""
+        return f"\x1b[1m{text}\x1b[0m" if self.colour else text
+
+    def wrap(self, text: str, indent: str = "") -> list[str]:
+        """A text in lines that fit; further lines hang."""
+        return textwrap.wrap(
+            text, self.width, initial_indent=indent, subsequent_indent=f"{indent}  "
+        )
+
+    def inner(self, indent: int) -> Style:
+        """The same for what is indented."""
+        return Style(self.width - indent, self.colour)
+
+
+def indented(lines: Iterable[str], by: int = 4) -> list[str]:
+    """Lines with spaces before them."""
+    return [f"{' ' * by}{line}".rstrip() for line in lines]
+
+
+def count_text(count: int, noun: str) -> str:
+    """A number of things."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def fitted_table(columns: Sequence[tuple[str, Sequence[str]]], width: int) -> Iterator[str]:
+    """Columns, titles first, as wide as their longest cell; those without any are left out.
+
+    What has no room is named below.
+    """
+    filled = [(title, cells) for title, cells in columns if any(cell.strip() for cell in cells)]
+    kept: list[tuple[str, Sequence[str], int]] = []
+    left: list[str] = []
+    room = width
+    for title, cells in filled:
+        wide = max(len(title), *map(len, cells)) + 2
+        if kept and wide > room + 2:
+            left.append(title)
+            continue
+        kept.append((title, cells, wide))
+        room -= wide
+    for row in range(-1, len(kept[0][1]) if kept else -1):
+        cells = [(title if row < 0 else cells[row]).ljust(wide) for title, cells, wide in kept]
+        yield "".join(cells).rstrip()
+    if left:
+        yield f"no room for: {'; '.join(left)}; --format json has all"

@@ -1,0 +1,288 @@
+"""Charts of error against work: of a scenario, and of a hard case.
+
+1. A line for each integrator goes from long timesteps to short ones, over those rows that have the
+   scene's own solver, iterations and cone; the rows with others are small marks beside it. A mark
+   is filled where the setting is on the Pareto front; a ring is around the scene's own.
+2. Beside the cost, which is time, work is counted as it is on every machine: in evaluations of the
+   forward dynamics, and in iterations of the solver. Each has a front of its own.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterator, Sequence
+
+from msgspec.structs import replace
+
+from mjbench.reports import Interval
+from mjbench.reports.case_report import CaseReport, ErrorLine
+from mjbench.reports.charts import Chart, ChartLevel, ChartLine, ChartMark, ChartPoint
+from mjbench.reports.scene_report import FLOORS, ScenarioReport, WorkPrecisionRow, step_evaluations
+from mjbench.reports.shown_errors import (
+    INTEGRATORS,
+    SEEN,
+    STEPPED,
+    Quantity,
+    front,
+    horizon_error_text,
+    interval_text,
+    seconds_text,
+    setting_text,
+    status_text,
+)
+
+EVALUATION_LABEL = "evaluations of the forward dynamics"
+_WORKS = {
+    "cost": "cost",
+    "evaluations": EVALUATION_LABEL,
+    "iterations": "iterations of the solver",
+}
+"""What a setting costs: time, and what is the same on every machine."""
+_AMOUNTS = {"cost": "at costs of {}", "evaluations": "with {}", "iterations": "with {}"}
+
+
+def scenario_charts(report: ScenarioReport) -> tuple[Chart, ...]:
+    """The charts of error against cost, evaluations, and where a solver runs, its iterations.
+
+    None where no row errs.
+    """
+    found = next((q for q in report.quantities if q.name == report.main), None)
+    if found is None:
+        return ()
+    quantity = Quantity(found.name, found.label, found.least)
+    if not any(quantity.value_of(row) for row in report.rows):
+        return ()
+    return tuple(
+        _chart(report, quantity, work, works)
+        for work in _WORKS
+        if any(works := _find_works(report, work))
+    )
+
+
+def _chart(
+    report: ScenarioReport, quantity: Quantity, work: str, works: Sequence[Interval | None]
+) -> Chart:
+    pairs = zip(report.rows, works, strict=True)
+    places = front([replace(row, cost=x) for row, x in pairs], quantity)
+    label = axis = _WORKS[work]
+    if work == "cost":
+        base = "the scene’s own setting"
+        if report.cost_of is not None:
+            base = setting_text(report.cost_of, report.own_setting)
+        axis = f"cost, relative to {base}"
+    lines = tuple(
+        ChartLine(name, INTEGRATORS.index(name), points)
+        for name in INTEGRATORS
+        if (points := tuple(_points(report, places, quantity, works, name)))
+    )
+    visible = [point for line in lines for point in line.points if point.y is not None]
+    marks = [ChartMark("front", "on the Pareto front")] if any(p.full for p in visible) else []
+    if not all(point.full for point in visible):
+        marks.append(ChartMark("beaten", "another costs less, or errs less for no more"))
+    if any(point.small for point in visible):
+        marks.append(ChartMark("other", "other solver, iterations or cone"))
+    own_names = (setting_text(row.setting, row.setting) for row in report.rows if row.own)
+    marks += [ChartMark("own", f"the scene’s own: {name}") for name in own_names]
+    losses = {"run lost": _lost(report), "past its horizon": _parted(report)}
+    if words := [text for text, names in losses.items() if names]:
+        marks.append(ChartMark("lost", ", or ".join(words)))
+    return Chart(
+        title=f"{report.title or report.name}: error of {quantity.label} against {label}",
+        text=" ".join(_describe(report, quantity, lines, work)),
+        axes=(axis, f"error: {quantity.label}"),
+        lines=lines,
+        least=quantity.least,
+        levels=tuple(_levels(report, quantity)),
+        marks=tuple(marks),
+    )
+
+
+def _levels(report: ScenarioReport, quantity: Quantity) -> Iterator[ChartLevel]:
+    if quantity.name not in (SEEN.name, STEPPED.name):
+        return
+    yield ChartLevel(1.0, "just visible")
+    own = report.own_setting
+    model = report.contact_model.get(own.cone, 0.0) if own is not None else 0.0
+    if quantity.name == STEPPED.name and own is not None and model:
+        yield ChartLevel(model, f"the {own.cone} cone's own error")
+
+
+def _points(
+    report: ScenarioReport,
+    places: Sequence[WorkPrecisionRow],
+    quantity: Quantity,
+    works: Sequence[Interval | None],
+    name: str,
+) -> Iterator[ChartPoint]:
+    """The points of an integrator, from long timesteps to short ones."""
+    baseline = report.own_setting
+    rows = [
+        (row, place, x)
+        for row, place, x in zip(report.rows, places, works, strict=True)
+        if row.setting.integrator == name and not row.idle
+    ]
+    for row, place, x in sorted(rows, key=lambda part: -part[0].setting.timestep):
+        if x is None:
+            continue
+        error = quantity.value_of(row) if row.status == "ok" else None
+        yield ChartPoint(
+            x,
+            error,
+            " · ".join(_point_title(report, row, place, error)),
+            full=place.front,
+            small=baseline is not None and row.setting.solver_settings != baseline.solver_settings,
+            ringed=row.own,
+        )
+
+
+def _find_works(report: ScenarioReport, work: str) -> list[Interval | None]:
+    """What each row costs; nothing where that is not known of any."""
+    rows = report.rows
+    if work == "iterations":
+        return [Interval(n, n, n) if n else None for n in (row.iterations for row in rows)]
+    if work == "evaluations":
+        return [Interval(n, n, n) for n in (float(row.work) for row in rows)]
+    timed = [row for row in rows if row.cost is not None and row.cost.value > 0]
+    works: list[Interval | None] = []
+    for row in rows if timed else ():
+        x = row.cost
+        if x is None or not x.value:  # its evaluations say about how much it would be
+            alike = [peer for peer in timed if peer.setting.integrator == row.setting.integrator]
+            rates = [peer.cost.value / peer.work for peer in alike or timed if peer.cost]
+            value = row.work * statistics.median(rates)
+            x = Interval(value, value, value)
+        works.append(x)
+    return works
+
+
+def _lost(report: ScenarioReport) -> list[str]:
+    """The integrators under which runs were lost."""
+    return list(dict.fromkeys(r.setting.integrator for r in report.rows if r.status != "ok"))
+
+
+def _parted(report: ScenarioReport) -> list[str]:
+    """Those under which runs are too far from a chaotic motion to have an error."""
+    return list(dict.fromkeys(r.setting.integrator for r in report.rows if r.parted is not None))
+
+
+def _describe(
+    report: ScenarioReport, quantity: Quantity, lines: Sequence[ChartLine], work: str
+) -> Iterator[str]:
+    for line in lines:
+        if visible := [point for point in line.points if point.y is not None]:
+            errors = _range([point.y or 0.0 for point in visible], 2, "{1} to {0}")
+            costs = _range([point.x.value for point in visible], 3, "{0} to {1}")
+            yield f"{line.name}: errors {errors} {_AMOUNTS[work].format(costs)}."
+    if work != "cost":
+        return  # the rest is said with the costs
+    if lost := _lost(report):
+        yield f"Runs were lost under {', '.join(lost)}."
+    if parted := _parted(report):
+        error = horizon_error_text(report.horizon_error)
+        yield f"Runs are off by more than {error} under {', '.join(parted)}."
+    if (own := report.own_setting) is not None:
+        yield f"The scene’s own setting is {setting_text(own)}."
+    if quantity.least > 0:
+        yield f"No error below {quantity.least:.1e} is given."
+
+
+def _range(values: Sequence[float], digits: int, words: str) -> str:
+    least, largest = (f"{value:.{digits}g}" for value in (min(values), max(values)))
+    return words.format(least, largest) if max(values) > min(values) else least
+
+
+def _point_title(
+    report: ScenarioReport, row: WorkPrecisionRow, place: WorkPrecisionRow, error: float | None
+) -> Iterator[str]:
+    yield setting_text(row.setting)
+    if row.parted is not None:
+        yield f"off by {horizon_error_text(report.horizon_error)} after {seconds_text(row.parted)}"
+    elif error is None:
+        yield "; ".join((status_text(row.status), *row.reasons))
+    else:
+        yield f"error {error:.3g}"
+    if row.cost is not None:
+        yield f"cost {interval_text(row.cost)}"
+    elif any(row.cost is not None for row in report.rows):
+        yield "not timed"
+    yield f"{row.steps} steps"
+    if row.work > row.steps:
+        yield f"{row.work} evaluations"
+    if row.iterations is not None:
+        yield f"{row.iterations:.6g} iterations of the solver"
+    if row.lucky:
+        yield f"luck: {row.lucky}"
+    if row.own:
+        yield "the scene’s own setting"
+    if place.front:
+        yield "on the Pareto front"
+    elif place.dominated_by is not None:
+        rival = setting_text(report.rows[place.dominated_by].setting, row.setting)
+        yield f"{rival} costs less, or errs less for no more"
+
+
+def case_charts(report: CaseReport) -> tuple[Chart, ...]:
+    """The charts of each error against processor time, where it was measured, and evaluations."""
+    return tuple(
+        _case_chart(report, quantity, is_time=is_time)
+        for quantity in case_quantities(report)
+        for is_time in (True, False)
+        if not is_time or report.costs
+    )
+
+
+def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:
+    """The first error that is resolved, and energy drift where energy is conserved."""
+    units = {"position": "m or rad", "attitude": "rad", "velocity": "m/s or rad/s"}
+    errors = (
+        Quantity(part, f"error of {part} ({unit})", FLOORS * getattr(report.reference, part))
+        for part, unit in units.items()
+    )
+    drift = Quantity("energy_drift", "energy drift, relative")
+    runs = [line for line in report.errors if line.status == "ok"]
+    return (
+        *[quantity for quantity in errors if quantity.is_resolved(runs)][:1],
+        *[drift] * drift.is_resolved(runs),
+    )
+
+
+def step_cost(report: CaseReport, line: ErrorLine) -> Interval | None:
+    """Processor time for a simulated second, s; `None` where the integrator was not timed."""
+    costs = (cost.seconds for cost in report.costs if cost.integrator == line.integrator)
+    step = next(costs, None)
+    return None if step is None else step.scale(1 / line.timestep)
+
+
+def _case_chart(report: CaseReport, quantity: Quantity, *, is_time: bool) -> Chart:
+    work = "processor time" if is_time else EVALUATION_LABEL
+
+    def amount(x: float, digits: int = 2) -> str:
+        return seconds_text(x, digits) if is_time else f"{x:.{digits}g}"
+
+    lines = []
+    for number, integrator in enumerate(INTEGRATORS):
+        points = []
+        for run in report.errors:
+            count = step_evaluations(run.integrator) / run.timestep
+            x = step_cost(report, run) if is_time else Interval(count, count, count)
+            if run.integrator != integrator or x is None:
+                continue
+            setting = f"{integrator} at {seconds_text(run.timestep)}"
+            if run.status != "ok":
+                points.append(ChartPoint(x, None, f"{setting}: {status_text(run.status)}"))
+            elif error := quantity.value_of(run):
+                title = f"{setting}: {error:.3g}, {amount(x.value, 3)}"
+                points.append(ChartPoint(x, error, title))
+        lines += [ChartLine(integrator, number, tuple(points))] if points else []
+    texts = []
+    for line in lines:
+        if visible := [point for point in line.points if point.y is not None]:
+            ends = (f"{p.y:.2g} at {amount(p.x.value)}" for p in (visible[0], visible[-1]))
+            texts.append(f"{line.name}: {', '.join(ends)}.")
+    return Chart(
+        title=f"{report.title}: {quantity.label} against {work}",
+        text=" ".join(texts),
+        axes=(f"{work} for a simulated second{' (s)' * is_time}", quantity.label),
+        lines=tuple(lines),
+        least=quantity.least,
+    )
