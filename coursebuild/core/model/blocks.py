@@ -184,6 +184,8 @@ class Script(Labelled, frozen=True):
     figures: tuple[FigureName, ...] = ()
     show: Show | None = None
     """`None`: a long one folds by itself."""
+    archive: bool = False
+    """Whether readers are handed over an archive, not one file."""
     parts: tuple[Script | ScriptPart, ...] = ()
     """The blocks of a whole script that stands in several."""
 
