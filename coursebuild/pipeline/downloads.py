@@ -15,7 +15,7 @@ from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model.addresses import recorded_figures
-from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
+from coursebuild.core.model.results import CachedFile, OutputFile, ScriptDownload, SiteFile
 from coursebuild.core.pages import urls, zips
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
@@ -50,16 +50,33 @@ class Downloads(Struct, frozen=True):
             CachedFile(archive.path, step_key("archive", archive.key), archive.pack)
             for archive in archives.values()
         )
+        handed_over = {d.path: _handed_over(d) for d in library.results.downloads}
         scripts = (
             CachedFile(path, script.code.digest.hex(), script.code.text.encode)
             for path, (script, _) in library.scripts.items()
+            if path not in handed_over
         )
         models = (
             OutputFile(urls.model_file_path(model.name), model.source.text.encode())
             for model in library.course.models
         )
-        files = (*scripts, *models, *_files(library, assets, root), *archive_files)
+        files = (
+            *handed_over.values(),
+            *scripts,
+            *models,
+            *_files(library, assets, root),
+            *archive_files,
+        )
         return cls(files, archives, imports)
+
+
+def _handed_over(download: ScriptDownload) -> OutputFile:
+    """The file of a script that readers get."""
+    if not download.archive:
+        return OutputFile(download.path, download.files[0].data)
+    folder = download.path.rpartition("/")[2].removesuffix(".zip")
+    files = {f"{folder}/{file.path}": file.data for file in download.files}
+    return OutputFile(download.path, zips.pack_files(files))
 
 
 def _files(library: Library, assets: Assets, root: Path) -> Iterator[SiteFile]:

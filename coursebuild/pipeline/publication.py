@@ -41,6 +41,7 @@ from coursebuild.pipeline.load import MAP
 from coursebuild.pipeline.options import Options, find_owner
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.site import Site, page_request
+from coursebuild.pipeline.verify import with_downloads
 from coursebuild.report import Report
 
 
@@ -106,6 +107,8 @@ def make_files(
 ) -> tuple[Report, Outputs | None]:
     """The report on a course, and what `make` makes of it where nothing is wrong.
 
+    What readers would download of a script and does not run is wrong, and is not handed over.
+
     The caller holds the course's lock, and closes the reader once the files are written.
     """
     checked_course = read_and_verify(options, reader, static=True)
@@ -114,7 +117,8 @@ def make_files(
     report = checked_course.report()
     if not report.ok:
         return report, None
-    course, results = checked_course.course, checked_course.verification.results
+    course, options = checked_course.course, checked_course.options
+    results, failures = with_downloads(course, checked_course.verification.results, options)
     assets = Assets(template_texts(), Bundle(), prepared_folder())
     try:
         outputs = make(make_library(course, results, assets, checked_course.reports))
@@ -127,7 +131,10 @@ def make_files(
         from coursebuild.pipeline.theme_files import template_diagnostic
 
         return checked_course.report((template_diagnostic(course, failure),)), None
-    return report, outputs if report.ok else None
+    is_sound = report.ok
+    if failures:  # their buttons are hidden
+        report = checked_course.report((*outputs.diagnostics, *failures))
+    return report, outputs if is_sound else None
 
 
 def _find_exporter(options: Options, name: str) -> Exporter:

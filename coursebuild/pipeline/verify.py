@@ -14,6 +14,7 @@ from itertools import groupby
 from operator import itemgetter
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.features import Trial, TrialContext, TrialOutcome, Trials
@@ -35,12 +36,13 @@ from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.scripts.bound_places import document_bindings
 from coursebuild.core.scripts.compare import repeat_findings
 from coursebuild.core.scripts.compare import verify as compare_all
-from coursebuild.core.scripts.extract import Extraction
+from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
+from coursebuild.pipeline.script_downloads import find_downloads, try_downloads
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
     extract_scripts,
@@ -154,8 +156,22 @@ def verify(
     interpreter = options.interpreter
     engine = engine_version() if interpreter is None else interpreter.engine
     results = Results(runs, verdicts, (), models, engine, trial_results)
+    if static:
+        results = with_downloads(course, results, options, only_known=True)[0]
     labs = _lab_lines(course, trials, trial_results)
     return Verification(results, course_diagnostics, run_diagnostics, lines, labs, addresses)
+
+
+def with_downloads(
+    course: Course, results: Results, options: Options, *, only_known: bool = False
+) -> tuple[Results, tuple[Diagnostic, ...]]:
+    """The results with what is handed over of scripts, after its trial; see `try_downloads`."""
+    scripts, runs = extract(course).value, results.runs
+    downloads = results.downloads or find_downloads(course, scripts, runs, results.models, options)
+    downloads, diagnostics = try_downloads(
+        course, scripts, runs, results.verdicts, downloads, options, only_known=only_known
+    )
+    return replace(results, downloads=downloads), diagnostics
 
 
 def _lab_lines(

@@ -183,6 +183,8 @@ class Script(Labelled, frozen=True):
     """Whether the course keeps its output, and it runs only on request."""
     figures: tuple[FigureName, ...] = ()
     show: Show = "open"
+    archive: bool = False
+    """Whether readers are handed over an archive, not one file."""
     parts: tuple[Script | ScriptPart, ...] = ()
     """The blocks of a whole script that stands in several."""
 

@@ -364,6 +364,32 @@ class CachedFile(Struct, frozen=True):
 SiteFile: TypeAlias = OutputFile | CachedFile
 
 
+DownloadState: TypeAlias = Literal["unrun", "ran", "failed"]
+
+
+class ScriptDownload(Struct, frozen=True):
+    """What readers are handed over of a script: a file that runs by itself, or an archive."""
+
+    script: str
+    """The script's path."""
+    files: tuple[OutputFile, ...]
+    """The one file, or those of the archive; with paths in the folder where they are to lie."""
+    entry: str
+    """The path of the file to run."""
+    packages: tuple[str, ...]
+    """What it needs, as installers take it: `mujoco==3.14.0`."""
+    modules: tuple[str, ...]
+    """The top-level modules that these bring."""
+    archive: bool = False
+    state: DownloadState = "unrun"
+    """Whether it was run in an empty folder, and how that ended."""
+
+    @property
+    def path(self) -> str:
+        """Its path in the site."""
+        return f"{self.script.removesuffix('.py')}.zip" if self.archive else self.script
+
+
 class PublishedTrials(Struct, frozen=True):
     """The results of trials as a site needs them."""
 
@@ -404,6 +430,7 @@ class Results(Struct, frozen=True):
     engine: str
     """Version of MuJoCo that ran the scripts."""
     trials: tuple[TrialResult, ...] = ()
+    downloads: tuple[ScriptDownload, ...] = ()
 
 
 class Reports(Struct, frozen=True):

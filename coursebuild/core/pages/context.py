@@ -45,6 +45,24 @@ class ShownRun(Struct, frozen=True):
     """What it ran with."""
 
 
+class ShownDownload(Struct, frozen=True):
+    """What a page hands over of a script."""
+
+    href: str
+    file: str
+    """The name of the file."""
+    entry: str
+    """The file to run; in an archive, its path there."""
+    packages: tuple[str, ...]
+    """As installers take them."""
+    was_run: bool
+    """Whether it was run in an empty folder."""
+
+    @property
+    def is_archive(self) -> bool:
+        return self.file != self.entry
+
+
 class ShownVerdict(Struct, frozen=True):
     """What a page shows of the comparison of an output."""
 
@@ -88,6 +106,8 @@ class DocumentInputs(Struct, frozen=True):
     """What stands before the numbers of figures: `4.2.` in a lesson."""
     callouts: Mapping[str, model.CalloutKind] = field(default_factory=dict)
     runs: Mapping[str, ShownRun] = field(default_factory=dict)
+    downloads: Mapping[str, ShownDownload] = field(default_factory=dict)
+    """What is handed over of the scripts in the document, by path."""
     verdicts: Mapping[int, ShownVerdict] = field(default_factory=dict)
     trials: Mapping[int, Struct] = field(default_factory=dict)
     blocks: Mapping[int, Struct] = field(default_factory=dict)

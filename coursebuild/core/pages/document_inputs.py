@@ -16,6 +16,7 @@ from coursebuild.core.pages.context import (
     DocumentInputs,
     PageHead,
     PageInputs,
+    ShownDownload,
     ShownRun,
     ShownVerdict,
 )
@@ -61,6 +62,8 @@ def document_inputs(
             runs[script] = ShownRun(
                 run.outcome, run.missing, quotes, run.recorded, run.unrepeated, versions
             )
+    paths = (script.path for script in document_scripts(document))
+    downloads = {path: library.downloads[path] for path in paths if path in library.downloads}
     names = {target: name_elsewhere(library, path, target) for target in targets}
     verdicts = ((block.span.start, library.verdict(block)) for block in recordings)
     trials = ((block.span.start, library.trial_value(block)) for block in feature_blocks)
@@ -72,6 +75,17 @@ def document_inputs(
         number_prefix=number_prefix,
         callouts={b.kind: library.callout(b.kind) for b in blocks if isinstance(b, model.Callout)},
         runs=runs,
+        downloads={
+            path: ShownDownload(
+                place.href(download.path),
+                download.path.rpartition("/")[2],
+                download.entry,
+                download.packages,
+                download.state == "ran",
+            )
+            for path, download in downloads.items()
+            if download.state != "failed"
+        },
         verdicts={at: ShownVerdict(v.status, v.comparison, v.rows) for at, v in verdicts if v},
         trials={start: value for start, value in trials if value is not None},
         blocks={b.span.start: make(library, place, b) for b, make in values if make is not None},

@@ -18,6 +18,7 @@ from coursebuild.core.model.results import (
     OutputFile,
     Reports,
     Results,
+    ScriptDownload,
     ScriptRun,
     Verdict,
 )
@@ -171,6 +172,11 @@ class Library(Struct, frozen=True, dict=True):
     def runs(self) -> Mapping[str, ScriptRun]:
         """By path of the script."""
         return {run.path: run for run in self.results.runs}
+
+    @cached_property
+    def downloads(self) -> Mapping[str, ScriptDownload]:
+        """What is handed over of scripts, by their path."""
+        return {download.script: download for download in self.results.downloads}
 
     @cached_property
     def _verdicts(self) -> Mapping[tuple[str, int], Verdict]:

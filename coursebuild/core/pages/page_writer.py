@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from decimal import Decimal
 from typing import TypeAlias, assert_never
 
@@ -23,6 +23,7 @@ from coursebuild.core.pages.context import (
     PageContext,
     PageHead,
     PageInputs,
+    ShownDownload,
     ShownRun,
 )
 from coursebuild.core.pages.graph import drawings
@@ -165,8 +166,8 @@ class PageWriter(PageContext, frozen=True):
             lines=self._lines(first, first + len(lines) - 1),
             show=block.show,
             anchor=model.listing_anchor(block.path),
-            href=self.place.href(block.path),
-            command=shlex.join(("python", block.path, *script.args)),
+            download=self.inputs.downloads.get(block.path),
+            commands=run_commands(self.inputs.downloads.get(block.path), script.args),
             outputs=tuple(map(self._output, recordings)),
             receipt=receipt,
         )
@@ -265,6 +266,21 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
     if run is not None and run.outcome is Outcome.NORUN:
         return Receipt("unverified", words("receipt.norun"))
     return Receipt("unverified", words("receipt.unchecked"))
+
+
+def run_commands(download: ShownDownload | None, args: Sequence[str]) -> tuple[str, ...]:
+    """How a reader runs what is handed over: with uv, or, with nothing but Python, in steps."""
+    if download is None:
+        return ()
+    run = shlex.join((download.entry, *args))
+    if not download.packages:
+        return f"uv run {run}", f"python {run}"
+    if download.is_archive:
+        listed = "-r requirements.txt"
+        uv = f"uv run --with-requirements requirements.txt {run}"
+    else:
+        listed, uv = shlex.join(download.packages), f"uv run {run}"
+    return uv, f"pip install {listed}", f"python {run}"
 
 
 def numbered_lines(lines: Iterable[Markup], path: str, first: int = 1) -> Markup:

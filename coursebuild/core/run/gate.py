@@ -184,10 +184,11 @@ def finish(
     stderr: Stream = PIPE,
     seconds: float | None = None,
     bound: bool = True,
+    enclose: Enclose | None = None,
 ) -> Completed:
     """Run a process to its end; an interrupt, or that it takes longer, ends all that it started.
 
-    `folder` and `bound` are as in `start`; without a folder it gets one of its own.
+    `folder`, `bound` and `enclose` are as in `start`; without a folder it gets one of its own.
 
     Raises:
         OSError: it cannot be started.
@@ -203,6 +204,7 @@ def finish(
                 stdout=PIPE,
                 stderr=stderr,
                 bound=bound,
+                enclose=enclose,
             )
         )
         try:

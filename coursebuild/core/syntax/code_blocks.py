@@ -41,7 +41,7 @@ from coursebuild.core.text.source import Excerpt
 DEFAULT_TIMEOUT, MAX_TIMEOUT = 60.0, 86400.0
 """Seconds."""
 
-_VALUES = ("timeout", "requires", "args", "writes", "record", "figure")
+_VALUES = ("timeout", "requires", "args", "writes", "record", "figure", "download")
 _FLAGS = ("norun", "diverges", "deep")
 _SHOWS: tuple[Show, ...] = ("open", "folded", "hidden")
 _WHOLE_STATEMENTS = "a part holds whole statements: a function or a loop stands in one part"
@@ -170,6 +170,11 @@ def _build_script(
         message = f"`{record.value}` is not a way to record"
         help = Fix("write `record=once`", "once")
         diagnostics.append(diagnose("fence-key-value", record.value_span, message, help=help))
+    download = keys.get("download")
+    if download is not None and download.value != "zip":
+        message = f"`{download.value}` is not a way to hand a script over"
+        help = Fix("write `download=zip`, or nothing for one file", "zip")
+        diagnostics.append(diagnose("fence-key-value", download.value_span, message, help=help))
     figures = _read_list("figure", keys, diagnostics)
     show = _read_show(keys, diagnostics)
     if not has_path:
@@ -191,6 +196,7 @@ def _build_script(
         once=record is not None,
         figures=tuple(FigureName(name.text, name.span()) for name in figures),
         show=show,
+        archive=download is not None,
     )
 
 

@@ -173,6 +173,8 @@ GROUPS: dict[str, dict[str, str]] = {
         "script-shallow": "A fence says `deep`, but no bodies overlap deeply.",
         "script-writes": "A script writes outside its temporary folder.",
         "script-connects": "A script uses the network.",
+        "download-failed": "What readers download of a script does not run alone, or prints "
+        "something else; its page has no button then.",
     },
     "Recorded outputs": {
         "recording-orphan": "A recorded output has no script above it, or code that nothing runs.",

@@ -8,7 +8,6 @@ another block at the start of a line is escaped when a paragraph is complete.
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias, assert_never
@@ -19,7 +18,7 @@ from coursebuild.core import model
 from coursebuild.core.pages import marks
 from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.markup import escape, is_tight, raw_html
-from coursebuild.core.pages.page_writer import output_receipt, script_receipt
+from coursebuild.core.pages.page_writer import output_receipt, run_commands, script_receipt
 from coursebuild.core.registry import kind_of_block
 from coursebuild.features.markdown.from_html import html_to_markdown
 
@@ -319,12 +318,14 @@ class DocumentWriter:
         parts = [self.recording(recording) for recording in recordings]
         if self.notebook and block.show == "hidden":
             return "\n\n".join(parts)
-        if begins and not self.notebook:
-            command = marks.code_span(shlex.join(("python", block.path, *script.args)))
-            run = f"{self.words('code.run')}: {command}"
-            if script.requires:
-                run += f" ({self.words('code.requires', modules=', '.join(script.requires))})"
-            parts.insert(0, run)
+        download = self.page.inputs.downloads.get(block.path)
+        if begins and not self.notebook and download is not None:
+            first, *others = map(marks.code_span, run_commands(download, script.args))
+            unpack = self.words("code.unpack", file=download.file) if download.is_archive else ""
+            other = f", {self.words('code.then')} ".join(others)
+            run = f"{self.words('code.run')}: {unpack} {first}, {self.words('code.or')} {other}"
+            run += "" if download.was_run else f" ({self.words('code.unrun')})"
+            parts.insert(0, " ".join(run.split()))
         if script.parts:
             last = first + block.code.text.rstrip("\n").count("\n")
             lines = self.words("code.lines", first=first, last=last)

@@ -1,0 +1,371 @@
+"""A script as one file that runs by itself: what it imports of the course stands in it.
+
+1. The script's own lines stay as they are, but for the imports of modules of the course. In their
+   place come the definitions that are used of each module, and what these need in turn.
+2. A name that two modules define differently gets the module's name in front. A module that is
+   imported whole becomes a namespace of what is used of it.
+3. Models, data and the style of figures become texts. `model_path` gives files of these models.
+4. What does more on import than define names cannot be carried over: there is no such file.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TypeAlias
+
+from msgspec import Struct
+
+from coursebuild.core.scripts.module_code import (
+    CourseModule,
+    ModuleCode,
+    NotOneFileError,
+    bound_names,
+    futures,
+    global_names,
+    is_future,
+    is_text,
+)
+
+_OF_THE_FILE = frozenset(("__file__", "__name__", "globals", "locals", "vars"))
+"""What gives something else in another file."""
+_LIBRARY = "mjcourse.paths"
+_MODEL_PATH = '''\
+_folder = tempfile.TemporaryDirectory()
+
+
+def model_path(name):
+    """The path of one of the MODELS, which it writes into a temporary folder."""
+    for file, text in MODELS.items():
+        path = Path(_folder.name, file)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    return Path(_folder.name, name.removesuffix(".xml") + ".xml")'''
+_DATA = """\
+for file, text in DATA.items():
+    if not Path(file).exists():
+        Path(file).parent.mkdir(parents=True, exist_ok=True)
+        Path(file).write_text(text, encoding="utf-8")"""
+
+
+FindModule: TypeAlias = Callable[[str], CourseModule | None]
+"""Returns the course's module of a dotted name."""
+
+
+class Belongings(Struct, frozen=True):
+    """What a script needs besides modules, as texts."""
+
+    models: Mapping[str, str] = {}
+    """By path in the folder of models."""
+    data: Mapping[str, str] = {}
+    """By path in the course's folder, in which scripts work."""
+    style: Mapping[str, str] = {}
+    """Settings of Matplotlib."""
+
+
+def single_file(name: str, text: str, find_module: FindModule, belongings: Belongings) -> str:
+    """The script with this dotted name and text as one file.
+
+    Raises:
+        NotOneFileError: it cannot be one.
+    """
+    return _File(name, text, find_module).write(belongings)
+
+
+def foreign_modules(text: str) -> tuple[str, ...]:
+    """The top-level modules that a text imports and that Python does not bring."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            names.add(node.module or "")
+    tops = {name.partition(".")[0] for name in names}
+    return tuple(sorted(tops - sys.stdlib_module_names))
+
+
+class _File:
+    """The file while it is put together."""
+
+    def __init__(self, name: str, text: str, find_module: FindModule) -> None:
+        self._find_module = find_module
+        self._modules: dict[str, ModuleCode] = {}
+        self._script = ModuleCode(name, CourseModule("", text))
+        self._meanings: dict[str, object] = {}
+        """What each name means in the file: the text of an import, or where it is defined."""
+        self._imports: set[str] = set()
+        self._namespaces: dict[str, dict[str, str]] = {}
+        self._has_models = False
+        statements = self._script.statements
+        self._head = 0
+        while self._head < len(statements) and (
+            isinstance(statements[self._head], ast.Import | ast.ImportFrom)
+            or is_text(statements[self._head])
+        ):
+            self._head += 1
+
+    def write(self, belongings: Belongings) -> str:
+        removed = self._take_imports()
+        if self._has_models and not belongings.models:
+            raise NotOneFileError("it is not known which models it loads")
+        sections = self._sections(belongings)
+        lines, statements = self._script.lines, self._script.statements
+        start = 0
+        while start < self._head and (is_text(statements[start]) or is_future(statements[start])):
+            start += 1
+        top = (statements[start - 1].end_lineno or 0) if start else 0
+        end = (statements[self._head - 1].end_lineno or 0) if self._head else 0
+        opening = lines[:top]
+        if not any(is_future(statement) for statement in statements[:start]):
+            opening += ["", *(line for line in sorted(self._imports) if "__future__" in line)]
+        kept = "\n".join(lines[n - 1] for n in range(top + 1, end + 1) if n not in removed)
+        imports = _merge_imports(kept, self._imports)
+        parts = ["\n".join(opening), imports, *sections, "\n".join(lines[end:])]
+        text, last = "", ""
+        for part in filter(None, (part.strip("\n") for part in parts)):
+            defines = part.startswith(("def ", "class ", "@", "# --- ")) or "\ndef " in last
+            text += ("\n\n\n" if defines and text else "\n\n" if text else "") + part
+            last = part
+        return f"{text}\n"
+
+    def _take_imports(self) -> set[int]:
+        """Take what the script imports of the course; return the lines of these imports."""
+        script, removed = self._script, set[int]()
+        ours: list[tuple[str, str, str]] = []
+        for number, statement in enumerate(script.statements):
+            course_imports = [
+                row
+                for node in ast.walk(statement)
+                if isinstance(node, ast.Import | ast.ImportFrom)
+                for row in script.imported(node)
+                if self._find_module(row[1]) is not None
+            ]
+            if not course_imports:
+                is_import = isinstance(statement, ast.Import | ast.ImportFrom)
+                for bound in bound_names(statement):
+                    same = ast.unparse(statement) if not is_import else None
+                    self._meanings[bound] = same or self._external(script, bound)
+                continue
+            is_whole = isinstance(statement, ast.Import | ast.ImportFrom)
+            names = statement.names if isinstance(statement, ast.Import | ast.ImportFrom) else ()
+            if number >= self._head or not is_whole or len(course_imports) != len(names):
+                raise NotOneFileError(f"what line {statement.lineno} imports cannot stand there")
+            ours += course_imports
+            removed |= {*range(statement.lineno, (statement.end_lineno or 0) + 1)}
+        for node in ast.walk(ast.Module(script.statements, [])):
+            if isinstance(node, ast.Global):
+                self._meanings |= dict.fromkeys(node.names, "assigned")
+        for bound, module_name, name in ours:  # the script's own names come first
+            self._meanings[bound] = self._origin(module_name, name)
+        for bound, module_name, name in ours:
+            self._take(bound, module_name, name)
+        return removed
+
+    def _origin(self, module_name: str, name: str) -> object:
+        """Where a name of a module is defined; a module's own name where it is one."""
+        whole = f"{module_name}.{name}" if name else module_name
+        source = self._find_module(module_name)
+        if source is None or not name or self._find_module(whole) is not None:
+            return whole
+        module = self._module(module_name, source)
+        statement = module.statement_of(name)
+        if not isinstance(statement, ast.Import | ast.ImportFrom):
+            return module_name, name
+        row = next(row for row in module.imported(statement) if row[0] == name)
+        is_ours = self._find_module(row[1]) is not None
+        return self._origin(row[1], row[2]) if is_ours else self._external(module, name)
+
+    def _module(self, name: str, source: CourseModule) -> ModuleCode:
+        if name not in self._modules:
+            self._modules[name] = ModuleCode(name, source)
+        return self._modules[name]
+
+    def _take(self, bound: str, module: str, name: str) -> None:
+        """Take a name of a module, or a whole module, for a name of the script."""
+        if name == "*":
+            raise NotOneFileError(f"it imports everything of {module}")
+        if not name and "." in module:
+            raise NotOneFileError(f"it imports {module} whole")
+        whole = f"{module}.{name}" if name else module
+        if name and self._find_module(whole) is None:
+            self._need(self._script, module, name, bound)
+        else:
+            self._use_whole(self._script, bound, whole, self._script.statements[self._head :])
+
+    def _use_whole(
+        self, user: ModuleCode, bound: str, whole: str, statements: Sequence[ast.stmt]
+    ) -> None:
+        """Take what these statements use of a module that they know by the name `bound`."""
+        attributes: set[str] = set()
+        others = 0
+        for node in ast.walk(ast.Module([*statements], [])):
+            match node:
+                case ast.Attribute(ast.Name(id), attribute, ast.Load()) if id == bound:
+                    attributes.add(attribute)
+                    others -= 1
+                case ast.Name(id) if id == bound:
+                    others += 1
+                case _:
+                    pass
+        if others or self._meanings.setdefault(bound, whole) != whole:
+            raise NotOneFileError(f"`{bound}` is used as more than a module")
+        for attribute in sorted(attributes):
+            ours = self._need(user, whole, attribute)
+            self._imports.add("from types import SimpleNamespace")
+            self._namespaces.setdefault(bound, {})[attribute] = ours
+
+    def _need(self, user: ModuleCode, module_name: str, name: str, wanted: str = "") -> str:
+        """Take a name of a module and what it needs; return what it is called in the file."""
+        source = self._find_module(module_name)
+        if source is None:
+            raise NotOneFileError(f"there is no module {module_name}")
+        if module_name == _LIBRARY and name == "model_path" and wanted in ("", name):
+            self._imports |= {"import tempfile", "from pathlib import Path"}
+            self._has_models = True
+            return name
+        module = self._module(module_name, source)
+        if module is not user:
+            user.uses[module_name] = None
+        statement = module.statement_of(name)
+        if isinstance(statement, ast.Import | ast.ImportFrom):
+            row = next(row for row in module.imported(statement) if row[0] == name)
+            if self._find_module(row[1]) is None:
+                return self._keep(wanted or name, self._external(module, name))
+            if self._find_module(f"{row[1]}.{row[2]}") is not None or not row[2]:
+                raise NotOneFileError(f"{source.path} uses the module {row[1]} as a value")
+            return self._need(user, row[1], row[2], wanted)
+        return self._define(module, name, statement, wanted)
+
+    def _define(self, module: ModuleCode, name: str, statement: ast.stmt, wanted: str) -> str:
+        meaning = (module.name, name)
+        number = module.numbers[name][0]
+        if number in module.needed and not wanted:
+            return module.new_names.get(name, name)
+        same = isinstance(statement, ast.Assign) and ast.unparse(statement)
+        new = wanted or name
+        known = self._meanings.get(new)
+        if known not in (None, meaning, same) or (new in dir(builtins)):
+            new = f"{module.name.rpartition('.')[2]}_{name.strip('_')}"
+            if wanted or self._meanings.get(new, meaning) != meaning:
+                raise NotOneFileError(f"`{name}` means two things in it")
+        if module.new_names.get(name, new) != new:
+            raise NotOneFileError(f"it imports `{name}` under two names")
+        self._meanings[new] = same if known == same else meaning
+        if new != name:
+            module.new_names[name] = new
+        if number not in module.needed:
+            module.check()
+            module.needed.add(number)
+            self._need_used(module, statement)
+        return new
+
+    def _need_used(self, module: ModuleCode, statement: ast.stmt) -> None:
+        """Take what a statement of a module uses of that module."""
+        self._imports |= {f"from __future__ import {n}" for n in futures(module.statements)}
+        for node in ast.walk(statement):
+            rows = module.imported(node) if isinstance(node, ast.Import | ast.ImportFrom) else ()
+            if any(self._find_module(row[1]) for row in rows):
+                raise NotOneFileError(f"{module.source.path} imports inside of a definition")
+        for node in global_names(statement):
+            if node.id in _OF_THE_FILE and node.id not in module.numbers:
+                raise NotOneFileError(f"{module.source.path} uses `{node.id}`")
+            if node.id not in module.numbers or node.id in bound_names(statement):
+                continue
+            origin = module.statement_of(node.id)
+            if isinstance(origin, ast.Import | ast.ImportFrom):
+                row = next(row for row in module.imported(origin) if row[0] == node.id)
+                whole = ".".join(filter(None, row[1:]))
+                if self._find_module(whole) is not None:
+                    self._use_whole(module, node.id, whole, [statement])
+                    continue
+            new = self._need(module, module.name, node.id)
+            if new != node.id:
+                module.new_names[node.id] = new
+
+    def _external(self, module: ModuleCode, name: str) -> str:
+        """The import of a name from another package, as a line."""
+        statement = module.statements[module.numbers[name][-1]]
+        assert isinstance(statement, ast.Import | ast.ImportFrom)
+        aliases = [a for a in statement.names if (a.asname or a.name.partition(".")[0]) == name]
+        if isinstance(statement, ast.Import):
+            return ast.unparse(ast.Import(aliases))
+        return ast.unparse(ast.ImportFrom(statement.module, aliases, statement.level))
+
+    def _keep(self, name: str, line: str) -> str:
+        """Let the file import a name of another package."""
+        if self._meanings.get(name, line) != line:
+            raise NotOneFileError(f"`{name}` means two things in it")
+        if name not in self._meanings:
+            self._meanings[name] = line
+            self._imports.add(line)
+        return name
+
+    def _sections(self, belongings: Belongings) -> list[str]:
+        sections: list[str] = []
+        if belongings.style:
+            self._imports.add("import matplotlib")
+            table = _dictionary({k: repr(v) for k, v in belongings.style.items()})
+            sections.append(f"# The course's style of figures\nmatplotlib.rcParams.update({table})")
+        if self._has_models:
+            texts = {path: _literal(text) for path, text in belongings.models.items()}
+            sections.append(f"MODELS = {_dictionary(texts)}\n{_MODEL_PATH}")
+        if belongings.data:
+            self._imports.add("from pathlib import Path")
+            texts = {path: _literal(text) for path, text in belongings.data.items()}
+            comment = "# What the script reads; a file that is there already stays as it is"
+            sections.append(f"{comment}\nDATA = {_dictionary(texts)}\n{_DATA}")
+        for module in self._in_order(self._script, set()):
+            if module.needed:
+                sections.append(f"# --- from {module.source.path}\n\n\n{module.code()}")
+        for name, attributes in self._namespaces.items():
+            rows = "".join(f"    {there}={here},\n" for there, here in sorted(attributes.items()))
+            sections.append(f"{name} = SimpleNamespace(\n{rows})")
+        if any(section.startswith("# --- from") for section in sections):
+            sections.append("# --- the script itself")
+        return sections
+
+    def _in_order(self, module: ModuleCode, seen: set[str]) -> Iterator[ModuleCode]:
+        """The modules that one uses, each after those that it uses itself."""
+        for name in module.uses:
+            if name not in seen:
+                seen.add(name)
+                yield from self._in_order(self._modules[name], seen)
+                yield self._modules[name]
+
+
+def _merge_imports(text: str, added: Iterable[str]) -> str:
+    """The script's imports and others: those of Python's own modules in the first group."""
+    lines = sorted(line for line in added if "__future__" not in line)
+    own = [line for line in lines if _is_standard(line)]
+    foreign = [line for line in lines if not _is_standard(line)]
+    groups = re.split(r"\n{2,}", text.strip("\n")) if text.strip() else []
+    if groups and all(map(_is_standard, groups[0].split("\n"))):
+        own += groups.pop(0).split("\n")
+    own.sort(key=lambda line: (line.startswith("from"), line))
+    if foreign and groups:
+        groups[0] = "\n".join((groups[0], *foreign))
+    elif foreign:
+        groups.append("\n".join(foreign))
+    return "\n\n".join(filter(None, ("\n".join(own), *groups)))
+
+
+def _dictionary(values: Mapping[str, str]) -> str:
+    rows = "".join(f'    "{key}": {value},\n' for key, value in sorted(values.items()))
+    return f"{{\n{rows}}}"
+
+
+def _literal(text: str) -> str:
+    """A text as Python writes it, on lines of its own."""
+    if '"""' in text or "\r" in text or text.endswith("\\") or "\0" in text:
+        return repr(text)
+    if "\\" in text or text.endswith('"'):
+        return repr(text)
+    return f'"""\\\n{text}"""'
+
+
+def _is_standard(line: str) -> bool:
+    words = line.split()
+    return len(words) > 1 and words[1].partition(".")[0] in sys.stdlib_module_names

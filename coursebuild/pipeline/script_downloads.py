@@ -1,0 +1,319 @@
+"""What readers are handed over of each script, and whether it runs alone.
+
+A script becomes one file with all that it needs of the course; where that cannot be, or its fence
+says `download=zip`, it becomes an archive, in which everything lies as in the course. Both say
+which packages they need. Run in an empty folder, they have to print what the page shows.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import platform
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+from msgspec.structs import replace
+
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.read import read_bytes
+from coursebuild.core.model import Course
+from coursebuild.core.model.results import (
+    CompileResult,
+    DownloadState,
+    Outcome,
+    OutputFile,
+    ScriptDownload,
+    ScriptRun,
+    Verdict,
+)
+from coursebuild.core.pages.library import models_named
+from coursebuild.core.run.alone import AloneJob, AloneRun, Runner
+from coursebuild.core.run.packages import distributions, module_files
+from coursebuild.core.scripts.compare import verify
+from coursebuild.core.scripts.extract import Extraction
+from coursebuild.core.scripts.module_code import CourseModule, NotOneFileError, is_text
+from coursebuild.core.scripts.single_file import Belongings, foreign_modules, single_file
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.pipeline.options import Options
+
+_STYLE = "matplotlibrc"
+_MODELS, _EXAMPLES = "models/", "examples/"
+_MOST_DATA = 1 << 16
+"""Bytes of data that stand in a file for people to read; more come in an archive."""
+
+
+class _Course:
+    """What scripts of a course may take from it."""
+
+    def __init__(self, course: Course, scripts: Iterable[Extraction], options: Options) -> None:
+        self.root, self.options = options.root, options
+        self._folders = [options.root / package.path for package in course.packages]
+        self._prefixes = tuple(f"{package.path.rstrip('/')}/" for package in course.packages)
+        self._models = {model.source.path: model.source.text for model in course.models}
+        self.modules = {
+            _dotted(e.path.removeprefix(_EXAMPLES)): CourseModule(e.path, e.text) for e in scripts
+        }
+        self._find_top = functools.cache(self._read_top)
+        self.files_of_module = functools.cache(
+            functools.partial(module_files, folders=self._folders)
+        )
+        self.read = functools.cache(functools.partial(read_bytes, options.root))
+
+    def find_module(self, folder: str, name: str) -> CourseModule | None:
+        """The module that a script in a folder of `examples/` gets by this name."""
+        top = name.partition(".")[0]
+        for prefix in dict.fromkeys((folder, "")):
+            module = self.modules.get(f"{prefix}.{name}" if prefix else name)
+            if module is not None:
+                return module
+        return self._find_top(top).get(name)
+
+    def _read_top(self, top: str) -> dict[str, CourseModule]:
+        return {
+            _dotted(file.path): CourseModule(file.path, file.data.decode("utf-8", "replace"))
+            for file in self.files_of_module(top)
+            if file.path.endswith(".py")
+        }
+
+    def files_of(
+        self, extraction: Extraction, run: ScriptRun | None, includes: Mapping[str, Sequence[str]]
+    ) -> dict[str, bytes]:
+        """The models and data that a script reads, by path; those that it names if it did not run."""
+        paths: set[str] = set()
+        if run is not None and run.trace is not None:
+            paths = {p for p in run.trace.files if (self.root / p).is_file()}
+            paths = {p for p in paths if not p.startswith((_EXAMPLES, *self._prefixes))}
+        else:
+            for name in models_named(extraction.script):
+                path = f"{_MODELS}{name}.xml"
+                paths |= {path, *includes.get(path, ())} if path in self._models else set()
+        return {path: self.read(path) for path in sorted(paths - {_STYLE, "content/course.toml"})}
+
+    @functools.cached_property
+    def style(self) -> dict[str, str]:
+        """The settings of Matplotlib that the course has."""
+        try:
+            text = self.read(_STYLE).decode()
+        except (EffectError, OSError, UnicodeDecodeError):
+            return {}
+        rows = re.findall(r"^[ \t]*([\w.]+)[ \t]*:[ \t]*((?:\"[^\"\n]*\"|[^#\n])*)", text, re.M)
+        return {name: value.strip() for name, value in rows}
+
+    def packages(self, modules: Iterable[str]) -> tuple[str, ...]:
+        """What brings these modules, for installers; with versions, where they are installed."""
+        interpreter = self.options.interpreter
+        folders = None if interpreter is None else interpreter.packages
+        names = sorted(set(modules))
+        rows = distributions(self.options.store, names, folders)
+        lines = {module: f"{name}=={version}" for module, name, version in rows}
+        return tuple(sorted({lines.get(name, name) for name in names}, key=str.lower))
+
+
+def find_downloads(
+    course: Course,
+    scripts: Sequence[Extraction],
+    runs: Iterable[ScriptRun],
+    models: Iterable[tuple[str, CompileResult]],
+    options: Options,
+) -> tuple[ScriptDownload, ...]:
+    """What is handed over of these scripts; nothing of those that fail as they are."""
+    around = _Course(course, scripts, options)
+    by_path = {run.path: run for run in runs}
+    facts = {f"{_MODELS}{name}.xml": result.facts for name, result in models}
+    includes = {path: fact.includes for path, fact in facts.items() if fact is not None}
+    downloads = []
+    for extraction in scripts:
+        run = by_path.get(extraction.path)
+        if run is None or run.outcome in (Outcome.OK, Outcome.SKIPPED, Outcome.NORUN):
+            files = around.files_of(extraction, run, includes)
+            downloads.append(_make_download(around, extraction, files))
+    return tuple(downloads)
+
+
+def _make_download(
+    around: _Course, extraction: Extraction, files: Mapping[str, bytes]
+) -> ScriptDownload:
+    path, name = extraction.path, extraction.path.rpartition("/")[2]
+    folder = _dotted(path.removeprefix(_EXAMPLES)).rpartition(".")[0]
+    find_module = functools.partial(around.find_module, folder)
+    if not extraction.script.archive:
+        try:
+            belongings = _belongings(files)
+            text = single_file(_dotted(name), extraction.text, find_module, belongings)
+            if "matplotlib" in foreign_modules(text) and around.style:
+                belongings = replace(belongings, style=around.style)
+                text = single_file(_dotted(name), extraction.text, find_module, belongings)
+        except (NotOneFileError, RecursionError, SyntaxError):
+            pass
+        else:
+            modules = foreign_modules(text)
+            packages = around.packages(modules)
+            text = _metadata(packages, around.options) + _rename(text, path, name)
+            file = OutputFile(name, text.encode())
+            return ScriptDownload(path, (file,), name, packages, modules)
+    members, modules = _members(around, extraction, find_module)
+    packages = around.packages(modules)
+    members |= files
+    if "matplotlib" in modules and around.style:
+        members[_STYLE] = around.read(_STYLE)
+    members["requirements.txt"] = "".join(f"{line}\n" for line in packages).encode()
+    listed = tuple(OutputFile(member, data) for member, data in sorted(members.items()))
+    return ScriptDownload(path, listed, path, packages, modules, archive=True)
+
+
+def _members(
+    around: _Course, extraction: Extraction, find_module: Callable[[str], CourseModule | None]
+) -> tuple[dict[str, bytes], tuple[str, ...]]:
+    """A script and the course's modules that it imports, by path, and the modules of others."""
+    beside = extraction.path.rpartition("/")[0]
+    members = {extraction.path: extraction.data}
+    texts, seen, foreign = [extraction.text], set[str](), set[str]()
+    for text in texts:
+        for name in set(foreign_modules(text)) - seen:
+            seen.add(name)
+            module = find_module(name)
+            if module is not None and module.path.startswith(_EXAMPLES):
+                members[module.path] = module.text.encode()
+                texts.append(module.text)
+                continue
+            files = around.files_of_module(name)
+            members |= {f"{beside}/{file.path}": file.data for file in files}
+            texts += [file.data.decode() for file in files if file.path.endswith(".py")]
+            foreign |= set() if files else {name}
+    return members, tuple(sorted(foreign))
+
+
+def _belongings(files: Mapping[str, bytes]) -> Belongings:
+    """What a script reads, as texts; NotOneFileError where a text is not what one would read."""
+    texts: dict[str, str] = {}
+    for path, data in files.items():
+        try:
+            texts[path] = data.decode()
+        except UnicodeDecodeError:
+            raise NotOneFileError(f"{path} is no text") from None
+        if "\r" in texts[path] or "\0" in texts[path]:
+            raise NotOneFileError(f"{path} is no text with plain line ends")
+    models = {p.removeprefix(_MODELS): t for p, t in texts.items() if p.startswith(_MODELS)}
+    data = {p: t for p, t in texts.items() if not p.startswith(_MODELS)}
+    if sum(map(len, data.values())) > _MOST_DATA:
+        raise NotOneFileError("its data are long")
+    return Belongings(models, data)
+
+
+def _rename(text: str, path: str, name: str) -> str:
+    """The text with the file's new place in its docstring."""
+    first = next(iter(ast.parse(text).body), None)
+    end = (first.end_lineno or 0) if first is not None and is_text(first) else 0
+    lines = text.split("\n")
+    return "\n".join([*(line.replace(path, name) for line in lines[:end]), *lines[end:]])
+
+
+def _metadata(packages: Iterable[str], options: Options) -> str:
+    """The block by which installers know what a script needs (PEP 723)."""
+    interpreter = options.interpreter
+    version = platform.python_version() if interpreter is None else interpreter.version
+    oldest = ".".join(version.split(".")[:2])
+    rows = "".join(f'#     "{package}",\n' for package in packages)
+    listed = f"# dependencies = [\n{rows}# ]\n" if rows else "# dependencies = []\n"
+    return f'# /// script\n# requires-python = ">={oldest}"\n{listed}# ///\n'
+
+
+# --- their trial
+
+
+def try_downloads(
+    course: Course,
+    scripts: Iterable[Extraction],
+    runs: Iterable[ScriptRun],
+    verdicts: Iterable[Verdict],
+    downloads: Sequence[ScriptDownload],
+    options: Options,
+    *,
+    only_known: bool = False,
+) -> tuple[tuple[ScriptDownload, ...], tuple[Diagnostic, ...]]:
+    """Run what is handed over of scripts that were run; say what fails, or prints another thing.
+
+    `only_known`: nothing runs, and what an earlier command found is repeated.
+    """
+    extractions = {e.path: e for e in scripts}
+    runs_by_path = {run.path: run for run in runs if run.outcome is Outcome.OK and not run.recorded}
+    jobs = {d.script: _job(d, extractions[d.script]) for d in downloads if d.script in runs_by_path}
+    runner = Runner(options.root, options.store, options.interpreter, options.sandbox, options.jobs)
+    known = {path: runner.known_run(job) for path, job in jobs.items()}
+    new_jobs = {path: job for path, job in jobs.items() if known[path] is None}
+    if new_jobs and not only_known:
+        with options.progress.stage("running downloads", len(new_jobs)):
+            new = runner.run(new_jobs.values(), options.progress.skip)
+            known |= dict(zip(new_jobs, new, strict=True))
+    alone_runs = {path: run for path, run in known.items() if run is not None}
+    problems = dict(_problems(course, runs_by_path, verdicts, alone_runs))
+    states: dict[str, DownloadState] = dict.fromkeys(jobs, "ran")
+    states |= dict.fromkeys(problems, "failed")
+    tried = tuple(replace(d, state=states.get(d.script, "unrun")) for d in downloads)
+    diagnostics = tuple(
+        diagnose(
+            "download-failed",
+            extractions[path].script.path_span,
+            f"what readers download of `{path}` {problem}",
+            help=_help(extractions[path]),
+        )
+        for path, problem in problems.items()
+    )
+    return tried, diagnostics
+
+
+def _help(extraction: Extraction) -> str:
+    if extraction.script.archive:
+        return "it runs in an empty folder, with nothing but what is in its archive"
+    return "it runs in an empty folder; `download=zip` hands over an archive instead"
+
+
+def _job(download: ScriptDownload, extraction: Extraction) -> AloneJob:
+    script = extraction.script
+    return AloneJob(
+        download.files,
+        download.entry,
+        script.args,
+        tuple(figure.name for figure in script.figures),
+        download.modules,
+        download.packages,
+        extraction.environment,
+        script.timeout,
+        extraction.memory,
+    )
+
+
+def _problems(
+    course: Course,
+    runs: Mapping[str, ScriptRun],
+    verdicts: Iterable[Verdict],
+    alone_runs: Mapping[str, AloneRun],
+) -> Iterator[tuple[str, str]]:
+    """The paths of scripts whose downloads fail, each with what is wrong."""
+    drifted = {v.recording.span for v in verdicts if v.status == "drift"}
+    other_runs = []
+    for path, alone_run in alone_runs.items():
+        if alone_run.failure:
+            yield path, f"fails in an empty folder: {alone_run.failure}"
+        elif alone_run.stdout != runs[path].stdout:
+            other_runs.append(_as_run(runs[path], alone_run.stdout))
+    told = set[str]()
+    for verdict in verify(course, other_runs) if other_runs else ():
+        path = verdict.recording.script or ""
+        if verdict.status == "drift" and verdict.recording.span not in drifted and path not in told:
+            change = verdict.changes[0]
+            told.add(path)
+            yield path, f"prints `{change.printed}` alone, where the page has `{change.recorded}`"
+
+
+def _as_run(run: ScriptRun, stdout: str) -> ScriptRun:
+    """A script's run with another output, whose parts have as many lines as before."""
+    lines = stdout.splitlines(keepends=True)
+    counts = (run.stdout[:start].count("\n") for start in run.part_starts)
+    starts = tuple(sum(map(len, lines[:count])) for count in counts)
+    return replace(run, stdout=stdout, part_starts=starts)
+
+
+def _dotted(path: str) -> str:
+    return path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
