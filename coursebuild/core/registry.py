@@ -20,6 +20,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.features import (
+    API,
     Exporter,
     Feature,
     FenceKind,
@@ -109,8 +110,13 @@ def feature_packages() -> tuple[frozenset[str], frozenset[str]]:
 
 
 def find_clash(candidate: Feature, installed: Iterable[Feature]) -> str:
-    """Why a feature cannot be used together with others; empty if it can."""
+    """Why a feature cannot be used, or not together with others; empty if it can."""
     installed = tuple(installed)
+    if candidate.api > API:
+        return (
+            f"it needs version {candidate.api} of `coursebuild.api`, and this is version {API}: "
+            "install a newer coursebuild"
+        )
     if any(feature.name == candidate.name for feature in installed):
         return f"two features are called `{candidate.name}`"
     invisible = [kind for kind in candidate.fences if kind.block.summary is FeatureBlock.summary]

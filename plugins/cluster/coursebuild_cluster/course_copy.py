@@ -18,8 +18,8 @@ from pathlib import Path, PurePosixPath
 
 from msgspec import Struct
 
+from coursebuild.api import is_dropping
 from coursebuild.core.engine.digests import file_state
-from coursebuild.core.files.course_root import is_dropping
 from coursebuild_cluster.messages import Piece, pack, unpack
 
 _NOT_COPIED = ("node_modules", "public")

@@ -26,21 +26,20 @@ from typing import Any
 
 from msgspec import Struct
 
-from coursebuild.core.engine.store import Store
-from coursebuild.core.files.course_root import DECISIVE
-from coursebuild.core.files.errors import EffectError
-from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.run_store import States
-from coursebuild.core.run.sandbox import find_sandbox
-from coursebuild.core.run.script_environment import Interpreter
-from coursebuild.core.run.script_server import (
-    Claim,
-    OnFinish,
-    OnStart,
+from coursebuild.api import (
+    DECISIVE,
+    EffectError,
+    Interpreter,
     RunAll,
     RunStoppedError,
+    ScriptJob,
+    ScriptRun,
     ScriptServer,
+    States,
+    Store,
+    find_sandbox,
 )
+from coursebuild.core.run.script_server import Claim, OnFinish, OnStart
 from coursebuild_cluster import worker
 from coursebuild_cluster.connection import connect
 from coursebuild_cluster.course_copy import CourseReader

@@ -12,8 +12,7 @@ from typing import TypeVar
 import msgspec
 from msgspec import Struct
 
-from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.dependencies import Dependency
+from coursebuild.api import Dependency, ScriptJob, ScriptRun
 
 Message = TypeVar("Message")
 

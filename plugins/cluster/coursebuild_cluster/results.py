@@ -13,11 +13,16 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from coursebuild.core.files.errors import EffectError
-from coursebuild.core.files.write import resolve_inside
-from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
-from coursebuild.core.run.dependencies import Dependency, Kind
-from coursebuild.core.run.run_store import States
+from coursebuild.api import (
+    Dependency,
+    EffectError,
+    Outcome,
+    ScriptJob,
+    ScriptRun,
+    States,
+    resolve_inside,
+)
+from coursebuild.core.run.dependencies import Kind
 from coursebuild_cluster.messages import Answer
 
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFound|Import)Error\b", re.MULTILINE)

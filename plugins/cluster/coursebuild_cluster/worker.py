@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from coursebuild import __version__
+from coursebuild.api import gate
 from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.run import gate
 from coursebuild.core.run.script_environment import conditions, engine_version, package_version
 from coursebuild_cluster.child import frame_message, read_message
 from coursebuild_cluster.course_copy import BlobStore

@@ -12,13 +12,20 @@ from pathlib import Path
 import mmdr
 from markupsafe import Markup
 
-from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter
-from coursebuild.core.model import FeatureBlock
-from coursebuild.core.pages.context import PageContext
+from coursebuild.api import (
+    Feature,
+    FeatureBlock,
+    Fence,
+    FenceKind,
+    IndexReader,
+    MarkdownWriter,
+    PageContext,
+    Parsed,
+    Rule,
+    TextParser,
+    diagnose,
+)
 from coursebuild.core.pages.marks import fence as code_block
-from coursebuild.core.syntax.fence import Fence, TextParser
-from coursebuild.core.text.diagnostics import Parsed, diagnose
-from coursebuild.core.text.rules import Rule
 
 SIZE = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
 
