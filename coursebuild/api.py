@@ -37,6 +37,7 @@ from coursebuild.core.features import (
 )
 from coursebuild.core.files.course_root import DECISIVE, is_dropping
 from coursebuild.core.files.errors import EffectError, UsageError
+from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.files.write import resolve_inside
 from coursebuild.core.model import (
     Block,
@@ -222,6 +223,7 @@ __all__ += [
     "gate",
     "is_dropping",
     "resolve_inside",
+    "temporary_folder",
 ]
 
 _COMMANDS = {

@@ -313,6 +313,7 @@ class TrialContext(Struct, frozen=True):
 
 
 TrialOutcome: TypeAlias = tuple[tuple[TrialResult, ...], tuple[Diagnostic, ...]]
+"""The results of trials, and what is wrong."""
 
 
 class TrialRun(Protocol):

@@ -25,9 +25,16 @@ from urllib.parse import unquote, unquote_to_bytes
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.api import EffectError, ExportContext, Lesson, OutputFile, gate, urls
+from coursebuild.api import (
+    EffectError,
+    ExportContext,
+    Lesson,
+    OutputFile,
+    gate,
+    temporary_folder,
+    urls,
+)
 from coursebuild.core.files.errors import reason
-from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model import Level
 from coursebuild.core.model.lesson_record import shown_versions
 from coursebuild.core.pages.frame import citation

@@ -30,11 +30,11 @@ from coursebuild.api import (
     gate,
     load_course,
     options_of,
+    temporary_folder,
     write,
 )
 from coursebuild.core.files.course_root import MAP
 from coursebuild.core.files.errors import reason
-from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model import Comparison
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.pages.html_xml import elements_with

@@ -39,7 +39,6 @@ from coursebuild.api import (
     Store,
     find_sandbox,
 )
-from coursebuild.core.run.script_server import Claim, OnFinish, OnStart
 from coursebuild_cluster import worker
 from coursebuild_cluster.connection import connect
 from coursebuild_cluster.course_copy import CourseReader
@@ -152,11 +151,11 @@ class Cluster:
         jobs: Sequence[ScriptJob],
         *,
         parallel: int,
-        on_start: OnStart = lambda path: None,
-        on_finish: OnFinish = lambda run: None,
+        on_start: Callable[[str], object] = lambda path: None,
+        on_finish: Callable[[ScriptRun], object] = lambda run: None,
         interpreter: Interpreter | None = None,
         is_unwanted: Callable[[frozenset[str]], bool] | None = None,
-        claim: Claim = lambda job: True,
+        claim: Callable[[ScriptJob], ScriptRun | bool] = lambda job: True,
     ) -> tuple[ScriptRun, ...]:
         """See `ScriptServer.run`; `parallel` counts only for what runs here."""
         if interpreter is not None:

@@ -59,7 +59,7 @@ class Answer(Struct, frozen=True):
     dependencies: tuple[Dependency, ...] = ()
     """What the run looked at, in the state that it has on the worker."""
     places: tuple[tuple[str, str], ...] = ()
-    """The worker's folders by name, as in `coursebuild.core.run.script_environment.places`."""
+    """The worker's folders by name, as in `States.places`."""
     written: tuple[tuple[str, bytes], ...] = ()
     """Files of the course that the script has written where it may."""
     result: bytes = b""

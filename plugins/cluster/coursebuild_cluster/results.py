@@ -22,7 +22,6 @@ from coursebuild.api import (
     States,
     resolve_inside,
 )
-from coursebuild.core.run.dependencies import Kind
 from coursebuild_cluster.messages import Answer
 
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFound|Import)Error\b", re.MULTILINE)
@@ -58,7 +57,7 @@ def would_differ(answer: Answer, states: States) -> bool:
 
 def _state_here(dependency: Dependency, states: States) -> str:
     # The path of a folder is another one on a worker, and is replaced where it was printed.
-    return dependency.state if dependency.kind is Kind.PLACE else states.now(dependency.need)
+    return dependency.state if dependency.kind.value == "place" else states.now(dependency.need)
 
 
 def _replacer(

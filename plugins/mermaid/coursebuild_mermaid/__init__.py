@@ -24,8 +24,8 @@ from coursebuild.api import (
     Rule,
     TextParser,
     diagnose,
+    marks,
 )
-from coursebuild.core.pages.marks import fence as code_block
 
 SIZE = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
 
@@ -73,7 +73,7 @@ def draw(page: PageContext, block: Diagram) -> Markup:
 
 def markdown(writer: MarkdownWriter, block: Diagram) -> str:
     """Return the text itself, which many readers of Markdown draw."""
-    return code_block("mermaid", block.text)
+    return marks.fence("mermaid", block.text)
 
 
 def index(reader: IndexReader, block: Diagram) -> None:

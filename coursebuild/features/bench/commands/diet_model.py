@@ -20,9 +20,17 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import Course, EffectError, FeatureBlock, Options, Source, Store, find_blocks
+from coursebuild.api import (
+    Course,
+    EffectError,
+    FeatureBlock,
+    Options,
+    Source,
+    Store,
+    find_blocks,
+    temporary_folder,
+)
 from coursebuild.core.checks.compiled import mjcf_texts
-from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.files.read import CourseFiles, read_bytes
 from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.run.mjcf import TEXT_PATH, model_files
