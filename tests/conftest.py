@@ -57,6 +57,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="write what is expected anew instead of comparing with it; review the difference",
     )
+    parser.addoption(
+        "--rewrite-budgets",
+        action="store_true",
+        help="lower what the parts of the house may weigh (tests/budgets.toml) to what they weigh",
+    )
 
 
 @pytest.fixture

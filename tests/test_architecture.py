@@ -23,15 +23,13 @@ LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"core.model"}),
     frozenset({"core.values"}),
     frozenset({"core.syntax", "core.checks", "core.scripts", "core.pages", "core.files"}),
-    frozenset({"report", "core.engine"}),
+    frozenset({"report", "output", "core.engine"}),
     frozenset({"core.run"}),
     frozenset({"core.features"}),
     frozenset({"core.registry"}),
-    frozenset({"features"}),
     frozenset({"pipeline"}),
-    frozenset({"preview"}),
-    frozenset({"cli"}),
-    frozenset({"features.commands"}),
+    frozenset({"preview", "api"}),
+    frozenset({"features", "cli"}),
     frozenset({"__main__"}),
 )
 ASK_FEATURES = {"core.syntax", "core.checks", "core.pages", "core.files", "core.engine"}
@@ -98,12 +96,7 @@ def part_of(path: Path) -> str:
 
 
 def part(names: tuple[str, ...]) -> str:
-    """The core's folders are parts of their own, and so are the commands of features.
-
-    These are imported by name alone, when they are given, so they may import everything.
-    """
-    if names[0] == "features" and names[2:3] == ("commands",):
-        return "features.commands"
+    """The core's folders are parts of their own."""
     return ".".join(names[: 2 if names[0] == "core" else 1])
 
 
@@ -153,6 +146,43 @@ def test_features_import_those_alone_that_they_need() -> None:
         and name.split(".")[2] not in (feature.name, *feature.needs)
     ]
     assert not violations, "\n".join(violations)
+
+
+def test_what_a_feature_registers_needs_no_pipeline() -> None:
+    """Only its commands do, which are imported when they are given."""
+    violations = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in FILES
+        if part_of(path) == "features" and "commands" not in path.with_suffix("").parts
+        for name in sorted(read(path).imports)
+        if name.split(".")[1:2] in (["pipeline"], ["preview"])
+    ]
+    assert not violations, "\n".join(violations)
+
+
+def test_plugins_scaffolds_and_docs_import_the_interface_alone() -> None:
+    foreign = re.compile(
+        r"^\s*(?:from|import)\s+coursebuild(?:\.(?!api\b)\w+|\s)[^\n]*|import_module\(\W*coursebuild\."
+        r"(?!api\b)[^\n]*",
+        re.MULTILINE,
+    )
+    scaffolds = PACKAGE / "features/authoring/feature"
+    paths = (
+        *(ROOT / "plugins").rglob("*.py"),
+        *(ROOT / "tests/fixtures/plugin").rglob("*.py"),
+        *(ROOT / "tests/fixtures/scripts").glob("*_feature.txt"),
+        *scaffolds.iterdir(),
+        *(ROOT / "docs").rglob("*.md"),
+    )
+    violations = [
+        f"{path.relative_to(ROOT)}: {match[0].strip()}"
+        for path in sorted(paths)
+        for match in foreign.finditer(path.read_text(encoding="utf-8"))
+    ]
+    assert not violations, "\n".join(violations)
+    assert foreign.search("from coursebuild.core import model\n")
+    assert foreign.search("from coursebuild import api\n")
+    assert not foreign.search("from coursebuild.api import model\nimport coursebuild_tabs\n")
 
 
 def test_mjcourse_and_mjbench_import_nothing_of_coursebuild() -> None:

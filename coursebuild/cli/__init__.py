@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 
-from coursebuild.cli.output import CLEAN, FAILURE, USAGE, say, write
+from coursebuild.output import CLEAN, FAILURE, USAGE, say, write
 
 
 def main(arguments: list[str] | tuple[str, ...] | None = None) -> int:

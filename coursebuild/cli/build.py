@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from coursebuild.cli.arguments import add_running, add_sandbox, add_strict, run_unless_unchanged
+from coursebuild.cli.check import run_unless_unchanged
+from coursebuild.pipeline.arguments import add_running, add_sandbox, add_strict
 from coursebuild.pipeline.publication import build
 
 EXAMPLES = """\

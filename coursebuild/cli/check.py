@@ -5,19 +5,22 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
+from collections.abc import Callable
 
 from msgspec.structs import replace
 
-from coursebuild.cli import arguments as shared
-from coursebuild.cli.arguments import options_of, print_report
-from coursebuild.cli.output import CLEAN, write
+from coursebuild.cli.unchanged import Watcher, identify_command
 from coursebuild.core.files.errors import UsageError
+from coursebuild.core.registry import package_paths
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.output import CLEAN, write
+from coursebuild.pipeline import arguments as shared
+from coursebuild.pipeline.arguments import options_of, print_report, report_text
 from coursebuild.pipeline.check import check
 from coursebuild.pipeline.fix import Answer, fix, proposals, propose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.shards import read_shard
-from coursebuild.report import Report
+from coursebuild.report import Report, unchanged_report
 from coursebuild.report.text import diagnostic_text, visible_lines
 from coursebuild.report.values import plural, with_hints
 
@@ -99,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
         with contextlib.redirect_stdout(sys.stderr):  # what a feature prints is not of the report
             report = work(options)
         return print_report(report, arguments.format, options)
-    return shared.run_unless_unchanged(arguments, ("examples",), work)
+    return run_unless_unchanged(arguments, ("examples",), work)
 
 
 def _mend(arguments: argparse.Namespace) -> int:
@@ -161,3 +164,22 @@ def _compare_with_version(arguments: argparse.Namespace) -> int:
         return write(comparison_json(report), CLEAN)
     style = shared.style_of(sys.stdout)
     return write(comparison_text(report, style, quiet=options.progress.quiet), CLEAN)
+
+
+def run_unless_unchanged(
+    arguments: argparse.Namespace, outputs: tuple[str, ...], work: Callable[[Options], Report]
+) -> int:
+    """Do the work; if it succeeds, the same command has nothing to do while nothing changes.
+
+    `outputs` are the folders that the command writes.
+    """
+    options = options_of(arguments)
+    command = identify_command(arguments.words)
+    watcher = None if command is None else Watcher(str(options.root), command)
+    report = work(options)
+    status = print_report(report, "text", options)
+    if watcher is not None and report.ok and report.depends is not None:
+        remark = f"nothing has changed since the last {arguments.words[0]}"
+        output = report_text(unchanged_report(report, remark), "text", options)
+        watcher.keep(output, (*report.depends, *package_paths()), outputs)
+    return status

@@ -22,7 +22,6 @@ import threading
 from typing import TYPE_CHECKING, NoReturn
 
 from coursebuild import MANUAL
-from coursebuild.cli.output import CLEAN, FAILURE, USAGE, fail, say, write
 from coursebuild.core.files.errors import (
     AddressLimitError,
     EffectError,
@@ -31,6 +30,7 @@ from coursebuild.core.files.errors import (
     lacking,
 )
 from coursebuild.core.files.locks import remove_abandoned_folders
+from coursebuild.output import CLEAN, FAILURE, USAGE, fail, say, write
 
 if TYPE_CHECKING:  # asking for the version loads nothing heavy
     from coursebuild.core.features import Command

@@ -11,12 +11,12 @@ import tomllib
 from pathlib import Path
 
 from coursebuild.cli.commands import known_commands, parser_of
-from coursebuild.cli.output import CLEAN, write
 from coursebuild.cli.unchanged import split_directory
 from coursebuild.core.files.course_root import MAP, find_course_root, read_regular
 from coursebuild.core.registry import features
 from coursebuild.core.syntax.course_schema import schema_roots
 from coursebuild.core.text.rules import RULES
+from coursebuild.output import CLEAN, write
 
 EXAMPLES = """\
 examples:

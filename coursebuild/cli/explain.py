@@ -17,9 +17,7 @@ from typing import Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_format, options_of, style_of
 from coursebuild.cli.explain_values import origins_text, value_origins
-from coursebuild.cli.output import CLEAN, write
 from coursebuild.core.files.resources import rules_page
 from coursebuild.core.model import (
     Course,
@@ -45,6 +43,8 @@ from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.rules import RULES, Rule
+from coursebuild.output import CLEAN, write
+from coursebuild.pipeline.arguments import add_format, options_of, style_of
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
 from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style, visible

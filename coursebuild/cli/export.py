@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from coursebuild.cli.arguments import add_running, add_sandbox, options_of, print_report
 from coursebuild.core.registry import features
+from coursebuild.pipeline.arguments import add_running, add_sandbox, options_of, print_report
 from coursebuild.pipeline.publication import export
 
 EXAMPLES = """\

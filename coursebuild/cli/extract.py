@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from coursebuild.cli.arguments import add_quiet, options_of, print_report
+from coursebuild.pipeline.arguments import add_quiet, options_of, print_report
 from coursebuild.pipeline.outputs import extract
 
 EXAMPLES = """\

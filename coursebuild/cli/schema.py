@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from coursebuild.cli.output import CLEAN, USAGE, fail, write
 from coursebuild.core.syntax.course_schema import json_schema, schema_roots
+from coursebuild.output import CLEAN, USAGE, fail, write
 
 EXAMPLES = """\
 examples:

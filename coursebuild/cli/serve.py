@@ -30,11 +30,11 @@ from typing import Any, BinaryIO
 
 import segno
 
-from coursebuild.cli.arguments import add_running, options_of, style_of
-from coursebuild.cli.output import CLEAN, say
 from coursebuild.core.files.locks import try_lock
 from coursebuild.core.files.trust import state_folder
 from coursebuild.core.run import gate
+from coursebuild.output import CLEAN, say
+from coursebuild.pipeline.arguments import add_running, options_of, style_of
 from coursebuild.pipeline.options import UsageError
 from coursebuild.preview.live_course import LiveCourse
 from coursebuild.preview.server import PreviewServer

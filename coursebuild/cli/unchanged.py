@@ -22,9 +22,9 @@ import sys
 import time
 from collections.abc import Iterable, Iterator
 
-from coursebuild.cli.output import terminal_style
 from coursebuild.core.files import trust
 from coursebuild.core.files.course_root import DECISIVE, FOLDERS, find_course_root, is_dropping
+from coursebuild.output import terminal_style
 
 _NO_CACHE = "--no-cache"
 _ARGUMENT_VARIABLES = ("COURSEBUILD_CACHE", "COURSEBUILD_CACHE_KEY", "COURSEBUILD_CACHE_SIZE")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from coursebuild.cli.output import CLEAN, FAILURE, fail, write
 from coursebuild.core.files.write import take_back
+from coursebuild.output import CLEAN, FAILURE, fail, write
 from coursebuild.pipeline.options import Progress, find_course
 
 EXAMPLES = """\

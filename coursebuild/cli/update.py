@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from coursebuild.cli import arguments as shared
 from coursebuild.core.files.errors import UsageError
+from coursebuild.pipeline import arguments as shared
 from coursebuild.pipeline.outputs import update
 
 EXAMPLES = """\

@@ -49,6 +49,9 @@ from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.rules import Rule
 from coursebuild.core.text.source import Span
 
+API = 1
+"""The version of `coursebuild.api`: each release that adds to it raises it by one."""
+
 B = TypeVar("B", bound=FeatureBlock)
 
 
@@ -310,6 +313,7 @@ class TrialContext(Struct, frozen=True):
 
 
 TrialOutcome: TypeAlias = tuple[tuple[TrialResult, ...], tuple[Diagnostic, ...]]
+"""The results of trials, and what is wrong."""
 
 
 class TrialRun(Protocol):
@@ -337,6 +341,8 @@ class Feature(Struct, frozen=True, kw_only=True):
     """Something a lesson can hold or a site can offer. Everything but the name is optional."""
 
     name: str
+    api: int = 1
+    """The version of `coursebuild.api` that it needs."""
     needs: tuple[str, ...] = ()
     """Names of the features whose modules it imports."""
     fences: tuple[FenceKind[Any], ...] = ()

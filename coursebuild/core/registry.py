@@ -20,6 +20,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.features import (
+    API,
     Exporter,
     Feature,
     FenceKind,
@@ -29,6 +30,7 @@ from coursebuild.core.features import (
     Trial,
     Trials,
 )
+from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model import Course, Document, FeatureBlock
 from coursebuild.core.model.results import Mathml, PublishedTrials, Results, ScriptRun
 from coursebuild.core.pages import urls
@@ -71,6 +73,7 @@ _INSTALLED_BY = {
 }
 """Where the features come from that courses commonly use, for messages."""
 
+_NEWER = "install a newer coursebuild"
 _PAGE_NAME = re.compile("[a-z][a-z0-9-]*")
 
 _of_course: tuple[Feature, ...] = ()
@@ -109,8 +112,10 @@ def feature_packages() -> tuple[frozenset[str], frozenset[str]]:
 
 
 def find_clash(candidate: Feature, installed: Iterable[Feature]) -> str:
-    """Why a feature cannot be used together with others; empty if it can."""
+    """Why a feature cannot be used, or not together with others; empty if it can."""
     installed = tuple(installed)
+    if candidate.api > API:
+        return f"it needs version {candidate.api} of `coursebuild.api`, and this is {API}: {_NEWER}"
     if any(feature.name == candidate.name for feature in installed):
         return f"two features are called `{candidate.name}`"
     invisible = [kind for kind in candidate.fences if kind.block.summary is FeatureBlock.summary]
@@ -277,20 +282,25 @@ def publish_trials(results: Results, assets: Assets) -> PublishedTrials:
 
 @functools.cache
 def installed_features() -> tuple[Feature, ...]:
-    """The features of coursebuild and of packages; RuntimeError for one that is broken."""
+    """The features of coursebuild and of packages; EffectError for one that is broken."""
     package = importlib.import_module("coursebuild.features")
     # Not by `pkgutil`, which takes an unreadable folder for an empty one.
     folders = Path(package.__path__[0]).iterdir()
     modules = sorted(path.name for path in folders if (path / "__init__.py").is_file())
     available = [importlib.import_module(f"{package.__name__}.{name}").FEATURE for name in modules]
     for point in _entry_points():
-        feature = point.load()
+        subject = f"the entry point {point.value}"
+        try:
+            feature = point.load()
+        except ImportError as error:
+            if error.name != "coursebuild.api":
+                raise
+            message = f"{subject} cannot be used: {error.msg}"
+            raise EffectError(message, help=_NEWER) from None
         if not isinstance(feature, Feature):
-            raise RuntimeError(
-                f"the entry point {point.value} is not a feature: write `{point.module}:FEATURE`"
-            )
+            raise EffectError(f"{subject} is not a feature", help=f"write `{point.module}:FEATURE`")
         if reason := find_clash(feature, available):
-            raise RuntimeError(f"the entry point {point.value} cannot be used: {reason}")
+            raise EffectError(f"{subject} cannot be used: {reason}")
         available.append(feature)
     return _register(map(_name_failures, available))
 

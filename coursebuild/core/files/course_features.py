@@ -88,4 +88,4 @@ def _run(path: str, code: bytes) -> Feature | str:
     feature = getattr(module, "FEATURE", None)
     if isinstance(feature, Feature):
         return feature
-    return f"{path} has no FEATURE of the type `coursebuild.core.features.Feature`"
+    return f"{path} has no FEATURE of the type `coursebuild.api.Feature`"

@@ -360,6 +360,7 @@ Block: TypeAlias = (
     | Mjcf
     | FeatureBlock
 )
+"""A part of a text with lines of its own: a paragraph, a table, what a feature reads."""
 
 
 class Footnote(Located, frozen=True):

@@ -296,6 +296,7 @@ Inline: TypeAlias = (
     | FootnoteRef
     | Citation
 )
+"""A part of a line: words, code, a formula, a link."""
 
 
 def plain_text(inlines: tuple[Inline, ...]) -> str:

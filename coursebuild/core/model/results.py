@@ -362,6 +362,7 @@ class CachedFile(Struct, frozen=True):
 
 
 SiteFile: TypeAlias = OutputFile | CachedFile
+"""A file, made now or when it is asked for."""
 
 
 DownloadState: TypeAlias = Literal["unrun", "ran", "failed"]

@@ -33,6 +33,8 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
+from coursebuild import __version__
+from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.errors import EffectError, UsageError, reason
 from coursebuild.core.files.locks import folder_lock
 from coursebuild.core.files.resources import locked_requirements
@@ -41,8 +43,10 @@ from coursebuild.core.run import gate
 from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.script_environment import (
     Interpreter,
+    conditions,
     engine_version,
     installed_distributions,
+    package_version,
     python_version,
 )
 
@@ -340,3 +344,13 @@ def _run(command: Sequence[str]) -> tuple[int, str]:
     variables = {name: value for name, value in variables.items() if name not in places}
     done = gate.finish(command, variables, stderr=gate.TO_OUTPUT)
     return done.status, done.output.decode("utf-8", "backslashreplace")
+
+
+def deciding_versions() -> dict[str, str]:
+    """What must be the same on another machine for its results to be those of this one, by name."""
+    return {
+        "coursebuild": f"{__version__}, code {code_digest('coursebuild', 'mjcourse')[:12]}",
+        **{name: value for name, value in conditions({}) if not name.startswith("the fixed")},
+        "MuJoCo": engine_version(),
+        "NumPy": package_version("numpy"),
+    }

@@ -8,12 +8,20 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
-from coursebuild.core.features import Feature
-from coursebuild.core.model import Course, Document, find_formulas
-from coursebuild.core.model.results import Mathml
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Parsed, diagnose
-from coursebuild.core.text.rules import Rule
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.api import (
+    Course,
+    Diagnostic,
+    Document,
+    Excerpt,
+    Feature,
+    Fix,
+    Mathml,
+    Parsed,
+    Rule,
+    Span,
+    diagnose,
+)
+from coursebuild.core.model import find_formulas
 from coursebuild.core.text.units import Dimension, find_unit
 from coursebuild.features.arithmetic.evaluate import FormulaComparison
 from coursebuild.features.arithmetic.expressions import NotUnderstood

@@ -21,11 +21,9 @@ from fractions import Fraction
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core import model
+from coursebuild.api import Diagnostic, Note, Span, diagnose, model
 from coursebuild.core.registry import kind_of_block
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.quantities import unit_behind
-from coursebuild.core.text.source import Span
 from coursebuild.core.text.units import Unit, find_unit
 from coursebuild.features.arithmetic.chains import check_arithmetic
 from coursebuild.features.arithmetic.evaluate import (

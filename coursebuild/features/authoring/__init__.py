@@ -1,6 +1,6 @@
 """Commands that begin a course and change it."""
 
-from coursebuild.core.features import Command, Feature
+from coursebuild.api import Command, Feature
 
 _SUMMARIES = {
     "init": "create a small, complete course",

@@ -14,21 +14,22 @@ from itertools import count
 
 from msgspec.structs import replace
 
-from coursebuild.core.files.errors import UsageError
-from coursebuild.core.model import (
+from coursebuild.api import (
     Course,
+    Edit,
+    Excerpt,
     Lesson,
-    LessonTarget,
-    Link,
-    find_inlines,
-    resolve,
+    Source,
+    Span,
+    UsageError,
+    did_you_mean,
+    parse_toml,
 )
+from coursebuild.core.model import LessonTarget, Link, find_inlines, resolve
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.nodes import ArrayNode, ObjectNode, StringNode
-from coursebuild.core.syntax.toml_text import parse_toml, toml_string
-from coursebuild.core.text.diagnostics import Edit, did_you_mean
-from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.core.syntax.toml_text import toml_string
 
 _COMMENTS_ABOVE = re.compile(r"(?:^[ \t]*#[^\n]*\n)*[ \t]*\Z", re.MULTILINE)
 _LINE_END = re.compile(r"\r?\n|\Z")

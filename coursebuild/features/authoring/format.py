@@ -15,19 +15,27 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from coursebuild.core import model
+from coursebuild.api import (
+    Diagnostic,
+    Edit,
+    Excerpt,
+    Fence,
+    Parsed,
+    Source,
+    Span,
+    model,
+    parse_json,
+)
 from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.registry import fence_names
 from coursebuild.core.scripts.edit import apply_edits, whole_lines
 from coursebuild.core.syntax.block_parser import block_tokens
 from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.syntax.fence import Fence, line_prefix, read_fence
-from coursebuild.core.syntax.json_text import parse_json, to_one_line
+from coursebuild.core.syntax.fence import line_prefix, read_fence
+from coursebuild.core.syntax.json_text import to_one_line
 from coursebuild.core.syntax.nodes import ArrayNode, Member, Node, ObjectNode
 from coursebuild.core.syntax.spans import PositionedToken, read_markdown
 from coursebuild.core.text.characters import cells
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Parsed
-from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import fingerprint
 
 WIDTH = 120

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coursebuild.core.features import Command, Feature, FenceKind, ModelPart
+from coursebuild.api import Command, Feature, FenceKind, ModelPart
 from coursebuild.features.bench.model import Bench, check_benches, check_keyframes, parse_bench
 from coursebuild.features.bench.page import (
     bench_markdown,

@@ -10,13 +10,23 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Literal, TypeAlias
 from urllib.parse import unquote
 
-from coursebuild.core.model import Course, Document, FeatureBlock, find_blocks
-from coursebuild.core.model.results import ModelFacts
+from coursebuild.api import (
+    Course,
+    Diagnostic,
+    Document,
+    FeatureBlock,
+    Fence,
+    ModelFacts,
+    Parsed,
+    Span,
+    TextParser,
+    diagnose,
+    did_you_mean,
+    find_blocks,
+)
 from coursebuild.core.model.scenarios import keyframe_scenarios
-from coursebuild.core.syntax.fence import Fence, TextParser, kind_of
+from coursebuild.core.syntax.fence import kind_of
 from coursebuild.core.syntax.spans import trim
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
-from coursebuild.core.text.source import Span
 
 BenchPart: TypeAlias = Literal["plot", "stable", "orders", "table", "engines"]
 """A part of a report that can be shown."""

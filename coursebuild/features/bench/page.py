@@ -12,7 +12,8 @@ from markupsafe import Markup, escape
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import MjcfModel, find_blocks, scenario_anchor
+from coursebuild.api import Library, MjcfModel, Renderer, find_blocks, urls
+from coursebuild.core.model import scenario_anchor
 from coursebuild.core.model.diet_findings import DietReport, Finding
 from coursebuild.core.model.measurements import (
     EngineReport,
@@ -21,10 +22,8 @@ from coursebuild.core.model.measurements import (
     SweepReport,
 )
 from coursebuild.core.model.report_files import BENCH, DIET, ENGINES
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import escape_marks, guard_lines
-from coursebuild.core.pages.renderer import Renderer, Strings
+from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids
 from coursebuild.features.bench.model import Bench, declared_scenarios
 from coursebuild.features.bench.scenario_view import (
@@ -36,8 +35,7 @@ from coursebuild.features.bench.scenario_view import (
 )
 
 if TYPE_CHECKING:
-    from coursebuild.core.features import IndexReader, MarkdownWriter
-    from coursebuild.core.pages.context import PageContext
+    from coursebuild.api import IndexReader, MarkdownWriter, PageContext
 
 
 class BenchView(Struct, frozen=True):

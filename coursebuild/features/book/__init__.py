@@ -1,6 +1,6 @@
 """All lessons in one file: as an e-book (EPUB 3), as one page, as a PDF of it; one as slides."""
 
-from coursebuild.core.features import Exporter, Feature
+from coursebuild.api import Exporter, Feature
 from coursebuild.features.book.chapters import PDF_MARK, page_file, pdf_file
 from coursebuild.features.book.epub import epub_files
 from coursebuild.features.book.slides import slides_file

@@ -25,17 +25,21 @@ from urllib.parse import unquote, unquote_to_bytes
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.files.errors import EffectError, reason
-from coursebuild.core.files.locks import temporary_folder
-from coursebuild.core.model import Lesson, Level
+from coursebuild.api import (
+    EffectError,
+    ExportContext,
+    Lesson,
+    OutputFile,
+    gate,
+    temporary_folder,
+    urls,
+)
+from coursebuild.core.files.errors import reason
+from coursebuild.core.model import Level
 from coursebuild.core.model.lesson_record import shown_versions
-from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.context import ExportContext
 from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, parse_html, to_html
 from coursebuild.core.pages.renderer import direction
-from coursebuild.core.run import gate
 from coursebuild.core.text.characters import visible
 
 _DROPPED_ELEMENTS = frozenset(

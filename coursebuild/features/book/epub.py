@@ -18,10 +18,8 @@ from collections.abc import Iterator
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.model import Lesson, Level
-from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.context import ExportContext
+from coursebuild.api import CachedFile, ExportContext, Lesson, OutputFile, SiteFile, urls
+from coursebuild.core.model import Level
 from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import to_xml
 from coursebuild.core.pages.renderer import direction

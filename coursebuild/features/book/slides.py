@@ -20,11 +20,8 @@ from collections.abc import Iterable, Iterator
 
 from markupsafe import Markup
 
-from coursebuild.core.model import document_scripts
+from coursebuild.api import ExportContext, OutputFile, document_scripts, urls
 from coursebuild.core.model.lesson_record import shown_versions
-from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.context import ExportContext
 from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, to_html
 from coursebuild.core.pages.renderer import direction

@@ -1,6 +1,6 @@
 """The command `diff` compares two states of a course and their sites; nothing is run."""
 
-from coursebuild.core.features import Command, Feature
+from coursebuild.api import Command, Feature
 
 FEATURE = Feature(
     name="diff",

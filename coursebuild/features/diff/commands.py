@@ -18,26 +18,35 @@ from typing import TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import options_of
-from coursebuild.cli.output import CLEAN, write
+from coursebuild.api import (
+    CLEAN,
+    Course,
+    EffectError,
+    Excerpt,
+    Place,
+    Recording,
+    UsageError,
+    find_blocks,
+    gate,
+    load_course,
+    options_of,
+    temporary_folder,
+    write,
+)
 from coursebuild.core.files.course_root import MAP
-from coursebuild.core.files.errors import EffectError, UsageError, reason
-from coursebuild.core.files.locks import temporary_folder
-from coursebuild.core.model import Comparison, Course, Recording, find_blocks
+from coursebuild.core.files.errors import reason
+from coursebuild.core.model import Comparison
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.pages.html_xml import elements_with
 from coursebuild.core.pages.marks import code_span, escape_text, fence, table
-from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import feature_trials
-from coursebuild.core.run import gate
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import text_diff
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.figures import ReadFile, describe_difference
 from coursebuild.core.scripts.findings import classes
-from coursebuild.core.text.source import Excerpt
 from coursebuild.features.truth.claims import unbound_results
-from coursebuild.pipeline.load import Code, load_course
+from coursebuild.pipeline.load import Code
 from coursebuild.pipeline.recordings import read_recorded
 
 _ROWS = 40

@@ -21,14 +21,11 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core import model
-from coursebuild.core.features import Feature, PageKind
-from coursebuild.core.model.results import Mathml
-from coursebuild.core.pages import document_inputs, typography, urls
-from coursebuild.core.pages.library import Library, links
+from coursebuild.api import Feature, Library, Mathml, PageKind, Parsed, model, urls
+from coursebuild.core.pages import document_inputs, typography
+from coursebuild.core.pages.library import links
 from coursebuild.core.pages.markup import HtmlWriter
 from coursebuild.core.pages.numbering import UNNAMED, fill_in, name_outside
-from coursebuild.core.text.diagnostics import Parsed
 
 
 class DefinitionPart(Struct, frozen=True):

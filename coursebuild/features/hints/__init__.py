@@ -14,12 +14,17 @@ import math
 import re
 from collections.abc import Collection, Iterable, Iterator
 
-from coursebuild.core import model
-from coursebuild.core.features import Feature
-from coursebuild.core.model import Course, Document
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
-from coursebuild.core.text.rules import Rule
-from coursebuild.core.text.source import Span
+from coursebuild.api import (
+    Course,
+    Diagnostic,
+    Document,
+    Feature,
+    Parsed,
+    Rule,
+    Span,
+    diagnose,
+    model,
+)
 
 # --- shown as written
 

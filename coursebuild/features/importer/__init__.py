@@ -6,7 +6,7 @@ once, which shows the keys that its fence needs. What has no counterpart is list
 and never dropped in silence. The folder itself is only read.
 """
 
-from coursebuild.core.features import Command, Feature
+from coursebuild.api import Command, Feature
 
 FEATURE = Feature(
     name="importer",

@@ -12,27 +12,38 @@ from textwrap import shorten
 
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_running, add_sandbox, available_cores, print_report
-from coursebuild.core.files.errors import UsageError
+from coursebuild.api import (
+    Course,
+    Edit,
+    Excerpt,
+    Options,
+    Outcome,
+    Recording,
+    ScriptRun,
+    Source,
+    Span,
+    UsageError,
+    add_running,
+    check,
+    find_sandbox,
+    print_report,
+)
 from coursebuild.core.files.write import FileChange, undo_changes
-from coursebuild.core.model import Course, Recording, Script
-from coursebuild.core.model.results import Change, Outcome, ScriptRun, Sign
+from coursebuild.core.model import Script
+from coursebuild.core.model.results import Change, Sign
 from coursebuild.core.pages.marks import fence
-from coursebuild.core.run.sandbox import find_sandbox
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.extract import Extraction
-from coursebuild.core.text.diagnostics import Edit
-from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.features.importer.convert import (
     change_tried_lessons,
     convert,
     write_course,
 )
 from coursebuild.features.importer.source_files import SourceFiles
-from coursebuild.pipeline.check import check
+from coursebuild.pipeline.arguments import add_sandbox, available_cores
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.options import Options, Progress, check_path, open_store
+from coursebuild.pipeline.options import Progress, check_path, open_store
 from coursebuild.pipeline.scripts import extract_scripts, recorded_outputs
 from coursebuild.pipeline.scripts import run as run_scripts
 from coursebuild.report.values import plural

@@ -19,8 +19,8 @@ from typing import Any
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.store import Store
-from coursebuild.core.files.errors import EffectError, UsageError, reason
+from coursebuild.api import EffectError, Store, UsageError
+from coursebuild.core.files.errors import reason
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.pages.marks import fence

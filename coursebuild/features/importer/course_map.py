@@ -16,7 +16,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from coursebuild.core.files.errors import UsageError
+from coursebuild.api import UsageError
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string

@@ -17,7 +17,7 @@ from mdit_py_plugins.admon import admon_plugin
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.files.errors import UsageError
+from coursebuild.api import UsageError
 from coursebuild.features.importer.source_files import Segment, read_yaml
 
 _COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")

@@ -18,7 +18,8 @@ from typing import Any, Literal
 import yaml
 from msgspec import Struct
 
-from coursebuild.core.files.errors import UsageError, reason
+from coursebuild.api import UsageError
+from coursebuild.core.files.errors import reason
 from coursebuild.core.values import DAMAGE
 
 

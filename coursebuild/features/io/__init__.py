@@ -8,14 +8,27 @@ from collections.abc import Iterable, Mapping
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter
-from coursebuild.core.model import FeatureBlock, Inline
-from coursebuild.core.pages.context import PageContext
-from coursebuild.core.syntax.fence import Fence, TextParser
+from coursebuild.api import (
+    Diagnostic,
+    Edit,
+    Excerpt,
+    Feature,
+    FeatureBlock,
+    Fence,
+    FenceKind,
+    Fix,
+    IndexReader,
+    Inline,
+    MarkdownWriter,
+    Note,
+    PageContext,
+    Parsed,
+    Span,
+    TextParser,
+    diagnose,
+)
 from coursebuild.core.syntax.spans import trim
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, Parsed, diagnose
 from coursebuild.core.text.near import nearest
-from coursebuild.core.text.source import Excerpt, Span
 
 LABELS = ("INPUT", "PROCESS", "OUTPUT")
 _LABEL = re.compile(r"\s*(INPUT|PROCESS|OUTPUT):")

@@ -7,15 +7,7 @@ Labs of formulas and equations, which need no engine, are read and tried in `equ
 
 from __future__ import annotations
 
-from coursebuild.core.features import (
-    Feature,
-    FenceKind,
-    ModelPart,
-    PagePart,
-    TrialContext,
-    TrialRun,
-    Trials,
-)
+from coursebuild.api import Feature, FenceKind, ModelPart, PagePart, TrialContext, TrialRun, Trials
 from coursebuild.features.lab import page
 from coursebuild.features.lab.compile import lab_trials, trial_inputs
 from coursebuild.features.lab.model import Lab

@@ -18,10 +18,8 @@ from typing import Any, Literal
 
 from msgspec import Struct, to_builtins
 
-from coursebuild.core.features import Trial
-from coursebuild.core.model import Course, find_blocks
+from coursebuild.api import Course, Inputs, Trial, find_blocks
 from coursebuild.core.run.child import LIMITS
-from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.script_environment import package_version
 from coursebuild.core.text.source import key_of
 from coursebuild.features.lab import schema

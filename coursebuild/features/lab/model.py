@@ -7,9 +7,9 @@ from typing import TypeAlias
 
 from msgspec.structs import replace
 
-from coursebuild.core.model import Block, FeatureBlock, Inline
+from coursebuild.api import Block, Excerpt, FeatureBlock, Inline, Span
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode
-from coursebuild.core.text.source import Excerpt, Span, key_of
+from coursebuild.core.text.source import key_of
 from coursebuild.features.lab.schema import SimLab, Verify
 
 SIMLAB = "simlab"

@@ -14,18 +14,23 @@ from markupsafe import Markup, escape
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.features import IndexReader, MarkdownWriter, Picture
-from coursebuild.core.model import (
+from coursebuild.api import (
     Course,
     Document,
     FeatureBlock,
+    IndexReader,
+    Library,
+    MarkdownWriter,
     MjcfModel,
-    ModelTarget,
+    PageContext,
+    Picture,
+    Place,
+    Renderer,
     find_blocks,
+    urls,
 )
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.library import BY_LAB, Library
+from coursebuild.core.model import ModelTarget
+from coursebuild.core.pages.library import BY_LAB
 from coursebuild.core.pages.marks import (
     code_span,
     escape_line,
@@ -35,9 +40,8 @@ from coursebuild.core.pages.marks import (
     picture,
     table,
 )
-from coursebuild.core.pages.renderer import Renderer, Strings
+from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.pages.typography import number
-from coursebuild.core.pages.urls import Place
 from coursebuild.core.text.quantities import with_unit
 from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab

@@ -12,13 +12,22 @@ from typing import Any
 
 from msgspec import Struct, ValidationError, convert
 
+from coursebuild.api import (
+    Excerpt,
+    Fence,
+    Parsed,
+    Prose,
+    Span,
+    TextParser,
+    decode,
+    diagnose,
+    parse_json,
+)
 from coursebuild.core.model.fields import Positive, RelativeTolerance
-from coursebuild.core.syntax.decode import decode
-from coursebuild.core.syntax.fence import Fence, Prose, TextParser, kind_of
-from coursebuild.core.syntax.json_text import parse_json, to_one_line
+from coursebuild.core.syntax.fence import kind_of
+from coursebuild.core.syntax.json_text import to_one_line
 from coursebuild.core.syntax.nodes import JSON, ObjectNode, StringNode
-from coursebuild.core.text.diagnostics import Parsed, diagnose, sort_diagnostics
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.diagnostics import sort_diagnostics
 from coursebuild.features.lab.equations.equation_lab import parse_equations
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab, values_in
 from coursebuild.features.lab.relations import check_lab

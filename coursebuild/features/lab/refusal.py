@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from coursebuild.api import Diagnostic, Excerpt, Source, Span, diagnose
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.run.mjcf import existing_files, read_tags
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.features.lab.model import Lab
 
 _NO_PLUGIN = "invalid plugin slot"

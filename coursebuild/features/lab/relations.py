@@ -11,8 +11,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
-from coursebuild.core.model import Course, Document, FeatureBlock, find_blocks
-from coursebuild.core.model.results import ModelFacts
+from coursebuild.api import (
+    Course,
+    Diagnostic,
+    Document,
+    FeatureBlock,
+    ModelFacts,
+    diagnose,
+    did_you_mean,
+    find_blocks,
+)
 from coursebuild.core.syntax.decode import check_unique, require_one_of
 from coursebuild.core.syntax.nodes import (
     ArrayNode,
@@ -22,7 +30,6 @@ from coursebuild.core.syntax.nodes import (
     StringNode,
     format_value,
 )
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.features.lab.model import BUILT_IN_KINDS, Lab
 from coursebuild.features.lab.schema import Button, Expect, Select, SimLab, Slider
 

@@ -15,8 +15,8 @@ import msgspec
 from markupsafe import Markup
 from msgspec import Meta, Struct
 
-from coursebuild.core.model.results import OutputFile, PublishedTrials, Results
-from coursebuild.core.pages.assets import Assets, hashed_name
+from coursebuild.api import Assets, OutputFile, PublishedTrials, Results
+from coursebuild.core.pages.assets import hashed_name
 from coursebuild.core.run.run_record import Moment
 from coursebuild.features.lab.model import ODE, PLOT, Entry
 

@@ -19,18 +19,26 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.features import Trial, TrialContext, TrialOutcome
+from coursebuild.api import (
+    Diagnostic,
+    Source,
+    Trial,
+    TrialContext,
+    TrialOutcome,
+    TrialResult,
+    diagnose,
+    did_you_mean,
+)
 from coursebuild.core.files.errors import AddressLimitError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Limits
-from coursebuild.core.model.results import TrialLine, TrialResult
+from coursebuild.core.model.results import TrialLine
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.mjcf import model_files, model_key
 from coursebuild.core.run.sandbox import Sandbox
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.core.text.source import Source, key_of
+from coursebuild.core.text.source import key_of
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab import verdict
 from coursebuild.features.lab.compile import (

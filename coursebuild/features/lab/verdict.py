@@ -9,10 +9,9 @@ from typing import Any
 from msgspec import Struct
 from tree_sitter import Node
 
+from coursebuild.api import Diagnostic, Excerpt, Fix, Span, diagnose, did_you_mean
 from coursebuild.core.checks.compiled import line_span
 from coursebuild.core.run.mjcf import error_line, readable_error
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
-from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.features.lab.compile import LabCode, pieces
 from coursebuild.features.lab.javascript import dotted_names, parse, text_of, walk
 from coursebuild.features.lab.model import MJCF, Entry, Lab

@@ -3,7 +3,7 @@
 It needs the package pygls, of the extra `lsp`.
 """
 
-from coursebuild.core.features import Command, Feature
+from coursebuild.api import Command, Feature
 
 FEATURE = Feature(
     name="language_server",

@@ -14,12 +14,19 @@ from collections.abc import Callable, Iterator
 from typing import TypeAlias
 from urllib.parse import urlsplit
 
-from coursebuild.core.features import Feature, PageCopy
-from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.context import PageContext, PageInputs, SiteContext
+from coursebuild.api import (
+    CachedFile,
+    Feature,
+    Library,
+    OutputFile,
+    PageContext,
+    PageCopy,
+    PageInputs,
+    SiteContext,
+    SiteFile,
+    urls,
+)
 from coursebuild.core.pages.document_inputs import LessonLink, LevelView
-from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.marks import code_span, escape_line, guard_lines, link
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.registry import has_copies

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from coursebuild.core.pages import marks
+from coursebuild.api import marks
 from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, parse_html
 
 _SKIPPED_ELEMENTS = frozenset(

@@ -14,9 +14,7 @@ from typing import Literal, TypeAlias, assert_never
 
 from markupsafe import Markup
 
-from coursebuild.core import model
-from coursebuild.core.pages import marks
-from coursebuild.core.pages.context import PageContext
+from coursebuild.api import PageContext, marks, model
 from coursebuild.core.pages.markup import escape, is_tight, raw_html
 from coursebuild.core.pages.page_writer import output_receipt, run_commands, script_receipt
 from coursebuild.core.registry import kind_of_block

@@ -10,14 +10,19 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from fnmatch import fnmatchcase
 
-from coursebuild.core.engine.store import Store
-from coursebuild.core.features import Feature
-from coursebuild.core.model import Course, Document
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library
-from coursebuild.core.run.script_environment import Interpreter
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
-from coursebuild.core.text.rules import Rule
+from coursebuild.api import (
+    Course,
+    Diagnostic,
+    Document,
+    Feature,
+    Interpreter,
+    Library,
+    Parsed,
+    Rule,
+    Store,
+    diagnose,
+    urls,
+)
 from coursebuild.features.names.claims import course_names, document_names, names_of
 from coursebuild.features.names.known_names import (
     EngineTable,

@@ -20,9 +20,8 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core import model
+from coursebuild.api import Span, model
 from coursebuild.core.pages.listings import python_nodes
-from coursebuild.core.text.source import Span
 
 Kind: TypeAlias = Literal[
     "word",

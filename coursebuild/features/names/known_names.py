@@ -22,14 +22,12 @@ import msgspec
 import msgspec.inspect as inspect
 from msgspec import Struct
 
-from coursebuild.core.engine.store import Store
-from coursebuild.core.files.errors import EffectError
+from coursebuild.api import EffectError, Interpreter, Store, did_you_mean
 from coursebuild.core.registry import CORE_COMMANDS, features
 from coursebuild.core.run import mjcf
 from coursebuild.core.run.child import JsonChild
-from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
+from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.core.syntax.course_schema import CourseFile
-from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.core.text.source import key_of
 from coursebuild.features.names import introspect
 
@@ -250,7 +248,7 @@ def options_by_command() -> dict[str, frozenset[str]]:
     """The commands of coursebuild and the options in their code, which is read and not run."""
     modules = {name: f"coursebuild.cli.{name}" for name in CORE_COMMANDS}
     modules |= {c.name: c.module for feature in features() for c in feature.commands}
-    common = {"--help", "--version", *_options(["coursebuild.cli.arguments"])}
+    common = {"--help", "--version", *_options(["coursebuild.pipeline.arguments"])}
     options = {name: frozenset((*common, *_options([m]))) for name, m in modules.items()}
     return {**options, "help": frozenset(common)}
 

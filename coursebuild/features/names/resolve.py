@@ -13,9 +13,10 @@ import functools
 import re
 
 from coursebuild import MANUAL
-from coursebuild.core.model import Course, Script, document_scripts
+from coursebuild.api import Course, did_you_mean, document_scripts
+from coursebuild.core.model import Script
 from coursebuild.core.model.addresses import line_anchor
-from coursebuild.core.text.diagnostics import did_you_mean, propose
+from coursebuild.core.text.diagnostics import propose
 from coursebuild.core.text.near import nearest
 from coursebuild.features.names import known_names
 from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, course_names

@@ -27,12 +27,19 @@ from urllib.parse import quote, urljoin, urlsplit
 
 import msgspec
 
-from coursebuild.core import model
-from coursebuild.core.engine.tool import step_key
-from coursebuild.core.features import Feature, PageCopy
-from coursebuild.core.model.results import CachedFile, Outcome
-from coursebuild.core.pages import urls, zips
-from coursebuild.core.pages.context import PageContext, PageInputs, SiteContext
+from coursebuild.api import (
+    CachedFile,
+    Feature,
+    Outcome,
+    PageContext,
+    PageCopy,
+    PageInputs,
+    SiteContext,
+    model,
+    step_key,
+    urls,
+)
+from coursebuild.core.pages import zips
 from coursebuild.core.pages.marks import code_span, escape_marks, hang, link
 from coursebuild.features.markdown import head
 from coursebuild.features.markdown.writer import DocumentWriter

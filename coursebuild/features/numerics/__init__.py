@@ -12,11 +12,9 @@ from operator import attrgetter
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import Command, Feature, PageKind
+from coursebuild.api import Command, Feature, Library, PageKind, urls
 from coursebuild.core.model.measurements import CaseReport, FigureLine, SceneReport
 from coursebuild.core.model.report_files import STABILITY
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids, scenario_view
 from coursebuild.features.bench.shown_errors import (

@@ -19,12 +19,11 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
+from coursebuild.api import Options, UsageError, urls
 from coursebuild.core.files.errors import require
 from coursebuild.core.model.measurements import CaseReport, ErrorLine, SceneReport
 from coursebuild.core.model.report_files import STABILITY, ReportFailure
 from coursebuild.core.model.scenarios import exact_file
-from coursebuild.core.pages import urls
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.near import nearest
 from coursebuild.features.bench.commands import bench
@@ -48,7 +47,7 @@ from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbenc
 from coursebuild.features.bench.shown_errors import seconds_text, status_text
 from coursebuild.features.numerics import case_view
 from coursebuild.features.numerics.cases import case_quantities, course_cases
-from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.pipeline.scenes import find_scenes, read_record
 from coursebuild.report.text import BOLD, Column, Style, table
 from coursebuild.report.values import json_text

@@ -13,14 +13,20 @@ import json
 import textwrap
 from collections.abc import Iterable, Iterator
 
+from coursebuild.api import (
+    Feature,
+    FileList,
+    OutputFile,
+    PageKind,
+    PagePart,
+    SiteContext,
+    step_key,
+    urls,
+)
 from coursebuild.core.drawing.contrast import GROUNDS_LIGHT
-from coursebuild.core.engine.tool import step_key
-from coursebuild.core.features import Feature, PageKind, PagePart
 from coursebuild.core.model.course import ThemeFile
-from coursebuild.core.model.results import FileFacts, FileList, OutputFile
-from coursebuild.core.pages import urls
+from coursebuild.core.model.results import FileFacts
 from coursebuild.core.pages.assets import hashed_name, page_script
-from coursebuild.core.pages.context import SiteContext
 from coursebuild.core.pages.renderer import direction
 from coursebuild.core.pages.theme import picture_size
 

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from coursebuild.core.features import Feature, PageKind, PagePart
-from coursebuild.core.model import Lesson
-from coursebuild.core.pages import urls
+from coursebuild.api import Feature, Lesson, Library, PageKind, PagePart, urls
 from coursebuild.core.pages.document_inputs import level_view
-from coursebuild.core.pages.library import Library
 
 _PROGRESS, _REVIEW = "progress/index.html", "review/index.html"
 STORAGE_PREFIX = "coursebuild.progress."

@@ -2,10 +2,7 @@
 
 from collections.abc import Iterator
 
-from coursebuild.core.features import Exporter, Feature
-from coursebuild.core.model.results import SiteFile
-from coursebuild.core.pages.context import ExportContext
-from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.api import Diagnostic, ExportContext, Exporter, Feature, SiteFile
 
 
 def export(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:

@@ -16,12 +16,21 @@ from urllib.parse import urlsplit
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.model import Block, Course, Inline, find_blocks
-from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.context import ExportContext, PageContext
+from coursebuild.api import (
+    Block,
+    CachedFile,
+    Course,
+    Diagnostic,
+    ExportContext,
+    Inline,
+    OutputFile,
+    PageContext,
+    SiteFile,
+    diagnose,
+    find_blocks,
+    urls,
+)
 from coursebuild.core.pages.html_xml import element, identifier, markup, render_xml
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.features.qti.flow import STRIKE_CLASS, Flow
 from coursebuild.features.quiz import model
 from coursebuild.features.quiz.page import letter, output_line, shuffle, unit_html

@@ -7,29 +7,28 @@ from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
 
-from coursebuild.core.features import Feature, FenceKind, PagePart
-from coursebuild.core.model import (
-    CodeBlock,
+from coursebuild.api import (
     Course,
-    Document,
-    Heading,
-    Mode,
-    Recording,
-    ThematicBreak,
-    document_scripts,
-    find_blocks,
-)
-from coursebuild.core.model.results import Mathml, Outcome, ScriptRun
-from coursebuild.core.scripts.lines import LineMatcher, MappedText, apply_filters
-from coursebuild.core.syntax.json_text import parse_json
-from coursebuild.core.text.diagnostics import (
     Diagnostic,
+    Document,
+    Excerpt,
+    Feature,
+    FenceKind,
+    Mathml,
     Note,
+    Outcome,
+    PagePart,
     Parsed,
+    Recording,
+    ScriptRun,
     diagnose,
     did_you_mean,
+    document_scripts,
+    find_blocks,
+    parse_json,
 )
-from coursebuild.core.text.source import Excerpt
+from coursebuild.core.model import CodeBlock, Heading, Mode, ThematicBreak
+from coursebuild.core.scripts.lines import LineMatcher, MappedText, apply_filters
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.relations import check_steps
 from coursebuild.features.quiz.model import ChoiceQuestion, Quiz

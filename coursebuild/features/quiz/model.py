@@ -8,8 +8,7 @@ from typing import TypeAlias
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.model import Block, FeatureBlock, Inline
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.api import Block, Excerpt, FeatureBlock, Inline, Span
 from coursebuild.features.lab.model import Lab
 
 

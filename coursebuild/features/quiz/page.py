@@ -16,10 +16,7 @@ from typing import assert_never
 
 from markupsafe import Markup, escape
 
-from coursebuild.core import model
-from coursebuild.core.features import IndexReader, MarkdownWriter
-from coursebuild.core.model.results import Outcome
-from coursebuild.core.pages.context import PageContext
+from coursebuild.api import IndexReader, MarkdownWriter, Outcome, PageContext, model
 from coursebuild.core.pages.marks import escape_marks, fence, hang
 from coursebuild.features.quiz import model as quizzes
 

@@ -16,12 +16,23 @@ from typing import assert_never
 
 from msgspec.structs import replace
 
-from coursebuild.core.syntax.decode import Decoding, check_unique, decode, has_value
-from coursebuild.core.syntax.fence import Fence, Prose, TextParser
-from coursebuild.core.syntax.json_text import parse_json, to_one_line
+from coursebuild.api import (
+    Diagnostic,
+    Excerpt,
+    Fence,
+    Parsed,
+    Prose,
+    Span,
+    TextParser,
+    decode,
+    diagnose,
+    parse_json,
+)
+from coursebuild.core.syntax.decode import Decoding, check_unique, has_value
+from coursebuild.core.syntax.json_text import to_one_line
 from coursebuild.core.syntax.nodes import JSON, Node, ObjectNode, StringNode
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, sort_diagnostics
-from coursebuild.core.text.source import Excerpt, Span, key_of, unique_name
+from coursebuild.core.text.diagnostics import sort_diagnostics
+from coursebuild.core.text.source import key_of, unique_name
 from coursebuild.core.text.units import check_unit
 from coursebuild.features.lab.parse import sim_lab
 from coursebuild.features.lab.relations import check_lab

@@ -13,14 +13,22 @@ from urllib.parse import quote
 from markupsafe import Markup, escape
 from msgspec import Struct
 
-from coursebuild.core.features import Feature, PageKind
-from coursebuild.core.model import Citation, CitedWork, Course, Document, Owner, find_inlines
-from coursebuild.core.pages import urls
-from coursebuild.core.pages.context import Citations, CitedEntry
+from coursebuild.api import (
+    Citations,
+    Course,
+    Diagnostic,
+    Document,
+    Feature,
+    Library,
+    PageKind,
+    Rule,
+    diagnose,
+    did_you_mean,
+    urls,
+)
+from coursebuild.core.model import Citation, CitedWork, Owner, find_inlines
+from coursebuild.core.pages.context import CitedEntry
 from coursebuild.core.pages.document_inputs import OwnerLinks, owner_links
-from coursebuild.core.pages.library import Library
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
-from coursebuild.core.text.rules import Rule
 from coursebuild.features.references.bibtex import Work, check_identifier, read_works
 from coursebuild.features.references.csl import FormattedWorks, StyleFailure, format_works
 

@@ -13,8 +13,7 @@ import re
 
 from msgspec import Struct
 
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
-from coursebuild.core.text.source import Source, Span
+from coursebuild.api import Diagnostic, Note, Parsed, Source, Span, diagnose
 
 NAMES = ("author", "editor", "translator")
 _KEY = re.compile(r"@\s*\w+\s*[{(]\s*([^,\s{}()]*)")

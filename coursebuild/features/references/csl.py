@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 from markupsafe import Markup, escape
 from msgspec import Struct
 
-from coursebuild.core.text.source import Source
+from coursebuild.api import Source
 from coursebuild.features.references.bibtex import Work, read_works
 
 _STYLE = Path(__file__).with_name("style.csl")

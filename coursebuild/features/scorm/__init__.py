@@ -11,12 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from coursebuild.core.features import Exporter, Feature
-from coursebuild.core.model import Lesson
-from coursebuild.core.model.results import OutputFile, SiteFile
-from coursebuild.core.pages import urls
+from coursebuild.api import ExportContext, Exporter, Feature, Lesson, OutputFile, SiteFile, urls
 from coursebuild.core.pages.assets import page_script
-from coursebuild.core.pages.context import ExportContext
 from coursebuild.core.pages.frame import policy
 from coursebuild.core.pages.html_xml import identifier, render_xml
 from coursebuild.core.pages.renderer import direction

@@ -21,9 +21,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
-from coursebuild.core.features import Feature, PageKind, PagePart
-from coursebuild.core.model.results import CachedFile
-from coursebuild.core.pages.context import NotedPage, SiteContext
+from coursebuild.api import CachedFile, Feature, PageKind, PagePart, SiteContext
+from coursebuild.core.pages.context import NotedPage
 from coursebuild.features.search.page import LEAD_ONLY, as_json, note_page, script, text_and_terms
 from coursebuild.features.search.words import is_fuzzy, shelf_of
 

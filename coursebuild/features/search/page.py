@@ -15,10 +15,9 @@ from typing import Literal, TypeAlias, assert_never
 
 from msgspec import Struct
 
-from coursebuild.core import model
-from coursebuild.core.model import Document
+from coursebuild.api import Document, PageContext, PageInputs, model
 from coursebuild.core.model.inlines import CodeSpan
-from coursebuild.core.pages.context import DocumentInputs, HighlightedFile, PageContext, PageInputs
+from coursebuild.core.pages.context import DocumentInputs, HighlightedFile
 from coursebuild.core.pages.document_inputs import LessonLink
 from coursebuild.core.pages.html_xml import HtmlContent, parse_html
 from coursebuild.core.registry import kind_of_block

@@ -22,15 +22,23 @@ from markupsafe import Markup
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from coursebuild.core import model
-from coursebuild.core.features import Feature, PageKind
-from coursebuild.core.model import Lesson, Owner
-from coursebuild.core.model.results import Mathml
-from coursebuild.core.pages import document_inputs, urls
+from coursebuild.api import (
+    Diagnostic,
+    Feature,
+    Lesson,
+    Library,
+    Mathml,
+    Note,
+    PageKind,
+    Parsed,
+    diagnose,
+    model,
+    urls,
+)
+from coursebuild.core.model import Owner
+from coursebuild.core.pages import document_inputs
 from coursebuild.core.pages.document_inputs import OwnerLink, OwnerLinks
-from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.numbering import UNNAMED, fill_in, name_outside
-from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 
 Element = ElementTree.Element
 

@@ -7,10 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from coursebuild.core.features import Feature
-from coursebuild.core.model import Course, Document
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
-from coursebuild.core.text.rules import Rule
+from coursebuild.api import Course, Diagnostic, Document, Feature, Parsed, Rule, diagnose
 from coursebuild.features.truth.claims import (
     Claims,
     check_sources,

@@ -31,11 +31,9 @@ from operator import itemgetter
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core import model
+from coursebuild.api import Diagnostic, Excerpt, Fix, Span, diagnose, did_you_mean, model
 from coursebuild.core.registry import kind_of_block
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import Number, point_decimals, scan_prose
-from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import UNIT_PATTERN, find_unit
 from coursebuild.features.arithmetic.evaluate import FormulaComparison, measure, read_numeral
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood

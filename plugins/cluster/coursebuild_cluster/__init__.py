@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from coursebuild.core.features import ExecutorKind, Feature
+from coursebuild.api import ExecutorKind, Feature
 
 CLUSTER = ExecutorKind(
     option="--cluster",

@@ -23,15 +23,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
-from coursebuild.core.engine.lifetime import end_with_parent
-from coursebuild.core.engine.store import Store
-from coursebuild.core.files.course_root import DECISIVE
-from coursebuild.core.files.errors import EffectError
-from coursebuild.core.model.results import ScriptJob
-from coursebuild.core.run.dependencies import dependencies_of
-from coursebuild.core.run.run_store import States
-from coursebuild.core.run.sandbox import find_sandbox
-from coursebuild.core.run.script_server import ScriptServer
+from coursebuild.api import (
+    DECISIVE,
+    EffectError,
+    ScriptJob,
+    ScriptServer,
+    States,
+    Store,
+    dependencies_of,
+    end_with_parent,
+    find_sandbox,
+)
 from coursebuild_cluster.course_copy import BlobStore, CourseFolder
 from coursebuild_cluster.messages import Answer, Request, Work, pack, unpack
 

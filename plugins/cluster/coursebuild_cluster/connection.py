@@ -10,8 +10,7 @@ import logging
 from contextlib import ExitStack
 from typing import Any
 
-from coursebuild.core.files.errors import EffectError
-from coursebuild.core.files.locks import temporary_folder
+from coursebuild.api import EffectError, temporary_folder
 from coursebuild_cluster import worker
 
 LOCAL = "local"

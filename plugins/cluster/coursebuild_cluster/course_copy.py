@@ -18,8 +18,7 @@ from pathlib import Path, PurePosixPath
 
 from msgspec import Struct
 
-from coursebuild.core.engine.digests import file_state
-from coursebuild.core.files.course_root import is_dropping
+from coursebuild.api import is_dropping
 from coursebuild_cluster.messages import Piece, pack, unpack
 
 _NOT_COPIED = ("node_modules", "public")
@@ -77,7 +76,7 @@ class CourseReader:
                         if not Path(entry.path, "pyvenv.cfg").exists():
                             folders.append(path)
                             pending.append(f"{path}/")
-                    elif entry.is_file() and len(digest := file_state(entry.path)) == 64:
+                    elif entry.is_file() and (digest := _digest(entry.path)):
                         is_program = bool(entry.stat().st_mode & 0o100)
                         files.append(CopiedFile(path, digest, is_program))
         self.copy = pack(CourseCopy(self.root.name, tuple(folders), tuple(files)))
@@ -240,6 +239,15 @@ class CourseFolder:
             return
         shutil.copyfile(self._blobs.path(file.digest), target)
         target.chmod(0o755 if file.is_program else 0o644)
+
+
+def _digest(path: str) -> str:
+    """The SHA-256 of a file; empty for one that cannot be read."""
+    try:
+        with Path(path).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return ""
 
 
 def _state(status: os.stat_result) -> tuple[int, ...]:

@@ -26,20 +26,18 @@ from typing import Any
 
 from msgspec import Struct
 
-from coursebuild.core.engine.store import Store
-from coursebuild.core.files.course_root import DECISIVE
-from coursebuild.core.files.errors import EffectError
-from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.run_store import States
-from coursebuild.core.run.sandbox import find_sandbox
-from coursebuild.core.run.script_environment import Interpreter
-from coursebuild.core.run.script_server import (
-    Claim,
-    OnFinish,
-    OnStart,
+from coursebuild.api import (
+    DECISIVE,
+    EffectError,
+    Interpreter,
     RunAll,
     RunStoppedError,
+    ScriptJob,
+    ScriptRun,
     ScriptServer,
+    States,
+    Store,
+    find_sandbox,
 )
 from coursebuild_cluster import worker
 from coursebuild_cluster.connection import connect
@@ -153,11 +151,11 @@ class Cluster:
         jobs: Sequence[ScriptJob],
         *,
         parallel: int,
-        on_start: OnStart = lambda path: None,
-        on_finish: OnFinish = lambda run: None,
+        on_start: Callable[[str], object] = lambda path: None,
+        on_finish: Callable[[ScriptRun], object] = lambda run: None,
         interpreter: Interpreter | None = None,
         is_unwanted: Callable[[frozenset[str]], bool] | None = None,
-        claim: Claim = lambda job: True,
+        claim: Callable[[ScriptJob], ScriptRun | bool] = lambda job: True,
     ) -> tuple[ScriptRun, ...]:
         """See `ScriptServer.run`; `parallel` counts only for what runs here."""
         if interpreter is not None:

@@ -12,8 +12,7 @@ from typing import TypeVar
 import msgspec
 from msgspec import Struct
 
-from coursebuild.core.model.results import ScriptJob, ScriptRun
-from coursebuild.core.run.dependencies import Dependency
+from coursebuild.api import Dependency, ScriptJob, ScriptRun
 
 Message = TypeVar("Message")
 
@@ -60,7 +59,7 @@ class Answer(Struct, frozen=True):
     dependencies: tuple[Dependency, ...] = ()
     """What the run looked at, in the state that it has on the worker."""
     places: tuple[tuple[str, str], ...] = ()
-    """The worker's folders by name, as in `coursebuild.core.run.script_environment.places`."""
+    """The worker's folders by name, as in `States.places`."""
     written: tuple[tuple[str, bytes], ...] = ()
     """Files of the course that the script has written where it may."""
     result: bytes = b""

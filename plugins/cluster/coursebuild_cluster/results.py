@@ -13,11 +13,15 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from coursebuild.core.files.errors import EffectError
-from coursebuild.core.files.write import resolve_inside
-from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
-from coursebuild.core.run.dependencies import Dependency, Kind
-from coursebuild.core.run.run_store import States
+from coursebuild.api import (
+    Dependency,
+    EffectError,
+    Outcome,
+    ScriptJob,
+    ScriptRun,
+    States,
+    resolve_inside,
+)
 from coursebuild_cluster.messages import Answer
 
 _MISSING_MODULE = re.compile(r"^(?:\w+\.)*(?:ModuleNotFound|Import)Error\b", re.MULTILINE)
@@ -53,7 +57,7 @@ def would_differ(answer: Answer, states: States) -> bool:
 
 def _state_here(dependency: Dependency, states: States) -> str:
     # The path of a folder is another one on a worker, and is replaced where it was printed.
-    return dependency.state if dependency.kind is Kind.PLACE else states.now(dependency.need)
+    return dependency.state if dependency.kind.value == "place" else states.now(dependency.need)
 
 
 def _replacer(

@@ -15,10 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from coursebuild import __version__
-from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.run import gate
-from coursebuild.core.run.script_environment import conditions, engine_version, package_version
+from coursebuild.api import deciding_versions, gate
 from coursebuild_cluster.child import frame_message, read_message
 from coursebuild_cluster.course_copy import BlobStore
 from coursebuild_cluster.messages import Answer, Piece, WorkerFacts, pack, unpack
@@ -38,13 +35,7 @@ def dask_setup(worker: Any) -> None:
 
 def describe() -> bytes:
     """What must be the same on a worker and where the command is given."""
-    versions = {
-        "coursebuild": f"{__version__}, code {code_digest('coursebuild', 'mjcourse')[:12]}",
-        **{name: value for name, value in conditions({}) if not name.startswith("the fixed")},
-        "MuJoCo": engine_version(),
-        "NumPy": package_version("numpy"),
-    }
-    return pack(WorkerFacts(versions))
+    return pack(WorkerFacts(deciding_versions()))
 
 
 def missing(digests: bytes, dask_worker: Any) -> bytes:

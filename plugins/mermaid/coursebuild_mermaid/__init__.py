@@ -12,13 +12,20 @@ from pathlib import Path
 import mmdr
 from markupsafe import Markup
 
-from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter
-from coursebuild.core.model import FeatureBlock
-from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.marks import fence as code_block
-from coursebuild.core.syntax.fence import Fence, TextParser
-from coursebuild.core.text.diagnostics import Parsed, diagnose
-from coursebuild.core.text.rules import Rule
+from coursebuild.api import (
+    Feature,
+    FeatureBlock,
+    Fence,
+    FenceKind,
+    IndexReader,
+    MarkdownWriter,
+    PageContext,
+    Parsed,
+    Rule,
+    TextParser,
+    diagnose,
+    marks,
+)
 
 SIZE = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
 
@@ -66,7 +73,7 @@ def draw(page: PageContext, block: Diagram) -> Markup:
 
 def markdown(writer: MarkdownWriter, block: Diagram) -> str:
     """Return the text itself, which many readers of Markdown draw."""
-    return code_block("mermaid", block.text)
+    return marks.fence("mermaid", block.text)
 
 
 def index(reader: IndexReader, block: Diagram) -> None:

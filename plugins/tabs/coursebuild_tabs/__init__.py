@@ -12,13 +12,23 @@ from pathlib import Path
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter, PagePart
-from coursebuild.core.model import Block, FeatureBlock
-from coursebuild.core.pages.context import PageContext
-from coursebuild.core.syntax.fence import Fence, TextParser
-from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
-from coursebuild.core.text.rules import Rule
-from coursebuild.core.text.source import Span
+from coursebuild.api import (
+    Block,
+    Diagnostic,
+    Feature,
+    FeatureBlock,
+    Fence,
+    FenceKind,
+    IndexReader,
+    MarkdownWriter,
+    PageContext,
+    PagePart,
+    Parsed,
+    Rule,
+    Span,
+    TextParser,
+    diagnose,
+)
 
 TITLE = re.compile(r"===[ \t]+(?P<title>\S.*?)[ \t]*$", re.MULTILINE)
 """A line that begins a tab."""

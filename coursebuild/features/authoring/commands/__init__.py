@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from coursebuild.cli.output import CLEAN, write
-from coursebuild.core.files.errors import UsageError
+from coursebuild.api import CLEAN, UsageError, write
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.pipeline.options import Progress
 

@@ -15,20 +15,18 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.cli.arguments import style_of
-from coursebuild.cli.output import CLEAN, FAILURE, write
+from coursebuild.api import CLEAN, FAILURE, EffectError, UsageError, gate, write
 from coursebuild.core.engine.store import SIZE
 from coursebuild.core.files.course_root import find_course_root
-from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import try_lock
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.files.trust import FOLDER, find_store, store_key
-from coursebuild.core.run import gate
 from coursebuild.core.run.environments import find_environment, prepare_environment
 from coursebuild.core.run.sandbox import examine_sandbox
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import LAB_ENGINE
+from coursebuild.pipeline.arguments import style_of
 from coursebuild.pipeline.options import Progress
 from coursebuild.report.text import GREEN, RED, YELLOW, visible
 from coursebuild.report.values import plural

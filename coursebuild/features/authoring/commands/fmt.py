@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import argparse
 
-from coursebuild.cli.arguments import add_lessons, options_of
-from coursebuild.cli.output import CLEAN, FAILURE, fail, write
+from coursebuild.api import CLEAN, FAILURE, Lesson, Source, load_course, options_of, write
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import FileChange
-from coursebuild.core.model import Lesson
-from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.format import format_document
-from coursebuild.pipeline.load import load_course
+from coursebuild.output import fail
+from coursebuild.pipeline.arguments import add_lessons
 from coursebuild.pipeline.options import select
 from coursebuild.pipeline.outputs import changed_text
 from coursebuild.report.text import location

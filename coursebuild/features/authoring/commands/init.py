@@ -11,13 +11,13 @@ from importlib.metadata import requires
 from pathlib import Path
 
 from coursebuild import __version__
-from coursebuild.cli.output import CLEAN, USAGE, fail, write
-from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.api import CLEAN, EffectError, gate, write
+from coursebuild.core.files.errors import reason
 from coursebuild.core.files.resources import locked_requirements
 from coursebuild.core.files.write import FileChange, change_files, undo_changes
-from coursebuild.core.run import gate
 from coursebuild.core.run.script_environment import package_version
 from coursebuild.core.syntax.course_schema import json_schema
+from coursebuild.output import USAGE, fail
 from coursebuild.pipeline.options import Progress, check_path
 from coursebuild.report.values import plural
 

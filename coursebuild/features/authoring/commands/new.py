@@ -11,14 +11,11 @@ from pathlib import Path
 
 from jinja2 import Environment
 
-from coursebuild.cli.arguments import options_of
-from coursebuild.cli.output import CLEAN, write
-from coursebuild.core.files.errors import UsageError
+from coursebuild.api import CLEAN, UsageError, did_you_mean, load_course, options_of, write
 from coursebuild.core.files.write import FileChange
 from coursebuild.core.model.course import TEMPLATES
 from coursebuild.core.registry import CORE_FENCES, features, fence_names
 from coursebuild.core.syntax.course_schema import slug_of
-from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import (
     next_lesson_ids,
@@ -28,7 +25,6 @@ from coursebuild.features.authoring.course_map import (
     with_level,
     with_page,
 )
-from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.theme_files import template_copies
 
 EXAMPLES = """\

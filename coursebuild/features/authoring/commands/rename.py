@@ -7,24 +7,28 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import options_of
-from coursebuild.cli.output import FAILURE, fail
+from coursebuild.api import (
+    FAILURE,
+    Edit,
+    Lesson,
+    Source,
+    UsageError,
+    did_you_mean,
+    load_course,
+    options_of,
+)
 from coursebuild.core.files.course_root import FOLDERS
-from coursebuild.core.files.errors import UsageError
 from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.files.write import FileChange
-from coursebuild.core.model import Lesson
 from coursebuild.core.model.lesson_record import record_path
 from coursebuild.core.scripts.edit import apply_edits
-from coursebuild.core.text.diagnostics import Edit, did_you_mean
-from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import (
     doubtful_places,
     rename_references,
     with_lesson_renamed,
 )
-from coursebuild.pipeline.load import load_course
+from coursebuild.output import fail
 from coursebuild.pipeline.options import documents_by_name
 from coursebuild.report.text import location, visible
 from coursebuild.report.values import plural

@@ -18,12 +18,11 @@ import msgspec
 from msgspec import Raw
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
+from coursebuild.api import Diagnostic, Options
 from coursebuild.core.files.errors import require
 from coursebuild.core.model.measurements import ScenarioReport, SceneReport
 from coursebuild.core.model.report_files import BENCH, ReportFailure
 from coursebuild.core.model.scenarios import DeclaredSweep, keyframe_scenarios
-from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.bench.commands.engines import run_engines
 from coursebuild.features.bench.commands.measurement import (
     Departure,
@@ -46,7 +45,7 @@ from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbenc
 from coursebuild.features.bench.grids import Grid, machine_text, power
 from coursebuild.features.bench.scenario_view import scenario_view
 from coursebuild.features.bench.shown_errors import is_idle
-from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.pipeline.scenes import CourseScene, find_scenes, read_record
 from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 

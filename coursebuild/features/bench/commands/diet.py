@@ -21,14 +21,12 @@ import msgspec
 from msgspec import Raw, Struct
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
-from coursebuild.core.engine.store import Store
-from coursebuild.core.files.errors import EffectError, require
+from coursebuild.api import Diagnostic, EffectError, Options, Store
+from coursebuild.core.files.errors import require
 from coursebuild.core.files.read import read_course
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model.diet_findings import PROVED_LABEL, DietReport, Finding, Saving
 from coursebuild.core.model.report_files import DIET, ReportFailure
-from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.values import decode, encode
 from coursebuild.features.bench.commands.diet_model import DietModel, Reruns
 from coursebuild.features.bench.commands.measurement import (
@@ -42,8 +40,8 @@ from coursebuild.features.bench.commands.measurement import (
     write_records,
 )
 from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
+from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.pipeline.load import load, package_files
-from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 from coursebuild.report.values import plural

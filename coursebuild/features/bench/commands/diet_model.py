@@ -20,19 +20,24 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.api import (
+    Course,
+    EffectError,
+    FeatureBlock,
+    Options,
+    Source,
+    Store,
+    find_blocks,
+    temporary_folder,
+)
 from coursebuild.core.checks.compiled import mjcf_texts
-from coursebuild.core.engine.store import Store
-from coursebuild.core.files.errors import EffectError
-from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.files.read import CourseFiles, read_bytes
-from coursebuild.core.model import Course, FeatureBlock, find_blocks
 from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.run.mjcf import TEXT_PATH, model_files
 from coursebuild.core.scripts.extract import extract
-from coursebuild.core.text.source import Source
 from coursebuild.features.lab.model import Lab
 from coursebuild.pipeline.load import load, package_files
-from coursebuild.pipeline.options import Options, Progress
+from coursebuild.pipeline.options import Progress
 from coursebuild.pipeline.scenes import CourseScene
 from coursebuild.pipeline.verify import verify
 

@@ -9,7 +9,7 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.files.errors import UsageError
+from coursebuild.api import Options, UsageError
 from coursebuild.core.model.measurements import EngineReport
 from coursebuild.core.model.report_files import ENGINES
 from coursebuild.features.bench.commands.measurement import (
@@ -27,7 +27,6 @@ from coursebuild.features.bench.commands.measurement import (
 from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
 from coursebuild.features.bench.grids import machine_text
 from coursebuild.features.bench.scenario_view import engine_view
-from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.report.text import BOLD, YELLOW, Style, visible
 

@@ -16,21 +16,30 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import options_of, style_of
-from coursebuild.cli.output import CLEAN, FAILURE, write
+from coursebuild.api import (
+    CLEAN,
+    FAILURE,
+    Diagnostic,
+    EffectError,
+    Executor,
+    Options,
+    UsageError,
+    options_of,
+    resolve_inside,
+    write,
+)
 from coursebuild.core.engine.tool import code_digest
-from coursebuild.core.features import Executor
 from coursebuild.core.files.course_root import read_regular
-from coursebuild.core.files.errors import EffectError, reason
+from coursebuild.core.files.errors import reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.resources import template_texts
-from coursebuild.core.files.write import resolve_inside, write_atomic
+from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model.report_files import ReportFailure, ReportKind
 from coursebuild.core.model.results import Machine
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.pages.renderer import Strings
-from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
+from coursebuild.core.text.diagnostics import sort_diagnostics
 from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.features.bench.commands.measuring import (
     Facts,
@@ -39,7 +48,7 @@ from coursebuild.features.bench.commands.measuring import (
     diagnostic_of,
 )
 from coursebuild.features.bench.grids import Grid
-from coursebuild.pipeline.options import Options, UsageError
+from coursebuild.pipeline.arguments import style_of
 from coursebuild.pipeline.scenes import CourseScene
 from coursebuild.report.text import (
     BOLD,

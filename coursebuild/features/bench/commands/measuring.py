@@ -17,14 +17,21 @@ from typing import IO, Literal, Self
 import msgspec
 from msgspec import Raw, Struct
 
-from coursebuild.core.files.errors import EffectError, require
-from coursebuild.core.model.results import Machine, Outcome, ScriptJob
+from coursebuild.api import (
+    Diagnostic,
+    EffectError,
+    Outcome,
+    ScriptJob,
+    ScriptServer,
+    Source,
+    Span,
+    diagnose,
+    gate,
+)
+from coursebuild.core.files.errors import require
+from coursebuild.core.model.results import Machine
 from coursebuild.core.model.scenarios import exact_file
-from coursebuild.core.run import gate
 from coursebuild.core.run.mjcf import existing_files
-from coursebuild.core.run.script_server import ScriptServer
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.source import Source, Span
 from coursebuild.pipeline.scenes import CourseScene
 
 _SECONDS = 20.0

@@ -12,10 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from coursebuild.core.files.errors import EffectError
+from coursebuild.api import EffectError, Source
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.v8 import Heartbeat, Isolate, LimitError, ScriptError, V8Engine
-from coursebuild.core.text.source import Source
 from coursebuild.features.lab.compile import LabCode, compile_lab
 from coursebuild.features.lab.engines.native import (
     TRIAL,

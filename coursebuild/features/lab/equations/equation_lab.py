@@ -15,9 +15,19 @@ from typing import Any
 
 from msgspec import Struct, convert, to_builtins
 
-from coursebuild.core.syntax.decode import decode
-from coursebuild.core.syntax.fence import Prose, TextParser
-from coursebuild.core.syntax.json_text import parse_json
+from coursebuild.api import (
+    Diagnostic,
+    Excerpt,
+    Parsed,
+    Prose,
+    Span,
+    TextParser,
+    decode,
+    diagnose,
+    did_you_mean,
+    parse_json,
+    parse_toml,
+)
 from coursebuild.core.syntax.nodes import (
     JSON,
     TOML,
@@ -27,15 +37,7 @@ from coursebuild.core.syntax.nodes import (
     ObjectNode,
     StringNode,
 )
-from coursebuild.core.syntax.toml_text import parse_toml
-from coursebuild.core.text.diagnostics import (
-    Diagnostic,
-    Parsed,
-    diagnose,
-    did_you_mean,
-    sort_diagnostics,
-)
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.diagnostics import sort_diagnostics
 from coursebuild.core.text.units import check_unit
 from coursebuild.features.lab import relations, schema
 from coursebuild.features.lab.compile import control_data

@@ -17,10 +17,9 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
+from coursebuild.api import Course, Diagnostic, Recording, diagnose, did_you_mean, find_blocks
 from coursebuild.core.files.errors import require
-from coursebuild.core.model import Course, Recording, find_blocks
 from coursebuild.core.run.v8 import LimitError, ScriptError, V8Engine
-from coursebuild.core.text.diagnostics import Diagnostic, diagnose, did_you_mean
 from coursebuild.features.lab.engines.native import EQUATION_TRIAL, asset_path
 from coursebuild.features.lab.equations import reference
 from coursebuild.features.lab.model import PLOT, Entry, Lab

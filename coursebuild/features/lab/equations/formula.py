@@ -15,8 +15,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias, TypeVar
 
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Parsed, diagnose, did_you_mean
-from coursebuild.core.text.source import Excerpt
+from coursebuild.api import Diagnostic, Excerpt, Fix, Parsed, diagnose, did_you_mean
 
 Program: TypeAlias = list[float | str | list[int]]
 T = TypeVar("T")

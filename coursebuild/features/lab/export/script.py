@@ -21,8 +21,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from msgspec import Struct
 
-from coursebuild.core.features import Trial, TrialContext
-from coursebuild.core.model import Lesson
+from coursebuild.api import Lesson, Trial, TrialContext
 from coursebuild.core.text.source import unique_name
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.engines.native import (

@@ -14,14 +14,13 @@ from functools import lru_cache
 from lsprotocol import types
 from msgspec.structs import replace
 
+from coursebuild.api import Diagnostic, Edit, Note, Source, Span
 from coursebuild.core.model import CodeSpan, NumberBinding, Text, document_inlines
 from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.findings import output_findings
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
 from coursebuild.core.text.numbers import scan_prose
 from coursebuild.core.text.rules import Severity, rule_address
-from coursebuild.core.text.source import Source, Span
 from coursebuild.features.language_server.commands.texts import OpenTexts, Places
 from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.fix import choose_fixes, ways

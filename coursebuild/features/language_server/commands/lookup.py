@@ -14,12 +14,12 @@ from urllib.parse import unquote
 from lsprotocol import types
 from msgspec import Struct
 
-from coursebuild.core import model
+from coursebuild.api import Library, ModelFacts, Source, Span, model
 from coursebuild.core.checks.links import anchors
 from coursebuild.core.model import Owner
-from coursebuild.core.model.results import Formula, ModelFacts
+from coursebuild.core.model.results import Formula
 from coursebuild.core.model.walk import display_formulas
-from coursebuild.core.pages.library import Library, models_named
+from coursebuild.core.pages.library import models_named
 from coursebuild.core.pages.marks import code_span, escape_text, fence
 from coursebuild.core.pages.numbering import (
     item_name,
@@ -31,7 +31,6 @@ from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
-from coursebuild.core.text.source import Source, Span
 from coursebuild.features.glossary import definition_of
 from coursebuild.features.language_server.commands.texts import OpenTexts, field_place
 from coursebuild.features.names.claims import document_names

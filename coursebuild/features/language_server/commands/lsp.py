@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
 from msgspec.structs import replace
 
-from coursebuild.cli.arguments import add_cache, options_of
-from coursebuild.cli.output import CLEAN
+from coursebuild.api import CLEAN, options_of
 from coursebuild.core.files.errors import require
+from coursebuild.pipeline.arguments import add_cache
 from coursebuild.pipeline.options import Progress
 from coursebuild.preview.live_course import LiveCourse
 from coursebuild.report import Style

@@ -20,17 +20,13 @@ from msgspec import Struct
 from msgspec.structs import replace
 from pygls.exceptions import JsonRpcInvalidParams
 
-from coursebuild.core import model
+from coursebuild.api import Edit, Library, Source, Span, UsageError, model
 from coursebuild.core.checks.links import anchors
-from coursebuild.core.files.errors import UsageError
 from coursebuild.core.model.lesson_record import record_path
-from coursebuild.core.pages.library import Library
 from coursebuild.core.registry import CORE_FENCES, fence_names
 from coursebuild.core.syntax.attributes import collapse_spaces, term_id
 from coursebuild.core.syntax.decode import field_description
-from coursebuild.core.text.diagnostics import Edit
 from coursebuild.core.text.rules import RULES
-from coursebuild.core.text.source import Source, Span
 from coursebuild.features.authoring.course_map import rename_references, with_lesson_renamed
 from coursebuild.features.language_server.commands.lookup import label_titles, look_up, members
 from coursebuild.features.language_server.commands.texts import (

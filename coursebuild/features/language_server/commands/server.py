@@ -18,15 +18,8 @@ from lsprotocol import types
 from pygls.lsp.server import LanguageServer
 
 from coursebuild import __version__
-from coursebuild.core.model import (
-    Document,
-    Heading,
-    Lesson,
-    Paragraph,
-    document_blocks,
-    plain_text,
-)
-from coursebuild.core.text.source import Source, Span
+from coursebuild.api import Document, Lesson, Source, Span, document_blocks
+from coursebuild.core.model import Heading, Paragraph, plain_text
 from coursebuild.features.authoring.format import format_document
 from coursebuild.features.language_server.commands.diagnosis import (
     actions,

@@ -21,16 +21,14 @@ from lsprotocol import types
 from msgspec import Struct
 from pygls import uris
 
+from coursebuild.api import Document, Edit, Lesson, Library, Source, Span
 from coursebuild.core.files.course_root import MAP
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.write import FileChange
-from coursebuild.core.model import Document, Lesson, Owner
+from coursebuild.core.model import Owner
 from coursebuild.core.model.course import Words
-from coursebuild.core.pages.library import Library
 from coursebuild.core.syntax.course_schema import schema_roots
 from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.text.diagnostics import Edit
-from coursebuild.core.text.source import Source, Span
 from coursebuild.preview.session import Session
 
 _UNITS = {"utf-8": ("utf-8", 1), "utf-16": ("utf-16-le", 2), "utf-32": ("utf-32-le", 4)}

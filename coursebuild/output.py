@@ -6,6 +6,7 @@ import os
 import sys
 
 CLEAN, FAILURE, USAGE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
+"""Exit status of commands: nothing is wrong, something in the course is, or the usage."""
 
 
 def fail(status: int, message: str, help: str = "") -> int:

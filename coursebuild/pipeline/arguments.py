@@ -6,20 +6,18 @@ import argparse
 import importlib
 import os
 import sys
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TextIO
 
 from msgspec.structs import replace
 
-from coursebuild.cli.output import CLEAN, FAILURE, terminal_style, write
-from coursebuild.cli.unchanged import Watcher, identify_command
 from coursebuild.core.engine.store import Store
-from coursebuild.core.registry import installed_features, package_paths
+from coursebuild.core.registry import installed_features
 from coursebuild.core.run.sandbox import find_sandbox
+from coursebuild.output import CLEAN, FAILURE, terminal_style, write
 from coursebuild.pipeline.options import Options, Progress, find_course, open_store
-from coursebuild.report import Report, Style, render_report, unchanged_report
+from coursebuild.report import Report, Style, render_report
 
 
 def options_of(arguments: argparse.Namespace) -> Options:
@@ -150,22 +148,3 @@ def report_text(report: Report, form: str, options: Options) -> str:
 def style_of(stream: TextIO | None) -> Style:
     """The style of text on a stream."""
     return Style(*terminal_style(is_terminal=stream is not None and stream.isatty()))
-
-
-def run_unless_unchanged(
-    arguments: argparse.Namespace, outputs: tuple[str, ...], work: Callable[[Options], Report]
-) -> int:
-    """Do the work; if it succeeds, the same command has nothing to do while nothing changes.
-
-    `outputs` are the folders that the command writes.
-    """
-    options = options_of(arguments)
-    command = identify_command(arguments.words)
-    watcher = None if command is None else Watcher(str(options.root), command)
-    report = work(options)
-    status = print_report(report, "text", options)
-    if watcher is not None and report.ok and report.depends is not None:
-        remark = f"nothing has changed since the last {arguments.words[0]}"
-        output = report_text(unchanged_report(report, remark), "text", options)
-        watcher.keep(output, (*report.depends, *package_paths()), outputs)
-    return status
