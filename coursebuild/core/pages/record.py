@@ -140,7 +140,7 @@ def hoist_styles(html: str) -> tuple[str, frozenset[str]]:
     return "".join(parts), frozenset(declarations)
 
 
-@functools.lru_cache(maxsize=512)
+@functools.lru_cache(maxsize=2048)
 def _hoist_all(html: str) -> tuple[str, frozenset[str]]:
     """The same, wherever they stand; kept for formulas, which pages repeat."""
     declarations: set[str] = set()
