@@ -269,8 +269,7 @@ class Reader:
             if not formula_diagnostics:  # a formula that took too long may not do so again
                 self._store.put(_SUMMARIES, text.key, summary.to_bytes())
             with contextlib.suppress(*_UNPACKABLE):
-                bare = replace(whole, document=replace(whole.document))  # without what was computed
-                data = pickle.dumps(bare, pickle.HIGHEST_PROTOCOL)
+                data = pickle.dumps(whole, pickle.HIGHEST_PROTOCOL)
                 self._undrawn_documents[text.source.path] = text.key, data
             return summary
 
