@@ -20,9 +20,8 @@ from coursebuild.core.model import (
     Document,
     HtmlBlock,
     RawInline,
-    block_inlines,
     document_blocks,
-    walk_inlines,
+    document_inlines,
 )
 from coursebuild.core.model.course import Words
 from coursebuild.core.model.results import Reports, Results
@@ -172,10 +171,8 @@ _WITHOUT_PLACES: dict[type, Callable[[Any], object]] = {
 def document_fingerprint(document: Document) -> str:
     """The fingerprint of a document's summary, without what features note of it."""
     # Links are looked for in raw HTML, too, whose span alone has the text.
-    blocks = tuple(document_blocks(document))
-    inlines = (inline for block in blocks for inline in walk_inlines(block_inlines(block)))
-    html = [node.span.text for node in blocks if isinstance(node, HtmlBlock)]
-    html += [node.span.text for node in inlines if isinstance(node, RawInline)]
+    html = [node.span.text for node in document_blocks(document) if isinstance(node, HtmlBlock)]
+    html += [n.span.text for n in document_inlines(document) if isinstance(n, RawInline)]
     return fingerprint(
         (document.blocks, document.footnotes, document.numbered_items, html), _WITHOUT_PLACES
     )

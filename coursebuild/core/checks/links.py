@@ -74,10 +74,10 @@ def check_links(
     """Report each link, mention or image of a document that leads nowhere."""
     checker = _Checker(course, document, targets)
     recorded_spans = {figure.span for figure in recorded_figures(document)}
-    for block in model.document_blocks(document):
+    for block, inlines in model.inlines_by_block(document):
         if isinstance(block, model.HtmlBlock):
             yield from checker.check_html(block)
-        for inline in model.walk_inlines(model.block_inlines(block)):
+        for inline in inlines:
             if isinstance(inline, model.Link):
                 target = model.resolve(inline.target, course, document.source.path)
                 diagnostics = [*checker.check_target(inline.target_span, target)]

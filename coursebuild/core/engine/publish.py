@@ -285,17 +285,20 @@ class _NewSite:
         return False
 
     def _write(self, slot: Path, file: SiteFile) -> ManifestEntry:
-        target = f"{slot}/{file.path}"
-        Path(target).unlink(missing_ok=True)  # half a file, if a copy died
-        digest = _write_file(target, file.make())
+        target, data = f"{slot}/{file.path}", file.make()
+        try:
+            _write_file(target, data)
+        except FileExistsError:  # half a file, if a copy died
+            Path(target).unlink()
+            _write_file(target, data)
+        digest = hashlib.sha256(data).hexdigest()
         return ManifestEntry.of(self.keys[file.path], digest, os.lstat(target))
 
 
-def _write_file(path: str, data: bytes) -> str:
+def _write_file(path: str, data: bytes) -> None:
     with open(path, "xb") as file:  # noqa: PTH123 - thousands of them
         file.write(data)
         os.fchmod(file.fileno(), 0o644)  # whatever the umask is
-    return hashlib.sha256(data).hexdigest()
 
 
 def open_slot(root: Path, slot: Path) -> None:

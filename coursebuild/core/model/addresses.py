@@ -86,7 +86,7 @@ def document_anchors(document: blocks.Document) -> Iterator[tuple[str, AnchorOwn
             (label.id, label, block.span) for block, label in walk.labelled_blocks(document)
         )
     numbers = walk.output_numbers(document)
-    for block in walk.document_blocks(document):
+    for block, inlines in walk.inlines_by_block(document):
         if isinstance(block, blocks.Heading):
             yield block.anchor, block, block.span
         elif isinstance(block, blocks.FeatureBlock):
@@ -97,7 +97,7 @@ def document_anchors(document: blocks.Document) -> Iterator[tuple[str, AnchorOwn
             yield output_anchor(block.script, numbers[block.span.start]), block, block.span
         elif isinstance(block, blocks.HtmlBlock):
             yield from ((id, block, block.span) for id in html_ids(block.html))
-        for inline in walk.walk_inlines(walk.block_inlines(block)):
+        for inline in inlines:
             if isinstance(inline, RawInline):
                 yield from ((id, inline, inline.span) for id in html_ids(inline.html))
             elif isinstance(inline, Term):

@@ -212,41 +212,47 @@ def _with_empty_line(code: Excerpt) -> Excerpt:
 
 def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
     """Every inline in order, a container before its content."""
+    found: list[Inline] = []
+    _collect(inlines, found)
+    return iter(found)
+
+
+def _collect(inlines: Iterable[Inline], found: list[Inline]) -> None:
     for inline in inlines:
-        yield inline
+        found.append(inline)
         if isinstance(inline, _INLINE_CONTAINERS):
-            yield from walk_inlines(inline.children)
+            _collect(inline.children, found)
         elif isinstance(inline, Math) and inline.value is not None:
-            yield inline.value
+            found.append(inline.value)
 
 
-def block_formulas(block: Block) -> Iterator[Math | MathBlock]:
-    """The formulas of a block; not those of blocks inside it."""
-    if isinstance(block, MathBlock):
-        yield block
-    for inline in walk_inlines(block_inlines(block)):
-        if isinstance(inline, Math):
-            yield inline
+def inlines_by_block(document: Document) -> tuple[tuple[Block, tuple[Inline, ...]], ...]:
+    """Every block of a document, its footnotes last, with every inline outside its child blocks."""
+
+    def walk() -> tuple[tuple[Block, tuple[Inline, ...]], ...]:
+        blocks = document_blocks(document)
+        return tuple((block, tuple(walk_inlines(block_inlines(block)))) for block in blocks)
+
+    return computed_once(document, "inlines_by_block", walk)
 
 
 def find_formulas(document: Document) -> tuple[tuple[Block, Math | MathBlock], ...]:
     """The formulas of a document, each after the block that it is in."""
 
-    def walk() -> tuple[tuple[Block, Math | MathBlock], ...]:
-        blocks = document_blocks(document)
-        return tuple((block, formula) for block in blocks for formula in block_formulas(block))
+    def walk() -> Iterator[tuple[Block, Math | MathBlock]]:
+        for block, inlines in inlines_by_block(document):
+            if isinstance(block, MathBlock):
+                yield block, block
+            for inline in inlines:
+                if isinstance(inline, Math):
+                    yield block, inline
 
-    return computed_once(document, "formulas", walk)
+    return computed_once(document, "formulas", lambda: tuple(walk()))
 
 
 def document_inlines(document: Document) -> Iterator[Inline]:
     """Every inline of a document."""
-
-    def walk() -> tuple[Inline, ...]:
-        groups = (block_inlines(block) for block in document_blocks(document))
-        return tuple(inline for group in groups for inline in walk_inlines(group))
-
-    return iter(computed_once(document, "all_inlines", walk))
+    return (inline for _, inlines in inlines_by_block(document) for inline in inlines)
 
 
 def find_inlines(document: Document, kind: type[AnyInline]) -> Iterator[AnyInline]:
@@ -266,27 +272,28 @@ def without_prose(document: Document) -> Document:
     """
     recorded_ids: set[int] = set()
     blocks: list[Block] = []
-    for block in document_blocks(document):
+    for block, all_inlines in inlines_by_block(document):
         if id(block) in recorded_ids:  # a recorded table comes with its recording
             continue
+        inlines = _summary_inlines(all_inlines)
         match block:
             case Paragraph() if block.figure:
-                blocks.append(replace(block, children=_summary_inlines(block)))
+                blocks.append(replace(block, children=inlines))
             case Paragraph() | HtmlFlow() | Table():
-                blocks += _paragraph_of(block.span, _summary_inlines(block))
+                blocks += _paragraph_of(block.span, inlines)
             case Heading():
-                blocks.append(replace(block, children=_summary_inlines(block)))
+                blocks.append(replace(block, children=inlines))
             case Script() | ScriptPart() | Mjcf() | HtmlBlock():
                 blocks.append(block)
             case Recording():
                 recorded_ids.add(id(block.body))
-                blocks.append(replace(block, caption=_summary_inlines(block)))
+                blocks.append(replace(block, caption=inlines))
             case FeatureBlock():
                 bare = block.summary()
                 blocks += [] if bare is None else [bare]
-                blocks += _paragraph_of(block.span, _summary_inlines(block))
+                blocks += _paragraph_of(block.span, inlines)
             case Callout():
-                blocks.append(replace(block, title=_summary_inlines(block), blocks=()))
+                blocks.append(replace(block, title=inlines, blocks=()))
             case PlainCode():
                 blocks += [] if block.source is None else [block]
             case BlockQuote() | ListBlock() | CodeBlock() | ThematicBreak() | MathBlock():
@@ -303,10 +310,10 @@ def _paragraph_of(span: Span, inlines: tuple[Inline, ...]) -> Iterator[Paragraph
         yield Paragraph(span, inlines)
 
 
-def _summary_inlines(block: Block) -> tuple[Inline, ...]:
+def _summary_inlines(inlines: Iterable[Inline]) -> tuple[Inline, ...]:
     return tuple(
         replace(inline, children=()) if isinstance(inline, Link | Term) else inline
-        for inline in walk_inlines(block_inlines(block))
+        for inline in inlines
         if type(inline) in _SUMMARY_INLINES
     )
 

@@ -140,7 +140,7 @@ def hoist_styles(html: str) -> tuple[str, frozenset[str]]:
     return "".join(parts), frozenset(declarations)
 
 
-@functools.lru_cache(maxsize=512)
+@functools.lru_cache(maxsize=2048)
 def _hoist_all(html: str) -> tuple[str, frozenset[str]]:
     """The same, wherever they stand; kept for formulas, which pages repeat."""
     declarations: set[str] = set()
@@ -197,13 +197,18 @@ _FOREIGN = re.compile(r"[^\x00-\x7f]")
 def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:
     """The characters outside ASCII of a page's text and of its formulas; see `PageFacts`."""
     parts = FORMULA.split(html)
-    text, mathematics = _characters(parts[::2]), _characters(parts[1::2])
-    return text, mathematics | {" "} if len(parts) > 1 else mathematics
+    formulas = {" "} if len(parts) > 1 else set[str]()
+    return _characters("\n".join(parts[::2])), formulas.union(*map(_of_formula, parts[1::2]))
 
 
-def _characters(parts: Iterable[str]) -> frozenset[str]:
-    """The characters outside ASCII of the text of pieces of HTML."""
-    html = ">" + "\n".join(parts)
+@functools.lru_cache(maxsize=2048)
+def _of_formula(html: str) -> frozenset[str]:
+    return _characters(html)
+
+
+def _characters(html: str) -> frozenset[str]:
+    """The characters outside ASCII of the text of HTML."""
+    html = ">" + html
     texts = _TEXT.findall(html)
     texts.append(html.rpartition(">")[2])  # with a tag that nothing ends
     return frozenset(_FOREIGN.findall(unescape("\n".join(texts))))

@@ -37,10 +37,10 @@ LONG = 20
 WIDE = 22
 """Characters; a shorter piece fits into the narrowest window."""
 
-FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
+FORMULA = re.compile(r"(<math\b(?:[^<]++|<(?!/math>))*+</math>)")
 """A formula of any kind; splitting a page by it gives texts and formulas in turn."""
 
-_CACHE_SIZE = 256
+_CACHE_SIZE = 2048
 
 _ROW = re.compile(r"<(/?)mrow\b[^>]*>")
 _WHOLE = re.compile(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)

@@ -144,6 +144,11 @@ References: TypeAlias = dict[str, dict[str, Any]]
 
 def block_tokens(base: Excerpt, references: References) -> list[PositionedToken]:
     """The block tokens of a text with LF and no NUL, whose link definitions join `references`."""
+    text = base.text
+    if text[:1].isalpha() and "\n" not in text:  # as most texts of quizzes and labs
+        opening = PositionedToken("paragraph_open", "p", 1, end=len(text), start=0, text=base)
+        inline = PositionedToken("inline", "", 0, content=text)
+        return [opening, inline, PositionedToken("paragraph_close", "p", -1)]
     state = BlockState(base, _MARKDOWN, {"references": references})
     state.lines_left = _MAX_READINGS * state.lineMax + _SPARE_LINES
     _MARKDOWN.block.tokenize(state, 0, state.lineMax)
@@ -204,11 +209,27 @@ _WITH_TEXT = frozenset("fence code_block html_block paragraph_open math_block".s
 """Types of tokens whose content is the text that the last rule cut out."""
 
 
-def _with_places(rule: BlockRule) -> BlockRule:
+_FIRST_SIGNS = {
+    "math": "$",
+    "footnote": "[",
+    "fence": "`~",
+    "blockquote": ">",
+    "hr": "*-_",
+    "list": "*+-0123456789",
+    "reference": "[",
+    "html_block": "<",
+    "heading": "#",
+}
+"""The characters with which the blocks of some rules begin: no other line is tried."""
+
+
+def _with_places(rule: BlockRule, first_signs: str) -> BlockRule:
 
     def run(state: StateBlock, start: int, end: int, silent: bool) -> bool:
         assert isinstance(state, BlockState)
         begin = state.bMarks[start] + state.tShift[start]
+        if first_signs and state.src[begin : begin + 1] not in first_signs:
+            return False
         token_count = len(state.tokens)
         applies = rule(state, start, end, silent)
         if applies and len(state.tokens) > token_count:
@@ -257,4 +278,5 @@ _RULES: dict[str, tuple[BlockRule, list[str]]] = {
 """Our rules and those of markdown-it, each with the blocks that it may interrupt."""
 _MARKDOWN.block.ruler = Ruler()
 for _name, (_rule, _alt) in _RULES.items():
-    _MARKDOWN.block.ruler.push(_name, _with_places(_rule), {"alt": _alt})
+    _placed_rule = _with_places(_rule, _FIRST_SIGNS.get(_name, ""))
+    _MARKDOWN.block.ruler.push(_name, _placed_rule, {"alt": _alt})

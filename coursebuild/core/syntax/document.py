@@ -142,6 +142,9 @@ def _unclaimed_blocks(
             yield block
 
 
+_FORMULAS = (model.Math, model.MathBlock)
+
+
 def _check_placement(document: model.Document) -> Iterator[Diagnostic]:
     """Report terms and labels in places where no link could lead to them.
 
@@ -151,18 +154,19 @@ def _check_placement(document: model.Document) -> Iterator[Diagnostic]:
     if not any(mark in document.source.text for mark in ("]{", "{#eq:")):
         return
     elsewhere = feature_block_ids(document)
-    for block in model.document_blocks(document):
+    for block, inlines in model.inlines_by_block(document):
         is_elsewhere = id(block) in elsewhere
         if is_elsewhere or not isinstance(block, model.Paragraph):
             message = "a term cannot be defined here"
             help = "define it in a paragraph of the text, whose sentence the glossary can show"
-            for inline in model.walk_inlines(model.block_inlines(block)):
+            for inline in inlines:
                 if isinstance(inline, model.Term):
                     yield diagnose("term-place", inline.span, message, help=help)
         if is_elsewhere or isinstance(block, model.Heading):
             message = "a formula has no label here"
             help = "label formulas of the text, but not those of quizzes, labs and headings"
-            for formula in model.block_formulas(block):
+            formulas = (part for part in (block, *inlines) if isinstance(part, _FORMULAS))
+            for formula in formulas:
                 if formula.label is not None:
                     yield diagnose("label-attribute", formula.label.span, message, help=help)
 

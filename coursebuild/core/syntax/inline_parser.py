@@ -27,6 +27,8 @@ MAX_RUN = 200
 
 def inline_tokens(src: str, env: EnvType, *, html: bool = False) -> list[PositionedToken]:
     """The inline tokens of a block; in `html` only tags, entities and formulas are read."""
+    if src and not (_HTML_STOP if html else _STOP).search(src):
+        return [PositionedToken("text", "", 0, content=src, start=0, end=len(src))]
     parser = _HTML if html else _MARKDOWN
     return cast(list[PositionedToken], parser.inline.parse(src, parser, env, []))
 

@@ -122,7 +122,7 @@ def has_plain_comma(tex: str) -> bool:
     return _PLAIN_COMMA.search(tex) is not None
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=2048)
 def read_statements(tex: str, comma: bool = False) -> tuple[Statement, ...]:
     """Return the statements of a formula; none if it is too long."""
     if len(tex) > _MAX_LENGTH:

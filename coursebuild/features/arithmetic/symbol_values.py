@@ -15,7 +15,7 @@ all formulas with these values.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from fractions import Fraction
 
 from msgspec import Struct
@@ -248,14 +248,9 @@ def _read_places(document: model.Document) -> Iterator[_Place]:
             else (block.span,)
         )
     )
-    for block in blocks:
-        inlines = tuple(model.walk_inlines(model.block_inlines(block)))
-        formulas: Iterable[_Formula] = [i for i in inlines if isinstance(i, model.Math)]
-        texts = {i.span.start: i.text for i in inlines if isinstance(i, model.Text)}
-        if isinstance(block, model.MathBlock):
-            formulas = (block,)
-        for formula in formulas:
-            start = formula.tex.span().start
-            level = bisect_right(headings, start), *(s for s, end in parts if s <= start < end)
-            unit = unit_behind(texts.get(formula.span.end, "")).text
-            yield _Place(formula, level, unit, document.comma)
+    texts = {i.span.start: i.text for i in model.find_inlines(document, model.Text)}
+    for _, formula in model.find_formulas(document):
+        start = formula.tex.span().start
+        level = bisect_right(headings, start), *(s for s, end in parts if s <= start < end)
+        text = texts.get(formula.span.end, "") if isinstance(formula, model.Math) else ""
+        yield _Place(formula, level, unit_behind(text).text, document.comma)

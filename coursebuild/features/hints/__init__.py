@@ -12,7 +12,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator
+from bisect import bisect_right
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from operator import itemgetter
 
 from coursebuild.api import (
     Course,
@@ -89,7 +91,8 @@ def unread_marks(document: Document) -> Iterator[Diagnostic]:
                 text = text.replace("|", _OTHER)
             mark = find_mark(text) if _MARKS.search(text) else None
             if mark is not None:
-                span = document.source.span(places[mark.start()], places[mark.end() - 1] + 1)
+                start, end = (_find_place(places, at) for at in (mark.start(), mark.end() - 1))
+                span = document.source.span(start, end + 1)
                 message = f"`{mark[0]}` would be shown as written"
                 help = "close what it begins; or write a backslash before it, or code in backticks"
                 yield diagnose("shown-as-written", span, message, help=help)
@@ -99,20 +102,25 @@ def _hide(match: re.Match[str]) -> str:
     return _ESCAPED.get(match[0], _OTHER) + _OTHER * (len(match[0]) - 1)
 
 
-def _source_text(inlines: Iterable[model.Inline]) -> tuple[str, list[int]]:
-    """The texts of a paragraph as they are written, and where each character stands."""
-    text, places = "", list[int]()
+def _find_place(places: Sequence[tuple[int, int]], at: int) -> int:
+    start, place = places[bisect_right(places, at, key=itemgetter(0)) - 1]
+    return place + at - start
+
+
+def _source_text(inlines: Iterable[model.Inline]) -> tuple[str, list[tuple[int, int]]]:
+    """The texts of a paragraph as they are written, and where each begins there and in its file."""
+    text, places = "", list[tuple[int, int]]()
     for inline in model.walk_inlines(inlines):
         match inline:
             case model.Text():
+                places.append((len(text), inline.span.start))
                 text += _HIDDEN.sub(_hide, inline.span.text)
-                places += range(inline.span.start, inline.span.end)
             case model.Emphasis() | model.Strong() | model.Strikethrough() | model.Term():
                 pass
             case _:
                 is_line_end = isinstance(inline, model.SoftBreak | model.HardBreak)
+                places.append((len(text), inline.span.start))
                 text += "\n" if is_line_end else _OTHER
-                places.append(inline.span.start)
     return text, places
 
 

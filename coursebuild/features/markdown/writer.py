@@ -29,8 +29,6 @@ _SPACED_BLOCKS = (
 _Room: TypeAlias = Literal["block", "line", "cell"]
 """What inlines may fill: lines of their own, a single line, or a cell of a table."""
 _LAST_MARKS = re.compile(r"(^|\s)(#+)$")
-_ALWAYS_ESCAPED = re.compile(r"[$`]")
-"""Marks that other readers of Markdown may understand where ours reads text."""
 _PIPE = re.compile(r"(?<!\\)\|")
 _COMMENT = re.compile(r"(?<!\\)%")
 _MINUS = re.compile(r"(?<!\w)-(?=\d)")
@@ -368,7 +366,8 @@ def _text(node: model.Text, room: _Room) -> str:
         if text[-1:].isspace() and not source[-1:].isspace():
             text = f"{text[:-1]}&#{ord(text[-1])};"
         return text.replace("\n", "&#10;")
-    source = _ALWAYS_ESCAPED.sub(lambda match: f"\\{match[0]}", source)
+    for mark in "$`":  # which other readers of Markdown may understand where ours reads text
+        source = source.replace(mark, f"\\{mark}")
     return _escape_pipes(source, room)
 
 

@@ -130,7 +130,7 @@ def document_names(document: model.Document) -> DocumentNames | None:
     for script in model.document_scripts(document):
         _read_script(script, names)
     inner: set[int] = set()
-    for block in model.document_blocks(document):
+    for block, inlines in model.inlines_by_block(document):
         if isinstance(block, model.FeatureBlock):
             inner |= {id(part) for part in model.walk_blocks(block.child_blocks())}
         # A heading, an option of a quiz and a title may stand in a link or a button.
@@ -141,7 +141,7 @@ def document_names(document: model.Document) -> DocumentNames | None:
                 text = re.sub(r"(?<!`)`[^`\n]+`(?!`)", "", text)
             words.update(_CODE_WORD.findall(text))
         link_parts: set[int] = set()
-        for inline in model.walk_inlines(model.block_inlines(block)):
+        for inline in inlines:
             path = ""
             if isinstance(inline, model.Link):
                 link_parts |= {id(child) for child in model.walk_inlines(inline.children)}

@@ -267,6 +267,9 @@ def _formulas(
 ) -> Iterator[tuple[_Formula, tuple[str, str], tuple[model.Target, ...]]]:
     """Yield all formulas, with the heading above and what it refers to; footnotes have none."""
     targets: list[model.Target] = []
+    formulas: dict[int, list[_Formula]] = {}
+    for block, formula in model.find_formulas(document):
+        formulas.setdefault(id(block), []).append(formula)
 
     def reference(target: model.Target) -> str:
         targets.append(target)
@@ -280,7 +283,7 @@ def _formulas(
                 targets.clear()
                 text = model.plain_text(model.without_links(block.children, reference))
                 section = block.anchor, " ".join(text.split())
-            for formula in model.block_formulas(block):
+            for formula in formulas.get(id(block), ()):
                 yield formula, section, tuple(targets)
 
 
