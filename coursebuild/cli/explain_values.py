@@ -18,7 +18,7 @@ from coursebuild.core.scripts.bound_places import bound_values, find_texts
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.provenance import describe_line
+from coursebuild.core.scripts.printed_text import describe_line
 from coursebuild.core.scripts.table_cells import table_rows
 from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.source import Span
@@ -61,12 +61,7 @@ def value_origins(root: Path, course: Course, path: str, line: int) -> tuple[Val
         at = addresses.get(value, ())
         bound = find_texts(binding, outputs, at)
         places = [place for texts in bound.groups for place in bound.look_up(texts)]
-        recorded = (p.window.line.locate for p in places)
-        spans = [
-            locate(place.window.numbers[0].start, place.window.numbers[-1].end)
-            for place, locate in zip(places, recorded, strict=True)
-            if locate is not None
-        ]
+        spans = [place.span for place in places if place.span is not None]
         texts = tuple(f"number {a.place + 1} of {describe_line(a)}" for a in at)
         origin = ValueOrigin(binding.text, value.script, texts, tuple(map(location, spans)))
         origins.append((binding.span, origin))

@@ -34,7 +34,7 @@ from coursebuild.core.scripts.extract import extract as extract_course
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, recording_key
-from coursebuild.core.scripts.provenance import PrintedText
+from coursebuild.core.scripts.printed_text import PrintedText
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.check import judge

@@ -43,7 +43,7 @@ from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.figures import figure_difference, prepare_figure
 from coursebuild.core.scripts.findings import find_instability
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.provenance import PrintedText
+from coursebuild.core.scripts.printed_text import PrintedText
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.check import judge

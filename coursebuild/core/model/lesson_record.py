@@ -15,6 +15,7 @@ text. Nothing is known of what has no line; a line that cannot be read counts fo
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
 
@@ -174,6 +175,16 @@ class LessonRecord(Struct, frozen=True):
         """How something of a script was recorded that has this hash now."""
         of_script = (r for r in self.recordings if r.of.startswith(f"{script} "))
         return next((r for r in of_script if r.digest == digest), None)
+
+
+def shown_values(texts: Iterable[tuple[str, str, str, str]]) -> Iterator[ShownValue]:
+    """Values from their path, script, words before and text, in the order of the lesson."""
+    values = list(texts)
+    counts, earlier = Counter(values), Counter[tuple[str, str, str, str]]()
+    for value in values:
+        path, script, before, text = value
+        yield ShownValue(script, before, text, earlier[value], counts[value], path)
+        earlier[value] += 1
 
 
 def known_addresses(records: Mapping[str, LessonRecord]) -> Addresses:

@@ -24,23 +24,20 @@ from coursebuild.core.model.lesson_record import Address, Addresses
 from coursebuild.core.model.results import Change, DriftKind, Outcome, Verdict
 from coursebuild.core.scripts.bound_numbers import (
     BoundText,
-    PrintedLine,
-    Window,
-    printed_lines,
     shows,
     text_places,
 )
 from coursebuild.core.scripts.bound_places import (
     BoundNumber,
-    PrintedPlace,
     bound_values,
     document_bindings,
     find_texts,
     following_text,
+    place_note,
 )
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body, recording_key
-from coursebuild.core.scripts.provenance import describe_line
+from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, describe_line
 from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean
 from coursebuild.core.text.near import nearest
@@ -141,17 +138,15 @@ def _check(
         if next(text_places(bound.text.before, lines), None) is not None:
             return None, ()
     places = bound.places() if bound.text.numbers else []
-    if len(places) > 1:
-        return _ambiguous(bound, places), places
     if places:
-        place = places[0]
-        mismatch = _wrong_unit(binding, bound.text, path, [place.window], place.text.lines)
-        return mismatch, [] if mismatch else places
+        mismatch = _wrong_unit(binding, bound.text, path, places[:1])
+        if mismatch is not None:
+            return mismatch, ()
+        quantities = {place.quantity(binding.words) for place in places} - {None}
+        return _ambiguous(bound, places) if len(quantities) > 1 else None, places
     steady = [v for v in verdicts if v.comparison.mode is not model.Mode.VOLATILE]
     varying = [v.recording for v in verdicts if v not in steady or v.comparison.volatile]
-    if varying and (
-        not steady or bound.text.is_in([line for r in varying for line in printed_lines(r)])
-    ):
+    if varying and (not steady or bound.text.is_in(map(PrintedText.of_recording, varying))):
         message = f"`{binding.text}` is bound to an output that differs from run to run"
         help = "remove `{out}`, or narrow `volatile` so that this number is compared"
         return diagnose("binding-volatile", binding.text_span, message, help=help), ()
@@ -162,9 +157,7 @@ def _ambiguous(bound: BoundNumber, places: Sequence[PrintedPlace]) -> Diagnostic
     """The diagnostic of a binding that may be any of several printed numbers."""
     binding = bound.binding
     message = f"`{bound.path}` printed `{binding.text}` at {len(places)} places"
-    if binding.words:
-        message = f"`{bound.path}` printed `{binding.words}` before {len(places)} numbers"
-    notes = [place.note(binding) for place in places[:_MAX_NOTES]]
+    notes = [place_note(binding, place, places) for place in places[:_MAX_NOTES]]
     if len(places) > _MAX_NOTES:
         notes.append(Note(f"and {len(places) - _MAX_NOTES} more"))
     return diagnose("output-ambiguous", binding.text_span, message, help=_CHOOSE, notes=notes)
@@ -178,11 +171,10 @@ def _wrong_unit(
     binding: model.NumberBinding,
     bound_text: BoundText,
     path: str,
-    windows: Iterable[Window],
-    lines: Sequence[PrintedLine],
+    places: Iterable[PrintedPlace],
 ) -> Diagnostic | None:
     """The diagnostic of a number whose unit is another than is printed with it at any place."""
-    mismatch = bound_text.wrong_unit(windows, lines, following_text(binding))
+    mismatch = bound_text.wrong_unit(places, following_text(binding))
     if mismatch is None:
         return None
     number, printed_text, unit_text = mismatch
@@ -201,7 +193,7 @@ def unprinted_unit(binding: model.NumberBinding, outputs: PrintedOutputs) -> str
     shown_units = bound.text.units(following_text(binding))
     if not any(shown_units) or not bound.text.numbers:
         return ""
-    printed_units = [place.window.units(place.text.lines) for place in bound.places()]
+    printed_units = [place.units for place in bound.places()]
     for at, unit in enumerate(shown_units):
         if unit and printed_units and not any(units[at] for units in printed_units):
             return unit.text
@@ -232,17 +224,17 @@ def dependent_bindings(
 ) -> tuple[DependentBinding, ...]:
     """The bindings of the course, in order, that depend on a changed value of a recording."""
     changes = [c for c in verdict.changes if c.kind is not DriftKind.EXTRA]
-    key, lines = recording_key(verdict.recording), outputs.text(verdict).lines
+    key, output = recording_key(verdict.recording), outputs.text(verdict)
     dependents: list[DependentBinding] = []
     for binding in (b for document in documents for b in document_bindings(document)):
         if any(
             recording_key(candidate.recording) == key for candidate in outputs.of_binding(binding)
         ):
             bound_text = BoundText.of(binding.text, binding.comma)
-            places = text_places(bound_text.before, lines)
+            places = text_places(bound_text.before, output.lines)
             if bound_text.numbers:
-                windows = filter(bound_text.shows, bound_text.windows(lines))
-                places = ((w.line, n.start, n.end) for w in windows for n in w.numbers)
+                shown_places = bound_text.shown_places([output])
+                places = ((p.line, n.start, n.end) for p in shown_places for n in p.numbers)
             located = (line.locate(a, b) for line, a, b in places if line.locate is not None)
             spans = [(span.start, span.end) for span in located]
             overlap = (c for a, b in spans for c in changes if a < c.span.end and c.span.start < b)
@@ -257,7 +249,7 @@ _QUOTIENT = Context(prec=34)
 def _mismatch(bound: BoundNumber) -> Diagnostic:
     """The diagnostic of a binding that none of its outputs bears out."""
     binding, path, bound_text = bound.binding, bound.path, bound.text
-    lines = [line for text in bound.groups[-1] for line in text.lines]
+    outputs = bound.groups[-1]
     pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", binding.text)
     with_point = BoundText.of(pointed)
     bare, stray, label = replace(bound_text, before="", after=""), bound_text.stray, ""
@@ -268,16 +260,16 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
         help = "write it as it is printed, or remove `{out}`"
     elif bound.addresses or binding.words:
         return _address_mismatch(bound, message)
-    elif stray and bare.is_in(lines):
+    elif stray and bare.is_in(outputs):
         message = f"`{path}` printed no `{stray}` beside the number in `{binding.text}`"
         help = Fix(f"remove the `{stray}`", "", stray)
-    elif mismatch := _wrong_unit(binding, bare, path, bare.shown_windows(lines), lines):
+    elif mismatch := _wrong_unit(binding, bare, path, bare.shown_places(outputs)):
         return mismatch
-    elif pointed != binding.text and with_point.numbers and with_point.is_in(lines):
+    elif pointed != binding.text and with_point.numbers and with_point.is_in(outputs):
         message = f"`{binding.text}` has a comma where outputs have a decimal point"
         help = Fix(f"write `{pointed}`", pointed)
     else:
-        label, help = _nearest(bound_text, lines), ""
+        label, help = _nearest(bound_text, outputs), ""
     return diagnose(
         "binding-mismatch", binding.text_span, message, label=label, help=help, notes=notes
     )
@@ -287,18 +279,19 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
     """The diagnostic of a binding at whose address stands another number now, or none."""
     binding, text = bound.binding, bound.text
     places_now = next(filter(None, map(bound.look_up, bound.groups)), [])
-    if len({text.rewrite(place.window) for place in places_now}) > 1:
+    if len({text.rewrite(place) for place in places_now}) > 1:
         message = f"the places that showed `{binding.text}` have different numbers now"
         if binding.words:
             message = f"`{bound.path}` printed `{binding.words}` before {len(places_now)} numbers"
-        notes, help = [place.note(binding) for place in places_now[:_MAX_NOTES]], _CHOOSE
+        notes = [place_note(binding, p, places_now) for p in places_now[:_MAX_NOTES]]
+        help = _CHOOSE
         return diagnose("binding-mismatch", binding.text_span, message, help=help, notes=notes)
     if places_now:
-        line, better = places_now[0].window.line, text.rewrite(places_now[0].window)
-        if better and not BoundText.of(better, text.comma).is_in(places_now[0].text.lines):
+        place, better = places_now[0], text.rewrite(places_now[0])
+        if better and not BoundText.of(better, text.comma).is_in([place.output]):
             better = ""  # other numbers have its words or unit
         are = "are" if len(text.numbers) > 1 else "is"
-        label = f"{places_now[0].window.text} {are} printed there now, in `{plain_text(line.text)}`"
+        label = f"{place.text} {are} printed there now, in `{plain_text(place.line.text)}`"
         help = Fix(f"write `{better}`", better, safe=True) if better else ""
         return diagnose("binding-mismatch", binding.text_span, message, label=label, help=help)
     if binding.words:
@@ -306,19 +299,20 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
         return diagnose("binding-mismatch", binding.text_span, message)
     line_text = describe_line(bound.addresses[0])
     message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"
-    notes = [place.note(binding) for place in replace(bound, addresses=()).places()[:_MAX_NOTES]]
+    proposals = replace(bound, addresses=()).places()
+    notes = [place_note(binding, place, proposals) for place in proposals[:_MAX_NOTES]]
     help = 'bind it anew: choose the words before it, as in `{out="tau"}`'
     return diagnose("binding-mismatch", binding.text_span, message, help=help, notes=notes)
 
 
-def _nearest(bound_text: BoundText, lines: Sequence[PrintedLine]) -> str:
+def _nearest(bound_text: BoundText, outputs: Sequence[PrintedText]) -> str:
     """The printed numbers nearest to those of a binding, in words."""
-    windows = bound_text.windows(lines)
-    if not windows:
-        if len(bound_text.numbers) > 1 and any(line.numbers for line in lines):
+    places = bound_text.places(outputs)
+    if not places:
+        if len(bound_text.numbers) > 1 and any(o for output in outputs for o in output.places(1)):
             return f"no printed line has {len(bound_text.numbers)} numbers one after the other"
         return "no number was printed"
-    nearest = min(windows, key=lambda window: _distance(bound_text.numbers, window.numbers))
+    nearest = min(places, key=lambda place: _distance(bound_text.numbers, place.numbers))
     several = len(bound_text.numbers) > 1
     return f"the nearest printed value{'s are' if several else ' is'} {nearest.text}"
 

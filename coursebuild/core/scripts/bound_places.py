@@ -1,10 +1,12 @@
 """Where a bound number is found in the outputs of its script, and how it follows a new output.
 
-1. Where its address is known (see `provenance`), what stands there counts, and nothing else. The
-   words of `{out="words"}` are an address, too: those printed right before the number.
-2. Else it is sought. Text next to the numbers (a unit, a name) narrows the choice, then the unit
-   behind the binding, then digits that are printed exactly so. What is found at two places is
-   ambiguous; its addresses are all of these, and it follows where they agree.
+1. Where its address is known (see `printed_text`), what stands there counts, and nothing else. The
+   words of `{out="words"}` are an address where they are printed before one number only; of several
+   they choose.
+2. Else it is sought, by `search` alone. Text next to the numbers (a unit, a name) narrows the
+   choice, then the unit behind the binding, then digits that are printed exactly so. What is found
+   at two places has both as addresses, and follows where they agree; it is ambiguous if they are
+   not of one quantity.
 3. Recorded text decides, whatever this run printed. The run counts where recorded text leaves
    things out (`...`, tables), and for a number that is not in a text that has drifted.
 """
@@ -13,19 +15,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import NamedTuple
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.lesson_record import Address, Addresses, ShownValue
+from coursebuild.core.model.lesson_record import Address, Addresses, ShownValue, shown_values
 from coursebuild.core.model.results import Outcome, Verdict
-from coursebuild.core.scripts.bound_numbers import BoundText, Window
+from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.column_titles import ColumnTitle
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.provenance import PrintedText, masked, shown_values
+from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, masked
 from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.diagnostics import Edit, Note
 
@@ -87,30 +88,22 @@ def _words_before(binding: model.NumberBinding) -> str:
     return " ".join(masked(_MARKUP.sub("", paragraph)).split()[-_CONTEXT:])
 
 
-class PrintedPlace(NamedTuple):
-    """Printed numbers, and the output that they stand in."""
-
-    text: PrintedText
-    window: Window
-
-    @property
-    def address(self) -> Address | None:
-        return self.text.address(self.window)
-
-    def note(self, binding: model.NumberBinding) -> Note:
-        """The line, and the edit that chooses it."""
-        numbers, line = self.window.numbers, self.window.line
-        span = line.locate and line.locate(numbers[0].start, numbers[-1].end)
-        words = self.text.words_before(self.window)
-        if not words:
-            return Note(f"`{plain_text(line.text)}`", span)
-        target = f"{binding.script} " if binding.script else ""
-        braces = f'{{out={target}"{words}"}}'
-        end = binding.text_span.end
-        attribute = binding.span.source.text[end : binding.span.end]
-        place = binding.span.source.span(end + attribute.find("{"), binding.span.end)
-        edits = (Edit(place, braces),) if attribute.endswith("}") and "{" in attribute else ()
-        return Note(f"`{braces}` chooses `{plain_text(line.text)}`", span, edits)
+def place_note(
+    binding: model.NumberBinding, place: PrintedPlace, rivals: Iterable[PrintedPlace]
+) -> Note:
+    """The line of a printed number, and the edit that chooses it among others."""
+    line = plain_text(place.line.text)
+    words = place.output.words_before(place, rivals)
+    if not words:
+        return Note(f"`{line}`", place.span)
+    target = f"{binding.script} " if binding.script else ""
+    end = binding.text_span.end
+    attribute = binding.span.source.text[end : binding.span.end]
+    braces = binding.span.source.span(end + attribute.find("{"), binding.span.end)
+    edit = Edit(braces, f"{{out={target}{binding.quote}{words}{binding.quote}}}")
+    is_whole = attribute.endswith("}") and "{" in attribute
+    message = f'`{{out={target}"{words}"}}` chooses `{line}`'
+    return Note(message, place.span, (edit,) if is_whole else ())
 
 
 class BoundNumber(Struct, frozen=True):
@@ -126,34 +119,36 @@ class BoundNumber(Struct, frozen=True):
 
     def places(self) -> list[PrintedPlace]:
         """Where it holds: in recorded text, or else in the run."""
-        for texts in self.groups:
-            places = self.look_up(texts)
-            if places and all(self.text.shows(place.window) for place in places):
+        for outputs in self.groups:
+            places = self.look_up(outputs)
+            if places and all(map(self.text.shows, places)):
                 return places
         return []
 
-    def look_up(self, texts: Sequence[PrintedText]) -> list[PrintedPlace]:
+    def look_up(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers at its addresses; those that it may mean where none is known.
 
         None where one of the addresses is gone.
         """
         count, words = len(self.text.numbers), self.binding.words
-        if words:
-            return [PrintedPlace(text, w) for text in texts for w in text.find_words(words, count)]
-        if self.addresses:
-            places = [_find(address, texts, count) for address in self.addresses]
-            return [place for place in places if place is not None] if all(places) else []
-        by_line = {id(line): text for text in texts for line in text.lines}
-        lines = [line for text in texts for line in text.lines]
-        windows = self.text.candidates(lines, following_text(self.binding))
-        return [PrintedPlace(by_line[id(window.line)], window) for window in windows]
+        named = [p for output in outputs for p in output.find_words(words, count)] if words else []
+        if len(named) == 1:
+            return named
+        found = [_find(address, outputs, count) for address in self.addresses]
+        places = [place for place in found if place is not None and (place in named or not words)]
+        if not words:
+            is_gone = len(places) < len(found)
+            return [] if is_gone else places or self.search(outputs)
+        return places or list(filter(self.text.shows, named)) or named
+
+    def search(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
+        """The numbers that it may mean: a proposal, until one that it shows is remembered."""
+        return self.text.candidates(outputs, following_text(self.binding))
 
 
-def _find(address: Address, texts: Iterable[PrintedText], count: int) -> PrintedPlace | None:
-    places = (
-        PrintedPlace(text, w) for text in texts if (w := text.find(address, count)) is not None
-    )
-    return next(places, None)
+def _find(address: Address, outputs: Iterable[PrintedText], count: int) -> PrintedPlace | None:
+    places = (output.find(address, count) for output in outputs)
+    return next((place for place in places if place is not None), None)
 
 
 def following_text(binding: model.NumberBinding) -> str:
@@ -170,8 +165,8 @@ def _read_text(binding: model.NumberBinding, texts: Iterable[PrintedText]) -> Bo
     with_comma, as_printed = BoundText.of(binding.text, binding.comma), BoundText.of(binding.text)
     if not with_comma.comma:
         return as_printed
-    lines = [line for text in texts for line in text.lines]
-    is_list = as_printed.is_in(lines) and not with_comma.is_in(lines)
+    outputs = tuple(texts)
+    is_list = as_printed.is_in(outputs) and not with_comma.is_in(outputs)
     return as_printed if is_list else with_comma
 
 
@@ -226,7 +221,7 @@ def follow_outputs(
             continue
         texts += _run_texts(outputs, run.path, verdicts)
         places = bound.look_up([text for text in texts if text is not None])
-        rewritten = {bound.text.rewrite(place.window) for place in places}
-        is_shown = all(bound.text.shows(place.window) for place in places)
+        rewritten = {bound.text.rewrite(place) for place in places}
+        is_shown = all(bound.text.shows(place) for place in places)
         if not is_shown and len(rewritten) == 1 and (text := rewritten.pop()):
             yield Edit(binding.text_span, text)

@@ -15,13 +15,11 @@ from itertools import takewhile
 from msgspec import Struct
 
 from coursebuild.core import model
-from coursebuild.core.scripts.bound_numbers import PrintedLine
-from coursebuild.core.scripts.column_titles import ColumnTitle, PrintedRow
+from coursebuild.core.scripts.column_titles import ColumnTitle
 from coursebuild.core.scripts.lines import Side, plain_text
-from coursebuild.core.scripts.provenance import PrintedText, masked
+from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, PrintedText, masked
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
-from coursebuild.core.text.numbers import Number, write_comma
-from coursebuild.core.text.quantities import UnitText, unit_of_printed
+from coursebuild.core.text.numbers import write_comma
 
 
 class _Candidate(Struct, frozen=True):
@@ -29,9 +27,11 @@ class _Candidate(Struct, frozen=True):
 
     kind: tuple[str, ...]
     words: tuple[str, ...] | None
-    numbers: tuple[Number, ...]
-    units: tuple[UnitText, ...]
-    line: PrintedRow
+    places: tuple[PrintedPlace, ...]
+
+    @property
+    def line(self) -> str:
+        return self.places[0].line.text
 
 
 def fill_table(table: model.Table, stdout: str) -> Edit | Diagnostic:
@@ -47,7 +47,7 @@ def fill_table(table: model.Table, stdout: str) -> Edit | Diagnostic:
         message = "no printed line has a number for each column of this table"
         help = "print one line for each row, or write the rows by hand"
         if best:
-            lines_text = " or ".join(f"`{kinds[kind][0].line.line}`" for kind in best[:3])
+            lines_text = " or ".join(f"`{kinds[kind][0].line}`" for kind in best[:3])
             message = f"its rows may be lines such as {lines_text}"
             help = "write the words and units that are printed with the numbers into the header"
         return diagnose("output-not-updatable", place, message, help=help)
@@ -61,30 +61,27 @@ def fill_table(table: model.Table, stdout: str) -> Edit | Diagnostic:
 
 
 def _candidates(titles: Sequence[ColumnTitle], stdout: str) -> Iterator[_Candidate]:
-    lines = list(map(plain_text, Side.of(stdout).lines))
-    text = PrintedText([PrintedLine(line) for line in lines])
-    for index, line in enumerate(lines):
-        row = PrintedRow.of(line, text.heading(index))
-        numbers = [n for n in row.numbers if not row.is_in_unit(n)]
-        if not numbers:
+    output = PrintedText(map(PrintedLine, map(plain_text, Side.of(stdout).lines)))
+    for at, line in enumerate(output.lines):
+        if not line.numbers:
             continue
-        words = tuple(line[: numbers[0].start].split())
-        rest = masked(line[numbers[0].start :])
+        words = tuple(line.text[: line.numbers[0].start].split())
+        rest = masked(line.text[line.numbers[0].start :])
         for has_name, columns in ((False, titles), (True, titles[1:])):
-            places = [title.best_places(row) for title in columns]
-            row_numbers = tuple(numbers)
-            if len(numbers) > len(columns) and all(len(place) == 1 for place in places):
-                row_numbers = tuple(row.numbers[place[0]] for place in places)
-            if len(row_numbers) == len(columns) == len({*row_numbers}) and (words or not has_name):
-                kind = (text.heading(index), rest, "" if has_name else " ".join(words))
-                units = tuple(unit_of_printed(line, n, lines[:index]) for n in row_numbers)
-                yield _Candidate(kind, words if has_name else None, row_numbers, units, row)
+            named = [title.best_places(output.labels(at)) for title in columns]
+            numbers = line.numbers
+            if len(numbers) > len(columns) and all(len(place) == 1 for place in named):
+                numbers = tuple(line.numbers[place[0]] for place in named)
+            if len(numbers) == len(columns) == len({*numbers}) and (words or not has_name):
+                kind = (output.heading(at), rest, "" if has_name else " ".join(words))
+                places = tuple(PrintedPlace(output, at, (number,)) for number in numbers)
+                yield _Candidate(kind, words if has_name else None, places)
 
 
 def _score(titles: Sequence[ColumnTitle], candidate: _Candidate) -> tuple[int, int]:
     columns = titles if candidate.words is None else titles[1:]
-    numbers = zip(columns, candidate.numbers, candidate.units, strict=True)
-    verdicts = [title.names(candidate.line, number, unit) for title, number, unit in numbers]
+    pairs = zip(columns, candidate.places, strict=True)
+    verdicts = [title.names(place.labels, place.first, place.units[0]) for title, place in pairs]
     return -verdicts.count(False), verdicts.count(True)
 
 
@@ -96,7 +93,7 @@ def _cells(
     shared = sum(1 for _ in takewhile(lambda words: len({*words}) == 1, columns_of_words))
     for line in lines:
         words = line.words
-        cells = [write(line.line.line[n.start : n.end]) for n in line.numbers]
+        cells = [write(place.text) for place in line.places]
         if words is not None:
             count = shared
             if len(lines) == 1:  # its label is what the next title names

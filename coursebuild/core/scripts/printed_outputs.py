@@ -8,8 +8,7 @@ from collections.abc import Iterable, Sequence
 from coursebuild.core import model
 from coursebuild.core.model.lesson_record import Address
 from coursebuild.core.model.results import ScriptRun, Verdict
-from coursebuild.core.scripts.bound_numbers import PrintedLine, lines_of_run, printed_lines
-from coursebuild.core.scripts.provenance import PrintedText
+from coursebuild.core.scripts.printed_text import PrintedLine, PrintedText
 from coursebuild.core.scripts.table_cells import row_text
 from coursebuild.core.scripts.tables import TableMatcher, updated_row
 from coursebuild.core.text.numbers import point_decimals
@@ -61,8 +60,8 @@ class PrintedOutputs:
         """The lines of a recorded output."""
         key = recording_key(verdict.recording)
         if key not in self._texts:
-            lines = printed_lines(verdict.recording, verdict.comparison.own_filters)
-            self._texts[key] = PrintedText(lines)
+            filters = verdict.comparison.own_filters
+            self._texts[key] = PrintedText.of_recording(verdict.recording, filters)
         return self._texts[key]
 
     def row_addresses(self, recording: model.Recording) -> tuple[tuple[Address, ...], ...]:
@@ -89,8 +88,8 @@ class PrintedOutputs:
         key = path, tuple(filters), part
         if key not in self._run_texts:
             run = self.runs[path]
-            lines = lines_of_run(run.stdout if part is None else run.output_of(part), filters)
-            self._run_texts[key] = PrintedText(lines)
+            printed = run.stdout if part is None else run.output_of(part)
+            self._run_texts[key] = PrintedText.of_run(printed, filters)
         return self._run_texts[key]
 
 

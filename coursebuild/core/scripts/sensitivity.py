@@ -32,10 +32,10 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Course, Mode, Recording
 from coursebuild.core.model.results import Change, Outcome, ScriptRun
-from coursebuild.core.scripts.bound_numbers import printed_lines
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.diff import quote
 from coursebuild.core.scripts.lines import same_number
+from coursebuild.core.scripts.printed_text import PrintedText
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.numbers import Number, difference, only_number, round_like, unit
 from coursebuild.core.text.source import Span
@@ -157,7 +157,9 @@ def sensitivity(
         for finding in _find_doubts(recording, comparison, base, moved_runs, usable_runs)
     ]
     numbers = sum(
-        len(line.numbers) for r, c in compared for line in printed_lines(r, c.own_filters)
+        len(line.numbers)
+        for recording, comparison in compared
+        for line in PrintedText.of_recording(recording, comparison.own_filters).lines
     )
     doubts = tuple(finding for finding in findings if isinstance(finding, Doubt))
     flips = tuple(finding for finding in findings if isinstance(finding, Flip))

@@ -24,11 +24,10 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.lesson_record import Address, ShownValue
+from coursebuild.core.model.lesson_record import Address, ShownValue, shown_values
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
-from coursebuild.core.scripts.bound_numbers import PrintedLine, Window
-from coursebuild.core.scripts.column_titles import ColumnTitle, PrintedRow, swapped_columns
+from coursebuild.core.scripts.column_titles import ColumnTitle, swapped_columns
 from coursebuild.core.scripts.diff import number_change
 from coursebuild.core.scripts.lines import (
     MARK,
@@ -38,7 +37,7 @@ from coursebuild.core.scripts.lines import (
     plain_text,
     same_number,
 )
-from coursebuild.core.scripts.provenance import PrintedText, shown_values
+from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, PrintedText
 from coursebuild.core.scripts.table_cells import (
     RowCell,
     elides_rows,
@@ -47,7 +46,7 @@ from coursebuild.core.scripts.table_cells import (
     table_rows,
 )
 from coursebuild.core.text.numbers import Number, relative_error, round_like
-from coursebuild.core.text.quantities import UnitText, are_different, unit_of_printed
+from coursebuild.core.text.quantities import UnitText, are_different
 from coursebuild.core.text.source import Span
 
 _ALIKE_WEIGHT = 6
@@ -160,7 +159,7 @@ class TableMatcher:
         self._addresses = addresses if len(addresses) == len(self.rows) else [()] * len(self.rows)
         self._numbers_match = partial(same_number, comparison=comparison)
         self.lines = list(map(plain_text, Side.of(stdout, comparison.filters).lines))
-        self.text = PrintedText([PrintedLine(line) for line in self.lines])
+        self.text = PrintedText(map(PrintedLine, self.lines))
         self._canonical_line = cache(lambda line: canonicalize(self.lines[line]))
         self._fits_of_row = cache(self._fits_at_address)
 
@@ -186,7 +185,7 @@ class TableMatcher:
         for row in match.rows:
             line = self.text.lines[row.line]
             at = [
-                self.text.address(Window(line, (number,)))
+                PrintedPlace(self.text, row.line, (number,)).address
                 for _, _, number in row.pairs
                 if number in line.numbers  # the 1 of a unit such as `1/min` is none
             ]
@@ -233,13 +232,15 @@ class TableMatcher:
     def _score(self, layout: LineLayout) -> tuple[float, ...]:
         """How well a layout suits the table, in several respects."""
         fit = self._fits_in(0, layout)[0]
-        numbers = [(cell.column, number) for cell, _, number in self._pairs(0, fit)]
-        printed_row = PrintedRow.of(self.lines[fit.line], layout.heading)
-        verdicts = [
-            self.titles[column].names(printed_row, number, self._unit(fit.line, number))
-            for column, number in numbers
+        pairs, numbers = self._pairs(0, fit), self.text.lines[fit.line].numbers
+        places = [
+            (cell, PrintedPlace(self.text, fit.line, (n,))) for cell, _, n in pairs if n in numbers
         ]
-        share = len(numbers) / max(1, printed_row.count)
+        verdicts = [
+            self.titles[cell.column].names(place.labels, place.first, place.units[0])
+            for cell, place in places
+        ]
+        share = len(pairs) / max(1, len(numbers))
         return self._right_rows(layout), verdicts.count(True), -verdicts.count(False), share
 
     def _count_lines(self, layout: LineLayout | None) -> int:
@@ -263,13 +264,11 @@ class TableMatcher:
         fits, addresses = tuple(self._find_fits(row)), self._addresses[row]
         if not addresses:
             return fits
-        windows = [self.text.find(address, 1) for address in addresses]
-        numbers = [window.numbers[0] for window in windows if window is not None]
-        line = windows[0].line if windows[0] is not None else None
+        places = [self.text.find(address, 1) for address in addresses]
+        at = [(place.at, place.numbers[0]) for place in places if place is not None]
         for fit in fits:
-            at_line = self.text.lines[fit.line]
-            printed = [n for _, _, n in self._pairs(row, fit) if n in at_line.numbers]
-            if at_line is line and printed == numbers:
+            numbers = self.text.lines[fit.line].numbers
+            if at == [(fit.line, n) for _, _, n in self._pairs(row, fit) if n in numbers]:
                 return (fit,)
         return tuple(fit for fit in fits if fit.is_right)
 
@@ -375,9 +374,10 @@ class TableMatcher:
             if unlike is not None:
                 yield Change(DriftKind.TEXT, title.unit_span, title.unit.text, unlike.text)
         for row in match.rows[:1]:
-            numbers = {cell.column: number for cell, _, number in reversed(row.pairs)}
-            line = PrintedRow.of(self.lines[row.line], self.text.heading(row.line))
-            columns = swapped_columns(dict(enumerate(self.titles)), line, numbers)
+            numbers = self.text.lines[row.line].numbers
+            pairs = [(cell.column, n) for cell, _, n in reversed(row.pairs) if n in numbers]
+            places = {column: numbers.index(number) for column, number in pairs}
+            columns = swapped_columns(self.titles, self.text.labels(row.line), places)
             for column, right in columns.items():
                 title = self.titles[column]
                 back = next((a for a, b in columns.items() if b == column), right)
@@ -395,12 +395,8 @@ class TableMatcher:
         units: dict[int, list[UnitText]] = {}
         for row in match.rows:
             for cell, _, number in row.pairs:
-                units.setdefault(cell.column, []).append(self._unit(row.line, number))
+                units.setdefault(cell.column, []).append(self.text.unit(row.line, number))
         return units
-
-    def _unit(self, line: int, number: Number) -> UnitText:
-        """The unit that is printed with a number of a line."""
-        return unit_of_printed(self.lines[line], number, self.lines[:line])
 
 
 def number_text(old: Number, new: Number, comparison: model.Comparison) -> str:

@@ -31,6 +31,8 @@ class ParsingState:
         self.lesson = lesson
         self.words = words
         self.has_decimal_comma = "," in words.decimal
+        self.quote = '"'
+        """A quotation mark as it is written in what is read: in JSON behind a backslash."""
         self.references: References = {}
         """The link definitions of the document, which its inner texts may use."""
         self.diagnostics: list[Diagnostic] = []

@@ -26,7 +26,7 @@ from coursebuild.core.syntax.containers import (
 from coursebuild.core.syntax.fence import read_fence
 from coursebuild.core.syntax.html import Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_tree import read_inlines
-from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
+from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState, T
 from coursebuild.core.syntax.recording import (
     caption_start,
     check_code_above,
@@ -376,8 +376,8 @@ class NestedTextParser:
     def blocks(self, excerpt: Excerpt) -> Parsed[tuple[model.Block, ...]]:
         """The blocks of a text; HTML becomes an `HtmlFlow`."""
         base = normalize(excerpt)
-        return self._state.collect_diagnostics(
-            lambda: TextReader(base, self._state, self._references(), nested=True).read()
+        return self._read(
+            excerpt, lambda: TextReader(base, self._state, self._references(), nested=True).read()
         )
 
     def inlines(self, excerpt: Excerpt) -> Parsed[tuple[model.Inline, ...]]:
@@ -390,7 +390,16 @@ class NestedTextParser:
             balance.finish()
             return inlines
 
-        return self._state.collect_diagnostics(read)
+        return self._read(excerpt, read)
+
+    def _read(self, excerpt: Excerpt, read: Callable[[], T]) -> Parsed[T]:
+        state, start = self._state, excerpt.offset(0)
+        outer, is_string = state.quote, excerpt.source.text[start - 1 : start] == '"'
+        state.quote = '\\"' if is_string else outer
+        try:
+            return state.collect_diagnostics(read)
+        finally:
+            state.quote = outer
 
     def _references(self) -> References:
         """A copy of the document's link definitions, as those in a text hold in it only."""

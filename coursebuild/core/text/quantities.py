@@ -245,3 +245,14 @@ def unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
             if not any(only_number(cell) for cell in cells):
                 return unit_of_header(cells[column])
     return NO_UNIT
+
+
+def title_of_column(line: str, start: int, header: str) -> str:
+    """The title in a header above the number of a row; empty where the two have other columns."""
+    for pattern in _CELLS:
+        ends, titles = [cell.end() for cell in pattern.finditer(line)], pattern.findall(header)
+        column = sum(end <= start for end in ends)
+        shift = len(ends) - len(titles)  # the names of rows may have no title
+        if len(titles) > 1 and shift in (0, 1) and column >= shift:
+            return str(titles[column - shift])
+    return ""

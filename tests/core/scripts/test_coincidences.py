@@ -22,7 +22,7 @@ from coursebuild.core.scripts.bound_places import document_bindings, follow_outp
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.provenance import PrintedText
+from coursebuild.core.scripts.printed_text import PrintedText
 from coursebuild.core.scripts.table_cells import table_rows
 from coursebuild.core.text.diagnostics import Edit
 from support.sample_lessons import course, document, make_run

@@ -231,6 +231,6 @@ def _bind_numbers(texts: OpenTexts, place: Span) -> Iterator[types.CodeAction]:
             sources = (
                 printed.of_binding(binding) if shown_text.numbers and _overlap(span, place) else []
             )
-            if any(shown_text.is_in(printed.text(verdict).lines) for verdict in sources):
+            if any(shown_text.is_in([printed.text(verdict)]) for verdict in sources):
                 title = f"bind `{text}` to what `{sources[0].recording.script}` prints"
                 yield _make_action(texts.places, title, [Edit(span, f"{code}{{out}}")])

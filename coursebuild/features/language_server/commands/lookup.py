@@ -295,12 +295,11 @@ class _Lookup:
         results, number = self.library.results, BoundText.of(binding.text, binding.comma)
         printed = PrintedOutputs(results.verdicts, results.runs, self.library.scripts)
         for verdict in printed.of_binding(binding) if number.numbers else ():
-            for window in number.windows(printed.text(verdict).lines):
-                if number.shows(window) and window.line.locate is not None:
-                    place = window.line.locate(window.numbers[0].start, window.numbers[-1].end)
-                    printed_line = fence("text", window.line.text, wary=True)
+            for place in number.shown_places([printed.text(verdict)]):
+                if place.span is not None:
+                    printed_line = fence("text", place.line.text, wary=True)
                     text = f"{code_span(verdict.recording.script or '')} printed\n{printed_line}"
-                    return Referent(binding.span, text, place)
+                    return Referent(binding.span, text, place.span)
         return None
 
     def look_up_code(

@@ -1,0 +1,365 @@
+"""The printed lines of an output, their numbers, and where each of these stands: its address.
+
+1. An address is the words of a printed line, the heading above it, and the number's place in the
+   line. A heading is the last line above that has no number, or ends with a colon.
+2. Where several lines have the same words, the numbers of the heading and those that the line
+   begins with name it, as few as suffice. Such a name counts only as long as none was replaced by
+   another: `0.1` may be a setting, which stays, or a result that another line has by chance now.
+3. Lines that nothing tells apart have no address.
+4. The label of a number is what is printed right before it, or the title of its column. Numbers of
+   two labels, or below two headings, are different quantities.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from functools import cached_property
+from itertools import accumulate
+from typing import TypeAlias
+
+from msgspec import Struct
+
+from coursebuild.core.model import Filter, Recording, Table
+from coursebuild.core.model.lesson_record import Address
+from coursebuild.core.scripts.column_titles import ColumnTitle
+from coursebuild.core.scripts.lines import MARK, MappedText, Side, canonicalize, plain_text
+from coursebuild.core.scripts.table_cells import RowCell, table_rows
+from coursebuild.core.text.numbers import Number, has_groups, point_decimals, scan
+from coursebuild.core.text.quantities import (
+    UnitText,
+    numbers_of_quantities,
+    title_of_column,
+    unit_behind,
+    unit_of_printed,
+)
+from coursebuild.core.text.source import Excerpt, Source, Span
+
+Locate: TypeAlias = Callable[[int, int], Span]
+_Words: TypeAlias = tuple[tuple[str, bool], ...]
+"""Words and numbers, each with whether it is a number."""
+
+
+_FORBIDDEN = re.compile(r'["{}]')
+"""What the words of `{out="words"}` cannot hold."""
+
+
+class PrintedLine(Struct, frozen=True, dict=True):
+    """A line of output, or a row of a recorded table with its cells joined."""
+
+    text: str
+    locate: Locate | None = None
+    """Where `text[start:end]` stands in the lesson; `None` for what is not recorded."""
+    is_grouped: bool = False
+    """Whether commas between digits part thousands, as they all do in its output."""
+    columns: tuple[tuple[int, ColumnTitle], ...] = ()
+    """Of a row of a table: the end of each cell, and the title of its column."""
+
+    def title(self, number: Number) -> ColumnTitle | None:
+        """The title above a number of a table."""
+        return next((title for end, title in self.columns if number.end <= end), None)
+
+    @cached_property
+    def numbers(self) -> tuple[Number, ...]:
+        """The numbers in it; not computed until needed, as those of most lines never are."""
+        return numbers_of_quantities(self.text, scan(self.text, self.is_grouped))
+
+
+class PrintedPlace(Struct, frozen=True):
+    """Numbers of one printed line, one after the other."""
+
+    output: PrintedText
+    at: int
+    """The index of the line."""
+    numbers: tuple[Number, ...]
+
+    @property
+    def line(self) -> PrintedLine:
+        return self.output.lines[self.at]
+
+    @property
+    def first(self) -> int:
+        """The index of its first number in the line."""
+        return self.line.numbers.index(self.numbers[0])
+
+    @property
+    def text(self) -> str:
+        """The numbers as printed."""
+        return ", ".join(number.text for number in self.numbers)
+
+    @property
+    def before(self) -> str:
+        """What stands before them in their line."""
+        return self.line.text[: self.numbers[0].start]
+
+    @property
+    def after(self) -> str:
+        """What stands after them, without white space at its start."""
+        return self.line.text[self.numbers[-1].end :].lstrip().replace("\u2212", "-")
+
+    @property
+    def units(self) -> list[UnitText]:
+        """The units that are printed with them."""
+        return [self.output.unit(self.at, number) for number in self.numbers]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The labels of all numbers of the line."""
+        return self.output.labels(self.at)
+
+    def quantity(self, words: str = "") -> tuple[str, str] | None:
+        """What the first of them is called: the heading, and its label or the words that name it.
+
+        `None` where it has no label: then nothing says that it is another than one with a label.
+        """
+        label = words or masked(self.labels[self.first])
+        return (self.output.heading(self.at), label) if any(map(str.isalpha, label)) else None
+
+    @property
+    def address(self) -> Address | None:
+        """`None` where nothing tells their line from others."""
+        heading, words = self.output.heading(self.at), self.output.words(self.at)
+        for depth in range(-1, self.first + 1):
+            name, names = self.output.names(self.at, depth)
+            if names.count(name) == 1:
+                return Address(words, self.first, heading, name, names if name else ())
+        return None
+
+    @property
+    def span(self) -> Span | None:
+        """Where they are recorded."""
+        locate = self.line.locate
+        return None if locate is None else locate(self.numbers[0].start, self.numbers[-1].end)
+
+
+class PrintedText:
+    """The lines of one output."""
+
+    def __init__(self, lines: Iterable[PrintedLine]) -> None:
+        self.lines = tuple(lines)
+        self._labels: dict[int, tuple[str, ...]] = {}
+        self._headings: list[int] = []
+        """The index of the heading of each line; -1 for none."""
+        heading = -1
+        for at, line in enumerate(self.lines):
+            self._headings.append(heading)
+            words = self._words[at]
+            if any(map(str.isalpha, words)) and (not line.numbers or words.endswith(":")):
+                heading = at
+
+    @classmethod
+    def of_run(cls, stdout: str, filters: Iterable[Filter] = ()) -> PrintedText:
+        """What a run printed."""
+        lines = Side.of(stdout, filters).lines
+        is_grouped = has_groups("\n".join(lines))
+        return cls(PrintedLine(line, None, is_grouped) for line in lines)
+
+    @classmethod
+    def of_recording(cls, recording: Recording, filters: Iterable[Filter] = ()) -> PrintedText:
+        """A recorded output; without filters, as the author sees it."""
+        body = recording.body
+        if isinstance(body, Table):
+            return cls(_lines_of_table(body))
+        side = Side.of(body.text, filters)
+        is_grouped = has_groups("\n".join(side.lines))
+        return cls(
+            PrintedLine(line, _locator_in_fence(body, side, at), is_grouped)
+            for at, line in enumerate(side.lines)
+        )
+
+    # --- what is printed with a number
+
+    @cached_property
+    def _words(self) -> list[str]:
+        return [masked(line.text) for line in self.lines]
+
+    def heading(self, at: int) -> str:
+        """The heading of a line, by its index."""
+        return self._words[self._headings[at]] if self._headings[at] >= 0 else ""
+
+    def title(self, at: int, number: Number) -> str:
+        """The title of the column that a number stands in; empty where there is none."""
+        if (title := self.lines[at].title(number)) is not None:
+            return title.text
+        heading = self._headings[at]
+        if heading < 0 or self._words[heading].endswith(":"):
+            return ""
+        return title_of_column(self.lines[at].text, number.start, self.lines[heading].text)
+
+    def unit(self, at: int, number: Number) -> UnitText:
+        """The unit that is printed with a number."""
+        above = [line.text for line in self.lines[:at]]
+        title = self.lines[at].title(number)
+        unit = unit_of_printed(self.lines[at].text, number, above)
+        return unit if unit or title is None else title.unit
+
+    def labels(self, at: int) -> tuple[str, ...]:
+        """The labels of the numbers of a line: what follows the one before with its unit."""
+        if at not in self._labels:
+            text, start, labels = self.lines[at].text, 0, []
+            for number in self.lines[at].numbers:
+                labels.append(f"{text[start : number.start]} {self.title(at, number)}".strip())
+                start = number.end
+                if unit_behind(text, start):
+                    start = len(text) - len(text[start:].lstrip().partition(" ")[2])
+            self._labels[at] = tuple(labels)
+        return self._labels[at]
+
+    # --- addresses
+
+    @cached_property
+    def _by_words(self) -> dict[tuple[str, str], list[int]]:
+        lines: dict[tuple[str, str], list[int]] = {}
+        for at, words in enumerate(self._words):
+            lines.setdefault((self.heading(at), words), []).append(at)
+        return lines
+
+    def words(self, at: int) -> str:
+        """The words of a line, with `#` for numbers."""
+        return self._words[at]
+
+    def names(self, at: int, depth: int) -> tuple[str, tuple[str, ...]]:
+        """The name of a line, of so many of its numbers, and those of all lines of its words."""
+        siblings = self._by_words[self.heading(at), self._words[at]]
+        return self._name(at, depth), tuple(self._name(sibling, depth) for sibling in siblings)
+
+    def find(self, address: Address, count: int) -> PrintedPlace | None:
+        """What stands at an address, `count` numbers; `None` where that is not certain."""
+        lines = self._by_words.get((address.heading, address.line), [])
+        if address.name and lines:
+            depth = len(address.name.split()) - len(self._numbers(self._headings[lines[0]]))
+            names = [self._name(at, depth) for at in lines]
+            is_intact = {*names} <= {*address.names} or {*names} >= {*address.names}
+            pairs = zip(lines, names, strict=True)
+            lines = [at for at, name in pairs if is_intact and name == address.name]
+        if len(lines) != 1:
+            return None
+        numbers = self.lines[lines[0]].numbers[address.place : address.place + count]
+        return PrintedPlace(self, lines[0], numbers) if len(numbers) == count else None
+
+    def _numbers(self, at: int) -> tuple[str, ...]:
+        numbers = self.lines[at].numbers if at >= 0 else ()
+        return tuple(format(number.value.normalize(), "f") for number in numbers)
+
+    def _name(self, at: int, depth: int) -> str:
+        """The numbers of a line's heading and the first `depth` of its own; none for depth -1."""
+        heading, numbers = self._numbers(self._headings[at]), self._numbers(at)
+        return "" if depth < 0 else " ".join(heading + numbers[:depth])
+
+    # --- words that an author types
+
+    def find_words(self, words: str, count: int) -> list[PrintedPlace]:
+        """The numbers, `count` in a row, that have these words right before them, or as a title.
+
+        In the words `#` stands for any number; signs around them do not count.
+        """
+        sought = _split(words)
+        return [
+            place
+            for place in self.places(count)
+            if any(_ends_with(context, sought) for context in self._contexts(place))
+        ]
+
+    def places(self, count: int) -> Iterator[PrintedPlace]:
+        """All runs of so many numbers of one line."""
+        for at, line in enumerate(self.lines):
+            for first in range(len(line.numbers) - count + 1):
+                yield PrintedPlace(self, at, line.numbers[first : first + count])
+
+    def words_before(self, place: PrintedPlace, rivals: Iterable[PrintedPlace] = ()) -> str:
+        """The fewest words that tell printed numbers from others; empty if none do.
+
+        `rivals`: these others; by default all of the output.
+        """
+        others = [p for p in rivals or self.places(1) if (p.at, p.first) != (place.at, place.first)]
+        contexts = [c for p in others for c in p.output._contexts(p)]
+        in_heading = len(_split(self.heading(place.at)))
+        found: list[str] = []
+        for context in self._contexts(place):
+            numbers = [at for at, (_, is_number) in enumerate(context) if is_number]
+            plain = ["#" if is_number else word for word, is_number in context]
+            named = [*plain]
+            for at in [at for at in numbers if at >= in_heading][:1]:  # it may name its line
+                named[at] = context[at][0]
+            for words in (plain, named):
+                for start in range(len(words) - 1, -1, -1):
+                    is_unit = start - 1 in numbers and bool(unit_behind(words[start]))
+                    sought = _split(" ".join(words[start:]))
+                    if words[start] == "#" or is_unit:
+                        continue
+                    if _FORBIDDEN.search(" ".join(words[start:])):
+                        break
+                    if not any(_ends_with(other, sought) for other in contexts):
+                        found.append(" ".join(words[start:]))
+                        break
+        return min(found, key=lambda words: ("#" in words, words.count(" ")), default="")
+
+    def _contexts(self, place: PrintedPlace) -> list[_Words]:
+        """All words before numbers, also the heading's, and again with the title of the column.
+
+        The title may stand right behind what its row begins with.
+        """
+        heading, title = self.heading(place.at), self.title(place.at, place.numbers[0])
+        before, line = f"{heading} {place.before}", place.line
+        end = line.numbers[0].end + len(unit_behind(line.text, line.numbers[0].end).text) + 1
+        row = f"{heading} {line.text[:end]}"
+        return [_split(text) for text in (before, f"{before} {title}", f"{row} {title}")]
+
+
+def masked(text: str) -> str:
+    """A text with `#` for each of its numbers, white space folded."""
+    return plain_text(canonicalize(text).skeleton.replace(MARK, " # "))
+
+
+def describe_line(address: Address) -> str:
+    """The printed line of an address in words."""
+    name = f", where it begins with {address.name}" if address.name else ""
+    return f"`{address.line}`{name}" + (f" below `{address.heading}`" if address.heading else "")
+
+
+def _split(text: str) -> _Words:
+    parts: list[tuple[str, bool]] = []
+    at = 0
+    for number in scan(text):
+        parts += ((word, False) for word in text[at : number.start].split())
+        parts.append((plain_text(number.text), True))
+        at = number.end
+    parts += ((word, False) for word in text[at:].split())
+    bare = ((w if is_number else w.strip('=:,;()[]|<>~/"'), is_number) for w, is_number in parts)
+    return tuple((word, is_number) for word, is_number in bare if word)
+
+
+def _ends_with(context: _Words, sought: _Words) -> bool:
+    """Whether words end with others, in which `#` is any number."""
+    pairs = zip(reversed(context), reversed(sought), strict=False)
+    return 0 < len(sought) <= len(context) and all(
+        word == sought_word or (sought_word == "#" and is_number)
+        for (word, is_number), (sought_word, _) in pairs
+    )
+
+
+# --- recorded tables
+
+
+def _lines_of_table(table: Table) -> Iterator[PrintedLine]:
+    rows, titles = table_rows(table), list(map(ColumnTitle.of, table.header))
+    joined_rows = [_join_cells(row) for row in rows]
+    texts = [point_decimals(row.text) if table.comma else row.text for row in joined_rows]
+    is_grouped = has_groups("\n".join(texts))
+    for row, joined_row, text in zip(rows, joined_rows, texts, strict=True):
+        ends = accumulate(len(cell.mapped.text) + 1 for cell in row)
+        columns = tuple((end - 1, titles[cell.column]) for end, cell in zip(ends, row, strict=True))
+        yield PrintedLine(text, _locator_in_row(joined_row, table.span.source), is_grouped, columns)
+
+
+def _locator_in_fence(body: Excerpt, side: Side, at: int) -> Locate:
+    return lambda start, end: body.span(*side.origin(at, start, end))
+
+
+def _join_cells(row: tuple[RowCell, ...]) -> MappedText:
+    gap = MappedText.substitute_for(0, 0, " ")
+    return MappedText.join([part for cell in row for part in (gap, cell.mapped)][1:])
+
+
+def _locator_in_row(row: MappedText, source: Source) -> Locate:
+    return lambda start, end: Span(source, *row.origin(start, end))
