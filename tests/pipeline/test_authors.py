@@ -7,6 +7,16 @@ import re
 import zipfile
 from html import unescape
 
+from lxml import etree
+
+from support.archives import (
+    LOM,
+    NAMESPACES,
+    entries,
+    mistakes,
+    packaging_schema,
+    scorm_schema,
+)
 from support.scratch_course import GOOD, Make
 
 AUTHORS = """\
@@ -52,6 +62,45 @@ def test_pages_and_exports_name_the_authors_and_say_how_to_cite(make: Make) -> N
     assert "Ada &amp; Noether</dc:creator>" in package
     assert "<dc:identifier>doi:10.5281/zenodo.1234567</dc:identifier>" in package
     assert f"Cite as: Ada &amp; Noether, 李明. {title}. 2026. {link}" in front
+
+
+PREDICTION = """
+```quiz
+{"id": "one", "questions": [
+  {"kind": "numeric", "text": "How many?", "answer": 2, "tolerance": 0, "explanation": "Two."}
+]}
+```
+"""
+
+
+def test_packages_for_learning_platforms_name_the_authors_too(make: Make) -> None:
+    folder = make(GOOD + PREDICTION)
+    text = folder.text("content/course.toml")
+    facts = AUTHORS.replace("Ada & Noether", "Ada; Noether") + 'licence = "CC-BY-4.0"\n'
+    folder.write("content/course.toml", text.replace("[course]\n", f"[course]\n{facts}", 1))
+    for export, space, schema, names in (
+        ("scorm", NAMESPACES["imsmd_rootv1p2p1.xsd"], scorm_schema(), ("vcard", "catalogentry")),
+        ("qti", LOM, packaging_schema(), ("entity", "identifier")),
+    ):
+        result = folder.main("export", export, "--out", "package.zip")
+        assert result.status == 0, result.out
+        manifest = entries(folder.root / "package.zip")["imsmanifest.xml"]
+        assert mistakes(schema, manifest) == []
+        root = etree.fromstring(manifest)
+        cards, doi = ([*root.iter(f"{{{space}}}{name}")] for name in names)
+        assert [card.text.splitlines()[2:] for card in cards] == [
+            [
+                "FN:Ada\\; Noether",
+                "N:Ada\\; Noether",
+                "URL:https://orcid.org/0000-0002-1825-0097",
+                "END:VCARD",
+            ],
+            ["FN:李明", "N:李明", "END:VCARD"],
+        ]
+        assert "".join(doi[0].itertext()) == "DOI10.5281/zenodo.1234567"
+        (rights,) = root.iter(f"{{{space}}}rights")
+        assert "".join(rights.itertext()).split() == ["LOMv1.0", "yes", "CC-BY-4.0"]
+        (folder.root / "package.zip").unlink()
 
 
 def test_a_course_without_authors_is_not_cited(make: Make) -> None:

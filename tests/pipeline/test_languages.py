@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from support.archives import entries
 from support.scratch_course import GOOD, Make
 
 FRENCH = """\
@@ -49,6 +50,17 @@ def test_a_lesson_has_a_language_of_its_own(make: Make) -> None:
     assert "Theorem 1.1.1</span>" in english
     assert french.count('<a href="1.1-one.html">la leçon 1.1</a>') == 0
     assert french.count('<a href="1.1-one.html">leçon 1.1</a>') == 2
+
+    assert folder.main("export", "epub", "--out", "book.epub").status == 0
+    book = {name: data.decode() for name, data in entries(folder.root / "book.epub").items()}
+    for name, language in (("1.1-one", "en"), ("1.2-two", "fr")):
+        chapter = next(text for path, text in book.items() if path.endswith(f"{name}.xhtml"))
+        assert f'lang="{language}" xml:lang="{language}" dir="ltr">' in chapter
+    languages = "<dc:language>en</dc:language>\n<dc:language>fr</dc:language>\n"
+    assert languages in book["EPUB/package.opf"]
+    assert 'lang="fr" xml:lang="fr">1.2 ' in book["EPUB/nav.xhtml"]
+    assert folder.main("export", "page", "--out", "page.html").status == 0
+    assert 'id="_1.2--_top" lang="fr" dir="ltr">' in folder.text("page.html")
 
     result = folder.main("rename", "1.1", "1.5")
     assert result.status == 1, "a range may mean it"

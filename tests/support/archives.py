@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -28,6 +28,7 @@ NAMESPACES = {
     "adlcp_rootv1p2.xsd": "http://www.adlnet.org/xsd/adlcp_rootv1p2",
     "imsmd_rootv1p2p1.xsd": "http://www.imsglobal.org/xsd/imsmd_rootv1p2p1",
 }
+LOM = "http://ltsc.ieee.org/xsd/LOM"
 
 
 @dataclass(frozen=True)
@@ -68,13 +69,17 @@ def scorm_schema() -> etree.XMLSchema:
         shutil.copytree(_schemas() / "scorm12edition", folder)
         _mend(folder / "ims_xml.xsd", 'xmlns="http://www.w3.org/XML/1998/namespace"', "")
         _mend(folder / "imsmd_rootv1p2p1.xsd", '"##any"', '"##other"')
-        imports = "".join(
-            f'<xs:import namespace="{space}" schemaLocation="{file}"/>'
-            for file, space in NAMESPACES.items()
-        )
-        whole = f'<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema">{imports}</xs:schema>'
-        (folder / "all.xsd").write_text(whole, encoding="utf-8")
-        return etree.XMLSchema(etree.parse(str(folder / "all.xsd")))
+        return _joined_schema(folder, NAMESPACES)
+
+
+def _joined_schema(folder: Path, namespaces: Mapping[str, str]) -> etree.XMLSchema:
+    imports = "".join(
+        f'<xs:import namespace="{space}" schemaLocation="{file}"/>'
+        for file, space in namespaces.items()
+    )
+    whole = f'<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema">{imports}</xs:schema>'
+    (folder / "all.xsd").write_text(whole, encoding="utf-8")
+    return etree.XMLSchema(etree.parse(str(folder / "all.xsd")))
 
 
 def _mend(path: Path, old: str, new: str) -> None:
@@ -85,8 +90,18 @@ def _mend(path: Path, old: str, new: str) -> None:
 
 @functools.cache
 def packaging_schema() -> etree.XMLSchema:
-    """IMS Content Packaging 1.1.4, whose namespace packages of QTI 2.1 have."""
-    return etree.XMLSchema(etree.parse(str(_schemas() / "scorm20043rdedition/imscp_v1p1.xsd")))
+    """IMS Content Packaging 1.1.4, whose namespace packages of QTI 2.1 have.
+
+    It takes any metadata of IEEE LOM, whose schema is not installed.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name) / "schemas"
+        shutil.copytree(_schemas() / "scorm20043rdedition", folder)
+        schema = '<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" targetNamespace="{}">{}'
+        element = '<xs:element name="lom"/></xs:schema>'
+        (folder / "lom.xsd").write_text(schema.format(LOM, element), encoding="utf-8")
+        packaging = "http://www.imsglobal.org/xsd/imscp_v1p1"
+        return _joined_schema(folder, {"imscp_v1p1.xsd": packaging, "lom.xsd": LOM})
 
 
 @functools.cache

@@ -6,6 +6,7 @@ string is Markdown) and `expects` (words for what the pattern or the bounds allo
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, TypeAlias
 
 from msgspec import Meta, Struct
@@ -84,6 +85,13 @@ class Author(Struct, frozen=True, forbid_unknown_fields=True):
     def address(self) -> str:
         """That of the ORCID iD; empty without one."""
         return f"https://orcid.org/{self.orcid}" if self.orcid else ""
+
+    @property
+    def card(self) -> str:
+        """Who it is for a learning platform (RFC 2426, vCard 3.0)."""
+        name = re.sub(r"([\\;,])", r"\\\1", self.name)
+        url = f"URL:{self.address}\r\n" if self.address else ""
+        return f"BEGIN:VCARD\r\nVERSION:3.0\r\nFN:{name}\r\nN:{name}\r\n{url}END:VCARD"
 
     @property
     def is_misspelt(self) -> bool:

@@ -39,6 +39,7 @@ from coursebuild.core.model import Level
 from coursebuild.core.model.lesson_record import shown_versions
 from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, parse_html, to_html
+from coursebuild.core.pages.materials import in_language
 from coursebuild.core.pages.renderer import direction
 from coursebuild.core.text.characters import visible
 
@@ -170,9 +171,13 @@ def render_lesson(
     top: str,
 ) -> Markup:
     """Render a lesson for use elsewhere; `write` writes its tree, `top` is its own id there."""
-    return context.library.render(
+    language = context.course.language_of(lesson)
+    return in_language(context.library, language).render(
         "book/lesson.html",
         lesson=lesson,
+        language=language,
+        direction=direction(language),
+        is_foreign=language != context.course.language,
         draft=lesson.status == "draft",
         article=Markup(write(list(rewrite(lesson_text(context, rules.place.path), rules)))),
         top=top,

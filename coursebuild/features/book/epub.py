@@ -121,7 +121,8 @@ class _Epub:
                 place = urls.Place(urls.lesson_path(lesson))
                 rules = chapters.RewriteRules(place, self._address, self._picture, xml_id)
                 text = chapters.render_lesson(self._context, lesson, rules, to_xml, "_top")
-                chapter = self._page(f"{lesson.id} {lesson.title}", text, "bodymatter")
+                title, language = f"{lesson.id} {lesson.title}", self._course.language_of(lesson)
+                chapter = self._page(title, text, "bodymatter", language)
                 properties = [key for key in ("mathml", "svg") if f"<{key[:4]}".encode() in chapter]
                 yield _page_item(_lesson_name(lesson), chapter, " ".join(properties))
         for path, name in self._pictures.items():
@@ -141,15 +142,13 @@ class _Epub:
 
     # --- pages
 
-    def _page(self, title: str, body: Markup, kind: str) -> bytes:
-        return self._render("epub-page", title=title, body=body, kind=kind)
+    def _page(self, title: str, body: Markup, kind: str, language: str = "") -> bytes:
+        return self._render("epub-page", language, title=title, body=body, kind=kind)
 
-    def _render(self, template: str, **values: object) -> bytes:
+    def _render(self, template: str, language: str = "", **values: object) -> bytes:
+        language = language or self._language
         text = self._library.render(
-            f"book/{template}.html",
-            language=self._language,
-            direction=direction(self._language),
-            **values,
+            f"book/{template}.html", language=language, direction=direction(language), **values
         )
         return visible(text).encode()
 
@@ -204,6 +203,9 @@ class _Epub:
             licence=course.licence,
             authors=course.authors,
             doi=course.doi,
+            languages=dict.fromkeys(
+                (self._language, *filter(None, map(course.language_of, course.written_lessons)))
+            ),
             address=course.base_url,
             modified=_MODIFICATION_TIME,
             visual=bool(self._pictures),

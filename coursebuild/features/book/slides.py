@@ -24,6 +24,7 @@ from coursebuild.api import ExportContext, OutputFile, document_scripts, urls
 from coursebuild.core.model.lesson_record import shown_versions
 from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, to_html
+from coursebuild.core.pages.materials import in_language
 from coursebuild.core.pages.renderer import direction
 from coursebuild.core.text.characters import visible
 from coursebuild.features.book import chapters
@@ -46,8 +47,11 @@ _UNWRAPPED = frozenset(("dock", "dock-before", "dock-lab", "dock-after", "furthe
 
 def slides_file(context: ExportContext) -> OutputFile:
     """Return the page."""
-    lesson, course, words = context.lesson, context.course, context.library.words
+    lesson, course = context.lesson, context.course
     assert lesson is not None  # the exporter is one of a lesson
+    language = course.language_of(lesson) or "en"
+    library = in_language(context.library, language)
+    words = library.words
     path = urls.lesson_path(lesson)
     place = urls.Place(path)
     files: dict[str, bytes] = {}
@@ -79,10 +83,10 @@ def slides_file(context: ExportContext) -> OutputFile:
     script = context.assets.file("js/slides.js").decode().replace("</", "<\\/")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     evaluation = " 'unsafe-eval'" if any(path.endswith(".wasm") for path in files) else ""
-    language, runs = course.language_of(lesson) or "en", context.library.runs
+    runs = library.runs
     scripts = document_scripts(lesson.document) if lesson.document is not None else ()
     versions = shown_versions(runs[s.path].provenance for s in scripts if s.path in runs)
-    html = context.library.render(
+    html = library.render(
         "book/slides.html",
         language=language,
         direction=direction(language),

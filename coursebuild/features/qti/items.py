@@ -93,7 +93,7 @@ class _Writer:
         values = {
             "identifier": name,
             "title": f"{self.quiz.title}: {title}" if self.quiz.title else title,
-            "language": self.course.language or "en",
+            "language": self.words.language,
             "style": STYLE,
             "text": self._blocks(question.text),
             "task": "",
@@ -255,6 +255,8 @@ def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
         manifest = render_xml(
             _FOLDER / "manifest.jinja",
             identifier=identifier("course.", context.course.key),
+            course=context.course,
+            language=context.course.language or "en",
             quizzes=quizzes,
             style=STYLE,
             encode=urls.encode,
