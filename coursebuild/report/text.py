@@ -112,25 +112,6 @@ def table(columns: Sequence[Column]) -> list[str]:
     return [_GAP.join(row).rstrip() for row in zip(*padded_columns, strict=True)]
 
 
-def fit(columns: Sequence[Column], width: int) -> list[list[Column]]:
-    """Share columns out among tables no wider than `width`, where possible."""
-    shared = [n for n, column in enumerate(columns) if not column.rank]
-    rest = [n for n, column in enumerate(columns) if column.rank and _is_filled(column)]
-    rest.sort(key=lambda n: columns[n].rank)
-    groups: list[list[Column]] = []
-    while rest or not groups:
-        group, full_rank = shared + rest[:1], 0
-        for n in rest[1:]:
-            lines = table([columns[m] for m in (*group, n)])
-            if columns[n].rank != full_rank and max(map(cells, lines)) <= width:
-                group.append(n)
-            else:  # the next ones of its rank stay with it
-                full_rank = columns[n].rank
-        rest = [n for n in rest if n not in group]
-        groups.append([columns[n] for n in sorted(group)])
-    return groups
-
-
 def _is_filled(column: Column) -> bool:
     return any(cell.strip() for cell in column.cells)
 

@@ -24,7 +24,7 @@ from mjbench.declarations import (
     Place,
     parse_declarations,
 )
-from mjbench.derive import derive_sweep
+from mjbench.derive import derive_sweep, known_cases
 from mjbench.fair import fair_declarations
 from mjbench.host import Host
 from mjbench.machine import one_processor, this_machine
@@ -32,12 +32,8 @@ from mjbench.problem import Array
 from mjbench.pruning.comparison import watch
 from mjbench.pruning.reachability import possible_pairs
 from mjbench.reports import PartFailure
-from mjbench.reports.scene_report import (
-    ScenarioReport,
-    SceneCard,
-    SceneReport,
-    SweepReport,
-)
+from mjbench.reports.model_report import SceneCard, SceneReport
+from mjbench.reports.scene_report import ScenarioReport, SweepReport
 from mjbench.scene import ExactMotion, ExactStates, Scene, SceneError, scenes
 from mjbench.simulation import silent
 from mjbench.sweep import THREADS, measure_sweep
@@ -226,6 +222,7 @@ def join_parts(
         sweeps=tuple(map(derive_sweep, sweeps)),
         failures=tuple(failures),
     )
+    report = replace(report, cases=known_cases(report))
     return replace(report, card=_card(compiled_model, host)) if card and scenarios else report
 
 

@@ -29,6 +29,7 @@ from mjbench.problems import all_problems
 from mjbench.reports import PartFailure
 from mjbench.reports.diet_report import DietReport, Keep
 from mjbench.reports.diet_text import diet_text
+from mjbench.reports.model_report import SceneReport
 from mjbench.reports.page import scene_page
 from mjbench.reports.records import (
     BENCH,
@@ -39,7 +40,7 @@ from mjbench.reports.records import (
     case_departures,
     scene_departures,
 )
-from mjbench.reports.scene_report import ScenarioReport, SceneReport
+from mjbench.reports.scene_report import ScenarioReport
 from mjbench.reports.terminal import Style
 from mjbench.schemas import schema_text
 from mjbench.work_precision import StoppedError

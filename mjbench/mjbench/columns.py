@@ -109,11 +109,15 @@ class Spread(Struct, frozen=True):
 
     def text(self, figure: str) -> str:
         """In words: what is how many times as large, and when."""
-        name, span = self.column
-        if name == LOST:
+        if self.column[0] == LOST:
             return "it is lost"
-        label = figure.partition(" [")[0] or "the figure" if name == "figure" else LABELS[name]
-        return f"{label} is {times_text(self.low, self.high)} as large {span}"
+        label = self.label(figure)
+        return f"{label} is {times_text(self.low, self.high)} as large {self.column[1]}"
+
+    def label(self, figure: str) -> str:
+        """What errs, in words."""
+        name = self.column[0]
+        return (figure.partition(" [")[0] or "the figure") if name == "figure" else LABELS[name]
 
 
 def spreads(starts: Sequence[Mapping[Column, float]]) -> list[Spread]:
@@ -123,7 +127,7 @@ def spreads(starts: Sequence[Mapping[Column, float]]) -> list[Spread]:
     for column in columns:
         values = [start[column] for start in starts if column in start]
         found.append(Spread(column, min(values), max(values)))
-    return sorted(found, key=lambda spread: (-spread.low, -spread.high, spread.column))
+    return sorted(found, key=lambda part: (-part.low, -part.high, part.column[1] != WHOLE))
 
 
 def times_text(low: float, high: float) -> str:

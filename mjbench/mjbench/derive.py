@@ -9,14 +9,28 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from msgspec.structs import replace
+from msgspec.structs import asdict, replace
 
 from mjbench.columns import mark_dominated
 from mjbench.judge import Starts, find_parts, five_lines, judge_setting, largest_of, mark_luck
 from mjbench.reports import Interval
-from mjbench.reports.case_report import RIGHT, CaseReport
+from mjbench.reports.case_report import (
+    RIGHT,
+    BoundaryLine,
+    CaseReport,
+    ErrorLine,
+    ReferenceLine,
+    StepCost,
+)
 from mjbench.reports.limits import limit_text, map_text, widest_gaps
-from mjbench.reports.scene_report import ErrorQuantity, ScenarioReport, StableRow, SweepReport
+from mjbench.reports.model_report import SceneReport
+from mjbench.reports.scene_report import (
+    ErrorQuantity,
+    MeasuredRun,
+    ScenarioReport,
+    StableRow,
+    SweepReport,
+)
 from mjbench.reports.shown_errors import (
     FEWEST_STEPS,
     INTEGRATORS,
@@ -28,6 +42,8 @@ from mjbench.reports.shown_errors import (
 )
 from mjbench.reports.work_charts import case_charts, case_quantities, scenario_charts, step_cost
 
+EXACT_SUFFIX = ".exact.py"
+"""Of the file that gives the exact motion of a model."""
 FIGURES = (
     *("change", "parted", "figure", "penetration", "slip", "restitution", "residual"),
     *("iterations", "cost", "throughput"),
@@ -130,3 +146,42 @@ def derive_sweep(report: SweepReport) -> SweepReport:
         if values and max(values) > 1.01 * min(values):
             shown.append(name)
     return replace(report, show=tuple(shown))
+
+
+def known_cases(report: SceneReport) -> tuple[CaseReport, ...]:
+    """The scenarios of a model of which the exact motion or theory is given, as hard cases."""
+    cases = []
+    for scenario in report.scenarios:
+        if not scenario.source.endswith(EXACT_SUFFIX) and not scenario.figures:
+            continue
+        own = scenario.own_setting
+        usual = None if own is None else own.solver_settings
+        rows = [row for row in scenario.rows if row.setting.solver_settings == usual]
+        steps = {
+            row.setting.integrator: row.seconds.scale(row.setting.timestep)
+            for row in reversed(rows)
+            if row.seconds is not None
+        }
+        floors = scenario.floor, scenario.floor, scenario.velocity_floor
+        case = CaseReport(
+            name=f"{report.model}/{scenario.name}",
+            title=f"{report.model}: {scenario.title or scenario.name}",
+            case=0,
+            machine=report.machine,
+            note="; ".join(scenario.notes),
+            reference=ReferenceLine(scenario.reference, scenario.source, scenario.second, *floors),
+            boundaries=tuple(BoundaryLine(**asdict(row)) for row in scenario.stable),
+            figures=scenario.figures,
+            orders=scenario.orders,
+            errors=tuple(
+                ErrorLine(
+                    integrator=row.setting.integrator,
+                    timestep=row.setting.timestep,
+                    **{name: getattr(row, name) for name in MeasuredRun.__struct_fields__},
+                )
+                for row in rows
+            ),
+            costs=tuple(StepCost(name, seconds) for name, seconds in steps.items()),
+        )
+        cases.append(derive_case(case))
+    return tuple(cases)

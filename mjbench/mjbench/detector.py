@@ -197,6 +197,11 @@ class Passages:
         self.inside: dict[tuple[int, int], Array] = {}
         """Pairs that are deep in each other now, with the normal of their contact before."""
         self._normals: dict[tuple[int, int], Array] = {}
+        may_touch = np.any(model.geom_contype | model.geom_conaffinity) and model.ngeom > 1
+        is_off = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+        self.needed = bool((may_touch or model.npair) and not is_off)
+        """Whether anything can touch: then every step is looked at, as what is thin is passed
+        between two looks."""
 
     def look(self, data: Any) -> None:
         """Look at a state whose contacts are computed."""

@@ -33,7 +33,9 @@ from mjbench.machine import Machine, code_digest, one_processor, this_machine
 from mjbench.problems import all_problems
 from mjbench.reports.case_report import CaseReport
 from mjbench.reports.diet_report import DietReport, Keep
+from mjbench.reports.diet_text import diet_text
 from mjbench.reports.engine_report import EngineReport
+from mjbench.reports.model_report import SceneReport
 from mjbench.reports.records import (
     BENCH,
     DIET,
@@ -42,7 +44,9 @@ from mjbench.reports.records import (
     case_departures,
     scene_departures,
 )
-from mjbench.reports.scene_report import ScenarioReport, SceneReport, SweepReport
+from mjbench.reports.scene_report import ScenarioReport, SweepReport
+from mjbench.reports.terminal import Style
+from mjbench.text import case_text, engines_text, scene_text
 
 
 class About(Struct, frozen=True, tag_field="job", tag="about"):
@@ -142,6 +146,21 @@ class Write(Struct, frozen=True, tag_field="job", tag="write"):
     cases: tuple[CaseReport, ...] | None = None
 
 
+class Text(Struct, frozen=True, tag_field="job", tag="text"):
+    """Ask for reports of one kind in words, for a terminal."""
+
+    bench: tuple[SceneReport, ...] = ()
+    engines: tuple[EngineReport, ...] = ()
+    diet: tuple[DietReport, ...] = ()
+    cases: tuple[CaseReport, ...] = ()
+    width: int = 100
+    colour: bool = False
+    command: str = ""
+    """What looks at a model again, with `{}` for its name."""
+    declarations: str = ""
+    """The file that declares what is kept, the same way."""
+
+
 class Compare(Struct, frozen=True, tag_field="job", tag="compare"):
     """Compare what was recorded with what was measured: a list of `Departure`."""
 
@@ -153,7 +172,7 @@ class Compare(Struct, frozen=True, tag_field="job", tag="compare"):
 
 
 Job: TypeAlias = (
-    About | Scenario | Sweep | Join | Case | Diet | ChooseEngines | Engines | Write | Compare
+    About | Scenario | Sweep | Join | Case | Diet | ChooseEngines | Engines | Write | Text | Compare
 )
 
 
@@ -285,6 +304,8 @@ def answer(job: Job, host: Host) -> object:
             return measure_engines(job.subject, engines, host, quick=job.quick)
         case Write():
             return _file_text(job)
+        case Text():
+            return _words(job)
         case Compare():
             if job.recorded is not None and job.measured is not None:
                 return scene_departures(job.recorded, job.measured, job.bands)
@@ -311,3 +332,14 @@ def _file_text(job: Write) -> str:
         cases = sorted(job.cases or (), key=lambda case: (case.case, case.name))
         data = STABILITY.encode(tuple(cases))
     return data.decode()
+
+
+def _words(job: Text) -> str:
+    style = Style(job.width, job.colour)
+    texts = [scene_text(report, style) for report in job.bench]
+    texts += [engines_text(report, style) for report in job.engines]
+    texts += [case_text(report, style) for report in job.cases]
+    for report in job.diet:
+        command, declarations = (t.format(report.model) for t in (job.command, job.declarations))
+        texts.append(diet_text(report, command, declarations, style))
+    return "\n".join(texts)

@@ -18,6 +18,7 @@ from typing import TypeAlias
 from msgspec.structs import replace
 
 from mjbench.columns import (
+    WHOLE,
     Column,
     Spread,
     columns_of,
@@ -141,7 +142,11 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
         return RowVerdict(True, None, noticeable, text + remark, worse)
     text, is_better, worse = _judge_rival(report, row.dominated_by, starts)
     better = row.dominated_by if is_better else None
-    return RowVerdict(not is_better, better, noticeable, text + remark, worse)
+    known = is_better or not text.startswith(_UNRESOLVED)
+    return RowVerdict(known and not is_better, better, noticeable, text + remark, worse)
+
+
+_UNRESOLVED = "no setting can be called better: the reference resolves no error of "
 
 
 def quantity_of(report: ScenarioReport) -> Quantity:
@@ -162,8 +167,7 @@ def _judge_rival(
     here = ratios(pair[0], pair[1], leasts)
     resolved = [c for c in here if max(pair[0][c], pair[1][c]) > leasts[c[0]] * (1 + 1e-9)]
     if not resolved and (own.seen is None or report.least_seen >= 1):
-        text = "no setting can be called better: the reference resolves no error of "
-        return f"{text}{rival.name}, or of the scene's own setting", False, ()
+        return f"{_UNRESOLVED}{rival.name}, or of the scene's own setting", False, ()
     cost = rival.cost.value / own.cost.value if rival.cost and own.cost else 1.0
     claim = f"{rival.name} {_advantage(cost, _gain([here]), figure)}"
     if cost > 1 - _WORTH_SAYING and min(here.values()) > 1 - _WORTH_SAYING:
@@ -191,7 +195,8 @@ def _judge_rival(
 def _gain(starts: Sequence[Mapping[Column, float]]) -> Spread:
     """The column in which an error is smallest, relative to the other one, from all starts."""
     found = [spread for spread in spreads(starts) if math.isfinite(spread.high)]
-    return min(found, key=lambda part: (part.high, part.column), default=Spread(("", ""), 1.0, 1.0))
+    none = Spread(("", ""), 1.0, 1.0)
+    return min(found, key=lambda part: (part.high, part.column[1] != WHOLE), default=none)
 
 
 def _advantage(cost: float, gain: Spread, figure: str) -> str:
@@ -203,9 +208,8 @@ def _advantage(cost: float, gain: Spread, figure: str) -> str:
         return f"{cheap} and errs no more in any column"
     if gain.high < 1e-4:
         return f"{cheap} and errs far less"
-    label = gain.text(figure).partition(" is ")[0]
     less = times_text(1 / gain.high, 1 / max(gain.low, 1e-300))
-    return f"{cheap} and errs {less} less ({label} {gain.column[1]})"
+    return f"{cheap} and errs {less} less ({gain.label(figure)} {gain.column[1]})"
 
 
 def _describe_rival(

@@ -63,9 +63,25 @@ def _report_schema() -> dict[str, Any]:
 def _field_descriptions() -> dict[tuple[str, str], str]:
     """What stands below the fields of all types of reports, by class and field."""
     from mjbench import machine, reports
-    from mjbench.reports import case_report, diet_report, engine_report, scene_report
+    from mjbench.reports import (
+        case_report,
+        charts,
+        diet_report,
+        engine_report,
+        model_report,
+        scene_report,
+    )
 
-    modules = (reports, machine, scene_report, case_report, engine_report, diet_report)
+    modules = (
+        reports,
+        machine,
+        charts,
+        scene_report,
+        case_report,
+        model_report,
+        engine_report,
+        diet_report,
+    )
     fields: dict[str, dict[str, str]] = {}
     for module in modules:
         for node in ast.parse(inspect.getsource(module)).body:

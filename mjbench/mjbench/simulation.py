@@ -137,6 +137,17 @@ def advance(model: Any, data: Any, steps: int = 1) -> None:
         mujoco.mj_step(model, data, steps)
 
 
+def watch_steps(model: Any, data: Any, steps: int, passages: Passages) -> None:
+    """Make so many steps, and watch what goes through what."""
+    if not passages.needed:
+        advance(model, data, steps)
+        return
+    with silent():
+        for _ in range(steps):
+            mujoco.mj_step(model, data)
+            passages.look(data)
+
+
 def advance_watching(
     model: Any,
     data: Any,
@@ -156,10 +167,9 @@ def advance_watching(
     steps_made = 0
     while steps_made < steps and peaks.finite:
         part = min(interval, steps - steps_made)
-        advance(model, data, part)
+        watch_steps(model, data, part, passages)
         steps_made += part
         peaks = update_peaks(data, peaks, passages.thickness)
-        passages.look(data)
     return peaks, steps_made
 
 

@@ -63,10 +63,10 @@ from mjbench.reports.scene_report import StableRow
 from mjbench.reports.shown_errors import FEWEST_STEPS, horizon_error_text
 from mjbench.simulation import (
     EngineStates,
-    advance,
     compile_model,
     initial_data,
     simulate,
+    watch_steps,
     with_integrator,
 )
 
@@ -440,12 +440,11 @@ def run_trial(
     for stop in (stop for stop in stops if stop <= steps):
         try:
             if stop > count:
-                advance(model, data, stop - count)
+                watch_steps(model, data, stop - count, passages)
         except mujoco.FatalError:  # MuJoCo does not run it
             reason = "MuJoCo does not run it"
             return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan, -math.inf, reason, reason)
         count, now = stop, update_peaks(data, Peaks())
-        passages.look(data)
         if not count:  # before the first step MuJoCo has computed no energy: it says 0
             now = replace(now, energy=-math.inf)
         energy = max(energy, now.energy)

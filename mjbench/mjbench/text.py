@@ -14,13 +14,13 @@ from mjbench.reports.diet_report import DietReport
 from mjbench.reports.diet_text import diet_text
 from mjbench.reports.engine_report import EngineReport
 from mjbench.reports.limits import reach_text
+from mjbench.reports.model_report import SceneReport
 from mjbench.reports.plot_text import plot_lines
 from mjbench.reports.records import Departure
 from mjbench.reports.scene_report import (
     MeasuredRun,
     OrderRow,
     ScenarioReport,
-    SceneReport,
     StableRow,
     SweepReport,
     WorkPrecisionRow,

@@ -40,8 +40,9 @@ def test_a_model_is_measured_recorded_and_checked(model: Path, capsys: Capture) 
     record = str(model.with_name("arm.bench.json"))
     assert main([str(model), "--record", record]) == 0
     out = capsys.readouterr().out
-    assert out.startswith("arm\n  MuJoCo ") and "  swing: swing\n" in out
-    assert ">" in out and "Euler at 2 ms" in out and "largest stable timestep" in out
+    assert out.startswith("arm\n  swing: swing\n    Euler at 2 ms: "), "the verdict comes first"
+    for text in (" times real time\n", "stays bounded at", ">", "error: ", "largest timestep"):
+        assert text in out, text
     report = BENCH.decode(Path(record).read_bytes())
     assert report.card is not None and report.card.browser is None
     assert main(["bench", str(model), "--check", record]) == 0
@@ -51,27 +52,44 @@ def test_a_model_is_measured_recorded_and_checked(model: Path, capsys: Capture) 
     assert "± 5 %" in capsys.readouterr().out
 
 
-def test_what_a_model_does_not_need_is_taken_out(model: Path, capsys: Capture) -> None:
+ENERGY = ARM.replace(
+    '<option timestep="0.002"/>', '<option timestep="0.002"><flag energy="enable"/></option>'
+)
+
+
+def test_what_a_model_does_not_need_is_taken_out_and_its_interface_stays(
+    model: Path, capsys: Capture
+) -> None:
     record = str(model.with_name("arm.diet.json"))
+    model.write_text(ENERGY)
     assert main(["diet", str(model), "--quick"]) == 1
-    assert '    - <sensor><clock name="time"/></sensor>\n' in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert '    - <flag energy="enable"/>\n' in out
+    assert f"shown by `mjbench diet {model} --only energy-flag`" in " ".join(out.split())
+    assert "interface: nothing reads the sensor time" in out
+    assert main(["diet", str(model), "--quick", "--only", "sensor-unread"]) == 0
+    assert "energy-flag" not in capsys.readouterr().out
     code = model.with_name("use.py")
-    code.write_text('print(data.sensor("time").data)\n')
+    code.write_text('print(data.sensor("time").data, data.energy)\n')
     assert main(["diet", str(model), "--quick", "--code", str(code)]) == 0
     capsys.readouterr()
     assert main(["diet", str(model), "--quick", "--fix"]) == 0
     assert capsys.readouterr().err == "changed arm.xml\n"
-    assert "sensor" not in model.read_text()
-    model.write_text(ARM)
-    keep = '[[keep]]\nfinding = "sensor-unread time"\nreason = "for the plot"\n'
+    assert "energy" not in model.read_text() and "sensor" in model.read_text()
+    model.write_text(ENERGY)
+    keep = '[[keep]]\nfinding = "energy-flag"\nreason = "for the plot"\n'
     model.with_suffix(".toml").write_text(SWING + keep)
     assert main(["diet", str(model), "--record", record]) == 0
-    (finding, *_) = DIET.decode(Path(record).read_bytes()).findings
-    assert finding.kept == "for the plot"
-    model.with_suffix(".toml").write_text(SWING + keep.replace("time", "tone"))
+    findings = DIET.decode(Path(record).read_bytes()).findings
+    assert {f.kind: (f.label, f.kept) for f in findings if f.kind != "actuator-idle"} == {
+        "energy-flag": ("proved", "for the plot"),
+        "sensor-unread": ("interface", ""),
+    }
+    assert main(["show", record]) == 0 and "kept: for the plot" in capsys.readouterr().out
+    model.with_suffix(".toml").write_text(SWING + keep.replace("energy-flag", "unused-mesh"))
     assert main(["diet", str(model), "--quick"]) == 1
     out = capsys.readouterr().out
-    assert "`sensor-unread tone` no longer keeps anything (arm.toml:7)" in out
+    assert "`unused-mesh` no longer keeps anything: remove the entry (arm.toml:7:12)" in out
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from mjbench.declarations import BenchTable
+from mjbench.reports import Reach
 from mjbench.reports.case_report import BoundaryLine
 from mjbench.reports.records import (
     BENCH,
@@ -57,7 +58,7 @@ def test_what_is_written_is_read() -> None:
 
 def test_a_row_is_a_line_and_keys_are_sorted() -> None:
     lines = GOOD.decode().splitlines()
-    assert lines[:2] == ["{", ' "holds": "mjbench bench",'] and lines[-2] == ' "version": 3'
+    assert lines[:2] == ["{", ' "holds": "mjbench bench",'] and lines[-2] == ' "version": 4'
     assert sum('"timestep"' in line for line in lines) == len(swing().rows)
     assert GOOD.endswith(b"}\n")
 
@@ -78,8 +79,8 @@ def test_a_row_is_a_line_and_keys_are_sorted() -> None:
         (b"\xff", "is damaged: JSON is malformed: invalid character (byte 0)"),
         (b"[" * 100_000, "is damaged: "),
         (b"[]", "holds no report of `mjbench bench`"),
-        (HEAD + b', "version": 2}', "has version 2 of its format, and this one is 3"),
-        (HEAD + b', "version": 3}', "is damaged: Object missing required field `scene`"),
+        (HEAD + b', "version": 3}', "has version 3 of its format, and this one is 4"),
+        (HEAD + b', "version": 4}', "is damaged: Object missing required field `scene`"),
         (GOOD.replace(b'"value": 0.1}', b'"value": 1e999}', 1), "is damaged: Number out of range"),
         (
             GOOD.replace(b'"name": "swing"', b'"name": 7'),
@@ -213,14 +214,14 @@ def test_what_is_said_of_the_whole_scenario() -> None:
     [
         (0.04, 0.0403, None),
         (0.04, 0.041, ("0.04", "0.041", "± 1 %")),
-        (0.04, None, ("40 ms", "all", "the same")),
-        (None, 0.04, ("all", "40 ms", "the same")),
+        (0.04, "all", ("40 ms", "all", "the same")),
+        ("all", 0.04, ("all", "40 ms", "the same")),
     ],
 )
 def test_largest_stable_timesteps(
-    was: float | None, now: float | None, expected: tuple[str, str, str] | None
+    was: Reach, now: Reach, expected: tuple[str, str, str] | None
 ) -> None:
-    def stable(largest: float | None) -> ScenarioReport:
+    def stable(largest: Reach) -> ScenarioReport:
         return scenario(
             [], stable=(StableRow("Euler", largest, (1e-3, 0.1), None, 1.0, 9, 9, None),)
         )
@@ -261,7 +262,7 @@ def test_what_is_known_exactly_is_compared_by_how_far_it_is_off() -> None:
 
 def test_boundaries_and_runs_of_cases() -> None:
     line = BoundaryLine(
-        "Euler", None, (1e-3, 1.0), (0.3, 0.4), 9.0, 9, 9, None, beyond="reset", growth=1.5
+        "Euler", "all", (1e-3, 1.0), (0.3, 0.4), 9.0, 9, 9, None, beyond="reset", growth=1.5
     )
     old, run = case(), replace(case().errors[0], status="reset")
     new = replace(old, boundaries=(line, *old.boundaries[1:]), errors=(run, *old.errors[1:]))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
@@ -74,11 +75,6 @@ class MeasuredSetting(Struct, frozen=True):
     cone: str
     options: tuple[tuple[str, str], ...] = ()
 
-    @property
-    def solver_settings(self) -> tuple[str, int, str, tuple[tuple[str, str], ...]]:
-        """All but integrator and timestep."""
-        return self.solver, self.iterations, self.cone, self.options
-
 
 class Errors(Struct, frozen=True):
     """How far a motion is from its reference: at its largest, and at its end."""
@@ -99,11 +95,6 @@ class MeasuredRun(Errors, frozen=True):
     refsafe: bool
 
 
-def step_evaluations(integrator: str) -> int:
-    """How often a step computes the forward dynamics."""
-    return 4 if integrator == "RK4" else 1
-
-
 class WorkPrecisionRow(MeasuredRun, frozen=True):
     """One setting in one scenario."""
 
@@ -122,17 +113,14 @@ class WorkPrecisionRow(MeasuredRun, frozen=True):
     evaluations: int = 0
     iterations: float | None = None
     lucky: str = ""
-    same: bool = False
+    step_error: float | None = None
+    idle: bool = False
+    name: str = ""
 
     @property
     def realtime(self) -> float | None:
         """Simulated time over processor time."""
         return 1 / self.seconds.value if self.seconds and self.seconds.value else None
-
-    @property
-    def work(self) -> int:
-        """`evaluations`, also where they were not recorded."""
-        return self.evaluations or max(self.steps, 1) * step_evaluations(self.setting.integrator)
 
 
 class FittedOrder(Struct, frozen=True):
@@ -162,24 +150,29 @@ class OrderRow(Struct, frozen=True):
         return any(order is not None for order in (self.position, self.attitude, self.velocity))
 
 
+Reach: TypeAlias = float | Literal["all", "none"]
+"""The largest timestep at which something holds, s: or it holds at all of them, or at none."""
+
+
 class StableRow(Struct, frozen=True):
     """The largest stable timestep of an integrator in a scenario."""
 
     integrator: str
-    largest: float | None
+    largest: Reach
     searched: tuple[float, float]
     islands: tuple[float, float] | None
     duration: float
     steps: int
     tried: int
     energy: float | None
-    bracket: tuple[float, float] | None = None
-    theory: float | None = None
+    theory: Reach | None = None
     formula: str = ""
-    orbital: float | None = None
-    periodic: bool = False
+    orbital: Reach | None = None
     gain: tuple[float, float] | None = None
-    tries: tuple[tuple[float, int, int], ...] = ()
+    near: Reach | None = None
+    through: Reach | None = None
+    shown: str = ""
+    map: str = ""
 
 
 class FigureLine(Struct, frozen=True):
@@ -203,6 +196,71 @@ class RowVerdict(Struct, frozen=True):
     text: str
 
 
+class ErrorQuantity(Struct, frozen=True):
+    """An error that rows have, in the order in which they are shown."""
+
+    name: str
+    label: str
+    least: float
+    resolved: bool
+
+
+class ChartPoint(Struct, frozen=True):
+    """A run, in a chart."""
+
+    x: float
+    y: float | None
+    title: str
+    spread: tuple[float, float] | None = None
+    full: bool = True
+    small: bool = False
+    ringed: bool = False
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Between which `x` lies."""
+        return self.spread or (self.x, self.x)
+
+
+class ChartLine(Struct, frozen=True):
+    """Points joined in their order, except for small and lost ones."""
+
+    name: str
+    number: int
+    points: tuple[ChartPoint, ...]
+
+    @property
+    def visible_points(self) -> list[ChartPoint]:
+        """The points that were not lost."""
+        return [point for point in self.points if point.y is not None]
+
+
+class ChartLevel(Struct, frozen=True):
+    """A level of the vertical axis that means something."""
+
+    y: float
+    text: str
+
+
+class ChartMark(Struct, frozen=True):
+    """An entry of the key of a chart."""
+
+    kind: str
+    text: str
+
+
+class Chart(Struct, frozen=True):
+    """Lines between two logarithmic axes."""
+
+    title: str
+    text: str
+    axes: tuple[str, str]
+    lines: tuple[ChartLine, ...]
+    least: float = 0.0
+    levels: tuple[ChartLevel, ...] = ()
+    marks: tuple[ChartMark, ...] = ()
+
+
 class ScenarioReport(Struct, frozen=True):
     """Everything that was measured in a scenario."""
 
@@ -224,12 +282,12 @@ class ScenarioReport(Struct, frozen=True):
     verdict: RowVerdict
     velocity_floor: float = 0.0
     notes: tuple[str, ...] = ()
-    figures: tuple[FigureLine, ...] = ()
     horizons: tuple[float, float] | None = None
-    least_seen: float = 0.0
-    least_figure: float = 0.0
-    cost_of: MeasuredSetting | None = None
     horizon_error: Mapping[str, float] = {}
+    quantities: tuple[ErrorQuantity, ...] = ()
+    charts: tuple[Chart, ...] = ()
+    missed: tuple[float, float] | None = None
+    cut_short: bool = False
 
     @property
     def own_setting(self) -> MeasuredSetting | None:
@@ -247,31 +305,12 @@ class SceneCard(Struct, frozen=True):
     browser: float | None
 
 
-class SceneReport(Struct, frozen=True):
-    """Everything that was measured on a model."""
-
-    model: str
-    digest: str
-    quick: bool
-    machine: Machine
-    scenarios: tuple[ScenarioReport, ...]
-    card: SceneCard | None = None
-    sweeps: tuple[SweepReport, ...] = ()
-
-
 class BoundaryLine(StableRow, frozen=True):
     """The largest stable timestep of an integrator, compared with theory."""
 
     difference: float | None = None
     beyond: str = ""
     growth: float | None = None
-
-
-class StepCost(Struct, frozen=True):
-    """The time of a step of an integrator."""
-
-    integrator: str
-    seconds: Interval
 
 
 class ErrorLine(MeasuredRun, frozen=True):
@@ -305,7 +344,23 @@ class CaseReport(Struct, frozen=True):
     figures: tuple[FigureLine, ...]
     orders: tuple[OrderRow, ...]
     errors: tuple[ErrorLine, ...]
-    costs: tuple[StepCost, ...]
+    charts: tuple[Chart, ...] = ()
+    main: str = ""
+    reached: tuple[tuple[str, float], ...] = ()
+    missed: tuple[float, float] | None = None
+
+
+class SceneReport(Struct, frozen=True):
+    """Everything that was measured on a model."""
+
+    model: str
+    digest: str
+    quick: bool
+    machine: Machine
+    scenarios: tuple[ScenarioReport, ...]
+    card: SceneCard | None = None
+    sweeps: tuple[SweepReport, ...] = ()
+    cases: tuple[CaseReport, ...] = ()
 
 
 class BatchCost(Struct, frozen=True):

@@ -15,8 +15,6 @@ from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
-from msgspec import Struct
-
 from coursebuild.core.drawing.scales import (
     Scale,
     log,
@@ -26,7 +24,7 @@ from coursebuild.core.drawing.scales import (
     shorten_to_width,
     text_width,
 )
-from coursebuild.core.model.measurements import Interval
+from coursebuild.core.model.measurements import Chart, ChartPoint
 
 _DASHES = ("", "7 3", "2 3", "10 3 2 3", "1 4", "5 2 1 2 1 2", "12 4", "6 6")
 """One more than colours, as are the marks, so that the eighth line is not the first again."""
@@ -189,52 +187,6 @@ _NAME = 15.0
 """The distance from one name to the next."""
 
 
-class Point(Struct, frozen=True):
-    """A run."""
-
-    x: Interval
-    y: float | None
-    """`None` for a run that was lost."""
-    title: str
-    """The tooltip."""
-    full: bool = True
-    """Whether its mark is filled."""
-    small: bool = False
-    """Whether it stands beside the line, with a smaller mark."""
-    ringed: bool = False
-
-
-class Line(Struct, frozen=True):
-    """Points joined in their order, except for small and lost ones."""
-
-    name: str
-    number: int
-    """Selects colour, dash and mark."""
-    points: tuple[Point, ...]
-
-    @property
-    def visible_points(self) -> list[Point]:
-        """The points that were not lost."""
-        return [point for point in self.points if point.y is not None]
-
-
-class Chart(Struct, frozen=True):
-    """The content of a chart."""
-
-    title: str
-    text: str
-    """The description for readers who cannot see the chart."""
-    axes: tuple[str, str]
-    """The titles of the horizontal and the vertical axis."""
-    lines: tuple[Line, ...]
-    least: float = 0.0
-    """Errors below are not resolved."""
-    unit_label: str = ""
-    """The meaning of the value 1, if it has one."""
-    marks: tuple[Entry, ...] = ()
-    """Entries of the key after the lines; without them there is no key."""
-
-
 def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
     """The chart as an `svg` element; empty where there is no point to be drawn.
 
@@ -243,13 +195,14 @@ def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
     if not any(line.visible_points for line in chart.lines):
         return ""
     points = [point for line in chart.lines for point in line.points]
-    xs = [log(x) for point in points for x in (point.x.low, point.x.high)]
+    xs = [log(x) for point in points for x in point.ends]
     ys = [log(point.y) for point in points if point.y]
     pad = max(0.06 * (max(xs) - min(xs)), 0.12)
     floor = log(chart.least)
     bottom, top = min(ys, default=floor), max(ys, default=floor + 1)
-    if chart.unit_label and bottom - 1 <= 0 <= top + 1:
-        bottom, top = min(bottom, 0.0), max(top, 0.0)
+    for level in (log(level.y) for level in chart.levels if level.y > 0):
+        if bottom - 1 <= level <= top + 1:
+            bottom, top = min(bottom, level), max(top, level)
     if floor > bottom - 1.5:  # the band, with room for what it says
         bottom = min(bottom, floor) - 0.07 * max(top - bottom, 1.0)
     span = max(top - bottom, 0.6)
@@ -261,7 +214,8 @@ def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
     if chart.marks:
         lines = (Entry("line", line.name, line.number) for line in chart.lines)
         key_left = 6.0 if size == NARROW_SIZE else x.start
-        key_svg, height = key((*lines, *chart.marks), key_left, y.start + 62, size[0])
+        marks = (Entry(mark.kind, mark.text) for mark in chart.marks)
+        key_svg, height = key((*lines, *marks), key_left, y.start + 62, size[0])
         body += key_svg
     return svg(body, (size[0], height), name, (chart.title, chart.text))
 
@@ -285,8 +239,9 @@ def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
             if point.y is None:
                 yield cross(right, down, paint, point.title)
                 continue
-            if point.x.high > point.x.low:
-                bars += bar(x(point.x.low), x(point.x.high), down)
+            if point.spread is not None:
+                low, high = point.spread
+                bars += bar(x(low), x(high), down)
             size = SMALL if point.small else MARK
             marks.append(symbol(line.number, right, down, size, full=point.full, title=point.title))
         yield path(bars, f'stroke="{paint}"') if bars else ""
@@ -307,7 +262,7 @@ def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
 
 
 def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
-    """The band that is not resolved, or where it would be, and the line at 1."""
+    """The band that is not resolved, or where it would be, and lines of what means something."""
     if chart.least > 0 and log(chart.least) > y.low:
         top = y(chart.least)
         d = f"M{x.start:.1f} {top:.1f}H{x.end:.1f}V{y.start:.1f}H{x.start:.1f}Z"
@@ -319,11 +274,12 @@ def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
         text = f"not resolved: under {number_text(chart.least)}, below this scale"
         place = _roomiest(chart, x, y, text, (y.start - 5, y.end + 12))
         yield label(*place, text, f'text-anchor="middle" {FINE} {HALO}')
-    if chart.unit_label and y.low < 0 < y.high:
-        look = 'stroke="currentColor" stroke-dasharray="1 3" stroke-width="1.2"'
-        yield path(f"M{x.start:.1f} {y(1.0):.1f}H{x.end:.1f}", look)
-        place = _roomiest(chart, x, y, chart.unit_label, (y(1.0) - 4,))
-        yield label(*place, chart.unit_label, f'text-anchor="middle" {FINE} {HALO}')
+    for level in chart.levels:
+        if level.y > 0 and y.low < log(level.y) < y.high:
+            look = 'stroke="currentColor" stroke-dasharray="1 3" stroke-width="1.2"'
+            yield path(f"M{x.start:.1f} {y(level.y):.1f}H{x.end:.1f}", look)
+            place = _roomiest(chart, x, y, level.text, (y(level.y) - 4,))
+            yield label(*place, level.text, f'text-anchor="middle" {FINE} {HALO}')
 
 
 def _roomiest(
@@ -343,8 +299,8 @@ def _roomiest(
     return max(((side, at) for at in heights for side in sides), key=room)
 
 
-def _place(point: Point, x: Scale, y: Scale) -> tuple[float, float]:
-    return x(point.x.value), y.end - 6 if point.y is None else y(point.y)
+def _place(point: ChartPoint, x: Scale, y: Scale) -> tuple[float, float]:
+    return x(point.x), y.end - 6 if point.y is None else y(point.y)
 
 
 def _grid(x: Scale, y: Scale, titles: tuple[str, str]) -> tuple[list[str], list[str]]:

@@ -135,16 +135,13 @@ def draw_bench(page: PageContext, block: Bench) -> Markup:
 
 def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     """Write the report without its plot, and what the plot shows."""
-    from coursebuild.features.bench.report_plots import work_precision
-
     view = _view(writer.page, block)
     html = writer.page.template("bench/bench.html", bench=view, plots=(), engine_plots=())
     head, *rest = writer.html(html).split("\n\n")
     report = None if view.scenario is None else view.scenario.report
     if isinstance(report, ScenarioReport) and "plot" in block.shows:
-        # The block says the verdict itself. The table of a sweep holds all that its plot shows.
-        charts = work_precision(replace(report, verdict=replace(report.verdict, text="")))
-        texts = (f"{chart.title}. {chart.text}" for chart in charts)
+        # The table of a sweep holds all that its plot shows.
+        texts = (f"{chart.title}. {chart.text}" for chart in report.charts)
         rest = [*(guard_lines(escape_marks(text)) for text in texts), *rest]
     return "\n\n".join((head, *rest))
 

@@ -1,30 +1,24 @@
 """The plots of reports on models as SVG: error against work, of a scenario, sweeps, and engines.
 
-1. A line for each integrator goes from long timesteps to short ones, over those rows that have the
-   scene's own solver, iterations and cone; the rows with others are small marks beside it. A mark
-   is filled where the setting is on the Pareto front; a ring is around the scene's own.
-2. Beside the cost, which is time, work is counted as it is on every machine: in evaluations of the
-   forward dynamics, and in iterations of the solver. Each has a front of its own.
-3. A sweep has a row for each value, and for each figure a scale beside it, which is logarithmic
-   where its figures differ by much. A line joins the values of one parameter.
+A sweep has a row for each value, and for each figure a scale beside it, which is logarithmic
+where its figures differ by much. A line joins the values of one parameter.
 """
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 
-from msgspec.structs import replace
-
 from coursebuild.core.drawing.scales import Scale, log, shorten_to_width, text_width
 from coursebuild.core.model.measurements import (
+    Chart,
+    ChartLine,
+    ChartMark,
+    ChartPoint,
     EngineScenario,
-    Interval,
     ScenarioReport,
     SweepReport,
     SweepRow,
-    WorkPrecisionRow,
 )
 from coursebuild.features.bench.chart import (
     FINE,
@@ -35,10 +29,7 @@ from coursebuild.features.bench.chart import (
     SIZE,
     TICK_SIZE,
     WIDE_SIZE,
-    Chart,
     Entry,
-    Line,
-    Point,
     bar,
     chart_svg,
     colour,
@@ -52,217 +43,22 @@ from coursebuild.features.bench.chart import (
     symbols,
 )
 from coursebuild.features.bench.shown_errors import (
-    EVALUATION_LABEL,
     FIGURES,
-    INTEGRATORS,
-    Quantity,
     cell,
     figure_interval,
-    front,
-    horizon_error_text,
-    interval_text,
-    is_idle,
-    main_quantity,
     row_name,
     seconds_text,
-    setting_text,
-    shown_figures,
-    status_text,
 )
 
 
 def plot_svgs(report: ScenarioReport, *, name: str, narrow: bool = False) -> tuple[str, ...]:
-    """The plots of `work_precision` as `svg` elements, with a `name` that is unique on the page."""
+    """The charts of a report as `svg` elements, with a `name` that is unique on the page."""
     sizes = [WIDE_SIZE, PAIR_SIZE, PAIR_SIZE] if not narrow else [NARROW_SIZE] * 3
     return tuple(
         svg_text
-        for number, (chart, size) in enumerate(zip(work_precision(report), sizes, strict=False))
+        for number, (chart, size) in enumerate(zip(report.charts, sizes, strict=False))
         if (svg_text := chart_svg(chart, f"{name}-{number}" if number else name, size))
     )
-
-
-_WORKS = {
-    "cost": "cost",
-    "evaluations": EVALUATION_LABEL,
-    "iterations": "iterations of the solver",
-}
-"""What a setting costs: time, and what is the same on every machine."""
-_AMOUNTS = {"cost": "at costs of {}", "evaluations": "with {}", "iterations": "with {}"}
-
-
-def work_precision(report: ScenarioReport) -> tuple[Chart, ...]:
-    """The charts of error against cost, evaluations, and where a solver runs, its iterations.
-
-    None where no row errs.
-    """
-    quantity = main_quantity(report)
-    if quantity is None or not any(quantity.value_of(row) for row in report.rows):
-        return ()
-    return tuple(
-        _chart(report, quantity, work, works)
-        for work in _WORKS
-        if any(works := _find_works(report, work))
-    )
-
-
-def _chart(
-    report: ScenarioReport, quantity: Quantity, work: str, works: Sequence[Interval | None]
-) -> Chart:
-    if work != "cost":
-        pairs = list(zip(report.rows, works, strict=True))
-        places = front([replace(row, cost=x) for row, x in pairs], quantity)
-        rows = tuple(
-            replace(row, front=place.front, dominated_by=place.dominated_by)
-            for (row, _), place in zip(pairs, places, strict=True)
-        )
-        report = replace(report, rows=rows)
-    label = axis = _WORKS[work]
-    if work == "cost":
-        base = "the scene’s own setting"
-        if report.cost_of is not None:
-            base = setting_text(report.cost_of, report.own_setting)
-        axis = f"cost, relative to {base}"
-    lines = tuple(
-        Line(name, INTEGRATORS.index(name), points)
-        for name in INTEGRATORS
-        if (points := tuple(_points(report, quantity, works, name)))
-    )
-    visible = [point for line in lines for point in line.visible_points]
-    marks = [Entry("front", "on the Pareto front")] if any(p.full for p in visible) else []
-    if not all(point.full for point in visible):
-        marks.append(Entry("beaten", "another is better"))
-    if any(point.small for point in visible):
-        marks.append(Entry("other", "other solver, iterations or cone"))
-    own_names = (setting_text(row.setting, row.setting) for row in report.rows if row.own)
-    marks += [Entry("own", f"the scene’s own: {name}") for name in own_names]
-    losses = {"run lost": _lost(report), "past its horizon": _parted(report)}
-    if words := [text for text, names in losses.items() if names]:
-        marks.append(Entry("lost", ", or ".join(words)))
-    return Chart(
-        title=f"{report.title or report.name}: error of {quantity.label} against {label}",
-        text=" ".join(_describe(report, quantity, lines, work)),
-        axes=(axis, f"error: {quantity.label}"),
-        lines=lines,
-        least=quantity.least,
-        unit_label="just visible" if quantity.name == "seen" else "",
-        marks=tuple(marks),
-    )
-
-
-def _points(
-    report: ScenarioReport,
-    quantity: Quantity,
-    works: Sequence[Interval | None],
-    name: str,
-) -> Iterator[Point]:
-    """The points of an integrator, from long timesteps to short ones."""
-    baseline = report.own_setting
-    rows = [
-        (row, x)
-        for row, x in zip(report.rows, works, strict=True)
-        if row.setting.integrator == name and not is_idle(row)
-    ]
-    for row, x in sorted(rows, key=lambda pair: -pair[0].setting.timestep):
-        if x is None:
-            continue
-        error = quantity.value_of(row) if row.status == "ok" else None
-        yield Point(
-            x,
-            error,
-            " · ".join(_point_title(report, row, error)),
-            full=row.front,
-            small=baseline is not None and row.setting.solver_settings != baseline.solver_settings,
-            ringed=row.own,
-        )
-
-
-def _find_works(report: ScenarioReport, work: str) -> list[Interval | None]:
-    """What each row costs; nothing where that is not known of any."""
-    rows = report.rows
-    if work == "iterations":
-        return [Interval(n, n, n) if n else None for n in (row.iterations for row in rows)]
-    if work == "evaluations":
-        return [Interval(n, n, n) for n in (float(row.work) for row in rows)]
-    timed = [row for row in rows if row.cost is not None and row.cost.value > 0]
-    works: list[Interval | None] = []
-    for row in rows if timed else ():
-        x = row.cost
-        if x is None or not x.value:  # its evaluations say about how much it would be
-            alike = [peer for peer in timed if peer.setting.integrator == row.setting.integrator]
-            rates = [peer.cost.value / peer.work for peer in alike or timed if peer.cost]
-            value = row.work * statistics.median(rates)
-            x = Interval(value, value, value)
-        works.append(x)
-    return works
-
-
-def _lost(report: ScenarioReport) -> list[str]:
-    """The integrators under which runs were lost."""
-    return list(dict.fromkeys(r.setting.integrator for r in report.rows if r.status != "ok"))
-
-
-def _parted(report: ScenarioReport) -> list[str]:
-    """Those under which runs are too far from a chaotic motion to have an error."""
-    return list(dict.fromkeys(r.setting.integrator for r in report.rows if r.parted is not None))
-
-
-def _describe(
-    report: ScenarioReport, quantity: Quantity, lines: Sequence[Line], work: str
-) -> Iterator[str]:
-    for line in lines:
-        if line.visible_points:
-            errors = _range([point.y or 0.0 for point in line.visible_points], 2, "{1} to {0}")
-            costs = _range([point.x.value for point in line.visible_points], 3, "{0} to {1}")
-            yield f"{line.name}: errors {errors} {_AMOUNTS[work].format(costs)}."
-    if work != "cost":
-        return  # the rest is said with the costs
-    if lost := _lost(report):
-        yield f"Runs were lost under {', '.join(lost)}."
-    if parted := _parted(report):
-        error = horizon_error_text(report.horizon_error)
-        yield f"Runs are off by more than {error} under {', '.join(parted)}."
-    for row in report.rows:
-        if row.own:
-            yield f"The scene’s own setting is {setting_text(row.setting)}."
-    if report.verdict.text:
-        yield report.verdict.text
-    if quantity.least > 0:
-        yield f"No error below {quantity.least:.1e} is given."
-
-
-def _range(values: Sequence[float], digits: int, words: str) -> str:
-    least, largest = (f"{value:.{digits}g}" for value in (min(values), max(values)))
-    return words.format(least, largest) if max(values) > min(values) else least
-
-
-def _point_title(
-    report: ScenarioReport, row: WorkPrecisionRow, error: float | None
-) -> Iterator[str]:
-    yield setting_text(row.setting)
-    if row.parted is not None:
-        yield f"off by {horizon_error_text(report.horizon_error)} after {seconds_text(row.parted)}"
-    elif error is None:
-        yield "; ".join((status_text(row.status), *row.reasons))
-    else:
-        yield f"error {error:.3g}"
-    if row.cost is not None:
-        yield f"cost {interval_text(row.cost)}"
-    elif any(row.cost is not None for row in report.rows):
-        yield "not timed"
-    yield f"{row.steps} steps"
-    if row.work > row.steps:
-        yield f"{row.work} evaluations"
-    if row.iterations is not None:
-        yield f"{row.iterations:.6g} iterations of the solver"
-    if row.lucky:
-        yield f"luck: {row.lucky}"
-    if row.own:
-        yield "the scene’s own setting"
-    if row.front:
-        yield "on the Pareto front"
-    elif row.dominated_by is not None and 0 <= row.dominated_by < len(report.rows):
-        better = setting_text(report.rows[row.dominated_by].setting, row.setting)
-        yield f"{better} is better"
 
 
 _SPREAD = 20.0
@@ -275,7 +71,7 @@ _GAP = 18.0
 
 def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
     """The plot as an `svg` element; empty where nothing was measured."""
-    figures = shown_figures(sweep)[:_MAX_FIGURES]
+    figures = sweep.show[:_MAX_FIGURES]
     width, _ = NARROW_SIZE if narrow else WIDE_SIZE
     if not figures:
         return ""
@@ -362,15 +158,15 @@ def engine_svg(report: EngineScenario, *, name: str, narrow: bool = False) -> st
     lines = []
     for number, row in enumerate(report.rows):
         points = tuple(
-            Point(
-                Interval(cost.worlds, cost.worlds, cost.worlds),
+            ChartPoint(
+                float(cost.worlds),
                 cost.seconds.value * 1e6,
                 f"{row_name(row)}, {cost.worlds:,} worlds: {seconds_text(cost.seconds.value, 3)}",
             )
             for cost in row.costs
             if cost.seconds is not None
         )
-        lines += [Line(row_name(row), number, points)] if points else []
+        lines += [ChartLine(row_name(row), number, points)] if points else []
     text = " ".join(
         f"{line.name}: {', '.join(point.title.rsplit(', ', 1)[1] for point in line.points)}."
         for line in lines
@@ -380,6 +176,6 @@ def engine_svg(report: EngineScenario, *, name: str, narrow: bool = False) -> st
         text=text,
         axes=("worlds simulated at once", "time of a step per world (µs)"),
         lines=tuple(lines),
-        marks=(Entry("note", "lowest of at least 8 rounds"),),
+        marks=(ChartMark("note", "lowest of at least 8 rounds"),),
     )
     return chart_svg(chart, name, NARROW_SIZE if narrow else WIDE_SIZE)

@@ -13,9 +13,11 @@ from coursebuild.core.model.measurements import (
     EngineReport,
     EngineRow,
     EngineScenario,
+    ErrorQuantity,
     FittedOrder,
     MeasuredRun,
     OrderRow,
+    Reach,
     ScenarioReport,
     StableRow,
     SweepReport,
@@ -25,27 +27,21 @@ from coursebuild.core.model.measurements import (
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids
 from coursebuild.features.bench.shown_errors import (
-    FEWEST_STEPS,
     FIGURES,
-    Quantity,
     cell,
     horizon_error_text,
     interval_text,
-    is_cut_short,
-    is_idle,
-    limit_text,
-    map_text,
-    quantities,
     row_name,
     seconds_text,
     setting_text,
-    shown_figures,
     solving_parts,
     status_text,
-    widest_gaps,
 )
 
+_FEWEST_STEPS = 20
+"""Steps of a scenario at the longest timestep that is tried for stability."""
 _QUANTITIES = {
+    "step_error": "measured.step_error",
     "seen": "measured.seen",
     "position": "measured.position",
     "attitude": "measured.attitude",
@@ -88,24 +84,22 @@ def scenario_view(
             (words("measured.value"), [row.value for row in report.rows]),
             *((name, [cell(row, key) for row in report.rows]) for key, name in FIGURES.items()),
         ]
-        figures = shown_figures(report)
-        minor = tuple(name for key, name in FIGURES.items() if key not in figures)
+        minor = tuple(name for key, name in FIGURES.items() if key not in report.show)
         own_rows = tuple(n for n, row in enumerate(report.rows) if row.own)
         notes = lost_runs((f"{row.parameter} {row.value}", row) for row in report.rows)
         table = grids.grid(report.title, columns, minor=minor, highlights=own_rows)
         return ScenarioView(anchor, report.title, table, tuple(notes), report)
-    names = [setting_text(row.setting, report.own_setting) for row in report.rows]
-    notes = lost_runs(zip(names, report.rows, strict=True))
-    softened = [name for name, row in zip(names, report.rows, strict=True) if row.refsafe]
+    notes = lost_runs((row.name, row) for row in report.rows)
+    softened = [row.name for row in report.rows if row.refsafe]
     if softened:
         notes.append(words("measured.refsafe", settings="; ".join(softened)))
     rows = []
     for row in report.stable:
         remark = stable_again(words, row)
-        if row.largest is None and is_cut_short(report):
-            remark = words("measured.stable_short", steps=FEWEST_STEPS)
+        if row.largest == "all" and report.cut_short:
+            remark = words("measured.stable_short", steps=_FEWEST_STEPS)
         rows.append((row.integrator, (*stable_cells(words, row), remark)))
-    notes += missed_islands(words, report.stable)
+    notes += missed_islands(words, report.missed)
     label = stable_title(words, report.stable) if rows else ""
     return ScenarioView(
         anchor=anchor,
@@ -147,10 +141,12 @@ def _describe(words: Strings, report: ScenarioReport) -> list[str]:
 
 
 def _settings_table(words: Strings, report: ScenarioReport) -> grids.Grid:
-    rows = [row for row in report.rows if not is_idle(row)]
+    rows = [row for row in report.rows if not row.idle]
 
-    def error_column(quantity: Quantity) -> tuple[str, list[str]]:
-        errors: list[str] = [grids.bounded(quantity.value_of(row), quantity.least) for row in rows]
+    def error_column(quantity: ErrorQuantity) -> tuple[str, list[str]]:
+        values = (getattr(row, quantity.name) for row in rows)
+        sizes = (value[0] if isinstance(value, tuple) else value for value in values)
+        errors: list[str] = [grids.bounded(size, quantity.least) for size in sizes]
         key = _QUANTITIES.get(quantity.name)
         return quantity.label if key is None else words(key), errors
 
@@ -159,18 +155,18 @@ def _settings_table(words: Strings, report: ScenarioReport) -> grids.Grid:
     columns: list[tuple[str, list[str]]] = [
         (
             words("measured.setting"),
-            [setting_text(row.setting, report.own_setting) for row in rows],
+            [row.name for row in rows],
         ),
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (speed, [grids.factor(row.realtime) for row in rows]),
         (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
-        (evaluations, [f"{row.work:,}" for row in rows]),
+        (evaluations, [f"{row.evaluations:,}" if row.evaluations else "" for row in rows]),
         (iterations, ["" if r.iterations is None else f"{r.iterations:,.0f}" for r in rows]),
         (
             words("measured.parted", error=horizon_error_text(report.horizon_error)),
             ["" if r.parted is None else seconds_text(r.parted, 3) for r in rows],
         ),
-        *(error_column(quantity) for quantity in quantities(report) if quantity.is_resolved(rows)),
+        *(error_column(quantity) for quantity in report.quantities if quantity.resolved),
         (words("measured.energy"), [grids.percent(row.energy_drift) for row in rows]),
         (words("measured.momentum"), [grids.power(row.momentum_drift, 2) for row in rows]),
         (words("measured.depth"), [grids.power(row.penetration or None, 2) for row in rows]),
@@ -195,8 +191,7 @@ def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> st
     elif row.front:
         parts.append(words("measured.front"))
     elif row.dominated_by is not None:
-        better = report.rows[row.dominated_by].setting
-        parts.append(words("measured.better", setting=setting_text(better, row.setting)))
+        parts.append(words("measured.better", setting=report.rows[row.dominated_by].name))
     return "; ".join(parts)
 
 
@@ -248,6 +243,8 @@ def integrator_table(
 
 STABLE = (
     "measured.largest",
+    "measured.near",
+    "measured.through",
     "measured.theory",
     "measured.orbital",
     "measured.gain",
@@ -270,12 +267,7 @@ def stable_title(words: Strings, rows: Sequence[StableRow]) -> str:
 
 def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:
     """Write a largest stable timestep, what else is known of it, and the search for it."""
-    low, high = (seconds_text(float(f"{step:.3g}")) for step in row.searched)
-    largest = words("measured.stable_all", time=high)
-    if row.largest == 0:
-        largest = words("measured.stable_none", time=low)
-    elif row.largest is not None or row.bracket is not None:
-        largest = limit_text(row)
+    low = seconds_text(float(f"{row.searched[0]:.3g}"))
     search = words("measured.tried_from", count=row.tried, time=low) if row.tried else ""
     gain = ""
     if row.gain is not None:
@@ -284,20 +276,36 @@ def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:
         time = bound + seconds_text(step, 2)
         gain = words("measured.gained", time=time, energy=grids.factor(energy, 2))
     return (
-        largest,
-        _theory(words, row.theory, has_theory=bool(row.formula)),
-        _theory(words, row.orbital, has_theory=row.periodic, digits=2),
+        _reach(words, row.largest, row) if isinstance(row.largest, str) else row.shown,
+        _reach(words, row.near, row),
+        _reach(words, row.through, row),
+        _theory(words, row.theory),
+        _theory(words, row.orbital, digits=2),
         gain,
-        map_text(row),
+        row.map,
         str(row.steps),
         search,
     )
 
 
-def _theory(words: Strings, limit: float | None, *, has_theory: bool, digits: int = 5) -> str:
-    if limit:
-        return seconds_text(limit, digits)
-    return words("numerics.all" if limit is None else "numerics.none") if has_theory else ""
+def _reach(words: Strings, limit: Reach | None, row: StableRow) -> str:
+    """A largest timestep, and where it is none, what was tried."""
+    low, high = (seconds_text(float(f"{step:.3g}")) for step in row.searched)
+    match limit:
+        case None:
+            return ""
+        case "all":
+            return words("measured.stable_all", time=high)
+        case "none":
+            return words("measured.stable_none", time=low)
+        case _:
+            return seconds_text(limit, 2)
+
+
+def _theory(words: Strings, limit: Reach | None, digits: int = 5) -> str:
+    if isinstance(limit, str):
+        return words(f"numerics.{limit}")
+    return "" if limit is None else seconds_text(limit, digits)
 
 
 def stable_again(words: Strings, row: StableRow) -> str:
@@ -310,10 +318,12 @@ def stable_again(words: Strings, row: StableRow) -> str:
     return words("measured.islands", first=first, last=last)
 
 
-def missed_islands(words: Strings, rows: Sequence[StableRow]) -> list[str]:
+def missed_islands(words: Strings, missed: tuple[float, float] | None) -> list[str]:
     """Say what the search for largest stable timesteps cannot see; nothing without a search."""
-    near, far = (f"{100 * (gap - 1):.2g}" for gap in widest_gaps(rows))
-    return [words("measured.gaps", near=near, far=far)] if float(near) > 0 else []
+    if missed is None:
+        return []
+    near, far = (f"{100 * gap:.2g}" for gap in missed)
+    return [words("measured.gaps", near=near, far=far)]
 
 
 class EngineView(Struct, frozen=True):

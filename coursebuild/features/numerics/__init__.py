@@ -5,7 +5,7 @@ The page exists where hard cases are recorded.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import groupby
 from operator import attrgetter
 
@@ -17,17 +17,9 @@ from coursebuild.core.model.measurements import CaseReport, FigureLine, SceneRep
 from coursebuild.core.model.report_files import STABILITY
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids, scenario_view
-from coursebuild.features.bench.shown_errors import (
-    INTEGRATORS,
-    Quantity,
-    limit_text,
-    seconds_text,
-    status_text,
-)
-from coursebuild.features.numerics.cases import case_quantities, case_svgs, cost_to, course_cases
+from coursebuild.features.bench.chart import PAIR_SIZE, chart_svg
+from coursebuild.features.bench.shown_errors import INTEGRATORS, seconds_text, status_text
 
-_RIGHT = 1e-3
-"""m or rad: the error at which costs are compared."""
 _DIGITS = 3
 _BOUNDARY = (
     *scenario_view.STABLE,
@@ -71,7 +63,7 @@ def numerics_values(library: Library) -> dict[str, object]:
     """The values for the template of the page."""
     words, place = library.words, urls.Place(urls.NUMERICS)
     scenes: Mapping[str, SceneReport] = library.reports.scenes
-    course_reports = [report for name in sorted(scenes) for report in course_cases(scenes[name])]
+    course_reports = [report for name in sorted(scenes) for report in scenes[name].cases]
     cases: list[CaseReport] = [
         *sorted(library.reports.cases, key=attrgetter("case")),
         *course_reports,
@@ -97,19 +89,16 @@ def numerics_values(library: Library) -> dict[str, object]:
 
 
 def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
-    quantity = next(iter(case_quantities(report)), None)
-    part = None if quantity is None or quantity.name == "energy_drift" else quantity.name
+    part = report.main if report.main != "energy_drift" else ""
     fits = {row.integrator: getattr(row, part) for row in report.orders} if part else {}
-    limits = {}
-    for line in report.boundaries:
-        if line.largest == 0:
-            limits[line.integrator] = words("numerics.none")
-        elif line.largest is None and line.bracket is None:
-            limits[line.integrator] = words("numerics.all")
-        else:
-            limits[line.integrator] = limit_text(line)
+    limits = {
+        line.integrator: words(f"numerics.{line.largest}")
+        if isinstance(line.largest, str)
+        else line.shown
+        for line in report.boundaries
+    }
     orders = (fits.get(integrator) for integrator in INTEGRATORS)
-    costs = (cost_to(report, integrator, _RIGHT) for integrator in INTEGRATORS)
+    costs = map(dict(report.reached).get, INTEGRATORS)
     return (
         tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
         tuple(limits.get(integrator, "") for integrator in INTEGRATORS),
@@ -140,35 +129,34 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
     )
     boundaries = scenario_view.integrator_table(words, label, _BOUNDARY, rows, merge=True)
     tables = (boundaries, _figures(words, report), orders)
-    quantities = case_quantities(report)
     name = urls.encode(report.name)
-    drawings = [case_svgs(report, q, f"{name}-{q.name}") for q in quantities]
+    drawings = [
+        Markup(chart_svg(chart, f"{name}-{number}", PAIR_SIZE))
+        for number, chart in enumerate(report.charts, 1)
+    ]
+    first = sum(chart.axes[1] == report.charts[0].axes[1] for chart in report.charts)
     return CaseView(
         name,
         report.title,
         _matrix(words, report),
-        tuple(_describe(words, report, quantities)),
-        tuple(map(Markup, drawings[0] if drawings else ())),
-        tuple(Markup(svg) for svgs in drawings[1:] for svg in svgs),
+        tuple(_describe(words, report)),
+        tuple(filter(None, drawings[:first])),
+        tuple(filter(None, drawings[first:])),
         tuple(grid for grid in tables if grid is not None),
         tuple(_notes(words, report)),
         place.href(urls.model_page_path(model)) if model else "",
     )
 
 
-def _describe(words: Strings, report: CaseReport, quantities: Sequence[Quantity]) -> Iterator[str]:
-    costs = [
-        (cost, integrator)
-        for integrator in INTEGRATORS
-        if (cost := cost_to(report, integrator, _RIGHT)) is not None
-    ]
+def _describe(words: Strings, report: CaseReport) -> Iterator[str]:
+    costs = [(cost, integrator) for integrator, cost in report.reached]
     if costs:
         (least, best), (most, worst) = min(costs), max(costs)
         key = "cheapest" if most > 1.05 * least else "alike"
         key = f"numerics.{key if len(costs) > 1 else 'only'}"
         cheapest, ratio = seconds_text(least, _DIGITS), f"{most / least:.3g}"
         yield words(key, best=best, cost=cheapest, worst=worst, factor=ratio)
-    elif quantities:
+    elif report.main:
         yield words("numerics.out_of_reach")
     if report.note:
         yield grids.sentence(report.note)
@@ -210,7 +198,7 @@ def _notes(words: Strings, report: CaseReport) -> list[str]:
     formulas = dict.fromkeys(line.formula for line in report.boundaries if line.formula)
     if formulas:
         notes.append(words("numerics.theory", sources="; ".join(formulas)))
-    notes += scenario_view.missed_islands(words, report.boundaries)
+    notes += scenario_view.missed_islands(words, report.missed)
     softened_steps = sorted({line.timestep for line in report.errors if line.refsafe})
     if softened_steps:
         times = ", ".join(seconds_text(step) for step in softened_steps)

@@ -21,7 +21,7 @@ from msgspec.structs import replace
 
 from coursebuild.api import Options, UsageError, urls
 from coursebuild.core.files.errors import require
-from coursebuild.core.model.measurements import CaseReport, ErrorLine, SceneReport
+from coursebuild.core.model.measurements import CaseReport, SceneReport
 from coursebuild.core.model.report_files import STABILITY, ReportFailure
 from coursebuild.core.model.scenarios import exact_file
 from coursebuild.core.run.script_environment import engine_version
@@ -33,11 +33,9 @@ from coursebuild.features.bench.commands.measurement import (
     MeasuringRun,
     RecordCheck,
     add_report_options,
-    english,
     file_of,
-    grid_lines,
+    in_words,
     measurement_json,
-    plain_text,
     read_task,
     recorded_value,
     run_measurement,
@@ -48,8 +46,8 @@ from coursebuild.features.bench.shown_errors import seconds_text, status_text
 from coursebuild.features.numerics import case_view
 from coursebuild.features.numerics.cases import case_quantities, course_cases
 from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
+from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.scenes import find_scenes, read_record
-from coursebuild.report.text import BOLD, Column, Style, table
 from coursebuild.report.values import json_text
 
 EXAMPLES = """\
@@ -83,7 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
         with Mjbench(options.root, "`coursebuild stability`") as mjbench:
             if arguments.check:
                 return check_stability(options, mjbench, names)
-            return stability(options, mjbench, names, record=arguments.record)
+            measurement = stability(options, mjbench, names, record=arguments.record)
+            return in_words(arguments, mjbench, "cases", measurement)
 
     def as_json(measurement: Measurement[Any]) -> str:
         if measurement.ok and not (arguments.record or arguments.check):
@@ -93,7 +92,6 @@ def run(arguments: argparse.Namespace) -> int:
     return run_measurement(
         arguments,
         measure,
-        lambda reports, style: "" if arguments.check else stability_text(reports, style),
         as_json,
     )
 
@@ -138,10 +136,9 @@ def _record(
 def _join_reports(
     measurement: Measurement[CaseReport], of_course: Measurement[SceneReport]
 ) -> Measurement[CaseReport]:
-    course_reports = [case for scene in of_course.reports for case in course_cases(scene)]
     return Measurement(
-        reports=(*measurement.reports, *course_reports),
-        values=(*measurement.values, *map(msgspec.to_builtins, course_reports)),
+        reports=(*measurement.reports, *(c for scene in of_course.reports for c in scene.cases)),
+        values=(*measurement.values, *(c for value in of_course.values for c in value["cases"])),
         diagnostics=of_course.diagnostics,
         failures=(*measurement.failures, *of_course.failures),
         checked=(*measurement.checked, *of_course.checked),
@@ -251,38 +248,3 @@ def _select_problems(
             raise UsageError(f"no hard case or model is called `{name}`", help=help)
         selection |= matches
     return [problem for problem in problem_names if problem in selection]
-
-
-def stability_text(reports: Sequence[CaseReport], style: Style) -> str:
-    """The reports as text, with a blank line between cases."""
-    texts = []
-    for report in reports:
-        view = case_view(english(), urls.Place(urls.NUMERICS), report)
-        number = f"case {report.case}: " if report.case else ""
-        lines = [style.paint(report.name, BOLD) + f"  {number}{report.title}"]
-        for text in (*view.sentences, *view.notes):
-            lines += style.wrap(plain_text(text), "  ")
-        for block in (*(grid_lines(grid, style) for grid in view.tables), _errors(report)):
-            lines += ["", *(f"  {line}".rstrip() for line in block)] if block else []
-        texts.append("\n".join(lines) + "\n")
-    return "\n".join(texts)
-
-
-def _errors(report: CaseReport) -> list[str]:
-    """The largest error of each run, by timestep and integrator."""
-    quantity = next(iter(case_quantities(report)), None)
-    if quantity is None:
-        return []
-    runs = {(line.timestep, line.integrator): line for line in report.errors}
-    steps = sorted({step for step, _ in runs}, reverse=True)
-
-    def cell(run: ErrorLine | None) -> str:
-        error = None if run is None else quantity.value_of(run)
-        if run is None or error is None:
-            return "" if run is None else status_text(run.status)
-        return f"<{quantity.least:.1e}" if error <= quantity.least * (1 + 1e-9) else f"{error:.2e}"
-
-    columns = [Column(quantity.label, tuple(seconds_text(h, 4) for h in steps), left=True)]
-    for name in dict.fromkeys(name for _, name in runs):
-        columns.append(Column(name, tuple(cell(runs.get((step, name))) for step in steps)))
-    return table(columns)

@@ -224,8 +224,9 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
             gauge.look(data, twin)
             horizon = float(data.time) if gauge.seen > ALIKE else horizon
     setup = Setup(scenario=scene.scenario)
-    if passages.texts():  # unless that is so in small steps too
-        setup = replace(setup, passing=_passing_pairs(model, scene))
+    if peaks.sunk > 1:  # small steps say what goes through what, and how fast things are after it
+        passing, fastest = _small_steps(model, scene)
+        setup = replace(setup, passing=passing, velocity_bound=_FASTER * fastest)
         passages.setup = setup
     elapsed = steps_made * scene.timestep
     judgement = judge(model, data, elapsed, peaks, setup, passages.texts())
@@ -235,10 +236,12 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
 
 _FINER = 8
 """How many times shorter the steps are that tell a soft contact from a lost run."""
+_FASTER = 2.0
+"""How many times faster than in small steps what went deep may come out again."""
 
 
-def _passing_pairs(model: Any, scene: Scene) -> frozenset[tuple[int, int]]:
-    """The pairs of geoms that go through each other in small steps."""
+def _small_steps(model: Any, scene: Scene) -> tuple[frozenset[tuple[int, int]], float]:
+    """The pairs of geoms that go through each other in small steps, and the largest velocity."""
     step = scene.timestep / _FINER
     fine = without_sleep(with_integrator(model, integrator_of(model), step))
     data, peaks, passages = initial_data(scene.scenario, fine), Peaks(), Passages(fine)
@@ -247,8 +250,8 @@ def _passing_pairs(model: Any, scene: Scene) -> frozenset[tuple[int, int]]:
             data.ctrl[:] = command
         peaks, _ = advance_watching(fine, data, _FINER, peaks, passages, interval=_FINER)
         if not peaks.finite:
-            return frozenset()
-    return passages.pairs()
+            return frozenset(), math.inf
+    return passages.pairs(), peaks.velocity
 
 
 def nearby_scenes(model: Any, run: WatchedRun, count: int) -> Iterator[Scene]:

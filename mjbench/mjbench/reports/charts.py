@@ -5,20 +5,28 @@ from __future__ import annotations
 from mjbench.reports import Interval, Record
 
 
-class ChartPoint(Record, frozen=True):
+class ChartPoint(Record, frozen=True, omit_defaults=True):
     """A run."""
 
-    x: Interval
+    x: float
     y: float | None
     """`None` for a run that was lost."""
     title: str
     """What the run was, in words."""
+    spread: tuple[float, float] | None = None
+    """The interval in which `x` lies; `None` where it is exact."""
     full: bool = True
     """Whether it is on the front."""
     small: bool = False
     """Whether it stands beside the line."""
     ringed: bool = False
     """Whether it is the scene's own setting."""
+
+
+def chart_point(x: Interval, y: float | None, title: str, **looks: bool) -> ChartPoint:
+    """A run whose work is known to an interval."""
+    spread = (x.low, x.high) if x.high > x.low else None
+    return ChartPoint(x.value, y, title, spread, **looks)
 
 
 class ChartLine(Record, frozen=True):

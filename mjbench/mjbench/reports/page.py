@@ -9,7 +9,8 @@ from html import escape
 from msgspec import Struct
 
 from mjbench.reports.charts import Chart, ChartLine, ChartPoint
-from mjbench.reports.scene_report import ScenarioReport, SceneReport
+from mjbench.reports.model_report import SceneReport
+from mjbench.reports.scene_report import ScenarioReport
 from mjbench.reports.terminal import Style
 
 _COLOURS = ("#0072b2", "#b34d00", "#00795a", "#a8467f", "#7a6a00", "#5b3fb0", "#1e1e1c")
@@ -53,11 +54,11 @@ def _scenario(report: ScenarioReport) -> Iterator[str]:
 
 def chart_svg(chart: Chart) -> str:
     """A chart: work across, error up, both logarithmic; empty where no run has an error."""
-    points = [point for line in chart.lines for point in line.points if point.x.value > 0]
+    points = [point for line in chart.lines for point in line.points if point.x > 0]
     errors = [math.log10(point.y) for point in points if point.y]
     if not errors:
         return ""
-    works = [math.log10(point.x.value) for point in points]
+    works = [math.log10(point.x) for point in points]
     x = _Scale(min(works) - 0.1, max(works) + 0.1, _LEFT, _RIGHT)
     y = _Scale(min(errors) - 0.3, max(errors) + 0.3, _BOTTOM, _TOP)
     parts = [
@@ -132,4 +133,4 @@ def _line(line: ChartLine, x: _Scale, y: _Scale) -> Iterator[str]:
 
 def _place(point: ChartPoint, x: _Scale, y: _Scale) -> tuple[float, float]:
     down = _TOP if not point.y else y.at(math.log10(point.y))
-    return x.at(math.log10(point.x.value)), down
+    return x.at(math.log10(point.x)), down

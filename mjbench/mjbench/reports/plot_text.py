@@ -15,16 +15,14 @@ _OWN, _LOST = "@", "x"
 
 def plot_lines(chart: Chart, width: int = 80) -> Iterator[str]:
     """The chart: work across, error up, both logarithmic; nothing where no run has an error."""
-    places = [
-        (line.number, point) for line in chart.lines for point in line.points if point.x.value > 0
-    ]
+    places = [(line.number, point) for line in chart.lines for point in line.points if point.x > 0]
     errors = [math.log10(point.y) for _, point in places if point.y]
     if not errors:
         return
     levels = [level for level in chart.levels if level.y > 0]
     shown = [math.log10(level.y) for level in levels]
     near = [y for y in shown if min(errors) - 1 <= y <= max(errors) + 1]
-    x = _Axis([math.log10(point.x.value) for _, point in places], min(_WIDTH, width - 12))
+    x = _Axis([math.log10(point.x) for _, point in places], min(_WIDTH, width - 12))
     y = _Axis([*errors, *near], _HEIGHT)
     rows = [[" "] * x.cells for _ in range(y.cells)]
     for level in near:
@@ -33,7 +31,7 @@ def plot_lines(chart: Chart, width: int = 80) -> Iterator[str]:
         row = y.cells - 1 if not point.y else y.cell(math.log10(point.y))
         letter = _LETTERS[number % len(_LETTERS)]
         mark = _LOST if point.y is None else letter if point.full else letter.lower()
-        rows[row][x.cell(math.log10(point.x.value))] = _OWN if point.ringed else mark
+        rows[row][x.cell(math.log10(point.x))] = _OWN if point.ringed else mark
     yield f"{chart.axes[1]}"
     ticks = y.ticks()
     for number in reversed(range(y.cells)):

@@ -22,7 +22,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench.declarations import BenchTable
-from mjbench.reports import scene_report
+from mjbench.reports import model_report, scene_report
 from mjbench.reports.case_report import CaseReport
 from mjbench.reports.diet_report import DietReport
 from mjbench.reports.engine_report import EngineReport
@@ -69,7 +69,7 @@ class ReportKind(Struct, Generic[_T], frozen=True):
         return report
 
 
-BENCH = ReportKind("bench", "scene", scene_report.SceneReport)
+BENCH = ReportKind("bench", "scene", model_report.SceneReport)
 ENGINES = ReportKind("bench --engines", "engines", EngineReport)
 DIET = ReportKind("diet", "diet", DietReport)
 STABILITY: ReportKind[tuple[CaseReport, ...]] = ReportKind(
@@ -151,7 +151,7 @@ _Report: TypeAlias = dict[tuple[str, str, str], _Figures]
 
 
 def scene_departures(
-    record: scene_report.SceneReport, measurement: scene_report.SceneReport, bench: BenchTable
+    record: model_report.SceneReport, measurement: model_report.SceneReport, bench: BenchTable
 ) -> tuple[Departure, ...]:
     """Everything of a model that left its band, in the order of the recorded report.
 
@@ -165,7 +165,7 @@ def scene_departures(
         )
         measurement = replace(measurement, scenarios=scenarios)
 
-    def figures(report: scene_report.SceneReport) -> _Report:
+    def figures(report: model_report.SceneReport) -> _Report:
         tables = [(scenario.name, _scenario(scenario, bench)) for scenario in report.scenarios]
         for sweep in report.sweeps:
             table: _Table = {("", "sweep"): {}}

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from mjbench.reports import Interval
 from mjbench.reports.case_report import CaseReport, ErrorLine
-from mjbench.reports.charts import Chart, ChartLevel, ChartLine, ChartMark, ChartPoint
+from mjbench.reports.charts import Chart, ChartLevel, ChartLine, ChartMark, ChartPoint, chart_point
 from mjbench.reports.scene_report import FLOORS, ScenarioReport, WorkPrecisionRow, step_evaluations
 from mjbench.reports.shown_errors import (
     INTEGRATORS,
@@ -125,7 +125,7 @@ def _points(
         if x is None:
             continue
         error = quantity.value_of(row) if row.status == "ok" else None
-        yield ChartPoint(
+        yield chart_point(
             x,
             error,
             " · ".join(_point_title(report, row, place, error)),
@@ -171,7 +171,7 @@ def _describe(
     for line in lines:
         if visible := [point for point in line.points if point.y is not None]:
             errors = _range([point.y or 0.0 for point in visible], 2, "{1} to {0}")
-            costs = _range([point.x.value for point in visible], 3, "{0} to {1}")
+            costs = _range([point.x for point in visible], 3, "{0} to {1}")
             yield f"{line.name}: errors {errors} {_AMOUNTS[work].format(costs)}."
     if work != "cost":
         return  # the rest is said with the costs
@@ -269,15 +269,15 @@ def _case_chart(report: CaseReport, quantity: Quantity, *, is_time: bool) -> Cha
                 continue
             setting = f"{integrator} at {seconds_text(run.timestep)}"
             if run.status != "ok":
-                points.append(ChartPoint(x, None, f"{setting}: {status_text(run.status)}"))
+                points.append(chart_point(x, None, f"{setting}: {status_text(run.status)}"))
             elif error := quantity.value_of(run):
                 title = f"{setting}: {error:.3g}, {amount(x.value, 3)}"
-                points.append(ChartPoint(x, error, title))
+                points.append(chart_point(x, error, title))
         lines += [ChartLine(integrator, number, tuple(points))] if points else []
     texts = []
     for line in lines:
         if visible := [point for point in line.points if point.y is not None]:
-            ends = (f"{p.y:.2g} at {amount(p.x.value)}" for p in (visible[0], visible[-1]))
+            ends = (f"{p.y:.2g} at {amount(p.x)}" for p in (visible[0], visible[-1]))
             texts.append(f"{line.name}: {', '.join(ends)}.")
     return Chart(
         title=f"{report.title}: {quantity.label} against {work}",

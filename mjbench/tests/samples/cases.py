@@ -60,8 +60,8 @@ def case(name: str = "spring", number: int = 5, **overrides: object) -> CaseRepo
                 gain=(0.1, 0.02),
                 tries=((0.2, 10, 0), (0.25, 10, 2), (0.3, 10, 10)),
             ),
-            BoundaryLine("implicit", None, *search),
-            BoundaryLine("discrete", None, *search),
+            BoundaryLine("implicit", "all", *search),
+            BoundaryLine("discrete", "all", *search),
         ),
         "figures": (
             FigureLine("period", "s", "Euler", 6.283, 6.2831853, "2π√(m/k)"),

@@ -7,19 +7,19 @@ from typing import Any
 
 from mjbench.machine import Machine
 from mjbench.reports import Interval
+from mjbench.reports.model_report import SceneReport
 from mjbench.reports.scene_report import (
     FittedOrder,
     MeasuredSetting,
     OrderRow,
     RowVerdict,
     ScenarioReport,
-    SceneReport,
     StableRow,
     WorkPrecisionRow,
 )
 
 MACHINE = Machine("3.14.0", "3.11.7", "2.3.0", "Linux x86_64", "A Processor @ 2 GHz")
-VERDICT = RowVerdict(True, None, None, None, False, "The scene’s own setting is on the front.")
+VERDICT = RowVerdict(True, None, False, "The scene’s own setting is on the front.")
 FIRST = FittedOrder(1.0, 0.01, 0.02)
 _INTEGRATORS = (("Euler", 1, 1.0), ("implicit", 1, 1.2), ("RK4", 4, 3.9))
 
@@ -127,10 +127,10 @@ def swing() -> ScenarioReport:
         ),
         stable=(
             StableRow("Euler", 0.04, (1e-3, 0.1), None, 10.0, 250, 60, 2.5, (0.04, 0.0402)),
-            StableRow("implicit", None, (1e-3, 0.1), None, 10.0, 100, 49, 2.5),
+            StableRow("implicit", "all", (1e-3, 0.1), None, 10.0, 100, 49, 2.5),
             StableRow("RK4", 0.09, (1e-3, 0.1), (0.095, 0.097), 10.0, 112, 71, 2.5, (0.08, 0.09)),
         ),
-        verdict=RowVerdict(False, 13, 0.39, 1 / 32, True, text),
+        verdict=RowVerdict(False, 13, True, text),
     )
 
 
@@ -189,7 +189,7 @@ def awkward() -> ScenarioReport:
         reference="self",
         second="",
         agreement=None,
-        stable=(StableRow("Euler", 0.0, (1e-4, 0.1), (0.01, 0.02), 10.0, 100_000, 0, None),),
-        verdict=RowVerdict(False, 2, 0.5, 0.1, None, text),
+        stable=(StableRow("Euler", "none", (1e-4, 0.1), (0.01, 0.02), 10.0, 100_000, 0, None),),
+        verdict=RowVerdict(False, 2, None, text),
         notes=("a note that does not fit into one line of a terminal, as there are some, too",),
     )

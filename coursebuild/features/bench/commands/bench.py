@@ -20,7 +20,7 @@ from msgspec.structs import replace
 
 from coursebuild.api import Diagnostic, Options
 from coursebuild.core.files.errors import require
-from coursebuild.core.model.measurements import ScenarioReport, SceneReport
+from coursebuild.core.model.measurements import SceneReport
 from coursebuild.core.model.report_files import BENCH, ReportFailure
 from coursebuild.core.model.scenarios import DeclaredSweep, keyframe_scenarios
 from coursebuild.features.bench.commands.engines import run_engines
@@ -30,12 +30,10 @@ from coursebuild.features.bench.commands.measurement import (
     MeasuringRun,
     RecordCheck,
     add_report_options,
-    english,
     file_of,
     forbid_quick,
-    grid_lines,
+    in_words,
     measurement_json,
-    plain_text,
     read_task,
     recorded_value,
     run_measurement,
@@ -46,10 +44,9 @@ from coursebuild.features.bench.grids import Grid, machine_text, power
 from coursebuild.features.bench.scenario_view import scenario_view
 from coursebuild.features.bench.shown_errors import is_idle
 from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
+from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes, read_record
-from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
 
-_INDENT = "  "
 THREADS = "threads"
 """The parameter of a sweep that is measured on all processors."""
 _PIECE = 16
@@ -95,12 +92,12 @@ def run(arguments: argparse.Namespace) -> int:
         with Mjbench(options.root, "`coursebuild bench`") as mjbench:
             if arguments.check:
                 return check(options, mjbench, names, quick=quick)
-            return bench(options, mjbench, names, quick=quick, record=arguments.record)
+            measurement = bench(options, mjbench, names, quick=quick, record=arguments.record)
+            return in_words(arguments, mjbench, "bench", measurement)
 
     return run_measurement(
         arguments,
         measure,
-        lambda reports, style: "" if arguments.check else bench_text(reports, style),
         lambda measurement: measurement_json({"scenes": measurement.values}, measurement),
         empty="there is no model to measure\n",
     )
@@ -300,92 +297,3 @@ def measure_part(root: Path, data: bytes) -> bytes:
             return mjbench.do("sweep", by_digest[digest], **piece, **settings)
         except FailedJobError:  # which is found and told where the command is
             return b""
-
-
-_OWN_MARK, _FRONT_MARK = ">", "*"
-
-
-def bench_text(scenes: Sequence[SceneReport], style: Style) -> str:
-    """Write every model with its scenarios, and a blank line between models."""
-    texts = []
-    for scene in scenes:
-        head = style.paint(visible(scene.model), BOLD)
-        if scene.quick:
-            head += "  " + style.paint("quick: fewer settings, rough times", YELLOW)
-        lines = [head, *style.wrap(machine_text(english(), scene.machine), _INDENT)]
-        if not scene.scenarios:
-            lines.append(f"{_INDENT}nothing in it can move, so nothing was measured")
-        for scenario in scene.scenarios:
-            view = scenario_view(english(), scenario)
-            lines += ["", _title(scenario.name, scenario.title, style)]
-            sentences = [plain_text(text) for text in view.description]
-            if scenario.figure:  # a page says this and the next in its plot
-                sentences.append(f"It measures {scenario.figure}.")
-            if scenario.velocity_floor > scenario.floor:
-                floor = plain_text(power(scenario.velocity_floor, 1))
-                sentences.append(f"Velocities are known to {floor}.")
-            for text in (*sentences, *scenario.notes, *_theory(scenario)):
-                lines += style.wrap(text, 2 * _INDENT)
-            legend = f"{_OWN_MARK} the scene's own   {_FRONT_MARK} on the Pareto front"
-            marks = []
-            for row in scenario.rows:
-                if not is_idle(row):
-                    code = BOLD if row.own else RED if row.status in ("diverged", "reset") else ""
-                    code = code or (YELLOW if row.status != "ok" else GREEN if row.front else "")
-                    mark = (_OWN_MARK if row.own else " ") + (_FRONT_MARK if row.front else " ")
-                    marks.append((mark, code))
-            lines += _table(view.settings, marks, legend, style)
-            verdict = scenario.verdict
-            colour = GREEN if verdict.on_front and not verdict.noticeable else YELLOW
-            if verdict.text:
-                lines += ["", *style.wrap(verdict.text, 2 * _INDENT, colour)]
-            for grid in filter(None, (view.orders, view.stable)):
-                grid_text = grid_lines(grid, style)
-                lines += ["", *(f"{2 * _INDENT}{line}".rstrip() for line in grid_text)]
-            lines += _notes(view.notes, style)
-        for sweep in scene.sweeps:
-            view = scenario_view(english(), sweep)
-            marks = [((_OWN_MARK, BOLD) if row.own else (" ", "")) for row in sweep.rows]
-            lines += ["", _title(sweep.name, sweep.title, style)]
-            lines += _table(view.settings, marks, f"{_OWN_MARK} as the model is", style)
-            lines += _notes(view.notes, style)
-        texts.append("\n".join(lines) + "\n")
-    return "\n".join(texts)
-
-
-def _theory(report: ScenarioReport) -> Iterator[str]:
-    """What theory says of quantities, and what each integrator makes of them."""
-
-    def amount(value: float | None, unit: str) -> str:
-        return "none" if value is None else f"{value:.4g} {unit}".strip()
-
-    for name in dict.fromkeys(line.name for line in report.figures):
-        lines = [line for line in report.figures if line.name == name]
-        integrators: dict[str, list[str]] = {}
-        for line in lines:
-            integrators.setdefault(amount(line.measured, line.unit), []).append(line.integrator)
-        values = (f"{value} under {', '.join(names)}" for value, names in integrators.items())
-        exact = amount(lines[0].exact, lines[0].unit)
-        yield f"theory ({lines[0].source}): the {name} is {exact}; measured: {'; '.join(values)}"
-
-
-def _title(name: str, title: str, style: Style) -> str:
-    return _INDENT + style.paint(visible(name), BOLD) + (f"  {visible(title)}" if title else "")
-
-
-def _table(
-    grid: Grid, marks: Sequence[tuple[str, str]], legend: str, style: Style
-) -> Iterator[str]:
-    yield ""
-    if not grid.rows:
-        yield f"{2 * _INDENT}no setting was measured"
-        return
-    _, *lines = grid_lines(grid, style, marks)
-    for line in (*lines, style.paint(legend, FAINT)):
-        yield f"{2 * _INDENT}{line}".rstrip()
-
-
-def _notes(notes: Sequence[str], style: Style) -> list[str]:
-    return ["" for _ in notes[:1]] + [
-        line for note in notes for line in style.wrap(note, 2 * _INDENT, YELLOW)
-    ]

@@ -25,7 +25,7 @@ from coursebuild.api import Diagnostic, EffectError, Options, Store
 from coursebuild.core.files.errors import require
 from coursebuild.core.files.read import read_course
 from coursebuild.core.files.write import FileChange, change_files
-from coursebuild.core.model.diet_findings import PROVED_LABEL, DietReport, Finding, Saving
+from coursebuild.core.model.diet_findings import DietReport
 from coursebuild.core.model.report_files import DIET, ReportFailure
 from coursebuild.core.values import decode, encode
 from coursebuild.features.bench.commands.diet_model import DietModel, Reruns
@@ -34,6 +34,7 @@ from coursebuild.features.bench.commands.measurement import (
     MeasuringRun,
     file_of,
     forbid_quick,
+    in_words,
     measurement_json,
     read_task,
     run_measurement,
@@ -43,8 +44,6 @@ from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbenc
 from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.pipeline.load import load, package_files
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
-from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, visible
-from coursebuild.report.values import plural
 
 _T = TypeVar("_T")
 EXAMPLES = """\
@@ -83,17 +82,25 @@ def run(arguments: argparse.Namespace) -> int:
     def measure(options: Options) -> Measurement[DietReport]:
         with Mjbench(options.root, "`coursebuild diet`") as mjbench:
             measurement = diet(options, mjbench, names, **settings)
-        if not quiet:
-            return measurement
-        if measurement.ok:
-            return Measurement(())
-        return replace(measurement, reports=tuple(r for r in measurement.reports if not r.ok))
+            if quiet:
+                pairs = zip(measurement.reports, measurement.values, strict=True)
+                values = tuple(value for report, value in pairs if not report.ok)
+                reports = tuple(report for report in measurement.reports if not report.ok)
+                measurement = replace(measurement, reports=reports, values=values)
+                measurement = Measurement(()) if measurement.ok else measurement
+            return in_words(
+                arguments,
+                mjbench,
+                "diet",
+                measurement,
+                command="coursebuild diet {}",
+                declarations="models/{}.toml",
+            )
 
     empty = "" if quiet else "there is no model to look at\n"
     return run_measurement(
         arguments,
         measure,
-        diet_text,
         lambda measurement: measurement_json(diet_values(measurement), measurement),
         empty=empty,
     )
@@ -312,137 +319,7 @@ def measure_part(root: Path, data: bytes) -> bytes:
     return b""
 
 
-_EDITS = 6
-"""The most changes that are shown of a finding."""
-_LINES = 6
-"""The most lines that are shown of a change."""
-_FOOTNOTE = (
-    "integrator and timestep are judged against a reference, not against the model as it is: "
-    "see `coursebuild bench`"
-)
-
-
 def diet_values(measurement: Measurement[DietReport]) -> dict[str, object]:
     """Return the reports as plain values, each with whether nothing is left to be done."""
     pairs = zip(measurement.values, measurement.reports, strict=True)
     return {"models": [value | {"ok": report.ok} for value, report in pairs]}
-
-
-_NAMES = 6
-"""The most names that are listed."""
-
-
-def name_list(names: Sequence[str]) -> str:
-    """Names in a message, and how many more there are."""
-    extra = len(names) - _NAMES
-    return ", ".join(names[:_NAMES]) + (f" and {extra} more" if extra > 0 else "")
-
-
-def diet_text(reports: Sequence[DietReport], style: Style) -> str:
-    """Write every model with its findings, and a blank line between; empty without models."""
-    if not reports:
-        return ""
-    texts: list[str] = []
-    for report in reports:
-        head = style.paint(visible(report.model), BOLD)
-        if report.quick:
-            head += "  " + style.paint("quick: short runs and rough times", YELLOW)
-        lines = [head]
-        names = [scenario.name for scenario in report.scenarios if scenario.status == "ok"]
-        lines += style.wrap(f"in {name_list(names)}" if names else "in no scenario", "  ")
-        for scenario in report.scenarios:
-            if scenario.status != "ok":
-                status = f"{scenario.status}: {'; '.join(scenario.reasons)}"
-                text = f"scenario {scenario.name}: {status}; nothing is claimed from it"
-                lines += style.wrap(text, "  ", RED)
-        for finding in report.findings:
-            lines += ["", *_finding(finding, style)]
-        for entry in report.stale:
-            place = f"{entry.path}:{entry.line}:{entry.column}"
-            text = f"`{entry.finding}` no longer keeps anything: remove the entry ({place})"
-            lines += ["", *style.wrap(text, "  ", RED)]
-        summary = _summary(report, style)
-        lines += ["", *summary] if summary else []
-        texts.append("\n".join(lines) + "\n")
-    footnote = "".join(line + "\n" for line in style.wrap(_FOOTNOTE, "", FAINT))
-    return "\n".join([*texts, footnote])
-
-
-def _summary(report: DietReport, style: Style) -> list[str]:
-    findings = [finding for finding in report.findings if finding.is_fault]
-    fixable = [finding for finding in findings if finding.fixable]
-    lines: list[str] = []
-    if findings:
-        text = plural(len(findings), "finding") + " not explained"
-        if fixable:
-            text += f", {len(fixable)} of them for `coursebuild diet {report.model} --fix`"
-        lines += style.wrap(text, "  ", RED)
-        first = findings[0]
-        name = first.places[0].name if len(first.places) == 1 else ""
-        key = f"{first.kind} {name}".strip()
-        quote = "'" if '"' in key else '"'
-        text = f"give the reason for what you keep in models/{report.model}.toml: "
-        text += f"[[keep]] finding = {quote}{key}{quote}, reason = …"
-        lines += style.wrap(text, "  ", FAINT)
-    elif report.ok and all(finding.kept for finding in report.findings):
-        text = f"nothing {'else ' if report.findings else ''}in it is proved useless"
-        lines.append("  " + style.paint(text, GREEN))
-    elif report.ok:
-        text = "nothing in it is proved useless; what is named above was not needed in what was run"
-        lines += style.wrap(text, "  ", GREEN)
-    if report.slim is not None and len(findings) > 1:
-        lines += style.wrap(f"without all of them: {_saving(report.slim)}", "  ")
-    if report.fixed is not None and len(fixable) > 1 and len(fixable) < len(findings):
-        lines += style.wrap(f"after --fix: {_saving(report.fixed)}", "  ")
-    kinds_by_reason: dict[str, list[str]] = {}
-    found_kinds = {finding.kind for finding in report.findings}
-    for attempt in report.tried:
-        things = f" {name_list(attempt.places)}" if attempt.kind in found_kinds else ""
-        kinds_by_reason.setdefault(attempt.reason, []).append(attempt.kind + things)
-    for reason, kinds in kinds_by_reason.items():
-        outcome = f"not found, because {reason}" if reason else "tried and needed"
-        lines += style.wrap(f"{outcome}: {name_list(list(dict.fromkeys(kinds)))}", "  ", FAINT)
-    return lines
-
-
-def _finding(finding: Finding, style: Style) -> list[str]:
-    colour = FAINT if finding.kept else RED if finding.is_fault else YELLOW
-    lines = style.wrap(f"{finding.kind}: {finding.message}", "  ")
-    lines[0] = lines[0].replace(finding.kind, style.paint(finding.kind, colour), 1)
-    label = finding.label
-    if finding.starts and finding.label != PROVED_LABEL:
-        label += f" (in {plural(finding.starts, 'run')}"
-        label += f"; at most {finding.shown})" if finding.shown else ", to the bit)"
-    label += "; in what is left, " if finding.in_rest else "; "
-    lines += style.wrap(label + _saving(finding.saving), "    ")
-    if finding.proof:
-        lines += style.wrap(f"because {finding.proof}", "    ")
-    if finding.kept:
-        return [*lines, *style.wrap(f"kept: {finding.kept}", "    ")]
-    for edit in finding.edits[:_EDITS]:
-        lines.append(f"    {visible(edit.path)}:{edit.line}:{edit.column}")
-        for mark, text, colour in (("-", edit.old, RED), ("+", edit.new, GREEN)):
-            text_lines = [line for line in text.splitlines() if line.strip()]
-            for line in text_lines[:_LINES]:
-                lines.append("    " + style.paint(f"{mark} {visible(line.strip())}", colour))
-            if len(text_lines) > _LINES:
-                lines.append(f"    {mark} … {plural(len(text_lines) - _LINES, 'more line')}")
-    if len(finding.edits) > _EDITS:
-        lines.append(f"    … and {len(finding.edits) - _EDITS} more changes")
-    if finding.doubt:
-        lines += style.wrap(f"not a fault, because {finding.doubt}", "    ")
-    elif finding.unfixed and finding.is_fault:
-        lines += style.wrap(f"not for --fix: {finding.unfixed}", "    ")
-    return lines
-
-
-def _saving(saving: Saving) -> str:
-    parts = []
-    if saving.time is not None:
-        speed = f"×{saving.time:.3g} as fast" if saving.certain else "no measurable time"
-        parts.append(speed)
-    for count, place in ((saving.memory, "memory"), (saving.text, "text")):
-        if count:
-            fewer = "fewer" if count > 0 else "more"
-            parts.append(f"{abs(count):,} bytes of {place} {fewer}")
-    return ", ".join(parts) or "saves nothing measurable"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 
 import msgspec
 from msgspec import Struct
@@ -15,22 +14,18 @@ from coursebuild.core.model.report_files import ENGINES
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     MeasuringRun,
-    english,
     file_of,
     forbid_quick,
-    grid_lines,
+    in_words,
     measurement_json,
-    plain_text,
     run_measurement,
     write_records,
 )
 from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
 from coursebuild.features.bench.grids import machine_text
 from coursebuild.features.bench.scenario_view import engine_view
+from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
-from coursebuild.report.text import BOLD, YELLOW, Style, visible
-
-_INDENT = "  "
 
 
 class EngineChoice(Struct, frozen=True):
@@ -50,7 +45,7 @@ def run_engines(arguments: argparse.Namespace) -> int:
 
     def measure(options: Options) -> Measurement[EngineReport]:
         with Mjbench(options.root, "`coursebuild bench`") as mjbench:
-            return bench_engines(
+            measurement = bench_engines(
                 options,
                 mjbench,
                 tuple(arguments.scenes),
@@ -58,11 +53,11 @@ def run_engines(arguments: argparse.Namespace) -> int:
                 quick=arguments.quick,
                 record=arguments.record,
             )
+            return in_words(arguments, mjbench, "engines", measurement)
 
     return run_measurement(
         arguments,
         measure,
-        engines_text,
         lambda measurement: measurement_json({"engines": measurement.values}, measurement),
         empty="there is no model to measure\n",
     )
@@ -123,24 +118,3 @@ class _EngineRun(MeasuringRun[EngineReport]):
             lambda: self.mjbench.do("engines", scene, names=names, quick=self.quick),
             scene,
         )
-
-
-def engines_text(reports: Sequence[EngineReport], style: Style) -> str:
-    """Write every model with its scenarios in other engines."""
-    texts = []
-    for report in reports:
-        head = style.paint(visible(report.model), BOLD)
-        if report.quick:
-            head += "  " + style.paint("quick: at most 64 worlds", YELLOW)
-        lines = [head, *style.wrap(machine_text(english(), report.machine), _INDENT)]
-        for scenario in report.scenarios:
-            view = engine_view(english(), scenario, report)
-            lines += ["", _INDENT + style.paint(visible(view.title), BOLD)]
-            for text in view.description:
-                lines += style.wrap(plain_text(text), 2 * _INDENT)
-            _, *grid_text = grid_lines(view.table, style)
-            lines += ["", *(f"{2 * _INDENT}{line}".rstrip() for line in grid_text)]
-            for note in view.notes:
-                lines += style.wrap(note, 2 * _INDENT, YELLOW)
-        texts.append("\n".join(lines) + "\n")
-    return "\n".join(texts)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import functools
-import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -12,7 +11,6 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import msgspec
-from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -40,6 +38,10 @@ from coursebuild.core.model.results import Machine
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.text.diagnostics import sort_diagnostics
+from coursebuild.core.files.write import resolve_inside, write_atomic
+from coursebuild.core.model.report_files import ReportFailure, ReportKind
+from coursebuild.core.model.results import Machine
+from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.features.bench.commands.measuring import (
     Facts,
@@ -49,6 +51,7 @@ from coursebuild.features.bench.commands.measuring import (
 )
 from coursebuild.features.bench.grids import Grid
 from coursebuild.pipeline.arguments import style_of
+from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.scenes import CourseScene
 from coursebuild.report.text import (
     BOLD,
@@ -59,7 +62,6 @@ from coursebuild.report.text import (
     Column,
     Style,
     diagnostic_paragraphs,
-    fit,
     table,
     visible,
 )
@@ -104,6 +106,8 @@ class Measurement(Struct, Generic[_T], frozen=True):
     failures: tuple[ReportFailure, ...] = ()
     checked: tuple[RecordCheck, ...] = ()
     remarks: tuple[str, ...] = ()
+    text: str = ""
+    """The reports in words; empty where they are not asked for."""
 
     @property
     def faults(self) -> str:
@@ -124,7 +128,8 @@ class Measurement(Struct, Generic[_T], frozen=True):
 
 def measurement_json(reports: Mapping[str, object], measurement: Measurement[_T]) -> str:
     """Write the same as one JSON object."""
-    rest = {name: getattr(measurement, name) for name in Measurement.__struct_fields__[2:]}
+    names = [name for name in Measurement.__struct_fields__[2:] if name != "text"]
+    rest = {name: getattr(measurement, name) for name in names}
     return json_text({**reports, **rest})
 
 
@@ -172,14 +177,13 @@ def add_report_options(parser: argparse.ArgumentParser) -> None:
 def run_measurement(
     arguments: argparse.Namespace,
     measure: Callable[[Options], Measurement[Any]],
-    text: Callable[[Sequence[Any], Style], str],
     json: Callable[[Measurement[Any]], str],
     *,
     empty: str = "",
 ) -> int:
     """Measure with the options that the arguments give, print it, and return the exit status.
 
-    `text` is of the reports, `json` of the whole; `empty` is for no text at all.
+    `json` writes the whole; `empty` is for no text at all.
     """
     options = options_of(arguments)
     try:
@@ -198,12 +202,31 @@ def run_measurement(
     parts = [
         *diagnostic_paragraphs(measurement.diagnostics, style),
         failures,
-        text(measurement.reports, style),
+        measurement.text,
         format_checks(measurement.checked, style),
         "".join(f"{visible(remark)}\n" for remark in measurement.remarks),
         f"{style.paint(measurement.faults, RED)}\n" if measurement.faults else "",
     ]
     return write("\n".join(part for part in parts if part) or empty, status)
+
+
+def in_words(
+    arguments: argparse.Namespace,
+    mjbench: Mjbench,
+    kind: str,
+    measurement: Measurement[_T],
+    **settings: str,
+) -> Measurement[_T]:
+    """The measurement with its reports in words, which mjbench writes, if these are printed.
+
+    `kind` and `settings`: as the job `text` takes them.
+    """
+    if arguments.format == "json" or not measurement.values:
+        return measurement
+    style = style_of(sys.stdout)
+    look = {"width": style.width, "colour": style.colour, **settings}
+    data = mjbench.do("text", None, **{kind: measurement.values}, **look)
+    return replace(measurement, text=msgspec.json.decode(data, type=str))
 
 
 class MeasuringRun(Generic[_T]):
@@ -379,51 +402,3 @@ def file_of(mjbench: Mjbench, **report: object) -> bytes:
 def recorded_value(root: Path, kind: ReportKind[Any], model: str = "") -> Any:
     """A recorded report with all its fields; it has been read before."""
     return msgspec.json.decode(read_bytes(root, kind.path(model)))[kind.field]
-
-
-_SUPERSCRIPTS = str.maketrans("-\u22120123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
-@functools.cache
-def english() -> Strings:
-    """Return the words of English pages."""
-    return strings_for(template_texts(), "en")
-
-
-def plain_text(text: str) -> str:
-    """Remove the markup of a sentence or a cell."""
-    if not isinstance(text, Markup):
-        return text
-    html = re.sub("<sup>(.*?)</sup>", lambda match: match[1].translate(_SUPERSCRIPTS), str(text))
-    return Markup(html).striptags()
-
-
-def grid_lines(grid: Grid, style: Style, marks: Sequence[tuple[str, str]] = ()) -> list[str]:
-    """Write a table of numbers under its label, not wider than the terminal.
-
-    `marks` holds what stands before each row, and the row's colour. Such a table is long, and says
-    for which columns there is no room. Without marks these follow below, and then remarks, each
-    with its row's name.
-    """
-    style = replace(style, width=max(style.width, 60) - 4)
-    columns = [Column("", tuple(mark for mark, _ in marks), left=True)] if marks else []
-    for n, (title, *cells) in enumerate(zip(grid.head, *grid.rows, strict=True)):
-        if not n or n not in grid.left:
-            rank = 0 if not n else 2 if n in grid.minor else 1
-            columns.append(Column(title, tuple(map(plain_text, cells)), rank, left=not n))
-    groups = fit(columns, style.width)
-    lines = [style.paint(visible(grid.label), FAINT)]
-    for number, group in enumerate(groups[:1] if marks else groups):
-        head, *rows = table(group)
-        if marks:
-            rows = [style.paint(row, code) for row, (_, code) in zip(rows, marks, strict=True)]
-        lines += [""] * (number > 0) + [style.paint(head, FAINT)]
-        for part, numbered_rows in grid.bodies:
-            lines += [] if part is None else [style.paint(visible(part.title), FAINT)]
-            lines += [rows[n] for n, _ in numbered_rows]
-    if marks:
-        titles = "; ".join(column.title for group in groups[1:] for column in group if column.rank)
-        text = f"no room for: {titles}. --format json has all" if titles else ""
-        return lines + style.wrap(text, code=FAINT)
-    remarks = ((row[0], row[n]) for row in grid.rows for n in grid.left[1:])
-    return [*lines, *(f"{visible(name)}: {text}" for name, text in remarks if text)]

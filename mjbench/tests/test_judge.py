@@ -1,0 +1,285 @@
+"""Verdicts: by columns, from several starts, and no more than is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from mjbench.columns import Column
+from mjbench.derive import derive_scenario
+from mjbench.judge import mark_luck
+from mjbench.reports import Interval
+from mjbench.reports.scene_report import ErrorParts, ScenarioReport, StableRow, WorkPrecisionRow
+from mjbench.reports.shown_errors import SEEN, FrontPoint, front
+from samples.reports import diverged_row, row, scenario
+
+Point = tuple[float, float] | None
+"""Cost and error; `None`: a run that was lost."""
+Ratios = Sequence[Mapping[Column, float]] | None
+
+
+def rows_of(*points: Point) -> list[WorkPrecisionRow]:
+    """Rows of which the first is the scene's own, Euler at 2 ms, and others are RK4 at 10 ms."""
+    rows = []
+    for n, point in enumerate(points):
+        fields: dict[str, Any] = {"own": n == 0, "position": None, "velocity": None}
+        name, timestep = ("Euler", 0.002) if n == 0 else ("RK4", 0.01)
+        if point is None:
+            rows.append(diverged_row(name, timestep, own=n == 0))
+        else:
+            rows.append(row(name, timestep, cost=point[0], seen=point[1], **fields))
+    return rows
+
+
+def judged(rows: Sequence[WorkPrecisionRow], starts: Ratios = (), **fields: Any) -> ScenarioReport:
+    return derive_scenario(scenario(rows, **fields), lambda _: starts)
+
+
+def said(*points: Point, **fields: Any) -> str:
+    return judged(rows_of(*points), **fields).verdict.text
+
+
+def test_cheaper_and_more_accurate_is_better() -> None:
+    rows = front(rows_of((1, 1e-3), (0.5, 1e-5), (0.1, 0.3), (4, 1e-3), None), SEEN)
+    assert [row.front for row in rows] == [False, True, True, False, False]
+    assert [row.dominated_by for row in rows] == [1, None, None, 1, None]
+    rows = front(rows_of((8, 8.0), (4, 4.0), (2, 2.0), (1, 1.0)), SEEN)
+    assert [row.dominated_by for row in rows] == [3, 3, 3, None], "it is on the front"
+
+
+def test_small_differences_are_none_and_lost_runs_are_on_no_front() -> None:
+    own_point = (1, 1e-3)
+    for points, on_front in (
+        ((own_point, (1.02, 1.04e-3)), [True, True]),
+        ((own_point, (1.2, 1e-3)), [True, False]),
+        ((own_point, (1, 1.06e-3)), [True, False]),
+        ((own_point, (0.98, 1.5e-3)), [True, False]),  # its cost is no better
+        ((own_point, (0.5, 1.04e-3)), [False, True]),
+        (((1, 0.0), (2, 0.0), (0.5, 1e-12)), [True, False, True]),
+        ((None, None), [False, False]),
+    ):
+        assert [row.front for row in front(rows_of(*points), SEEN)] == on_front, points
+    own = FrontPoint(Interval(1.0, 0.8, 1.2), 1e-3)
+    for high, is_cheaper in ((0.79, True), (0.8, False), (0.9, False)):
+        rival = FrontPoint(Interval(0.7, 0.6, high), 1e-3)
+        assert rival.is_cheaper(own) == rival.beats(own) == is_cheaper, high
+
+
+OWN_BEST = "no other setting is cheaper without being less accurate"
+OWN_FAILS = "the scene does not run under its own setting, Euler at 2 ms: the state is not finite"
+ERROR_SEEN = "the scene's own error can be seen: it is 2.5 times what an eye can tell"
+
+
+@pytest.mark.parametrize(
+    ("points", "better", "text"),
+    [
+        (
+            ((1, 1e-3), (4, 1e-7)),
+            None,
+            f"{OWN_BEST}; the scene's own error cannot be seen: it is 0.001 of what an eye can "
+            "tell",
+        ),
+        (
+            ((1, 2.5), (0.94, 2.5e-6)),
+            1,
+            f"RK4 at 10 ms is better: it takes 0.94 of the time and errs far less; {ERROR_SEEN}; "
+            "the cheapest without one that is seen is RK4 at 10 ms, at 0.94 times its cost",
+        ),
+        (
+            ((1, 2.5), (2, 2.4)),
+            None,
+            f"{OWN_BEST}; {ERROR_SEEN}, and that of every other setting too",
+        ),
+        ((None, (1, 2.0)), 1, f"{OWN_FAILS}; RK4 at 10 ms is the most accurate that does"),
+        ((None, None), None, OWN_FAILS),
+    ],
+)
+def test_verdicts(points: tuple[Point, ...], better: int | None, text: str) -> None:
+    verdict = judged(rows_of(*points)).verdict
+    assert (verdict.better, verdict.text) == (better, text)
+    assert verdict.on_front == (better is None and points[0] is not None)
+
+
+def masked(**rival: Any) -> list[WorkPrecisionRow]:
+    """A block under the pyramid, whose error all rows share, and a stone that falls beside it."""
+    newton = {"solver": "Newton", "iterations": 100, "cone": "pyramidal", "velocity": None}
+    own = {"seen": 8.27, "step_error": 0.1, "position": (0.0049, 0.0049), **newton, "own": True}
+    other = {**own, "own": False, "position": (0.0102, 0.0102), **rival}
+    return [row("Euler", 0.002, cost=1.0, **own), row("implicit", 1 / 240, cost=0.47, **other)]
+
+
+CONES = {"pyramidal": 8.17, "elliptic": 0.0}
+
+
+def test_an_error_that_all_share_does_not_hide_one_that_doubles() -> None:
+    verdict = judged(masked(), contact_model=CONES).verdict
+    assert verdict.better is None and verdict.text.startswith(
+        "no setting is better: implicit at 4.16667 ms takes 0.47 of the time, but the error of "
+        "position is 2.1 times as large over the whole run; "
+    )
+    assert judged(masked(position=(0.005, 0.005)), contact_model=CONES).verdict.better == 1
+
+
+def test_halves_count_as_much_as_the_whole() -> None:
+    halves = {"position": (0.001, 0.0049)}
+    rows = masked(position=(0.0049, 0.0049), halves={"position": (0.0017, 0.0049)})
+    rows[0] = replace(rows[0], halves=halves)
+    report = judged(rows, contact_model=CONES)
+    assert report.verdict.better is None
+    assert report.verdict.worse == (
+        "the error of position is 1.7 times as large in its first half",
+    )
+
+
+def test_what_is_worse_from_starts_nearby_is_not_better() -> None:
+    column = ("step_error", "over the whole run")
+    for starts, said_of in (
+        (
+            [{column: 0.9}, {column: 1.4}],
+            "what is seen is 0.9 to 1.4 times as large over",
+        ),
+        ([{column: 1.3}], "what is seen is 1 to 1.3 times as large"),
+        ([{("lost", "over the whole run"): math.inf}], "it is lost"),
+    ):
+        verdict = judged(masked(position=(0.0049, 0.0049)), starts, contact_model=CONES).verdict
+        assert verdict.better is None
+        assert f"here, but from starts nearby {said_of}" in verdict.text
+    verdict = judged(masked(position=(0.0049, 0.0049)), None, contact_model=CONES).verdict
+    assert verdict.better is None
+    assert "whether that holds from starts nearby was not measured" in verdict.text
+
+
+def test_gains_are_told_with_their_spread() -> None:
+    starts = [{("step_error", "over the whole run"): ratio} for ratio in (0.4, 0.5)]
+    rows = masked(position=(0.0049, 0.0049), step_error=0.05)
+    text = judged(rows, starts, contact_model=CONES).verdict.text
+    assert "errs 2 to 2.5 times less (what is seen over the whole run); " in text
+
+
+def test_the_error_is_taken_apart_and_what_mends_it_is_named() -> None:
+    cone = row(
+        "Euler", 0.002, cost=1.23, seen=0.1, step_error=0.1, position=(0.0049, 0.0049),
+        velocity=None, solver="Newton", iterations=100, cone="elliptic",
+    )  # fmt: skip
+    parts = ErrorParts(0.1, 0.01, 8.17, 1e-9, 0.001)
+    report = judged([*masked(), cone], contact_model=CONES, parts=parts)
+    assert report.parts is not None and report.parts.dominant == "contact_model"
+    mend = "Euler at 2 ms, elliptic cone errs 83 times less in all for 1.2 times the time"
+    assert report.parts.mend == mend
+    assert report.verdict.lines[1].endswith(
+        "and by 8.3 with the model of contacts; most of what is seen is the model of contacts': "
+        + mend
+    )
+    small = judged(masked(), contact_model=CONES, parts=ErrorParts(1e-4, None, None, None, 0.001))
+    assert small.parts is not None and small.parts.dominant == "", "none is resolved"
+
+
+def test_five_lines_say_speed_error_verdict_and_limits() -> None:
+    limit = StableRow(
+        "Euler", 0.0181, (1e-3, 0.1), None, 1.0, 55, 20, None, bracket=(0.0181, 0.0181),
+        near=0.007, near_reason="off by 0.1 rad at 0.8 s", through="all",
+    )  # fmt: skip
+    lines = judged(rows_of((1, 0.5)), stable=(limit,)).verdict.lines
+    assert len(lines) == 5
+    assert lines[0] == "Euler at 2 ms: 100 times real time"
+    assert lines[3] == (
+        "Euler stays bounded at steps to 18.1 ms, near the motion of small steps at steps to 7 ms "
+        "(off by 0.1 rad at 0.8 s), with nothing going through at all to 100 ms"
+    )
+    assert lines[4] == "not known: the error was not taken apart"
+
+
+def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:
+    """Rows of Euler at 4, 2, 1, … ms with these errors, each twice as dear as the one before."""
+    none = {"position": None, "velocity": None}
+    rows = [
+        row(
+            "Euler", 0.004 / 2**n, cost=2.0 ** (n - own_number), seen=e, own=n == own_number, **none
+        )
+        for n, e in enumerate(errors)
+    ]
+    return mark_luck(rows, {"Euler": 0.0025}, replace(SEEN, least=1e-6))
+
+
+def test_errors_that_do_not_fall_or_belong_to_no_stable_run_are_luck() -> None:
+    lucky = [bool(row.lucky) for row in ladder(8e-3, 4e-3, 2e-3, 1e-3)]
+    assert lucky == [True, False, False, False]
+    rows = ladder(8e-3, 1e-4, 2e-3, 1e-3)
+    assert rows[0].lucky == "it is beyond its largest stable timestep, 2.5 ms"
+    assert rows[1].lucky == "its error rises with shorter timesteps"
+    assert [row.front for row in front(rows, SEEN)] == [False, False, True, True]
+    (lost,) = mark_luck([row(own=True, seen=1e-3)], {"Euler": 0.0}, SEEN)
+    assert lost.lucky == "the shortest timestep that was tried is lost"
+    assert [bool(row.lucky) for row in ladder(8e-3, 1e-7, 1e-6)] == [True, False, False]
+
+
+def test_fewer_iterations_that_err_less_are_luck() -> None:
+    solving = {"solver": "Newton", "cone": "elliptic", "position": None, "velocity": None}
+    few, many = (
+        row("Euler", 0.002, iterations=n, seen=error, cost=cost, own=n == 100, **solving)
+        for n, error, cost in ((1, 1e-4, 0.8), (100, 1.4e-4, 1.0))
+    )
+    report = judged([few, many])
+    assert report.rows[0].lucky == "its error rises with more iterations"
+    assert report.verdict.on_front and report.verdict.text.startswith(
+        "no difference that holds: Euler at 2 ms, 1 iteration takes 0.8 of the time and errs 1.4 "
+        "times less (what is seen over the whole run) here, but its error rises with more "
+        "iterations"
+    )
+
+
+def test_verdicts_claim_only_what_holds() -> None:
+    small = [
+        row("Euler", 0.002, cost=1.0, seen=1e-3, own=True, velocity=None, position=None),
+        row("implicit", 0.002, cost=0.93, seen=0.94e-3, velocity=None, position=None),
+    ]
+    text = judged(small).verdict.text
+    assert text.startswith("no difference that holds: implicit at 2 ms takes 0.93 of the time")
+    assert "errs 1000 times less" in said((1, 1e-3), (0.5, 1e-6))
+    assert "errs 1000 times less" in (text := said((1, 1e-3), (0.5, 1e-6), least_seen=1e-6))
+    assert "or more: the reference resolves no more" in text
+    resting = judged(rows_of((1, 0.0), (0.1, 0.0))).verdict
+    assert resting.better is None and not resting.on_front
+    assert resting.text == "no setting can be called better: none errs, as where nothing moves"
+    untimed = judged([row(own=True, cost=None, seen=0.5)]).verdict.text
+    assert untimed.startswith("nothing was timed, so no setting can be called better; ")
+
+
+def test_what_is_not_resolved_makes_no_setting_better() -> None:
+    verdict = judged(rows_of((1, 2.0), (0.5, 2.0)), least_seen=2.0).verdict
+    assert verdict.better is None and not verdict.on_front
+    assert verdict.text == (
+        "no setting can be called better: the reference resolves no error of RK4 at 10 ms, or of "
+        "the scene's own setting; whether the scene's own error can be seen is not known"
+    )
+    verdict = judged(rows_of((1, 1e-9), (0.5, 1e-9)), least_seen=1e-9).verdict
+    assert verdict.better == 1, "what nobody can see may as well be cheap"
+    assert ", as far as the reference resolves; " in verdict.text
+
+
+def test_where_the_own_setting_is_lost_the_others_are_weighed() -> None:
+    words = "RK4 at 10 ms the cheapest without an error that is seen, at 0.25 of its cost"
+    assert f"is the most accurate that does, {words}" in said(None, (2, 1e-5), (0.5, 1e-3))
+    text = said(None, (2, 1e-5), (0.5, 170.0))
+    assert text.endswith("is the most accurate that does"), "a wrong motion is not cheap"
+
+
+def test_chaotic_scene_is_judged_by_how_long_runs_last() -> None:
+    none = {"position": None, "velocity": None}
+    rows = [
+        row("Euler", 0.002, cost=1.0, seen=None, own=True, parted=2.4, **none),
+        row("RK4", 0.002, cost=4.0, seen=None, parted=12.4, **none),
+    ]
+    text = judged(rows, horizon_error={"m": 0.002}).verdict.text
+    assert text == (
+        "the motion is chaotic: it is 0.002 m from the exact one at 2.4 s, under RK4 at 2 ms at "
+        "12.4 s"
+    )
+    whole_row = row("Euler", 0.004, cost=0.5, seen=0.1, **none)
+    report = judged([*rows, whole_row])
+    assert report.rows[2].lucky == "with shorter timesteps it is off sooner"
+    assert report.verdict.text.endswith(" at 12.4 s")
