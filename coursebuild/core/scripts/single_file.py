@@ -338,18 +338,30 @@ class _File:
 
 def _merge_imports(text: str, added: Iterable[str]) -> str:
     """The script's imports and others: those of Python's own modules in the first group."""
-    lines = sorted(line for line in added if "__future__" not in line)
-    own = [line for line in lines if _is_standard(line)]
-    foreign = [line for line in lines if not _is_standard(line)]
-    groups = re.split(r"\n{2,}", text.strip("\n")) if text.strip() else []
-    if groups and all(map(_is_standard, groups[0].split("\n"))):
-        own += groups.pop(0).split("\n")
-    own.sort(key=lambda line: (line.startswith("from"), line))
-    if foreign and groups:
-        groups[0] = "\n".join((groups[0], *foreign))
-    elif foreign:
-        groups.append("\n".join(foreign))
-    return "\n\n".join(filter(None, ("\n".join(own), *groups)))
+    groups = [group.split("\n") for group in re.split(r"\n{2,}", text.strip("\n")) if group]
+    present = {line for group in groups for line in group}
+    lines = [line for line in added if "__future__" not in line and line not in present]
+    for new, at in (
+        ([line for line in lines if _is_standard(line)], 0),
+        ([line for line in lines if not _is_standard(line)], len(groups)),
+    ):
+        there = groups[0] if at == 0 and groups else groups[-1] if groups else []
+        fits = bool(there) and all(_is_import(line, own=at == 0) for line in there)
+        group = there if fits else []
+        group += new
+        if fits:
+            group.sort(key=_import_order)
+        elif new:
+            groups.insert(at, sorted(new, key=_import_order))
+    return "\n\n".join("\n".join(group) for group in groups)
+
+
+def _is_import(line: str, *, own: bool) -> bool:
+    return line.startswith(("import ", "from ")) and "(" not in line and _is_standard(line) == own
+
+
+def _import_order(line: str) -> tuple[bool, str]:
+    return line.startswith("from "), line.lower()
 
 
 def _dictionary(values: Mapping[str, str]) -> str:

@@ -24,7 +24,6 @@ from coursebuild.core.run.environments import find_environment, prepare_environm
 from coursebuild.core.run.script_environment import (
     Interpreter,
     engine_version,
-    library_folder,
 )
 
 if TYPE_CHECKING:
@@ -140,12 +139,10 @@ class NativeEngine(JsonChild):
     def script(self, request: dict[str, Any]) -> ScriptReply:
         """Run an exported script natively.
 
-        `request` has the script's `path` in the course (nothing need be there), its `text`, its
-        `buttons`, `variants` (the text with other values), and `near`, the step whose state is
-        returned.
+        `request` has the script's `path` (nothing need be there), its `text`, its `buttons`,
+        `variants` (the text with other values), and `near`, the step whose state is returned.
         """
-        library = library_folder()
-        request = {"task": "script", "library": library, **request}
+        request = {"task": "script", **request}
         if self._sandbox is None:
             return msgspec.convert(self._request(request), ScriptReply)
         python = None if self._interpreter is None else self._interpreter.python
