@@ -38,7 +38,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.options import Options
 
 _STYLE = "matplotlibrc"
-_MODELS, _EXAMPLES = "models/", "examples/"
+_MODELS, _EXAMPLES, _LIBRARY = "models/", "examples/", "mjcourse/"
 _MOST_DATA = 1 << 16
 """Bytes of data that stand in a file for people to read; more come in an archive."""
 
@@ -79,11 +79,11 @@ class _Course:
     def files_of(
         self, extraction: Extraction, run: ScriptRun | None, includes: Mapping[str, Sequence[str]]
     ) -> dict[str, bytes]:
-        """The models and data that a script reads, by path; those that it names if it did not run."""
+        """The models and data that a script reads, by path; if it did not run, what it names."""
         paths: set[str] = set()
         if run is not None and run.trace is not None:
             paths = {p for p in run.trace.files if (self.root / p).is_file()}
-            paths = {p for p in paths if not p.startswith((_EXAMPLES, *self._prefixes))}
+            paths = {p for p in paths if not p.startswith((_EXAMPLES, _LIBRARY, *self._prefixes))}
         else:
             for name in models_named(extraction.script):
                 path = f"{_MODELS}{name}.xml"
@@ -195,10 +195,10 @@ def _belongings(files: Mapping[str, bytes]) -> Belongings:
         if "\r" in texts[path] or "\0" in texts[path]:
             raise NotOneFileError(f"{path} is no text with plain line ends")
     models = {p.removeprefix(_MODELS): t for p, t in texts.items() if p.startswith(_MODELS)}
-    data = {p: t for p, t in texts.items() if not p.startswith(_MODELS)}
-    if sum(map(len, data.values())) > _MOST_DATA:
+    others = {p: t for p, t in texts.items() if not p.startswith(_MODELS)}
+    if sum(map(len, others.values())) > _MOST_DATA:
         raise NotOneFileError("its data are long")
-    return Belongings(models, data)
+    return Belongings(models, others)
 
 
 def _rename(text: str, path: str, name: str) -> str:

@@ -158,7 +158,7 @@ def test_prediction_is_committed_to_before_its_simulation_opens(lesson: Page) ->
     expect(part.get_by_role("button", name="Try again")).to_be_hidden()
     expect(part.get_by_role("button", name="Show the answer")).to_be_hidden()
     part.locator(".lab").scroll_into_view_if_needed()
-    expect(part.locator(".lab")).to_have_attribute("data-state", "paused")
+    expect(part.locator(".lab")).to_have_attribute("data-state", "asleep")
     expect(part.get_by_role("button", name="Play")).to_be_visible()
 
 

@@ -18,7 +18,7 @@ from support import quiz_page
 from support.axe import violations
 from support.built_sites import Site
 from support.hostile_svg import HARMLESS, HOSTILE, mutants
-from support.lab_page import until, wait_until_settled, watch_page
+from support.lab_page import WAKE, until, wait_until_settled, watch_page
 from support.opened_drawings import Drawings, published_files
 from support.scratch_course import ROOT
 from support.static_host import Host
@@ -124,9 +124,13 @@ def test_no_page_names_anything_to_fetch_elsewhere(sites: Mapping[str, Site], na
 
 # ------------------------------------------------------------------------- in the browser
 
+LAB_IS_THERE = """n => {
+  const lab = document.querySelectorAll('main [data-lab][data-config]')[n]
+  return lab.querySelector('.lab-live') !== null
+}"""
 LAB_HAS_STARTED = """n => {
   const lab = document.querySelectorAll('main [data-lab][data-config]')[n]
-  return lab.querySelector('.lab-live') !== null && lab.dataset.state !== 'loading'
+  return !['loading', 'asleep'].includes(lab.dataset.state)
 }"""
 WHOLE = """() => {
   // All of the page, folded or far below.
@@ -141,6 +145,8 @@ def run_labs(page: Page) -> None:
     for number in range(labs.count()):
         if labs.nth(number).is_visible():
             labs.nth(number).scroll_into_view_if_needed()
+            until(page, LAB_IS_THERE, number)
+            labs.nth(number).evaluate(WAKE)
             until(page, LAB_HAS_STARTED, number)
 
 

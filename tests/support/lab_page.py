@@ -72,8 +72,20 @@ def lab(page: Page, number: int = SWING, state: str | None = "paused") -> Locato
     locator = page.locator(".lab").nth(number)
     locator.scroll_into_view_if_needed()
     if state is not None:
+        wake(page, number)
         reach(page, number, state)
     return locator
+
+
+WAKE = """(lab) => {
+  if (lab.dataset.state === 'asleep') lab.querySelectorAll('.lab-transport .lab-icon')[1].click()
+}"""
+
+
+def wake(page: Page, number: int) -> None:
+    """Let a lab load its engine, as anything that is asked of it does; here, to be reset."""
+    until(page, "(n) => document.querySelectorAll('.lab')[n].dataset.state !== undefined", number)
+    page.locator(".lab").nth(number).evaluate(WAKE)
 
 
 def reach(page: Page, number: int, state: str) -> None:

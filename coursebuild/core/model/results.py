@@ -323,7 +323,11 @@ class TrialLine(Struct, frozen=True):
     unexported: str = ""
     """Why its page offers no Python script, in words."""
     fill: float | None = None
-    """The mean share of its picture that moving things fill; `None` where nothing moves."""
+    """The share of its picture that its motion fills; `None` where nothing could move."""
+    moved: float | None = None
+    """The share of its picture in which something moves within 3 s after Play alone."""
+    still: str = ""
+    """Why nothing does."""
     fallen: tuple[str, ...] = ()
     """What has fallen out of the scene, and to where."""
     untried: str = ""

@@ -217,7 +217,7 @@ def is_future(statement: ast.stmt) -> bool:
 
 
 def futures(statements: Iterable[ast.stmt]) -> Iterator[str]:
-    """The features of Python\'s future that a module uses."""
+    """The features of Python's future that a module uses."""
     for statement in statements:
         if isinstance(statement, ast.ImportFrom) and is_future(statement):
             yield from (alias.name for alias in statement.names)

@@ -98,6 +98,8 @@ class _File:
         """What each name means in the file: the text of an import, or where it is defined."""
         self._imports: set[str] = set()
         self._namespaces: dict[str, dict[str, str]] = {}
+        self._users: dict[str, list[ModuleCode]] = {}
+        """The modules that use each namespace; the script's own is one of them."""
         self._has_models = False
         statements = self._script.statements
         self._head = 0
@@ -159,8 +161,10 @@ class _File:
             if isinstance(node, ast.Global):
                 self._meanings |= dict.fromkeys(node.names, "assigned")
         for bound, module_name, name in ours:  # the script's own names come first
+            if bound in self._meanings:
+                raise NotOneFileError(f"`{bound}` means two things in it")
             self._meanings[bound] = self._origin(module_name, name)
-        for bound, module_name, name in ours:
+        for bound, module_name, name in sorted(ours, key=self._is_whole):
             self._take(bound, module_name, name)
         return removed
 
@@ -177,6 +181,10 @@ class _File:
         row = next(row for row in module.imported(statement) if row[0] == name)
         is_ours = self._find_module(row[1]) is not None
         return self._origin(row[1], row[2]) if is_ours else self._external(module, name)
+
+    def _is_whole(self, row: tuple[str, str, str]) -> bool:
+        """Whether what is imported is a module."""
+        return self._find_module(".".join(filter(None, row[1:]))) is not None
 
     def _module(self, name: str, source: CourseModule) -> ModuleCode:
         if name not in self._modules:
@@ -212,10 +220,13 @@ class _File:
                     pass
         if others or self._meanings.setdefault(bound, whole) != whole:
             raise NotOneFileError(f"`{bound}` is used as more than a module")
+        namespace, users = self._namespaces.setdefault(bound, {}), self._users.setdefault(bound, [])
+        users.append(user)
         for attribute in sorted(attributes):
-            ours = self._need(user, whole, attribute)
             self._imports.add("from types import SimpleNamespace")
-            self._namespaces.setdefault(bound, {})[attribute] = ours
+            namespace[attribute] = self._need(user, whole, attribute)
+        for other in users:  # the namespace stands before the first, with all that it needs
+            other.uses |= user.uses
 
     def _need(self, user: ModuleCode, module_name: str, name: str, wanted: str = "") -> str:
         """Take a name of a module and what it needs; return what it is called in the file."""
@@ -317,12 +328,16 @@ class _File:
             texts = {path: _literal(text) for path, text in belongings.data.items()}
             comment = "# What the script reads; a file that is there already stays as it is"
             sections.append(f"{comment}\nDATA = {_dictionary(texts)}\n{_DATA}")
-        for module in self._in_order(self._script, set()):
+        written = set[str]()
+        for module in (*self._in_order(self._script, set()), self._script):
+            for name, users in self._users.items():
+                if name not in written and module in users and self._namespaces[name]:
+                    written.add(name)
+                    pairs = sorted(self._namespaces[name].items())
+                    rows = "".join(f"    {there}={here},\n" for there, here in pairs)
+                    sections.append(f"{name} = SimpleNamespace(\n{rows})")
             if module.needed:
                 sections.append(f"# --- from {module.source.path}\n\n\n{module.code()}")
-        for name, attributes in self._namespaces.items():
-            rows = "".join(f"    {there}={here},\n" for there, here in sorted(attributes.items()))
-            sections.append(f"{name} = SimpleNamespace(\n{rows})")
         if any(section.startswith("# --- from") for section in sections):
             sections.append("# --- the script itself")
         return sections
@@ -338,18 +353,30 @@ class _File:
 
 def _merge_imports(text: str, added: Iterable[str]) -> str:
     """The script's imports and others: those of Python's own modules in the first group."""
-    lines = sorted(line for line in added if "__future__" not in line)
-    own = [line for line in lines if _is_standard(line)]
-    foreign = [line for line in lines if not _is_standard(line)]
-    groups = re.split(r"\n{2,}", text.strip("\n")) if text.strip() else []
-    if groups and all(map(_is_standard, groups[0].split("\n"))):
-        own += groups.pop(0).split("\n")
-    own.sort(key=lambda line: (line.startswith("from"), line))
-    if foreign and groups:
-        groups[0] = "\n".join((groups[0], *foreign))
-    elif foreign:
-        groups.append("\n".join(foreign))
-    return "\n\n".join(filter(None, ("\n".join(own), *groups)))
+    groups = [group.split("\n") for group in re.split(r"\n{2,}", text.strip("\n")) if group]
+    present = {line for group in groups for line in group}
+    lines = [line for line in added if "__future__" not in line and line not in present]
+    for new, at in (
+        ([line for line in lines if _is_standard(line)], 0),
+        ([line for line in lines if not _is_standard(line)], len(groups)),
+    ):
+        there = groups[0] if at == 0 and groups else groups[-1] if groups else []
+        fits = bool(there) and all(_is_import(line, own=at == 0) for line in there)
+        group = there if fits else []
+        group += new
+        if fits:
+            group.sort(key=_import_order)
+        elif new:
+            groups.insert(at, sorted(new, key=_import_order))
+    return "\n\n".join("\n".join(group) for group in groups)
+
+
+def _is_import(line: str, *, own: bool) -> bool:
+    return line.startswith(("import ", "from ")) and "(" not in line and _is_standard(line) == own
+
+
+def _import_order(line: str) -> tuple[bool, str]:
+    return line.startswith("from "), line.lower()
 
 
 def _dictionary(values: Mapping[str, str]) -> str:

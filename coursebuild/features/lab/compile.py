@@ -162,7 +162,7 @@ def _control(functions: Mapping[Entry, str], i: int, control: schema.Control) ->
 
 _FIELDS = (
     *("title", "model", "key", "height", "camera", "toggles", "overlays", "forceScale"),
-    *("autoplay", "stopAt", "trail", "seed"),
+    *("autoplay", "stopAt", "start", "still", "trail", "seed"),
 )
 """Fields of a lab that are passed on as written; only overlays become a list."""
 _PLOT = ("ylabel", "xlabel", "window", "ymin", "ymax", "height", "refLines")
@@ -187,7 +187,7 @@ def control_data(control: schema.Control) -> dict[str, Any]:
 
 # --- trials
 
-_DISPLAY_FIELDS = ("id", "title", "model", "height", "toggles")
+_DISPLAY_FIELDS = ("id", "title", "model", "height", "toggles", "still")
 """Data of a lab on which no trial depends."""
 
 

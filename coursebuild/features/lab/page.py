@@ -81,6 +81,8 @@ class LabView(Struct, frozen=True):
     model_href: str
     start: str | None
     stop: str | None
+    still: str
+    """Why nothing moves by itself; empty where something does."""
     controls: tuple[tuple[str, str], ...]
     """Labels; range or options, and the initial value, in words."""
     readouts: tuple[str, ...]
@@ -163,6 +165,7 @@ def lab_view(words: Strings, place: Place, block: Lab, live: PublishedLab | None
         model_href="",
         start=None,
         stop=number(fields.stopAt) if fields.stopAt is not None else None,
+        still=fields.still,
         controls=tuple((control.label, _values(words, control)) for control in fields.controls),
         readouts=tuple(readout.label for readout in fields.readouts),
         plots=tuple(_plot(words, plot) for plot in fields.plots),
@@ -346,6 +349,7 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
         text += f" {words('lab.start')} {code_span(view.start)}."
     if view.stop is not None:
         text += f" {words('lab.stops', t=view.stop)}"
+    text += f" {escape_marks(view.still)}" if view.still else ""
     parts.append(text)
     if lab.kind == MJCF and lab.xml is not None:
         parts.append(fence("xml", lab.xml.text))

@@ -63,6 +63,9 @@ def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
             yield diagnose("field-value", claim_node.place("max"), message)
         if (after := claim_node.get("after")) is not None:
             yield from check_steps(after, "after", controls)
+    start = node.get("start")
+    if isinstance(start, StringNode):
+        yield from _check_step(start, "start", controls)
     goal = node.get("goal")
     if isinstance(goal, ObjectNode):
         before = 0.0

@@ -124,6 +124,7 @@ class MainRun(TypedDict):
     arrows: dict[str, Number | str] | None
     fallen: NotRequired[list[Fallen]]
     fill: Number | None
+    moved: Number | None
     parity: Parity | None
     recorded: NotRequired[MainRecord | None]
     resetDiffers: ResetDifference | None

@@ -266,6 +266,10 @@ class SimLab(CommonLab, frozen=True, forbid_unknown_fields=True):
     stopAt: Annotated[  # noqa: N815
         Positive | None, Meta(description="pauses at this simulated time, in seconds")
     ] = None
+    start: Annotated[
+        Text | None, Meta(description="the label of the button that Play presses at the start")
+    ] = None
+    still: Annotated[str, Meta(description="why nothing moves when a reader presses Play")] = ""
     setup: Annotated[str, Meta(description="statements run after load and every reset")] = ""
     controller: Annotated[str, Meta(description="statements run before every step")] = ""
     controls: Annotated[tuple[Control, ...], Meta(description="sliders, selects and buttons")] = ()

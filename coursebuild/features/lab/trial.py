@@ -60,7 +60,7 @@ from coursebuild.features.lab.equations.equation_trial import (
 from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
 from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size
-from coursebuild.features.lab.reply import LabOutput, TrialReply, read_reply, reply_bytes
+from coursebuild.features.lab.reply import LabOutput, MainRun, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 
 _PARITY_SECONDS = 1.0
@@ -290,7 +290,7 @@ class _LabTrial(Struct, frozen=True):
         reply, failures = evaluation.reply, evaluation.failures
         export = LabExport(None)
         if not failures and reply.main is not None and self.lab.kind != MJCF:
-            export = export_lab(self.context, self.engines.native, self.trial, self.lab, reply.main)
+            export = self._export(reply.main)
         files = model_files(self.context.root, self.model.path, self.model.text)
         self.context.run_store.note_trial(
             inputs,
@@ -314,6 +314,8 @@ class _LabTrial(Struct, frozen=True):
             tried=len(reply.attempts),
             parity=_in_english(*comparison),
             fill=None if reply.main is None else reply.main["fill"],
+            moved=None if reply.main is None else reply.main["moved"],
+            still=lab.fields.still,
             fallen=tuple(
                 f"`{body['name']}`, to z = {body['height']:.3g} m at t = {body['time']:.3g} s"
                 for body in ([] if reply.main is None else reply.main.get("fallen", []))
@@ -323,6 +325,17 @@ class _LabTrial(Struct, frozen=True):
         )
         output = replace(evaluation.output, mjb=mjb, script=export.script, parity=comparison)
         return TrialResult(lab.span, line, output), [*failures, *evaluation.remarks]
+
+    def _export(self, main: MainRun) -> LabExport:
+        root, model = self.context.root, self.model
+        paths = [
+            path for path in model_files(root, model.path, model.text) if (root / path).is_file()
+        ]
+        files = {
+            model.path: model.text.encode(),
+            **{path: read_bytes(root, path) for path in paths},
+        }
+        return export_lab(self.context, self.engines.native, self.trial, self.lab, files, main)
 
     def _fail(
         self, module: LabModule, diagnostics: list[Diagnostic]

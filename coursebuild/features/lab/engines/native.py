@@ -22,6 +22,10 @@ from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.run.child import LIMITS, JsonChild
 from coursebuild.core.run.environments import find_environment, prepare_environment
 from coursebuild.core.run.script_environment import engine_version, library_folder
+from coursebuild.core.run.script_environment import (
+    Interpreter,
+    engine_version,
+)
 
 if TYPE_CHECKING:
     from coursebuild.core.run.sandbox import Sandbox
@@ -136,12 +140,10 @@ class NativeEngine(JsonChild):
     def script(self, request: dict[str, Any]) -> ScriptReply:
         """Run an exported script natively.
 
-        `request` has the script's `path` in the course (nothing need be there), its `text`, its
-        `buttons`, `variants` (the text with other values), and `near`, the step whose state is
-        returned.
+        `request` has the script's `path` (nothing need be there), its `text`, its `buttons`,
+        `variants` (the text with other values), and `near`, the step whose state is returned.
         """
-        library = library_folder()
-        request = {"task": "script", "library": library, **request}
+        request = {"task": "script", **request}
         if self._sandbox is None:
             return msgspec.convert(self._request(request), ScriptReply)
         python = None if self._interpreter is None else self._interpreter.python

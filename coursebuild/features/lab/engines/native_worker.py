@@ -8,7 +8,6 @@ takes more processor time than its limit ends this process by SIGPROF.
 from __future__ import annotations
 
 import base64
-import importlib.util
 import json
 import os
 import re
@@ -171,8 +170,6 @@ def _relative_difference(native: Any, browser: Any) -> float:
 
 
 def _script(request: Any) -> dict[str, Any]:
-    if importlib.util.find_spec("mjcourse") is None:
-        sys.path.append(request["library"])
     try:
         path = request["path"]
         observations = _observe(_load(path, request["text"]), request["near"])

@@ -12,6 +12,7 @@ import functools
 import json
 import keyword
 import math
+import platform
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -96,21 +97,30 @@ def initial_values(lab: Lab) -> dict[int, float | str]:
     return {i: control.start for i, control in controls if not isinstance(control, Button)}
 
 
-def export_script(lab: Lab, metadata: ExportMetadata, engine: EngineDescription) -> Export | str:
-    """Write the script of a lab, or say why there is none."""
+def export_script(
+    lab: Lab, metadata: ExportMetadata, engine: EngineDescription, model: Mapping[str, bytes]
+) -> Export | str:
+    """Write the script of a lab, or say why there is none.
+
+    `model` holds the files of its model by path, that of the model itself first.
+    """
     if lab.kind != SIMLAB:
         return "its kind has code of its own"
-    if lab.xml is not None and "file" in lab.xml.text:
-        return "the model in the lab may be made of several files"
     try:
-        return _export(lab, metadata, engine)
+        texts = {path: data.decode() for path, data in model.items()}
+    except UnicodeDecodeError:
+        return "its model has files that are no text"
+    try:
+        return _export(lab, metadata, engine, texts)
     except UntranslatableError as error:
         return f"{error} has no counterpart in Python"
     except (RecursionError, MemoryError, SyntaxError):  # Python, too, has a limit
         return "code that is nested too deeply has no counterpart in Python"
 
 
-def _export(lab: Lab, metadata: ExportMetadata, engine: EngineDescription) -> Export:
+def _export(
+    lab: Lab, metadata: ExportMetadata, engine: EngineDescription, model: Mapping[str, str]
+) -> Export:
     code, names = lab.fields, _names(lab.fields.controls)
     translate = functools.partial(translate_statements, engine)
     setters = {
@@ -145,8 +155,11 @@ def _export(lab: Lab, metadata: ExportMetadata, engine: EngineDescription) -> Ex
         introduction=_introduction(lab, metadata),
         seconds=_literal(metadata.seconds),
         constants=constants,
-        model=json.dumps(code.model),
-        xml=None if lab.xml is None else _long_text(lab.xml.text),
+        python=".".join(platform.python_version_tuple()[:2]),
+        engine=metadata.engine,
+        main=json.dumps(next(iter(model))),
+        xml=_long_text(next(iter(model.values()))),
+        files=[(json.dumps(path), _long_text(text)) for path, text in model.items()],
         fields=fields,
         keyframe=_keyframe(code.key),
         setup=translate(code.setup, fields),
@@ -196,13 +209,9 @@ def _introduction(lab: Lab, metadata: ExportMetadata) -> str:
         "and steps as the lab in the page does, with the controls as they were there, and prints "
         "the lab's readouts and the state at the end."
     )
-    path, usage = metadata.name, "Run it with:"
-    if lab.xml is None:
-        path = f"examples/{metadata.name}"
-        usage = f"The model is the course's: save this file as {path} there, and run it with:"
     first = f"{title}{_one_line(metadata.origin)}, as a script."
-    texts = (textwrap.fill(text, _WIDTH) for text in (first, origin, usage))
-    return "\n\n".join([*texts, f"    python {path}"])
+    texts = (textwrap.fill(text, _WIDTH) for text in (first, origin, "Run it with:"))
+    return "\n\n".join([*texts, f"    uv run {metadata.name}"])
 
 
 def _comment(control: Slider | Select) -> list[str]:
@@ -249,11 +258,12 @@ def export_lab(
     native: NativeEngine,
     trial: Trial,
     lab: Lab,
+    model: Mapping[str, bytes],
     main: MainRun,
 ) -> LabExport:
     """Write and try the script of a lab, or take it from the store.
 
-    `main` is the main run of the lab's trial.
+    `model` is as in `export_script`, `main` the main run of the lab's trial.
     """
     start, end = (main["pictures"][i]["time"] for i in (0, -1))
     owner = next((o for o in context.course.owners if o.id == trial.owner), None)
@@ -267,16 +277,15 @@ def export_lab(
         LAB_ENGINE,
         round(end - start, 9),
     )
-    # The record stands for the model: a change that matters changes it, too.
     readouts = [picture["readouts"] for picture in main["pictures"]]
     code = lab_digest(".", "export/script.jinja")
-    key = fingerprint((code, lab.config, metadata, main.get("recorded"), readouts))
+    key = fingerprint((code, lab.config, metadata, {**model}, main.get("recorded"), readouts))
     store = context.run_store.store
     export = store.get_value("exports", key, LabExport)
     if export is not None:
         return export
     try:
-        export = _try_export(context.root, native, lab, metadata, main)
+        export = _try_export(native, lab, metadata, model, main)
     except NativeError as error:
         return LabExport(None, f"the script {error}")
     store.put_value("exports", key, export)
@@ -284,13 +293,13 @@ def export_lab(
 
 
 def _try_export(
-    root: Path,
     native: NativeEngine,
     lab: Lab,
     metadata: ExportMetadata,
+    model: Mapping[str, bytes],
     main: MainRun,
 ) -> LabExport:
-    export = export_script(lab, metadata, native.description)
+    export = export_script(lab, metadata, native.description, model)
     if isinstance(export, str):
         return LabExport(None, export)
     if main["diverged"]:
@@ -308,7 +317,7 @@ def _try_export(
             values = [value for _, value in control.options]
         variants += [{**start, i: value} for value in values if value != start[i]]
     request = {
-        "path": str(root / "examples" / export.name),
+        "path": export.name,
         "text": fill_in_values(export, start),
         "variants": [fill_in_values(export, values) for values in variants],
         "buttons": list(export.buttons),

@@ -5,7 +5,8 @@
  *   framing.begin(); framing.observe(lab); …        a run, and each moment of it
  *   framing.fit() → { distance, target } | null     null: nothing moves
  *
- * Runs in which something flies off are left out: those that would take the camera much farther away than the first run does. So is
+ * The run that Play alone gives is always shown. Others, in which a reader has changed something, are left out where they would take the
+ * camera much farther away. So is
  * what falls out of the scene (`fallen`): bodies that begin above its lowest point and end far below, beside others that stay or a floor.
  *
  * A camera sees a point if the point lies on the inner side of the picture's four edges, each of which is a plane through the
@@ -16,7 +17,7 @@
 const ASPECT = 1.6 // width of a view over its height
 const MARGIN = 0.9 // part of the view that the motion may fill
 const SURROUNDINGS = 0.3 // in sizes of the motion: what stands still and is nearer than this belongs in the picture
-const FARTHEST = 5 // in distances of the first run's camera
+const FARTHEST = 1.5 // in distances of the camera for what Play does
 const GAP = 0.04 // of the motion's size: between it and the floor
 const LEVEL = 0.999
 const SHOWN_GROUPS = 3
@@ -63,6 +64,7 @@ export class Framing {
     this.bottom = null // the depth of what the scene stands on, once a moment was observed
     this.fallen = new Map() // heights of the bodies that have fallen out of the scene
     this.runs = []
+    this.played = 0 // the number of the run that Play alone gives
     this.stillReaches = []
   }
 
@@ -71,15 +73,15 @@ export class Framing {
     this.runs.push([])
   }
 
-  /** The moments of the first run. */
-  get firstRun() {
-    return this.runs[0]
+  /** The moments of the run that Play gives. */
+  get playedRun() {
+    return this.runs[this.played]
   }
 
   /** The moments that a camera is to show. */
   get moments() {
-    const farthest = this.distanceOf(this.firstRun) * FARTHEST
-    return this.runs.flatMap((run) => (this.distanceOf([...this.firstRun, ...run]) <= farthest ? run : []))
+    const farthest = this.distanceOf(this.playedRun) * FARTHEST
+    return this.runs.flatMap((run) => (this.distanceOf([...this.playedRun, ...run]) <= farthest ? run : []))
   }
 
   distanceOf(moments) {
@@ -183,26 +185,27 @@ export class Framing {
     return -Math.max(reach.at(-1) + GAP * size, ...feet)
   }
 
-  /** The part of a camera's picture that the rectangle around what moves fills, averaged over the first run. */
+  /** The part of a camera's picture that the rectangle around all of the motion fills that Play gives. */
   fill({ distance, target }) {
     const [x, y, z] = this.directions.filter((_, i) => i < EDGES && i % 2 === 0).map((d) => dot(target, d))
-    const part = (low, high, middle, half) => Math.max(0, Math.min(high - middle, half) - Math.max(low - middle, -half)) / (2 * half)
-    const shares = this.firstRun.map(([right, left, top, bottom, back, front]) => {
+    const clipped = (value) => Math.max(-1, Math.min(value, 1))
+    const sides = this.playedRun.map(([right, left, top, bottom, back, front]) => {
       const depth = Math.max(1e-9, (back - front) / 2 - z + distance)
       const [w, h] = this.slopes.map((slope) => slope * depth)
-      return part(-left, right, x, w) * part(-bottom, top, y, h)
+      return [(right - x) / w, (left + x) / w, (top - y) / h, (bottom + y) / h].map(clipped)
     })
-    return shares.reduce((sum, share) => sum + share, 0) / shares.length
+    const [right, left, top, bottom] = furthest(sides)
+    return ((right + left) * (top + bottom)) / 4
   }
 }
 
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 const furthest = (moments) => moments[0].map((_, i) => Math.max(...moments.map((moment) => moment[i])))
 const sizeOf = (reach) => Math.max(...[0, 2, 4].map((i) => reach[i] + reach[i + 1]))
 const rows = (array, start, count) => Array.from({ length: count }, (_, i) => array.subarray(3 * (start + i), 3 * (start + i) + 3))
 
 /** Whether a geom is drawn, by its group and its colour. */
-function isShown(model, i) {
+export function isShown(model, i) {
   const material = model.geom_matid[i]
   const alphaOfGeom = model.geom_rgba[4 * i + 3]
   const alpha = material >= 0 && alphaOfGeom === 1 ? model.mat_rgba[4 * material + 3] : alphaOfGeom

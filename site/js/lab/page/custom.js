@@ -27,7 +27,8 @@ const PLAIN_PLOT = {
   log: false,
 }
 const PLAIN_LAB = {
-  key: null, camera: null, toggles: [], overlays: [], forceScale: null, autoplay: false, stopAt: null, trail: null, seed: null,
+  key: null, camera: null, toggles: [], overlays: [], forceScale: null, autoplay: false, stopAt: null, start: null, still: '',
+  trail: null, seed: null,
   controls: [], readouts: [], plots: [], expect: [],
 } // prettier-ignore
 const PLAIN_CONTROL = {

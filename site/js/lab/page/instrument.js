@@ -37,6 +37,7 @@ export class Instrument {
     this.values = this.initial = config.controls.map(({ value }) => value ?? null)
     this.textAt = this.plotAt = -Infinity
     this.sayTimer = 0 // of the announcement of a pause
+    this.starter = config.controls.findIndex(({ label }) => config.start && label === config.start) // the button that Play presses
     this.playRequested = false
     this.hasStarted = false // whether it has played, or the reader has stepped
     this.pendingAction = null // to be done when the lab is ready
@@ -92,7 +93,7 @@ export class Instrument {
     this.body = h(
       'div',
       { class: 'lab-live' },
-      h('div', { class: 'lab-stage' }, h('div', { class: 'lab-screen' }, this.view.element, this.transport.full), this.transport.element),
+      h('div', { class: 'lab-stage' }, h('div', { class: 'lab-screen' }, this.view.element, this.transport.full), this.transport.element, this.makeReason()),
       h(
         'div',
         { class: 'lab-side' },
@@ -110,6 +111,11 @@ export class Instrument {
     if (still !== null) still.before(this.body)
     else element.append(this.body)
     element.classList.add('lab-on')
+  }
+
+  /** Why nothing moves when a reader presses Play. */
+  makeReason() {
+    return this.config.still ? h('p', { class: 'lab-reason' }, this.config.still) : null
   }
 
   /** Link, export and help under the instrument. */
@@ -156,15 +162,15 @@ export class Instrument {
     this.pendingAction = null
     this.playRequested = false
     pendingAction?.()
-    if (pressed) this.simulation.play()
+    if (pressed) this.begin()
   }
 
   onStateChange(state, reason) {
     this.state = state
     this.element.dataset.state = state
     this.textAt = this.plotAt = -Infinity // so that the next refresh shows the numbers of the last picture
-    this.transport.setPlaying(state === 'playing')
-    this.transport.setEnabled(state === 'paused' || state === 'playing')
+    this.showPlay(state === 'playing')
+    this.transport.setEnabled(state !== 'loading' && state !== 'ended')
     this.controls.setEnabled(state !== 'ended')
     if (state === 'playing') {
       this.hasStarted = true
@@ -198,6 +204,7 @@ export class Instrument {
       this.textAt = now
       if (readouts !== null) this.readouts.show(readouts)
       this.transport.setTime(time)
+      this.showPlay(!resting)
       this.transport.setRatio(resting ? 1 : realtime)
     }
     if (resting || now - this.plotAt >= PLOT_EVERY) {
@@ -215,13 +222,28 @@ export class Instrument {
 
   togglePlay() {
     if (this.state === 'playing') this.simulation.pause()
-    else if (this.state === 'loading') {
+    else if (this.state === 'loading' || this.state === 'asleep') {
       this.playRequested = !this.playRequested
-      this.transport.setPlaying(this.playRequested)
+      this.simulation.wake()
+      this.showPlay(this.playRequested)
     } else {
       this.notices.clear()
-      this.simulation.play()
+      this.begin()
     }
+  }
+
+  get isAtStart() {
+    return (this.simulation?.latest?.time ?? 0) === 0
+  }
+
+  /** Play; at the start, press the button that begins the motion. */
+  begin() {
+    if (this.starter >= 0 && this.isAtStart) this.simulation.press(this.starter, true)
+    else this.simulation.play()
+  }
+
+  showPlay(isPlaying) {
+    this.transport.setPlaying(isPlaying, this.starter >= 0 && this.isAtStart ? this.config.start : undefined)
   }
 
   step() {
@@ -265,8 +287,9 @@ export class Instrument {
   }
 
   whenReady(act) {
-    if (this.state === 'loading') this.pendingAction = act
-    else act()
+    if (this.state !== 'loading' && this.state !== 'asleep') return act()
+    this.pendingAction = act
+    this.simulation.wake()
   }
 
   /** The label (a key) and the action of the button for a link. */

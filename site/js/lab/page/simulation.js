@@ -6,7 +6,7 @@
  *
  * `on` holds listeners, all optional:
  *
- *   state(state, reason)   'loading', 'paused', 'playing', 'ended' (it will not run again)
+ *   state(state, reason)   'asleep' (nothing is loaded before something is asked of it), 'loading', 'paused', 'playing', 'ended' (it will not run again)
  *   ready({scene, values, time, version})
  *   samples({epoch, times, values}, fresh)   `fresh`: a new run began, earlier samples belong to another
  *   refresh(frame, now)    once for each picture at most: {time, readouts, realtime, contacts, goal}
@@ -39,9 +39,13 @@ export class Simulation {
     this.settings = new Map() // messages to repeat after a restart: speed and overlays
     this.tick = (now) => this.refresh(now)
     this.request = 0
-    this.connect()
+    this.line = null
+    this.latest = null
+    if (config.autoplay) this.connect()
+    else this.setState('asleep')
   }
 
+  /** Load the engine and the model; what is asked of them meanwhile is done then. */
   connect() {
     const { config, address } = this
     this.spentBuffers = [] // one for each frame not yet answered; null: the worker has to make a new one
@@ -56,7 +60,16 @@ export class Simulation {
   }
 
   send(message, transfer) {
+    if (this.line === null) {
+      if (message.type === 'visible') return
+      this.connect()
+    }
     this.line.send(message, transfer)
+  }
+
+  /** Begin to load, if nothing was asked of it before. */
+  wake() {
+    if (this.line === null) this.connect()
   }
 
   setState(state, reason = null) {
@@ -145,7 +158,7 @@ export class Simulation {
 
   /** Start again, with a new engine if the worker is dedicated or has ended. */
   restart() {
-    this.line.close()
+    this.line?.close()
     cancelAnimationFrame(this.request)
     this.request = 0
     this.connect()
@@ -155,7 +168,7 @@ export class Simulation {
   dispose() {
     cancelAnimationFrame(this.request)
     this.request = -1
-    this.line.close()
+    this.line?.close()
     this.view?.dispose()
   }
 

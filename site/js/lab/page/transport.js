@@ -34,15 +34,16 @@ export function buildTransport(words, actions) {
     speed,
     clock,
   )
-  let playing = null
+  let shown = null
   return {
     element,
     full,
     speed,
-    setPlaying(isPlaying) {
-      if (isPlaying === playing) return
-      playing = isPlaying
-      label.textContent = words(isPlaying ? 'lab.live.pause' : 'lab.live.play')
+    /** `text`: what pressing does while nothing moves, if it is more than to play. */
+    setPlaying(isPlaying, text = words('lab.live.play')) {
+      const next = isPlaying ? words('lab.live.pause') : text
+      if (next === shown) return
+      shown = label.textContent = next
       sign.replaceChildren(icon(isPlaying ? 'pause' : 'play'))
     },
     setTime(seconds) {

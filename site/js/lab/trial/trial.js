@@ -4,6 +4,7 @@
  *   runTrial(engine, request, bytes, now) → reply          (both plain values)
  *
  * 1. The main run: from the start, stepping as Play does. It provides the lab's static form and the record for parity.
+ *    What Play alone moves is measured in its first 3 s; where Play presses a button (`start`), in a run of its own.
  * 2. Every control at its ends and at its value, every option, every button, each from a fresh start and followed by 0.5 s of steps
  *    (at most 500). Every readout and trace is evaluated before and after.
  * 3. Every claim (`expect`), from a fresh start; claims after the same acts share a run. The acts (`after`, here always a list) are done
@@ -34,7 +35,8 @@
  *     plots                      `{times, plots: [[values of each trace]]}`, at most 1000 times; a gap is `null`
  *     pictures                   `{time, frame, readouts}` at the start and at the end
  *     scene                      as the page gets it, with textures of at most 256 × 256 and faces of cubes of 64 × 64
- *     fill                       the part of the picture that what moves fills, in the mean of the run
+ *     fill                       the part of the picture that the motion fills which Play gives
+ *     moved                      the part of it in which something is seen to move within 3 s after Play
  *     fallen                     `[{name, height, time}]`: bodies that have fallen out of the scene, and where they are at the end
  *     arrows                     metres for each unit of momentum, angular momentum and force: the middle arrow seen is 0.3 of the
  *                                picture's height
@@ -55,6 +57,7 @@ import { nameOf } from '../core/names.js'
 import { act, controlActs, describe } from './acts.js'
 import { packed } from './base64.js'
 import { deepContact } from './deep.js'
+import { Motion } from './motion.js'
 import { ParityRecorder } from './parity.js'
 import { picture, record, withSmallTextures } from './record.js'
 import { resetDiffers } from './reset.js'
@@ -105,6 +108,8 @@ class Trial {
     this.steps = 0
     this.took = 0
     this.framing = null
+    this.motion = null // while it is measured
+    this.playedMotion = null
     this.arrowScales = new ArrowScales()
   }
 
@@ -113,6 +118,7 @@ class Trial {
     try {
       this.code = call([], () => new Function(`"use strict"; return ${this.text}`)())
       reply.main = this.attempt([], 'start', (lab) => this.mainRun(lab))
+      if (reply.main !== null) this.start()
       for (const { entry, what: title, act: change } of controlActs(this.config.controls)) {
         this.attempt(entry, title, (lab) => {
           change(lab)
@@ -130,6 +136,25 @@ class Trial {
     return { ...reply, tried, failures, stepsPerSecond: took > 0 ? Math.round(steps / took) : null }
   }
 
+  /** Press the button that Play presses, where there is one, and follow what it moves. */
+  start() {
+    const { start, controls, stopAt } = this.config
+    if (!start) return
+    this.attempt(['start'], 'Play', (lab) => {
+      this.framing.played = this.framing.runs.length - 1
+      this.motion = new Motion(lab)
+      this.observe(lab)
+      lab.press(controls.findIndex(({ label }) => label === start))
+      this.advance(lab, Math.min(stopAt ?? Infinity, lab.time + SECONDS))
+      this.endMotion()
+    })
+  }
+
+  endMotion() {
+    this.playedMotion = this.motion
+    this.motion = null
+  }
+
   /** Measure the speed of a lab of which only the recorded run was tried: run it once more, without recording. */
   pace({ steps }) {
     this.fresh(this.config, (lab) => this.advance(lab, Infinity, Math.min(steps, PACE), ['stopAt', 'code']))
@@ -143,6 +168,7 @@ class Trial {
     if (this.config.camera?.distance == null && this.config.camera?.target == null) Object.assign(camera, fitting)
     main.scene.floor = this.framing.floor()
     main.fill = this.framing.fill(camera)
+    main.moved = this.playedMotion.share(camera)
     main.arrows = this.arrowScales.fit(2 * camera.distance * Math.tan((camera.fovy * Math.PI) / 360))
     const hasArrows = this.config.overlays.some((name) => name in main.arrows)
     if (hasArrows) main.pictures[0] = packed(this.fresh({ ...this.config, arrows: main.arrows }, picture))
@@ -297,6 +323,7 @@ class Trial {
 
   observe(lab) {
     this.framing.observe(lab)
+    this.motion?.observe(lab)
     this.arrowScales.observe(lab)
   }
 
@@ -317,6 +344,7 @@ class Trial {
     const maxSteps = this.seconds === null ? STEPS : Infinity
     const due = Math.min(maxSteps, Math.ceil(seconds / timestep))
     this.framing = new Framing(lab, lab.scene().camera)
+    this.motion = new Motion(lab)
     this.framing.begin()
     this.observe(lab)
     this.checkValues(lab)
@@ -335,6 +363,7 @@ class Trial {
     if (stopAt !== null && reason !== 'stopAt' && lab.diverged === null && lab.time >= stopAt) {
       this.fail(['stopAt'], 'stopAt', `the lab does not stop at ${stopAt} s`, lab.time)
     }
+    this.endMotion()
     const parity = lab.recorder?.result() ?? null
     lab.recorder = null
     const pictures = packed([start, picture(lab)])
@@ -355,7 +384,8 @@ class Trial {
         height,
         time: lab.time,
       })),
-      fill: null, // see `frame`
+      fill: null, // see `frame`; likewise those below
+      moved: null,
       arrows: null,
       resetDiffers: resetDiffers(lab, atStart),
     }
