@@ -41,6 +41,7 @@ from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, parse_html, to_html
 from coursebuild.core.pages.renderer import direction
 from coursebuild.core.text.characters import visible
+from coursebuild.features.book import PDF_MARK
 
 _DROPPED_ELEMENTS = frozenset(
     "button form template script style dialog iframe object embed audio video source track"
@@ -290,8 +291,6 @@ def data_address(context: ExportContext, path: str) -> str:
 
 # --- the page as a PDF
 
-PDF_MARK = "/Keywords (coursebuild: the whole course"
-"""The note that replaces that of the time."""
 _BROWSER_PATH = "CHROME_PATH"
 """The variable of the environment that names another Chromium."""
 _BROWSERS = """
