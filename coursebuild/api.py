@@ -10,221 +10,109 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from coursebuild.core import model
-from coursebuild.core.engine.lifetime import end_with_parent
-from coursebuild.core.engine.store import Store
-from coursebuild.core.engine.tool import step_key
-from coursebuild.core.features import (
-    API,
-    Command,
-    Executor,
-    ExecutorKind,
-    Exporter,
-    Feature,
-    FenceKind,
-    IndexReader,
-    MarkdownWriter,
-    ModelPart,
-    PageCopy,
-    PageKind,
-    PagePart,
-    Picture,
-    Trial,
-    TrialContext,
-    TrialOutcome,
-    TrialRun,
-    Trials,
-)
-from coursebuild.core.files.course_root import DECISIVE, is_dropping
-from coursebuild.core.files.errors import EffectError, UsageError
-from coursebuild.core.files.locks import temporary_folder
-from coursebuild.core.files.write import resolve_inside
-from coursebuild.core.model import (
-    Block,
-    Course,
-    Document,
-    FeatureBlock,
-    Inline,
-    Lesson,
-    MjcfModel,
-    Recording,
-    document_blocks,
-    document_scripts,
-    find_blocks,
-)
-from coursebuild.core.model.results import (
-    CachedFile,
-    FileList,
-    Mathml,
-    ModelFacts,
-    Outcome,
-    OutputFile,
-    PublishedTrials,
-    Results,
-    ScriptJob,
-    ScriptRun,
-    SiteFile,
-    TrialResult,
-)
-from coursebuild.core.pages import marks, urls
-from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.context import (
-    Citations,
-    ExportContext,
-    PageContext,
-    PageInputs,
-    SiteContext,
-)
-from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.renderer import Renderer
-from coursebuild.core.pages.urls import Place
-from coursebuild.core.run import gate
-from coursebuild.core.run.dependencies import Dependency, Inputs, dependencies_of
-from coursebuild.core.run.environments import deciding_versions
-from coursebuild.core.run.run_store import States
-from coursebuild.core.run.sandbox import find_sandbox
-from coursebuild.core.run.script_environment import Interpreter
-from coursebuild.core.run.script_server import RunAll, RunStoppedError, ScriptServer
-from coursebuild.core.syntax.decode import decode
-from coursebuild.core.syntax.fence import Fence, Prose, TextParser
-from coursebuild.core.syntax.json_text import parse_json
-from coursebuild.core.syntax.toml_text import parse_toml
-from coursebuild.core.text.diagnostics import (
-    Diagnostic,
-    Edit,
-    Fix,
-    Note,
-    Parsed,
-    diagnose,
-    did_you_mean,
-)
-from coursebuild.core.text.rules import Rule
-from coursebuild.core.text.source import Excerpt, Source, Span
-from coursebuild.output import CLEAN, FAILURE, write
+from coursebuild.core import model as model
+from coursebuild.core.engine.lifetime import end_with_parent as end_with_parent
+from coursebuild.core.engine.store import Store as Store
+from coursebuild.core.engine.tool import step_key as step_key
+from coursebuild.core.features import API as API
+from coursebuild.core.features import Command as Command
+from coursebuild.core.features import Executor as Executor
+from coursebuild.core.features import ExecutorKind as ExecutorKind
+from coursebuild.core.features import Exporter as Exporter
+from coursebuild.core.features import Feature as Feature
+from coursebuild.core.features import FenceKind as FenceKind
+from coursebuild.core.features import IndexReader as IndexReader
+from coursebuild.core.features import MarkdownWriter as MarkdownWriter
+from coursebuild.core.features import ModelPart as ModelPart
+from coursebuild.core.features import PageCopy as PageCopy
+from coursebuild.core.features import PageKind as PageKind
+from coursebuild.core.features import PagePart as PagePart
+from coursebuild.core.features import Picture as Picture
+from coursebuild.core.features import Trial as Trial
+from coursebuild.core.features import TrialContext as TrialContext
+from coursebuild.core.features import TrialOutcome as TrialOutcome
+from coursebuild.core.features import TrialRun as TrialRun
+from coursebuild.core.features import Trials as Trials
+from coursebuild.core.files.course_root import DECISIVE as DECISIVE
+from coursebuild.core.files.course_root import is_dropping as is_dropping
+from coursebuild.core.files.errors import EffectError as EffectError
+from coursebuild.core.files.errors import UsageError as UsageError
+from coursebuild.core.files.locks import temporary_folder as temporary_folder
+from coursebuild.core.files.write import resolve_inside as resolve_inside
+from coursebuild.core.model import Block as Block
+from coursebuild.core.model import Course as Course
+from coursebuild.core.model import Document as Document
+from coursebuild.core.model import FeatureBlock as FeatureBlock
+from coursebuild.core.model import Inline as Inline
+from coursebuild.core.model import Lesson as Lesson
+from coursebuild.core.model import MjcfModel as MjcfModel
+from coursebuild.core.model import Recording as Recording
+from coursebuild.core.model import document_blocks as document_blocks
+from coursebuild.core.model import document_scripts as document_scripts
+from coursebuild.core.model import find_blocks as find_blocks
+from coursebuild.core.model.results import CachedFile as CachedFile
+from coursebuild.core.model.results import FileList as FileList
+from coursebuild.core.model.results import Mathml as Mathml
+from coursebuild.core.model.results import ModelFacts as ModelFacts
+from coursebuild.core.model.results import Outcome as Outcome
+from coursebuild.core.model.results import OutputFile as OutputFile
+from coursebuild.core.model.results import PublishedTrials as PublishedTrials
+from coursebuild.core.model.results import Results as Results
+from coursebuild.core.model.results import ScriptJob as ScriptJob
+from coursebuild.core.model.results import ScriptRun as ScriptRun
+from coursebuild.core.model.results import SiteFile as SiteFile
+from coursebuild.core.model.results import TrialResult as TrialResult
+from coursebuild.core.pages import marks as marks
+from coursebuild.core.pages import urls as urls
+from coursebuild.core.pages.assets import Assets as Assets
+from coursebuild.core.pages.context import Citations as Citations
+from coursebuild.core.pages.context import ExportContext as ExportContext
+from coursebuild.core.pages.context import PageContext as PageContext
+from coursebuild.core.pages.context import PageInputs as PageInputs
+from coursebuild.core.pages.context import SiteContext as SiteContext
+from coursebuild.core.pages.library import Library as Library
+from coursebuild.core.pages.renderer import Renderer as Renderer
+from coursebuild.core.pages.urls import Place as Place
+from coursebuild.core.run import gate as gate
+from coursebuild.core.run.dependencies import Dependency as Dependency
+from coursebuild.core.run.dependencies import Inputs as Inputs
+from coursebuild.core.run.dependencies import dependencies_of as dependencies_of
+from coursebuild.core.run.environments import deciding_versions as deciding_versions
+from coursebuild.core.run.run_store import States as States
+from coursebuild.core.run.sandbox import find_sandbox as find_sandbox
+from coursebuild.core.run.script_environment import Interpreter as Interpreter
+from coursebuild.core.run.script_server import RunAll as RunAll
+from coursebuild.core.run.script_server import RunStoppedError as RunStoppedError
+from coursebuild.core.run.script_server import ScriptServer as ScriptServer
+from coursebuild.core.syntax.decode import decode as decode
+from coursebuild.core.syntax.fence import Fence as Fence
+from coursebuild.core.syntax.fence import Prose as Prose
+from coursebuild.core.syntax.fence import TextParser as TextParser
+from coursebuild.core.syntax.json_text import parse_json as parse_json
+from coursebuild.core.syntax.toml_text import parse_toml as parse_toml
+from coursebuild.core.text.diagnostics import Diagnostic as Diagnostic
+from coursebuild.core.text.diagnostics import Edit as Edit
+from coursebuild.core.text.diagnostics import Fix as Fix
+from coursebuild.core.text.diagnostics import Note as Note
+from coursebuild.core.text.diagnostics import Parsed as Parsed
+from coursebuild.core.text.diagnostics import diagnose as diagnose
+from coursebuild.core.text.diagnostics import did_you_mean as did_you_mean
+from coursebuild.core.text.rules import Rule as Rule
+from coursebuild.core.text.source import Excerpt as Excerpt
+from coursebuild.core.text.source import Source as Source
+from coursebuild.core.text.source import Span as Span
+from coursebuild.output import CLEAN as CLEAN
+from coursebuild.output import FAILURE as FAILURE
+from coursebuild.output import write as write
 
 if TYPE_CHECKING:
-    from coursebuild.pipeline.arguments import add_running, options_of, print_report
-    from coursebuild.pipeline.check import check
-    from coursebuild.pipeline.load import load_course
-    from coursebuild.pipeline.options import Options
-    from coursebuild.report import Report
-
-# --- What a feature has
-__all__ = [
-    "API",
-    "Command",
-    "Executor",
-    "ExecutorKind",
-    "Exporter",
-    "Feature",
-    "FenceKind",
-    "ModelPart",
-    "PageCopy",
-    "PageKind",
-    "PagePart",
-    "Picture",
-    "Rule",
-    "Trials",
-]
-# --- Text and its places
-__all__ += ["Excerpt", "Source", "Span"]
-# --- Mistakes of an author
-__all__ += ["Diagnostic", "Edit", "Fix", "Note", "Parsed", "diagnose", "did_you_mean"]
-# --- From a fence to its block
-__all__ += [
-    "FeatureBlock",
-    "Fence",
-    "Prose",
-    "TextParser",
-    "decode",
-    "parse_json",
-    "parse_toml",
-]
-# --- The course
-__all__ += [
-    "Block",
-    "Course",
-    "Document",
-    "Inline",
-    "Lesson",
-    "MjcfModel",
-    "Recording",
-    "document_blocks",
-    "document_scripts",
-    "find_blocks",
-    "model",
-]
-# --- What was run
-__all__ += ["Mathml", "ModelFacts", "Outcome", "Results", "ScriptRun"]
-# --- Pages and copies
-__all__ += [
-    "Citations",
-    "IndexReader",
-    "Library",
-    "MarkdownWriter",
-    "PageContext",
-    "PageInputs",
-    "Place",
-    "Renderer",
-    "marks",
-    "urls",
-]
-# --- Files of a site, and exports
-__all__ += [
-    "CachedFile",
-    "ExportContext",
-    "FileList",
-    "OutputFile",
-    "SiteContext",
-    "SiteFile",
-    "step_key",
-]
-# --- Commands
-__all__ += [
-    "CLEAN",
-    "FAILURE",
-    "EffectError",
-    "Options",
-    "Report",
-    "UsageError",
-    "add_running",
-    "check",
-    "load_course",
-    "options_of",
-    "print_report",
-    "write",
-]
-# --- Trials
-__all__ += [
-    "Assets",
-    "Inputs",
-    "PublishedTrials",
-    "Trial",
-    "TrialContext",
-    "TrialOutcome",
-    "TrialResult",
-    "TrialRun",
-]
-# --- Work in other processes
-__all__ += [
-    "DECISIVE",
-    "Dependency",
-    "Interpreter",
-    "RunAll",
-    "RunStoppedError",
-    "ScriptJob",
-    "ScriptServer",
-    "States",
-    "Store",
-    "deciding_versions",
-    "dependencies_of",
-    "end_with_parent",
-    "find_sandbox",
-    "gate",
-    "is_dropping",
-    "resolve_inside",
-    "temporary_folder",
-]
+    from coursebuild.pipeline.arguments import add_running as add_running
+    from coursebuild.pipeline.arguments import options_of as options_of
+    from coursebuild.pipeline.arguments import print_report as print_report
+    from coursebuild.pipeline.check import check as check
+    from coursebuild.pipeline.load import load_course as load_course
+    from coursebuild.pipeline.options import Options as Options
+    from coursebuild.report import Report as Report
 
 _COMMANDS = {
     "Options": "coursebuild.pipeline.options",

@@ -53,7 +53,7 @@ def weights() -> Counter[str]:
 
 def is_offered(module: str, name: str) -> bool:
     """Whether a name of a module is one of the interface."""
-    if name not in api.__all__:
+    if not hasattr(api, name):
         return False
     value = getattr(importlib.import_module(module), name, None)
     if value is None:

@@ -246,8 +246,7 @@ class Command(Struct, frozen=True, kw_only=True):
     """A few words on what it does, for `coursebuild --help`."""
     module: str
     """The module with `declare(parser)`, which adds arguments, and `run(arguments)`, which returns
-    the exit status. It is imported when the command is called, and may import all of coursebuild,
-    since commands are a layer above features."""
+    the exit status. It is imported when the command is called."""
 
 
 class Executor(Protocol):
@@ -352,7 +351,7 @@ class Feature(Struct, frozen=True, kw_only=True):
     with the document's summary (`Library.summaries`); `None` if there is nothing."""
     model_part: ModelPart | None = None
     rules: tuple[Rule, ...] = ()
-    """Rules of its own, in addition to the catalogue (`coursebuild.core.text.rules`)."""
+    """Rules of its own, in addition to those that `coursebuild explain` knows."""
     reference: Callable[[Course, Store, Interpreter | None], Struct | None] | None = None
     """What it reads of the environment of the scripts, kept in `course.references`; the interpreter
     is `None` where the one of this tool runs them."""

@@ -2,13 +2,18 @@
 
 The scripts run here and in an environment with the other version and otherwise the same packages.
 Those that do something else run once more there, and in a fresh environment with the version of
-here, to find the cause (see `core.scripts.compare`). Models and MJCF blocks are compiled there.
+here, to find the cause. Models and MJCF blocks are compiled there.
+
+MuJoCo is the cause only if nothing else can be: the script prints here what is recorded; so does a
+control run in a fresh environment that differs from the other one in nothing but MuJoCo; and two
+runs in the other one agree.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, TypeAlias
 
 from msgspec import Struct, field
 from msgspec.structs import replace
@@ -17,7 +22,7 @@ from coursebuild.core.checks.compiled import mjcf_texts
 from coursebuild.core.files.errors import EffectError, UsageError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
-from coursebuild.core.model.results import ScriptRun
+from coursebuild.core.model.results import Change, Outcome, ScriptRun, Verdict
 from coursebuild.core.registry import losses_against
 from coursebuild.core.run.environments import (
     check_other_version,
@@ -25,14 +30,12 @@ from coursebuild.core.run.environments import (
     prepare_environment,
 )
 from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
-from coursebuild.core.scripts.compare import (
-    RunStanding,
-    judge,
-    judge_comparability,
-    run_standings,
-)
+from coursebuild.core.scripts.align import same_lines
+from coursebuild.core.scripts.compare import verify
+from coursebuild.core.scripts.diff import text_diff
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.failures import failure_diagnostic
+from coursebuild.core.scripts.lines import Side
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, Progress, select
 from coursebuild.pipeline.reader import Reader
@@ -191,3 +194,85 @@ class _Comparison(Struct):
             ModelLine(path, line, mjcf.readable_error(result.error))
             for (path, line), result in zip(places, results_there, strict=True)
         )
+
+
+# --- what became of a script
+
+Status: TypeAlias = Literal["same", "changed", "fails", "unclear", "drifted", "uncompared"]
+"""`changed` and `fails` are caused by MuJoCo; of `unclear` that cannot be said."""
+
+Judgement: TypeAlias = tuple[Status, str]
+"""What became of a script with another version of MuJoCo; why, as a clause, if need be."""
+
+
+class RunStanding(Struct, frozen=True):
+    """A run compared with what is recorded, or else with what the script prints here."""
+
+    run: ScriptRun
+    is_compared: bool
+    changes: tuple[Change, ...] = ()
+    diff: str = ""
+    """The difference between the outputs, where nothing is recorded."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether it ran to its end and printed what it should."""
+        return self.run.outcome is Outcome.OK and not (self.changes or self.diff)
+
+
+def run_standings(
+    course: Course, current_runs: Mapping[str, ScriptRun], runs: Iterable[ScriptRun]
+) -> dict[str, RunStanding]:
+    """The standing of each run, by path; `current_runs` are those of this environment."""
+    runs = tuple(runs)
+    verdicts: dict[str, list[Verdict]] = {}
+    for verdict in verify(course, runs):
+        verdicts.setdefault(verdict.recording.script or "", []).append(verdict)
+    standings: dict[str, RunStanding] = {}
+    for new_run in runs:
+        if new_run.path in verdicts:
+            compared = [v for v in verdicts[new_run.path] if v.status != "volatile"]
+            changes = tuple(change for verdict in compared for change in verdict.changes)
+            standings[new_run.path] = RunStanding(new_run, bool(compared), changes)
+        else:
+            old, new = current_runs[new_run.path].stdout, new_run.stdout
+            current_side, new_side = (Side.of(text, course.filters) for text in (old, new))
+            is_same = same_lines(current_side, new_side, course.comparison)
+            diff = "" if is_same else text_diff(old, new)
+            standings[new_run.path] = RunStanding(new_run, True, diff=diff)
+    return standings
+
+
+def judge_comparability(standing: RunStanding) -> Judgement | None:
+    """Why a script, as it runs here, cannot be compared; `None` where it can."""
+    match standing.run.outcome:
+        case Outcome.NORUN:
+            return "uncompared", "its lesson says `norun`"
+        case Outcome.SKIPPED:
+            return "uncompared", f"it needs {', '.join(standing.run.missing)}"
+        case Outcome.OK if not standing.is_compared:
+            return "uncompared", "its output is volatile"
+        case Outcome.OK if not standing.holds:
+            return "drifted", "what is recorded is not what it prints here"
+        case Outcome.OK:
+            return None
+        case _:
+            return "uncompared", "it does not run to its end here"
+
+
+def judge(
+    standing: RunStanding, control: RunStanding | None, repeated: RunStanding, engine: str
+) -> Judgement:
+    """Judge a script that prints what is recorded here, but not with the other MuJoCo.
+
+    `control` is its run with this version, `engine`, in a fresh environment, if there is one;
+    `standing` and `repeated` are those with the other version.
+    """
+    if (standing.run.outcome, standing.run.stdout) != (repeated.run.outcome, repeated.run.stdout):
+        return "unclear", "two runs of it there differed"
+    if control is None:
+        return "unclear", f"no fresh environment with MuJoCo {engine} could be made"
+    if not control.holds:
+        fresh = f"a fresh environment with MuJoCo {engine}"
+        return "unclear", f"it does not do in {fresh} what it does here either"
+    return ("changed" if standing.run.outcome is Outcome.OK else "fails"), ""

@@ -29,13 +29,64 @@ is version {version}: a feature that needs a newer one says so (`api=2`, say) an
 there is none. Each release that adds to the interface raises the version; what goes is announced in
 CHANGELOG.md.
 """
-SUBJECT = re.compile(r"^# --- (.*)\n__all__ \+?= (\[[^\]]*\])", re.MULTILINE)
+SUBJECTS = {
+    "What a feature has": ("core.features", "core.text.rules"),
+    "Text and its places": ("core.text.source",),
+    "Mistakes": ("core.text.diagnostics", "core.files.errors"),
+    "From a fence to its block": (
+        "core.syntax.decode",
+        "core.syntax.fence",
+        "core.syntax.json_text",
+        "core.syntax.toml_text",
+    ),
+    "The course": ("core", "core.model"),
+    "What was run, and files of the site": ("core.model.results", "core.engine.tool"),
+    "Pages": (
+        "core.pages",
+        "core.pages.assets",
+        "core.pages.context",
+        "core.pages.library",
+        "core.pages.renderer",
+        "core.pages.urls",
+    ),
+    "Commands": (
+        "output",
+        "pipeline.arguments",
+        "pipeline.check",
+        "pipeline.load",
+        "pipeline.options",
+        "report",
+    ),
+    "Work in other processes": (
+        "core.engine.lifetime",
+        "core.engine.store",
+        "core.files.course_root",
+        "core.files.locks",
+        "core.files.write",
+        "core.run",
+        "core.run.dependencies",
+        "core.run.environments",
+        "core.run.run_store",
+        "core.run.sandbox",
+        "core.run.script_environment",
+        "core.run.script_server",
+    ),
+}
+"""The sections of the reference, with the modules whose names stand there."""
 
 
-def subjects() -> Iterator[tuple[str, list[str]]]:
+@cache
+def sources() -> dict[str, str]:
+    """Where each name of the interface comes from."""
     text = Path(api.__file__).read_text(encoding="utf-8")
-    for subject, names in SUBJECT.findall(text):
-        yield subject, ast.literal_eval(names)
+    return {
+        alias.name: statement.module
+        for statement in ast.walk(ast.parse(text))
+        if isinstance(statement, ast.ImportFrom)
+        and (statement.module or "").startswith("coursebuild")
+        for alias in statement.names
+        if statement.module
+    }
 
 
 @cache
@@ -121,13 +172,7 @@ def entry(name: str) -> str:
     if isinstance(value, ModuleType):
         path = f"`{value.__name__.replace('.', '/')}`"
         return f"- `{name}` ({path}): {first_sentence(value.__doc__ or '')}\n"
-    source = next(
-        module
-        for statement in ast.walk(ast.parse(Path(api.__file__).read_text(encoding="utf-8")))
-        if isinstance(statement, ast.ImportFrom)
-        and (module := statement.module)
-        and name in {alias.name for alias in statement.names}
-    )
+    source = sources()[name]
     text, statement = find(source, name)
     assert first_sentence(text), f"nothing says what {name} is"
     own_form = form(statement) if isinstance(statement, ast.FunctionDef) else name
@@ -144,7 +189,8 @@ def entry(name: str) -> str:
 
 def reference() -> str:
     parts = [HEAD.format(version=api.API)]
-    for subject, names in subjects():
+    for subject, modules in SUBJECTS.items():
+        names = [name for name, module in sources().items() if module[12:] in modules]
         parts.append(f"\n## {subject}\n\n" + "".join(map(entry, names)))
     return "".join(parts)
 
@@ -157,10 +203,9 @@ def test_the_reference_of_the_interface_is_in_step(request: pytest.FixtureReques
 
 
 def test_every_public_name_has_its_subject_and_is_there() -> None:
-    names = [name for _, group in subjects() for name in group]
-    assert sorted(names) == sorted(api.__all__)
-    assert len(set(names)) == len(names)
-    assert [name for name in names if not hasattr(api, name)] == []
+    modules = [module for group in SUBJECTS.values() for module in group]
+    assert sorted(modules) == sorted({module[12:] for module in sources().values()})
+    assert [name for name in sources() if not hasattr(api, name)] == []
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         _ = api.nothing
 

@@ -1,21 +1,16 @@
-"""Is a recorded output what the script prints: here, a second time, with another version of MuJoCo?
+"""Is a recorded output what the script prints, and does it print that a second time?
 
 Where both are the same, character by character, the recording is verified. Else both sides are
 filtered and split into lines; if these match, it is verified too. Else the lines are aligned, each
 step that differs becomes changes, and every change is traced back through the filters to its place
 in the lesson. An output that its lesson calls volatile may differ.
-
-MuJoCo is the cause only if nothing else can be: the script prints here what is recorded; so does a
-control run in a fresh environment that differs from the other one in nothing but MuJoCo; and two
-runs in the other one agree.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
-from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
@@ -247,83 +242,3 @@ _TABLE_HELP = f"{_REPEAT_HELP}, or record the output in a `text` fence with `vol
 
 
 _DIFFERENT = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
-
-
-Status: TypeAlias = Literal["same", "changed", "fails", "unclear", "drifted", "uncompared"]
-"""`changed` and `fails` are caused by MuJoCo; of `unclear` that cannot be said."""
-
-Judgement: TypeAlias = tuple[Status, str]
-"""What became of a script with another version of MuJoCo; why, as a clause, if need be."""
-
-
-class RunStanding(Struct, frozen=True):
-    """A run compared with what is recorded, or else with what the script prints here."""
-
-    run: ScriptRun
-    is_compared: bool
-    changes: tuple[Change, ...] = ()
-    diff: str = ""
-    """The difference between the outputs, where nothing is recorded."""
-
-    @property
-    def holds(self) -> bool:
-        """Whether it ran to its end and printed what it should."""
-        return self.run.outcome is Outcome.OK and not (self.changes or self.diff)
-
-
-def run_standings(
-    course: model.Course, current_runs: Mapping[str, ScriptRun], runs: Iterable[ScriptRun]
-) -> dict[str, RunStanding]:
-    """The standing of each run, by path; `current_runs` are those of this environment."""
-    runs = tuple(runs)
-    verdicts: dict[str, list[Verdict]] = {}
-    for verdict in verify(course, runs):
-        verdicts.setdefault(verdict.recording.script or "", []).append(verdict)
-    standings: dict[str, RunStanding] = {}
-    for run in runs:
-        if run.path in verdicts:
-            compared = [v for v in verdicts[run.path] if v.status != "volatile"]
-            changes = tuple(change for verdict in compared for change in verdict.changes)
-            standings[run.path] = RunStanding(run, bool(compared), changes)
-        else:
-            old, new = current_runs[run.path].stdout, run.stdout
-            current_side, new_side = (Side.of(text, course.filters) for text in (old, new))
-            is_same = same_lines(current_side, new_side, course.comparison)
-            diff = "" if is_same else text_diff(old, new)
-            standings[run.path] = RunStanding(run, True, diff=diff)
-    return standings
-
-
-def judge_comparability(standing: RunStanding) -> Judgement | None:
-    """Why a script, as it runs here, cannot be compared; `None` where it can."""
-    match standing.run.outcome:
-        case Outcome.NORUN:
-            return "uncompared", "its lesson says `norun`"
-        case Outcome.SKIPPED:
-            return "uncompared", f"it needs {', '.join(standing.run.missing)}"
-        case Outcome.OK if not standing.is_compared:
-            return "uncompared", "its output is volatile"
-        case Outcome.OK if not standing.holds:
-            return "drifted", "what is recorded is not what it prints here"
-        case Outcome.OK:
-            return None
-        case _:
-            return "uncompared", "it does not run to its end here"
-
-
-def judge(
-    standing: RunStanding, control: RunStanding | None, repeated: RunStanding, engine: str
-) -> Judgement:
-    """Judge a script that prints what is recorded here, but not with the other MuJoCo.
-
-    `control` is its run with this version, `engine`, in a fresh environment, if there is one;
-    `standing` and `repeated` are those with the other version.
-    """
-    if (standing.run.outcome, standing.run.stdout) != (repeated.run.outcome, repeated.run.stdout):
-        return "unclear", "two runs of it there differed"
-    if control is None:
-        return "unclear", f"no fresh environment with MuJoCo {engine} could be made"
-    if not control.holds:
-        fresh = f"a fresh environment with MuJoCo {engine}"
-        return "unclear", f"it does not do in {fresh} what it does here either"
-    return ("changed" if standing.run.outcome is Outcome.OK else "fails"), ""

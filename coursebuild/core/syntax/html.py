@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from coursebuild.core.model import MediaAddress
 from coursebuild.core.model.inlines import ForbiddenHtml
-from coursebuild.core.syntax.mentions import check_raw_scheme
+from coursebuild.core.syntax.link_targets import check_raw_scheme
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 

@@ -18,15 +18,14 @@ from coursebuild.core.syntax.attributes import (
     split_source_mark,
 )
 from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
+from coursebuild.core.syntax.callouts import read_head
 from coursebuild.core.syntax.code_blocks import read_block
-from coursebuild.core.syntax.containers import (
-    read_head,
-    read_table,
-)
 from coursebuild.core.syntax.fence import read_fence
 from coursebuild.core.syntax.html import Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_tree import read_inlines
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState, T
+from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
+from coursebuild.core.syntax.pipe_tables import read_table
 from coursebuild.core.syntax.recording import (
     caption_start,
     check_code_above,

@@ -42,6 +42,7 @@ from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, parse_html
 from coursebuild.core.pages.materials import in_language
 from coursebuild.core.pages.renderer import direction
 from coursebuild.core.text.characters import visible
+from coursebuild.features.book import PDF_MARK
 
 _DROPPED_ELEMENTS = frozenset(
     "button form template script style dialog iframe object embed audio video source track"
@@ -295,8 +296,6 @@ def data_address(context: ExportContext, path: str) -> str:
 
 # --- the page as a PDF
 
-PDF_MARK = "/Keywords (coursebuild: the whole course"
-"""The note that replaces that of the time."""
 _BROWSER_PATH = "CHROME_PATH"
 """The variable of the environment that names another Chromium."""
 _BROWSERS = """
