@@ -24,7 +24,6 @@ from coursebuild.core.syntax.fence import read_fence
 from coursebuild.core.syntax.html import Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_tree import read_inlines
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState, T
-from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState
 from coursebuild.core.syntax.pipe_tables import read_table
 from coursebuild.core.syntax.recording import (
     caption_start,

@@ -19,7 +19,7 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from coursebuild.api import Options, UsageError, urls
+from coursebuild.api import Options, UsageError
 from coursebuild.core.files.errors import require
 from coursebuild.core.model.measurements import CaseReport, SceneReport
 from coursebuild.core.model.report_files import STABILITY, ReportFailure
@@ -42,11 +42,7 @@ from coursebuild.features.bench.commands.measurement import (
     write_records,
 )
 from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
-from coursebuild.features.bench.shown_errors import seconds_text, status_text
-from coursebuild.features.numerics import case_view
-from coursebuild.features.numerics.cases import case_quantities, course_cases
 from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
-from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.scenes import find_scenes, read_record
 from coursebuild.report.values import json_text
 

@@ -40,11 +40,7 @@ from coursebuild.features.bench.commands.measurement import (
     write_records,
 )
 from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
-from coursebuild.features.bench.grids import Grid, machine_text, power
-from coursebuild.features.bench.scenario_view import scenario_view
-from coursebuild.features.bench.shown_errors import is_idle
 from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
-from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes, read_record
 
 THREADS = "threads"

@@ -22,9 +22,6 @@ from coursebuild.features.bench.commands.measurement import (
     write_records,
 )
 from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
-from coursebuild.features.bench.grids import machine_text
-from coursebuild.features.bench.scenario_view import engine_view
-from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
 
 

@@ -31,17 +31,10 @@ from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.files.resources import template_texts
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model.report_files import ReportFailure, ReportKind
 from coursebuild.core.model.results import Machine
-from coursebuild.core.pages.materials import strings_for
-from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.text.diagnostics import sort_diagnostics
-from coursebuild.core.files.write import resolve_inside, write_atomic
-from coursebuild.core.model.report_files import ReportFailure, ReportKind
-from coursebuild.core.model.results import Machine
-from coursebuild.core.text.diagnostics import Diagnostic, sort_diagnostics
 from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.features.bench.commands.measuring import (
     Facts,
@@ -49,9 +42,7 @@ from coursebuild.features.bench.commands.measuring import (
     Mjbench,
     diagnostic_of,
 )
-from coursebuild.features.bench.grids import Grid
 from coursebuild.pipeline.arguments import style_of
-from coursebuild.pipeline.options import Options, UsageError
 from coursebuild.pipeline.scenes import CourseScene
 from coursebuild.report.text import (
     BOLD,

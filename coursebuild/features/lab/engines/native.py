@@ -21,11 +21,7 @@ from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.run.child import LIMITS, JsonChild
 from coursebuild.core.run.environments import find_environment, prepare_environment
-from coursebuild.core.run.script_environment import engine_version, library_folder
-from coursebuild.core.run.script_environment import (
-    Interpreter,
-    engine_version,
-)
+from coursebuild.core.run.script_environment import engine_version
 
 if TYPE_CHECKING:
     from coursebuild.core.run.sandbox import Sandbox
