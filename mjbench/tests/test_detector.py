@@ -11,7 +11,7 @@ import pytest
 from msgspec.structs import replace
 
 from mjbench.cases import measure
-from mjbench.detector import Peaks, RunStatus, driving_force, judge
+from mjbench.detector import Peaks, RunStatus, driving_force, judge, update_peaks
 from mjbench.linearization import find_theory
 from mjbench.pilot import longer_setup, run_pilot
 from mjbench.problem import Integrator, Scenario, Setup
@@ -67,6 +67,23 @@ def test_a_state_that_is_no_number() -> None:
         model, data = spring_data(0.01)
         getattr(data, field)[0] = np.nan
         assert judge(model, data, 0.0).reasons[0] == "the state is not finite"
+
+
+def test_a_state_that_was_no_number_on_the_way_is_lost() -> None:
+    model, data = spring_data(0.01)
+    peaks = Peaks()
+    for value in (0.1, np.nan, 0.2):
+        data.qpos[0] = value
+        peaks = update_peaks(data, peaks)
+    judgement = judge(model, data, 0.0, peaks)
+    assert (judgement.status, *judgement.reasons) == (RunStatus.DIVERGED, "the state is not finite")
+
+
+def test_a_clock_that_is_off_by_one_step_tells_of_a_reset() -> None:
+    model, data = spring_data(0.01)
+    advance(model, data, 10)
+    for steps, status in ((9, RunStatus.RESET), (10, RunStatus.OK), (11, RunStatus.RESET)):
+        assert judge(model, data, steps * 0.01).status is status
 
 
 def test_peaks_may_reach_every_bound_and_pass_none() -> None:

@@ -203,6 +203,14 @@ def test_files_of_somebody_are_never_published_over(root: Path, tmp_path: Path) 
         assert refusal(root, root / "public").startswith(foreign)
 
 
+def test_a_folder_that_no_build_has_renamed_away_does_not_become_the_site(root: Path) -> None:
+    foreign = root / ".public.coursebuild-old"
+    foreign.mkdir()
+    (foreign / "thesis.tex").write_text("mine")
+    publish(root, root / "public", site("one"))
+    assert texts(root / "public") == site_texts("one")
+
+
 def test_a_mount_point_is_refused(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (root / "public").mkdir()
     monkeypatch.setattr(os.path, "ismount", lambda path: path.name == "public")

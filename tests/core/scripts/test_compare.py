@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison, Filter
-from coursebuild.core.model.results import DriftKind
+from coursebuild.core.model.results import DriftKind, Outcome, ScriptRun
+from coursebuild.core.scripts.compare import RunStanding, judge
 from coursebuild.core.scripts.lines import MappedText, apply_filters
 from support.fixture_cases import fixture_tables
 from support.sample_lessons import (
@@ -127,6 +128,15 @@ def test_ellipsis_takes_what_a_regular_expression_takes(recorded: str, printed: 
     text = "".join(line + "\n" for line in output_lines(printed))
     expected = re.fullmatch(pattern, text) is not None
     assert matches(recorded, printed, ELLIPSIS) == expected
+
+
+def test_a_script_that_ends_otherwise_when_it_is_repeated_is_unclear() -> None:
+    good, failed = (
+        RunStanding(ScriptRun("examples/a.py", outcome, status, "1\n", "", 0.1), is_compared=True)
+        for status, outcome in enumerate((Outcome.OK, Outcome.FAILED))
+    )
+    assert judge(good, good, failed, "3.14.0") == ("unclear", "two runs of it there differed")
+    assert judge(failed, good, failed, "3.14.0") == ("fails", "")
 
 
 @settings(max_examples=50)
