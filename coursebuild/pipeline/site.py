@@ -37,7 +37,6 @@ from coursebuild.core.pages.context import Mistakes, NotedPage, SiteContext
 from coursebuild.core.pages.frame import (
     FrameInputs,
     PageFrame,
-    parts_by_mark,
     robots,
     sitemap,
     versions,
@@ -52,7 +51,7 @@ from coursebuild.core.pages.record import (
     common_files,
 )
 from coursebuild.core.pages.references import Reference, has_anchor
-from coursebuild.core.registry import features
+from coursebuild.core.registry import features, parts_by_mark
 from coursebuild.core.syntax.document import read_again
 from coursebuild.core.syntax.html import find_address
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
