@@ -27,6 +27,7 @@ from coursebuild.core.features import (
     ModelPart,
     PageCopy,
     PageKind,
+    PagePart,
     Trial,
     Trials,
 )
@@ -96,7 +97,7 @@ def use_course_features(
         RULES.pop(name, None)
     _of_course, _digest = _register(map(_name_failures, course_features)), digest
     _imports = imports
-    for table in (features, _by_fence, _by_block, page_kinds):
+    for table in (features, _by_fence, _by_block, page_kinds, parts_by_mark):
         table.cache_clear()
 
 
@@ -204,6 +205,12 @@ def has_copies(page: str) -> bool:
     """Whether there are copies of a page; pages filled in by scripts have none."""
     filled = (kind.path for kind in page_kinds() if not kind.indexed)
     return page != urls.NOT_FOUND and page not in filled
+
+
+@functools.cache
+def parts_by_mark() -> dict[str, PagePart]:
+    """The parts that features add to pages, by mark."""
+    return {part.mark: part for feature in features() for part in feature.parts}
 
 
 def page_copies() -> tuple[PageCopy, ...]:

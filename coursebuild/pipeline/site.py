@@ -26,7 +26,6 @@ from coursebuild.core.files.resources import prepared_file
 from coursebuild.core.model import (
     Course,
     HtmlBlock,
-    Lesson,
     RawInline,
     document_blocks,
     document_inlines,
@@ -38,7 +37,6 @@ from coursebuild.core.pages.context import Mistakes, NotedPage, SiteContext
 from coursebuild.core.pages.frame import (
     FrameInputs,
     PageFrame,
-    parts_by_mark,
     robots,
     sitemap,
     versions,
@@ -53,8 +51,8 @@ from coursebuild.core.pages.record import (
     common_files,
 )
 from coursebuild.core.pages.references import Reference, has_anchor
-from coursebuild.core.registry import features
-from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.registry import features, parts_by_mark
+from coursebuild.core.syntax.document import read_again
 from coursebuild.core.syntax.html import find_address
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Source, Span, key_of
@@ -392,10 +390,7 @@ def _find_in_texts(course: Course, page: str, url: str) -> Span | None:
     for owner, summary in owned:
         if url not in unescape(summary.source.text):
             continue
-        lesson = isinstance(owner, Lesson)
-        document = parse_document(
-            summary.source, course.callout_names, lesson=lesson, words=course.words_of(owner)
-        ).value
+        document = read_again(course, owner, summary)
         for node in (*document_blocks(document), *document_inlines(document)):
             if isinstance(node, HtmlBlock | RawInline) and (at := find_address(node.html, url)):
                 # In a quiz it is a part of JSON, in a quote of lines with marks.

@@ -129,33 +129,41 @@ class _Signs(Struct, frozen=True):
     """What each of its brackets may be."""
 
 
+@lru_cache(maxsize=256)
+def parse_mathml(mathml: str) -> Element | None:
+    """The tree of a formula, which nobody changes; `None` for characters that XML does not have."""
+    try:
+        return ElementTree.fromstring(mathml)
+    except ElementTree.ParseError:
+        return None
+
+
 @lru_cache(maxsize=1024)
 def _read_signs(mathml: str) -> _Signs | None:
     """Read the MathML of a formula without its TeX; many lessons have the same ones."""
-    try:
-        (semantics,) = ElementTree.fromstring(mathml)
-    except ElementTree.ParseError:  # characters that XML does not have
+    tree = parse_mathml(mathml)
+    if tree is None:
         return None
-    semantics.remove(semantics[-1])
-    runs = (run for run in _letter_runs(semantics) if len(run) > 1)
-    return _Signs(tuple(runs), tuple(_brackets(semantics)))
+    shown = tree[0][:-1]
+    runs = (run for run in _letter_runs(shown) if len(run) > 1)
+    return _Signs(tuple(runs), tuple(_brackets(shown)))
 
 
 # --- letters
 
 
-def _letter_runs(element: Element) -> Iterator[str]:
+def _letter_runs(elements: Sequence[Element], parent: str = "") -> Iterator[str]:
     """The letters that stand beside each other as names of their own; indices are words."""
     run = ""
-    for at, child in enumerate(element):
+    for at, child in enumerate(elements):
         text = child.text or ""
         if child.tag == "mi" and len(text) == 1 and text.isascii():
             run += text
             continue
         yield run
         run = ""
-        if at != 1 or element.tag not in _INDEXED:
-            yield from _letter_runs(child)
+        if at != 1 or parent not in _INDEXED:
+            yield from _letter_runs(child, child.tag)
     yield run
 
 
@@ -184,9 +192,8 @@ def _check_letters(
 # --- brackets
 
 
-def _brackets(element: Element) -> Iterator[tuple[int, ...]]:
+def _brackets(children: Sequence[Element]) -> Iterator[tuple[int, ...]]:
     """What each bracket of a formula may be."""
-    children = [*element]
     for before, child, after in zip(
         (None, *children), children, (*children[1:], None), strict=False
     ):

@@ -15,9 +15,9 @@ from html import escape
 from typing import TypeAlias
 
 from markupsafe import Markup
-from msgspec import Struct
+from msgspec import Struct, field
 
-from coursebuild.core.features import PageKind, PagePart
+from coursebuild.core.features import PageKind
 from coursebuild.core.model import Course, Lesson
 from coursebuild.core.model.fields import Author
 from coursebuild.core.model.lesson_record import shown_versions
@@ -27,7 +27,13 @@ from coursebuild.core.pages.context import PageHead
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.materials import renderer_for
 from coursebuild.core.pages.renderer import Strings, Texts, direction
-from coursebuild.core.registry import added_pages, features, has_copies, page_copies, page_kind
+from coursebuild.core.registry import (
+    added_pages,
+    has_copies,
+    page_copies,
+    page_kind,
+    parts_by_mark,
+)
 from coursebuild.core.text.characters import visible
 
 PAGE_WORDS = (
@@ -91,11 +97,6 @@ def page_title(library: Library, kind: PageKind) -> str:
     return library.words(key) if library.words.has(key) else kind.name.capitalize()
 
 
-def parts_by_mark() -> dict[str, PagePart]:
-    """The parts that features add to pages, by mark."""
-    return {part.mark: part for feature in features() for part in feature.parts}
-
-
 def parts_of(body: str, kind: str) -> tuple[str, ...]:
     """The marks, such as `data-quiz=`, of the parts on a page of this kind."""
     return tuple(
@@ -157,6 +158,8 @@ class PageFrame(Struct, frozen=True):
     inputs: FrameInputs
     assets: Assets
     """Files of the tool alone."""
+    _words: dict[tuple[str, tuple[str, ...]], tuple[str, ...]] = field(default_factory=dict)
+    """The keys of the words of scripts, by language and parts: most pages have the same."""
 
     def render(self, head: PageHead, parts: tuple[str, ...], body: str) -> str:
         """The whole page around a body that has these parts; see `parts_of`."""
@@ -171,6 +174,10 @@ class PageFrame(Struct, frozen=True):
             if mark in parts:
                 part = known_parts[mark]
                 part_names[place.href(path)] = part.bundled.removesuffix(".js") if part.late else ""
+        page_words = self._words.get((language, parts))
+        if page_words is None:
+            page_words = script_words(renderer.words.texts, parts)
+            self._words[language, parts] = page_words
         is_missing = head.path == urls.NOT_FOUND
         canonical = "" if is_missing else urls.absolute(inputs.base_url, head.path)
         html = renderer.render(
@@ -209,7 +216,7 @@ class PageFrame(Struct, frozen=True):
             credits=place.href(names.credits),
             menu=_links(place, inputs.menu),
             own=_links(place, inputs.added_pages),
-            page_words=script_words(renderer.words.texts, parts),
+            page_words=page_words,
         )
         return f"{visible(html)}\n"
 

@@ -89,6 +89,16 @@ def parse_document(
     return Parsed(document, sort_diagnostics(state.diagnostics))
 
 
+def read_again(course: model.Course, owner: model.Owner, summary: model.Document) -> model.Document:
+    """The whole document of a lesson or page, of whose text a course has a summary."""
+    return parse_document(
+        summary.source,
+        course.callout_names,
+        lesson=isinstance(owner, model.Lesson),
+        words=course.words_of(owner),
+    ).value
+
+
 def _check_scripts(
     document: model.Document, diagnostics: Sequence[Diagnostic]
 ) -> Iterator[Diagnostic]:

@@ -172,10 +172,13 @@ class Excerpt(Struct, frozen=True):
 
     def span(self, start: int = 0, end: int | None = None) -> Span:
         """The source span that `text[start:end]` came from, with what lies between its pieces."""
-        end = len(self.text) if end is None else end
+        end, limit = len(self.text) if end is None else end, len(self.source.text)
+        if len(self.pieces) == 1:  # as of most
+            shift = self.pieces[0][1]
+            return Span(self.source, min(shift + start, limit), min(shift + max(start, end), limit))
         first = self.offset(start)
         last = self.offset(end - 1) + 1 if end > start else first
-        return Span(self.source, first, max(first, min(last, len(self.source.text))))
+        return Span(self.source, first, max(first, min(last, limit)))
 
     def slice(self, start: int, end: int | None = None) -> Excerpt:
         """The excerpt `text[start:end]`."""

@@ -253,4 +253,4 @@ def _read_places(document: model.Document) -> Iterator[_Place]:
         start = formula.tex.span().start
         level = bisect_right(headings, start), *(s for s, end in parts if s <= start < end)
         text = texts.get(formula.span.end, "") if isinstance(formula, model.Math) else ""
-        yield _Place(formula, level, unit_behind(text).text, document.comma)
+        yield _Place(formula, level, unit_behind(text).text if text else "", document.comma)

@@ -37,6 +37,12 @@ from coursebuild.api import (
 )
 from coursebuild.core.model import Owner
 from coursebuild.core.pages import document_inputs
+from coursebuild.core import model
+from coursebuild.core.checks.formulas import parse_mathml
+from coursebuild.core.features import Feature, PageKind
+from coursebuild.core.model import Lesson, Owner
+from coursebuild.core.model.results import Mathml
+from coursebuild.core.pages import document_inputs, urls
 from coursebuild.core.pages.document_inputs import OwnerLink, OwnerLinks
 from coursebuild.core.pages.numbering import UNNAMED, fill_in, name_outside
 
@@ -62,7 +68,7 @@ _WRAPPERS = frozenset(("mrow", "mpadded", "mstyle", "semantics", "math", "mphant
 @functools.lru_cache(maxsize=1024)
 def symbols(mathml: str) -> tuple[str, ...]:
     """Return the symbols of a formula in their order, each once."""
-    root = _parse(mathml) if "<mi" in mathml else None  # without letters it has none
+    root = parse_mathml(mathml) if "<mi" in mathml else None  # without letters it has none
     symbols: dict[str, None] = {}
     if root is not None:
         _collect(root, symbols)
@@ -71,7 +77,7 @@ def symbols(mathml: str) -> tuple[str, ...]:
 
 def only_symbol(mathml: str) -> str | None:
     """Return the symbol that is the whole formula; `None` if that is anything else."""
-    root = _parse(mathml)
+    root = parse_mathml(mathml)
     return None if root is None else _symbol(_unwrap(root), is_declared=True)
 
 
@@ -80,13 +86,6 @@ def declared_symbol(mathml: str) -> str | None:
     only = only_symbol(mathml)
     is_value = only is None and "<mo>=</mo>" in mathml and len(symbols(mathml)) == 1
     return symbols(mathml)[0] if is_value else only
-
-
-def _parse(mathml: str) -> Element | None:
-    try:
-        return ElementTree.fromstring(mathml)
-    except ElementTree.ParseError:  # characters that XML does not have
-        return None
 
 
 def _children(element: Element) -> list[Element]:
@@ -199,7 +198,7 @@ def _mark(element: Element) -> str | None:
 
 def sort_key(symbol: str) -> tuple[object, ...]:
     """Sort Latin letters before Greek and others; plain letters before other shapes and marks."""
-    root = _parse(symbol)
+    root = parse_mathml(symbol)
     text = "" if root is None else "".join(root.itertext())
     while root is not None and len(root):
         root = root[0]

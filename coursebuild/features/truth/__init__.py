@@ -1,6 +1,7 @@
 """Holds given numbers against their sources, and lists results that are stated and not bound.
 
-The claims of a document are found when it is read (`claims`), and stored with it.
+Claims with a source are found when a document is read (`claims`), and stored with it. The others
+are found when they are asked for.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from coursebuild.api import Course, Diagnostic, Document, Feature, Parsed, Rule,
 from coursebuild.features.truth.claims import (
     Claims,
     check_sources,
-    document_claims,
+    sourced_claims,
     unbound_results,
 )
 
@@ -34,7 +35,7 @@ def unproven(course: Course) -> Iterator[Diagnostic]:
 FEATURE = Feature(
     name="truth",
     needs=("arithmetic",),
-    summary=lambda document, mathml: Parsed(document_claims(document)),
+    summary=lambda document, mathml: Parsed(sourced_claims(document)),
     check=check,
     unproven=unproven,
     rules=(

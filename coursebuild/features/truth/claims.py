@@ -1,7 +1,8 @@
 """Finds the numbers that a document states, and what each is held against.
 
-Entry points: `document_claims(document)`; `check_sources`, of the numbers whose source is a part of
-the course; `unbound_results`, of those that neither a script, a formula nor a source gives.
+Entry points: `document_claims(document)`; `sourced_claims`, of a document's numbers whose source is
+a part of the course, and `check_sources`, which looks there; `unbound_results`, of those that
+neither a script, a formula nor a source gives.
 
 1. A number in digits is a claim, except: a whole number up to twelve without a unit, which counts
    or names as a word does; a year; what only looks like a number (versions, dates, `x1`).
@@ -33,6 +34,8 @@ from msgspec.structs import replace
 
 from coursebuild.api import Diagnostic, Excerpt, Fix, Span, diagnose, did_you_mean, model
 from coursebuild.core.registry import kind_of_block
+from coursebuild.core.syntax.document import read_again
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import Number, point_decimals, scan_prose
 from coursebuild.core.text.units import UNIT_PATTERN, find_unit
 from coursebuild.features.arithmetic.evaluate import FormulaComparison, measure, read_numeral
@@ -176,13 +179,20 @@ def unbound_results(course: model.Course) -> Iterator[tuple[model.Owner, tuple[S
     parts = _Parts(course)
     for owner, document in course.owned_documents:
         if isinstance(owner, model.Lesson) or owner.menu:
-            summary = (document.summaries or {}).get("truth")
-            claims = summary if isinstance(summary, Claims) else document_claims(document)
+            claims = document_claims(read_again(course, owner, document))
             inputs = parts.inputs(document).union(claims.inputs) if claims.open else ()
             yield owner, tuple(claim for claim in claims.open if not claim.is_in(inputs))
 
 
 # --- found in a document
+
+
+def sourced_claims(document: model.Document) -> Claims | None:
+    """The claims of a document that name a part of the course; `None` where there are none."""
+    if "given" not in document.source.text:  # as a mark of a source has that word
+        return None
+    sourced = document_claims(document).sourced
+    return Claims((), sourced) if sourced else None
 
 
 def document_claims(document: model.Document) -> Claims:
