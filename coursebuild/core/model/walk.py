@@ -80,7 +80,7 @@ def block_inlines(block: Block) -> tuple[Inline, ...]:
         case Paragraph() | Heading() | HtmlFlow():
             return block.children
         case FeatureBlock():
-            return block.child_inlines()
+            return (*block.child_inlines(), *block.numbers)
         case Callout():
             return block.title
         case Table():
@@ -240,11 +240,13 @@ def find_formulas(document: Document) -> tuple[tuple[Block, Math | MathBlock], .
 
 
 def document_inlines(document: Document) -> Iterator[Inline]:
-    """Every inline of a document."""
+    """Every inline of a document, and the numbers of alternative texts."""
 
     def walk() -> tuple[Inline, ...]:
         groups = (block_inlines(block) for block in document_blocks(document))
-        return tuple(inline for group in groups for inline in walk_inlines(group))
+        inlines = [inline for group in groups for inline in walk_inlines(group)]
+        images = (inline for inline in inlines if isinstance(inline, Image))
+        return (*inlines, *(number for image in images for number in image.numbers))
 
     return iter(computed_once(document, "all_inlines", walk))
 
@@ -283,7 +285,7 @@ def without_prose(document: Document) -> Document:
                 blocks.append(replace(block, caption=_summary_inlines(block)))
             case FeatureBlock():
                 bare = block.summary()
-                blocks += [] if bare is None else [bare]
+                blocks += [] if bare is None else [replace(bare, numbers=())]
                 blocks += _paragraph_of(block.span, _summary_inlines(block))
             case Callout():
                 blocks.append(replace(block, title=_summary_inlines(block), blocks=()))
