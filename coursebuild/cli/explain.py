@@ -1,8 +1,8 @@
 """`coursebuild explain`: explain a rule, or why something would run again.
 
 Of a path it says whether it would run again, why, and what depends on it; of a line of a lesson,
-where its values come from. The lessons are read and
-parsed; nothing is run, compiled or written, and neither NumPy nor MuJoCo is imported.
+where its values come from. The lessons are read and parsed; nothing is run, compiled or written,
+and neither NumPy nor MuJoCo is imported.
 """
 
 from __future__ import annotations
@@ -176,9 +176,9 @@ def run(arguments: argparse.Namespace) -> int:
         text = rule_text(rule, rules_page())
         return write(json_text(rule) if arguments.format == "json" else text, CLEAN)
     options = options_of(arguments)
-    if match := re.fullmatch(r"(.+\.md):([1-9][0-9]{0,8})", arguments.name):
+    if match := re.fullmatch(r"(.+\.(?:md|toml)):([1-9][0-9]{0,8})", arguments.name):
         path = path_from_root(match[1], options.root)
-        origins = value_origins(options.root, load_course(options.root), path, int(match[2]))
+        origins = value_origins(load_course(options.root), path, int(match[2]))
         text = origins_text(f"{path}:{match[2]}", origins)
         return write(json_text(origins) if arguments.format == "json" else text, CLEAN)
     explanation = explain(options, arguments.name)

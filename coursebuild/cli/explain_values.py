@@ -7,7 +7,6 @@ recorded text.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 from msgspec import Struct
 
@@ -41,11 +40,11 @@ class ValueOrigin(Struct, frozen=True):
     """That of a given value."""
 
 
-def value_origins(root: Path, course: Course, path: str, line: int) -> tuple[ValueOrigin, ...]:
+def value_origins(course: Course, path: str, line: int) -> tuple[ValueOrigin, ...]:
     """The values that a line of a lesson or page shows."""
-    document = next((d for d in course.documents if d.source.path == path), None)
+    document = next((d for _, d in course.shown_texts if d.source.path == path), None)
     if document is None:
-        raise UsageError(f"{path} is no lesson or page of this course")
+        raise UsageError(f"{path} is no lesson or page of this course, and binds no number")
     if line > len(document.source.line_starts):
         raise UsageError(f"{path} has no line {line}")
     paths = [extraction.path for extraction in extract(course).value]

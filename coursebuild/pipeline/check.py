@@ -153,7 +153,7 @@ class CheckedCourse(Struct, frozen=True):
         broken = {diagnostic.span.path for diagnostic in diagnostics if diagnostic.is_error}
         documents = [
             document
-            for document in self.course.documents
+            for _, document in self.course.shown_texts
             if self.documents is None or document.source.path in self.documents
             if document.source.path not in broken
         ]

@@ -161,7 +161,7 @@ class _Loader:
             course,
             models=self.files.models,
             files=self._files_to_show(course),
-            records=read_records(self.root, [d.source.path for d in course.documents]),
+            records=read_records(self.root, [MAP, *(d.source.path for d in course.documents)]),
             declarations=declarations,
             theme=self._load_theme(course.theme),
             bibliography=self._read_list(BIBLIOGRAPHY, course.limits.text),
@@ -427,7 +427,7 @@ class _Loader:
         models = (f"models/{model.name}.xml" for model in self.files.models)
         texts = [source.path for source in (*self.files.lessons, *self.files.pages)]
         texts += [page.path for page in course.pages]
-        excluded = {MAP, *texts, *map(record_path, texts), *models}
+        excluded = {MAP, *texts, *map(record_path, (MAP, *texts)), *models}
         return tuple(path for path in self.files.files if path not in excluded)
 
 

@@ -195,7 +195,7 @@ class _Updater:
     def _chosen_documents(self, course: Course) -> list[Document]:
         return [
             document
-            for document in course.documents
+            for _, document in course.shown_texts
             if self.documents is None or document.source.path in self.documents
         ]
 
@@ -253,11 +253,8 @@ class _Updater:
         extractions = [e for e in extract_course(new_course).value if e.path in paths]
         if new_course is not self.course:
             self._carry_addresses(new_course, runs)
-        chosen_documents = [
-            (owner, document)
-            for owner, document in new_course.owned_documents
-            if self.documents is None or document.source.path in self.documents
-        ]
+        chosen_paths = {document.source.path for document in self._chosen_documents(new_course)}
+        chosen_documents = [p for p in new_course.shown_texts if p[1].source.path in chosen_paths]
         diagnostics = [
             *script_findings(
                 new_course,
@@ -275,7 +272,7 @@ class _Updater:
     def _carry_addresses(self, new_course: Course, runs: Sequence[ScriptRun]) -> None:
         """Keep the addresses of numbers that were written anew."""
         before, now = self._outputs(self.course, runs), self._outputs(new_course, runs)
-        new_documents = {document.source.path: document for document in new_course.documents}
+        new_documents = {d.source.path: d for d in self._chosen_documents(new_course)}
         for document in self._chosen_documents(self.course):
             if (new_document := new_documents.get(document.source.path)) is not None:
                 old, new = document_values(document, before), document_values(new_document, now)

@@ -19,7 +19,7 @@ from msgspec.structs import replace
 from coursebuild.core.checks.compiled import check_compiled, mjcf_texts
 from coursebuild.core.features import Trial, TrialContext, TrialOutcome, Trials
 from coursebuild.core.files.locks import project_lock
-from coursebuild.core.model import Course, Document, FeatureBlock, Owner, find_blocks
+from coursebuild.core.model import Course, Document, FeatureBlock, find_blocks
 from coursebuild.core.model.lesson_record import Addresses, known_addresses
 from coursebuild.core.model.results import (
     CompileResult,
@@ -139,18 +139,14 @@ def verify(
     )
     broken_paths = [d.span.path for d in model_diagnostics if d.is_error]
     chosen_places = {e.script.path_span for e in scripts}
-    owned_documents = course.owned_documents
+    shown_texts = course.shown_texts
     if documents is not None:  # some may quote scripts of other lessons
         chosen_paths = documents | {e.document for e in scripts}
-        owned_documents = tuple(
-            (owner, document)
-            for owner, document in owned_documents
-            if document.source.path in chosen_paths
-        )
+        shown_texts = tuple(pair for pair in shown_texts if pair[1].source.path in chosen_paths)
     run_diagnostics = (
         *(d for d in extracted_scripts.diagnostics if d.span in chosen_places),
         *trial_diagnostics,
-        *runner.find_mistakes(owned_documents, runs, verdicts, other_runs, broken_paths),
+        *runner.find_mistakes(shown_texts, runs, verdicts, other_runs, broken_paths),
         *figure_diagnostics,
     )
     interpreter = options.interpreter
@@ -258,7 +254,7 @@ class _ScriptRunner:
 
     def find_mistakes(
         self,
-        documents: Iterable[tuple[Owner, Document]],
+        documents: Iterable[tuple[str, Document]],
         runs: Sequence[ScriptRun],
         verdicts: Sequence[Verdict],
         other_runs: Mapping[str, ScriptRun] | None,

@@ -319,7 +319,7 @@ def new_output(
         return outputs.updated_text(output) if is_new else outputs.text(output)
 
     edits = [edit]
-    for document in course.documents:
+    for _, document in course.shown_texts:
         check_bindings(document, outputs, addresses)
         edits += follow_outputs(document, outputs, addresses, text_after)
     return tuple(edits)

@@ -124,3 +124,79 @@ def test_what_is_remembered_is_not_published(make: Make) -> None:
     folder = make_cups(make)
     assert folder.main("build").status == 0
     assert [path for path in folder.tree("public") if "recorded" in path] == []
+
+
+EVERYWHERE = """\
+## A period of `2.006`{out=examples/swing.py} s
+
+```python file=examples/swing.py figure=swing.svg
+period = 2.006
+print("period", period, "s")
+with open("swing.svg", "w") as file:
+    file.write('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0 0H9"/></svg>')
+```
+
+Output, with `2.006`{out}:
+
+```text
+period 2.006 s
+```
+
+Figure: ![A swing of `2.006`{out} s](swing.svg) It takes `2.006 s`{out}.
+
+```quiz
+{"id": "q1", "questions": [
+  {"kind": "numeric", "q": "How long?", "answer": "`2.006`{out}", "unit": "s",
+   "explain": "It takes `2.006`{out=examples/swing.py \\"period\\"} s."},
+  {"kind": "mcq", "q": "Which?", "options": ["`2.006`{out} s", "less"], "answer": 0}
+]}
+```
+
+```lab simlab
+{
+  "model": "swing",
+  "title": "A swing",
+  "plots": [{"traces": [{"label": "t", "expr": "data.time"}],
+             "refLines": [{"y": "`2.006`{out}", "label": "period"}]}]
+}
+```
+"""
+PLACES = {
+    "heading": "## A period of `{}`{{out=",
+    "caption of an output": "Output, with `{}`{{out}}:",
+    "alternative text": "![A swing of `{}`{{out}} s]",
+    "caption of a figure": "It takes `{} s`{{out}}.",
+    "answer": '"answer": "`{}`{{out}}"',
+    "explanation": '"explain": "It takes `{}`{{out=examples/swing.py \\"period\\"}} s."',
+    "option": '"options": ["`{}`{{out}} s", "less"]',
+    "line of a plot": '"refLines": [{{"y": "`{}`{{out}}"',
+}
+
+
+@pytest.mark.engine
+def test_numbers_are_bound_wherever_a_course_shows_them(make: Make) -> None:
+    folder = make(EVERYWHERE)
+    folder.write("models/swing.xml", "<mujoco/>\n")
+    summary = 'summary = "It takes `{}`{{out=examples/swing.py}} s."\n'
+    folder.replace("content/course.toml", "[course]\n", "[course]\n" + summary.format("2.006"))
+    folder.write("content/lessons/swing.svg", "")
+    assert folder.main("update").status == 0
+    check = folder.main("check")
+    assert check.status == 0, check.out
+    folder.replace(folder.lesson(), "period = 2.006", "period = 2.5")
+    assert folder.main("update").status == 0
+    text, course_map = folder.text(folder.lesson()), folder.text("content/course.toml")
+    assert [name for name, place in PLACES.items() if place.format("2.500") not in text] == []
+    assert summary.format("2.500") in course_map
+    assert folder.main("build").status == 0
+    page = folder.text("public/lessons/1.1-one.html")
+    assert 'alt="A swing of 2.500 s"' in page and "{out" not in page
+    assert "It takes 2.500 s." in folder.text("public/index.html")
+    line = course_map.split("\n").index(summary.format("2.500").strip()) + 1
+    explain = folder.main("explain", f"content/course.toml:{line}")
+    assert "`2.500` is printed by examples/swing.py" in explain.out
+    folder.write(folder.lesson(), text.replace("2.500", "2.501").replace("= 2.501", "= 2.5"))
+    folder.replace("content/course.toml", "2.500", "2.501")
+    result = folder.main("check")
+    lines = {line.split(":")[1] for line in result.out.split("\n") if "-->" in line}
+    assert result.out.count("error[binding-mismatch]") == len(PLACES) + 1, (lines, result.out)

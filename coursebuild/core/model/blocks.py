@@ -300,6 +300,8 @@ class FeatureBlock(Labelled, frozen=True, kw_only=True):
     """A block that a feature adds; its methods answer what the rest of the tool must know."""
 
     source_mark: SourceMark | None = None
+    numbers: tuple[Inline, ...] = ()
+    """The bound numbers that stand in place of plain ones in its JSON."""
 
     def child_blocks(self) -> tuple[Block, ...]:
         """The Markdown blocks in it, in the order of the page."""

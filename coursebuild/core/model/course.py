@@ -10,8 +10,9 @@ from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import fields
-from coursebuild.core.model.blocks import Comparison, Document, Filter, Recording
+from coursebuild.core.model.blocks import Comparison, Document, Filter, Paragraph, Recording
 from coursebuild.core.model.fields import Author, Slug, WebPlace, describe, matching
+from coursebuild.core.model.inlines import NumberBinding
 from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.text.source import Source, Span, key_of
@@ -145,7 +146,7 @@ class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
     status: Annotated[
         Literal["complete", "draft", "planned"], describe("a planned lesson has no file yet")
     ]
-    summary: Annotated[str, describe("one sentence, for the course map")] = ""
+    summary: Annotated[fields.Summary, describe("one sentence, for the course map")] = ""
     aliases: Annotated[
         tuple[fields.Text, ...], describe("other names, by which the search finds it")
     ] = ()
@@ -325,6 +326,8 @@ class Course(Struct, frozen=True):
     to the root."""
     declarations: tuple[Declarations, ...] = ()
     """The contents of the files `models/NAME.toml`, of existing models only."""
+    bound_numbers: tuple[NumberBinding, ...] = ()
+    """Those of the map's texts."""
     records: Mapping[str, LessonRecord] = {}
     """What lessons and pages were recorded with, by their paths."""
     features: tuple[NamedPath, ...] = ()
@@ -424,6 +427,16 @@ class Course(Struct, frozen=True):
     def documents(self) -> tuple[Document, ...]:
         """Every parsed document: lessons, then pages."""
         return tuple(document for _, document in self.owned_documents)
+
+    @property
+    def shown_texts(self) -> tuple[tuple[str, Document], ...]:
+        """Every text that shows what scripts print, with the id of its lesson or page."""
+        texts = [(owner.id, document) for owner, document in self.owned_documents]
+        if self.bound_numbers:
+            comma = "," in self.words_of(None).decimal
+            numbers = tuple(replace(number, comma=comma) for number in self.bound_numbers)
+            texts.append(("", Document(self.map, (Paragraph(self.map.span(), numbers),), ())))
+        return tuple(texts)
 
     @property
     def sources(self) -> tuple[Source, ...]:

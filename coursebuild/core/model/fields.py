@@ -1,7 +1,8 @@
 """Types of fields that several declarations share, and who wrote a course.
 
 In the `extra` of a `Meta` are two remarks for the decoder: `text` ("blocks" or "inlines": the
-string is Markdown) and `expects` (words for what the pattern or the bounds allow).
+string is Markdown; "plain" or "number": it is none, but may bind numbers) and `expects` (words for
+what the pattern or the bounds allow).
 """
 
 from __future__ import annotations
@@ -28,6 +29,14 @@ OptionalBlocks: TypeAlias = Annotated[
 Inlines: TypeAlias = Annotated[
     str, Meta(pattern=NOT_BLANK, extra={"text": "inlines"}, extra_json_schema=_MARKDOWN)
 ]
+
+BoundFloat: TypeAlias = Annotated[
+    float, Meta(extra={"text": "number"}, extra_json_schema={"type": ["number", "string"]})
+]
+"""A number, or a text that binds one to what a script printed, as in `` `1.42`{out} ``."""
+
+Summary: TypeAlias = Annotated[str, Meta(extra={"text": "plain"})]
+"""A plain text with numbers that may be bound."""
 
 Positive: TypeAlias = Annotated[float, Meta(gt=0)]
 NotNegative: TypeAlias = Annotated[float, Meta(ge=0)]

@@ -226,6 +226,8 @@ class Image(Located, frozen=True):
     title: str
     url_span: Span
     """Where the address is written: in the image, or in the definition that it names."""
+    numbers: tuple[NumberBinding, ...] = ()
+    """Those of its alternative text."""
 
 
 class MediaAddress(Struct, frozen=True):

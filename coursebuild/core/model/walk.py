@@ -80,7 +80,7 @@ def block_inlines(block: Block) -> tuple[Inline, ...]:
         case Paragraph() | Heading() | HtmlFlow():
             return block.children
         case FeatureBlock():
-            return block.child_inlines()
+            return (*block.child_inlines(), *block.numbers)
         case Callout():
             return block.title
         case Table():
@@ -251,8 +251,14 @@ def find_formulas(document: Document) -> tuple[tuple[Block, Math | MathBlock], .
 
 
 def document_inlines(document: Document) -> Iterator[Inline]:
-    """Every inline of a document."""
-    return (inline for _, inlines in inlines_by_block(document) for inline in inlines)
+    """Every inline of a document, and the numbers of alternative texts."""
+
+    def walk() -> tuple[Inline, ...]:
+        inlines = [inline for _, group in inlines_by_block(document) for inline in group]
+        images = (inline for inline in inlines if isinstance(inline, Image))
+        return (*inlines, *(number for image in images for number in image.numbers))
+
+    return iter(computed_once(document, "all_inlines", walk))
 
 
 def find_inlines(document: Document, kind: type[AnyInline]) -> Iterator[AnyInline]:
@@ -290,7 +296,7 @@ def without_prose(document: Document) -> Document:
                 blocks.append(replace(block, caption=inlines))
             case FeatureBlock():
                 bare = block.summary()
-                blocks += [] if bare is None else [bare]
+                blocks += [] if bare is None else [replace(bare, numbers=())]
                 blocks += _paragraph_of(block.span, inlines)
             case Callout():
                 blocks.append(replace(block, title=inlines, blocks=()))

@@ -13,7 +13,6 @@ from coursebuild.core.model import (
     Document,
     Filter,
     Mode,
-    Owner,
     Table,
     document_scripts,
 )
@@ -46,7 +45,7 @@ _WIDTH = 60
 
 def script_findings(
     course: Course,
-    documents: Iterable[tuple[Owner, Document]],
+    documents: Iterable[tuple[str, Document]],
     extractions: Sequence[Extraction],
     runs: Sequence[ScriptRun],
     verdicts: Sequence[Verdict],
@@ -60,7 +59,7 @@ def script_findings(
 
     Args:
         course: the course.
-        documents: those whose outputs and bound numbers are looked at.
+        documents: those whose outputs and bound numbers are looked at, with their ids.
         extractions: the scripts that were run, perhaps not all of the course.
         runs: what they did.
         verdicts: their output compared with the recorded one.
@@ -89,13 +88,13 @@ def script_findings(
 
 def output_findings(
     course: Course,
-    documents: Iterable[tuple[Owner, Document]],
+    documents: Iterable[tuple[str, Document]],
     outputs: PrintedOutputs,
     addresses: Addresses | None = None,
     other_runs: Mapping[str, ScriptRun] | None = None,
 ) -> Iterator[Diagnostic]:
     """What is wrong with the recorded outputs and bound numbers of some documents."""
-    for owner, document in documents:
+    for id, document in documents:
         record = course.records.get(document.source.path, LessonRecord())
         for verdict in outputs.of_document(document):
             recording = verdict.recording
@@ -106,13 +105,13 @@ def output_findings(
             if run is not None and ran_well and not run.output_of(recording.part).strip():
                 yield failures.silence_diagnostic(recording, run)
             elif run is not None and run.outcome is Outcome.UNRECORDED:
-                yield drift_diagnostic(verdict, owner.id)
+                yield drift_diagnostic(verdict, id)
             elif unstable_output := find_instability(verdict, run, other_runs or {}):
                 yield unstable_output
             elif verdict.status == "drift":
                 dependents = bindings.dependent_bindings(verdict, course.documents, outputs)
                 change = _environment_change(verdict, run, record)
-                yield drift_diagnostic(verdict, owner.id, dependents, change)
+                yield drift_diagnostic(verdict, id, dependents, change)
         yield from bindings.check_bindings(document, outputs, addresses)
         yield from _find_unmarked(course, document, outputs.runs)
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 from msgspec.structs import asdict, replace
 
 from coursebuild.core import model
-from coursebuild.core.model.course import CALLOUTS, Launch
+from coursebuild.core.model.course import CALLOUTS, ENGLISH, Launch
 from coursebuild.core.model.fields import Author
 from coursebuild.core.syntax.course_schema import (
     CourseFile,
@@ -28,6 +28,7 @@ from coursebuild.core.syntax.course_schema import (
     theme,
 )
 from coursebuild.core.syntax.decode import Decoding, check_unique, decode
+from coursebuild.core.syntax.fence import Prose
 from coursebuild.core.syntax.nodes import (
     TOML,
     Node,
@@ -37,7 +38,9 @@ from coursebuild.core.syntax.nodes import (
     format_name,
     shorten,
 )
+from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.toml_text import parse_toml
+from coursebuild.core.syntax.tree import NestedTextParser
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
     Note,
@@ -95,7 +98,9 @@ def parse_course_map(source: Source) -> Parsed[model.Course | None]:
     )
     if unusable or decoding.value is None:
         return Parsed(None, sort_diagnostics(diagnostics))
+    prose = Prose.read(decoding.texts, NestedTextParser(ParsingState(frozenset(), False, ENGLISH)))
     course = _build_course(source, root, decoding.value, tuple(levels))
+    course = replace(course, bound_numbers=prose.numbers)
     diagnostics += check_contrast(root.object("theme"), course.theme)
     return Parsed(course, sort_diagnostics(diagnostics))
 

@@ -38,6 +38,7 @@ from coursebuild.core.syntax.nodes import (
 from coursebuild.core.text.characters import REORDERING
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, propose
 from coursebuild.core.text.near import nearest
+from coursebuild.core.text.numbers import only_number
 from coursebuild.core.text.source import Span
 
 S = TypeVar("S", bound=Struct)
@@ -45,6 +46,7 @@ T = TypeVar("T", bound=Struct)
 
 _NO_REMARKS: Mapping[str, str] = {}
 _INVALID = object()
+_BOUND_NUMBER = re.compile(r"`(?P<text>[^`]+)`\{out\b[^{}]*\}")
 
 
 class Decoding(Struct, Generic[S], frozen=True):
@@ -55,7 +57,7 @@ class Decoding(Struct, Generic[S], frozen=True):
     diagnostics: tuple[Diagnostic, ...]
     structs: Mapping[ObjectNode, Struct]
     texts: tuple[tuple[StringNode, str], ...]
-    """Every string that is Markdown, with `blocks` or `inlines`."""
+    """Every string that is Markdown, or binds numbers, with the `text` of its remarks."""
 
     def find_structs(
         self, type: type[T], nodes: Iterable[ObjectNode] | None = None
@@ -104,6 +106,9 @@ class _Decoder:
         self, node: Node, type: inspect.Type, name: str, remarks: Mapping[str, str] = _NO_REMARKS
     ) -> object:
         """The value of a node of a declared type; `remarks` are the `extra` of its `Meta`."""
+        extra = type.extra if isinstance(type, inspect.Metadata) else None
+        if isinstance(node, StringNode) and (extra or {}).get("text") == "number":
+            return self.decode_bound_number(node, name)
         if not accepts(type, node):
             return self.report_wrong_type(node, type, name)
         match type, node:
@@ -150,12 +155,26 @@ class _Decoder:
             message = f"{format_name(name)} cannot be {format_value(node)}"
             help = f"expected: {remarks.get('expects', '')}"
             return self.report("field-value", node.mark, message, help)
-        if "text" in remarks:
-            self.texts.append((node, remarks["text"]))
+        if (kind := remarks.get("text", "plain")) != "plain":
+            self.texts.append((node, kind))
         elif (character := REORDERING.search(value)) is not None:
             message = f"U+{ord(character[0]):04X} shows the text in another order than it is read"
             return self.report("control-character", node.mark, message, "delete it")
+        elif "text" in remarks and _BOUND_NUMBER.search(value):
+            self.texts.append((node, kind))
+            value = _BOUND_NUMBER.sub(lambda match: match["text"], value)
         return value
+
+    def decode_bound_number(self, node: StringNode, name: str) -> object:
+        """The number of a text such as `` `1.42`{out} ``."""
+        match = _BOUND_NUMBER.fullmatch(node.value.strip())
+        number = None if match is None else only_number(match["text"])
+        if number is None or not number.is_finite:
+            message = f"{format_name(name)} must be a number, not {format_value(node)}"
+            help = "a text binds a number to what a script printed: `1.42`{out=examples/x.py}"
+            return self.report("field-type", node.mark, message, help)
+        self.texts.append((node, "number"))
+        return float(number.value)
 
     def decode_number(
         self,

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
 
-from coursebuild.core.model import Block, CodeBlock, Inline
+from coursebuild.core.model import Block, CodeBlock, Inline, NumberBinding
 from coursebuild.core.syntax.attributes import check_quotes, split_label
 from coursebuild.core.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
@@ -275,10 +275,13 @@ class Prose(Struct, frozen=True):
 
     _content: dict[Node, tuple[Any, ...]]
     diagnostics: tuple[Diagnostic, ...]
+    numbers: tuple[NumberBinding, ...]
+    """The bound numbers that stand in place of plain ones."""
 
     @classmethod
     def read(cls, texts: Iterable[tuple[StringNode, str]], parser: TextParser) -> Prose:
-        """Parse each text as `blocks` or `inlines`, but for blank ones."""
+        """Parse each text as blocks or inlines, but for blank ones."""
+        numbers: list[NumberBinding] = []
         content: dict[Node, tuple[Any, ...]] = {}
         diagnostics: list[Diagnostic] = []
         for node, kind in texts:
@@ -287,7 +290,9 @@ class Prose(Struct, frozen=True):
                 parsed_text: Parsed[tuple[Any, ...]] = parse(node.excerpt)
                 content[node] = parsed_text.value
                 diagnostics += parsed_text.diagnostics
-        return cls(content, tuple(diagnostics))
+                if kind in ("number", "plain"):
+                    numbers += (i for i in parsed_text.value if isinstance(i, NumberBinding))
+        return cls(content, tuple(diagnostics), tuple(numbers))
 
     def blocks(self, node: Node | None) -> tuple[Block, ...]:
         """The blocks of a string; none for a field that is not given."""

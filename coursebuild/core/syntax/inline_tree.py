@@ -33,6 +33,7 @@ from coursebuild.core.text.source import Excerpt, Span
 MAX_DEPTH = 60
 """How deep emphasis may nest; deeper marks are dropped."""
 
+_NUMBERS = ("number_binding", "number_given")
 _CONTROL = re.compile("[\x01-\x08\x0b\x0e-\x1f\x7f-\x9f\u202a-\u202e]")
 _DEFINITION_HEAD = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
@@ -251,8 +252,8 @@ class _TokenReader:
                 node = self._read_math(token, span)
             case "code_inline":
                 node = model.CodeSpan(span, token.content, token.info == "code")
-            case "number_binding" | "number_given":
-                node = self._read_number(token, span)
+            case type if type in _NUMBERS:
+                node = self._read_number(token)
             case "html_inline":
                 node = self._read_html(token, span)
             case "image":
@@ -281,9 +282,11 @@ class _TokenReader:
         label = self.state.take_label(braces, "eq")
         return model.Math(span, tex, display, label)
 
-    def _read_number(self, token: PositionedToken, span: Span) -> model.NumberBinding:
+    def _read_number(self, token: PositionedToken, shift: int = 0) -> model.NumberBinding:
+        """The number of a token that counts from `shift`."""
         assert token.map is not None
-        start, end = token.map
+        span = self.content.span(shift + token.start, shift + token.end)
+        start, end = shift + token.map[0], shift + token.map[1]
         if end - start == len(token.content) + 2:
             start, end = start + 1, end - 1
         place = self.content.span(start, end)
@@ -327,7 +330,12 @@ class _TokenReader:
             help = "say in the brackets what it shows, for readers who cannot see it"
             message = "the image has no alternative text"
             self.report(diagnose("image-alt", span, message, help=help))
-        return model.Image(span, url, alt, str(token.attrs.get("title", "")), place)
+        numbers = tuple(
+            self._read_number(child, token.start + len("!["))
+            for child in token.children or ()
+            if isinstance(child, PositionedToken) and child.type in _NUMBERS
+        )
+        return model.Image(span, url, alt, str(token.attrs.get("title", "")), place, numbers)
 
     def _read_works(self, token: PositionedToken) -> Iterator[model.CitedWork]:
         at = token.start + 1

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from msgspec import Struct, ValidationError, convert
+from msgspec.structs import replace
 
 from coursebuild.api import (
     Excerpt,
@@ -99,6 +100,7 @@ def parse_lab(
         if kind == SIMLAB:
             diagnostics += check_lab(node, decoding.structs)
             lab = sim_lab(span, kind_span, node, decoding.structs, prose)
+            lab = None if lab is None else replace(lab, numbers=prose.numbers)
         elif isinstance(decoding.value, CommonLab):
             common = decoding.value
             fields = SimLab(title=common.title, height=common.height, dock=common.dock)

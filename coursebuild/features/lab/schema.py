@@ -9,6 +9,7 @@ from msgspec import Meta, Struct
 
 from coursebuild.core.model.fields import (
     BELOW_ONE,
+    BoundFloat,
     Digits,
     Inlines,
     NotNegative,
@@ -148,7 +149,7 @@ class TraceFields(Struct, frozen=True, forbid_unknown_fields=True):
 class RefLine(Struct, frozen=True, forbid_unknown_fields=True):
     """Horizontal lines across a plot."""
 
-    y: Annotated[float, Meta(description="its height")]
+    y: Annotated[BoundFloat, Meta(description="its height")]
     label: Annotated[str, Meta(description="plain text")] = ""
 
 

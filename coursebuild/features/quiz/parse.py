@@ -89,7 +89,9 @@ def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[model.Qui
     elif isinstance(id_node, StringNode) and all(d.span != id_node.mark for d in diagnostics):
         id = id_node.value
     question_keys = tuple(question.key for question in questions)
-    quiz = model.Quiz(span, id, node.place("id"), title, tuple(questions), question_keys)
+    quiz = model.Quiz(
+        span, id, node.place("id"), title, tuple(questions), question_keys, numbers=prose.numbers
+    )
     return Parsed(quiz, sort_diagnostics(diagnostics))
 
 
@@ -184,6 +186,8 @@ def _question(
         case schema.Numeric():
             answer: Node | None = node.get("answer")
             answer_text = answer.raw if answer is not None else ""
+            if isinstance(answer, StringNode):
+                answer_text = answer.value.split("`")[1]
             tolerance = TOLERANCE * abs(fields.answer) if fields.tol is None else fields.tol
             return model.NumericQuestion(
                 *common, fields.answer, answer_text, tolerance, fields.unit

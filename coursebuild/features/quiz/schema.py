@@ -7,7 +7,14 @@ from typing import Annotated, TypeAlias
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.model.fields import Blocks, Inlines, NotNegative, OptionalBlocks, Text
+from coursebuild.core.model.fields import (
+    Blocks,
+    BoundFloat,
+    Inlines,
+    NotNegative,
+    OptionalBlocks,
+    Text,
+)
 from coursebuild.features.lab.schema import SimLab, Step
 
 Index: TypeAlias = Annotated[int, Meta(extra_json_schema={"minimum": 0})]
@@ -86,7 +93,7 @@ class Predict(WithOptions, frozen=True, kw_only=True, tag_field="kind", tag="pre
 class Numeric(Common, frozen=True, kw_only=True, tag_field="kind", tag="numeric"):
     """A question whose answer is a number."""
 
-    answer: Annotated[float, Meta(description="the number, in `unit`")]
+    answer: Annotated[BoundFloat, Meta(description="the number, in `unit`")]
     tol: Annotated[
         NotNegative | None,
         Meta(description="absolute tolerance; without it 2 % of the answer"),

@@ -288,6 +288,8 @@ class _Counter:
                         source = None
                     self.formula(inline.tex, source, inline.span)
                 case model.Image():
+                    for bound in inline.numbers:
+                        self.number(bound)
                     matches = find_numbers(inline.alt, self.comma)
                     numbers = {number.text: number for number in matches}
                     self.alternatives += (_claim(n, inline.span) for n in numbers.values())

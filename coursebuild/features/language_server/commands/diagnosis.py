@@ -62,8 +62,8 @@ def _diagnose(session: Session, version: int) -> tuple[Diagnostic, ...]:
                 library.results.verdicts, library.results.runs, library.scripts
             )
             changed_documents = [
-                (owner, document)
-                for owner, document in course.owned_documents
+                (id, document)
+                for id, document in course.shown_texts
                 if document.source.path in changed_paths
             ]
             addresses = dict(session.runs.addresses)
