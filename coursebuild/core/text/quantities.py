@@ -17,7 +17,7 @@ from collections.abc import Iterable, Sequence
 
 from msgspec import Struct
 
-from coursebuild.core.text.numbers import Number, only_number
+from coursebuild.core.text.numbers import Number, only_number, scan
 from coursebuild.core.text.units import NAMES, Unit, find_units, is_name
 
 _SECOND_READINGS = {
@@ -221,9 +221,36 @@ def _unit_of_label(before: str) -> UnitText:
 
 
 def unit_of_printed(line: str, number: Number, above: Sequence[str]) -> UnitText:
-    """The unit of a printed number: that in its own line, or that of its column."""
+    """The unit of a printed number: that in its own line, of its column, or in the heading."""
     unit = printed_unit(line, number.start, number.end)
-    return unit or unit_of_column(line, number.start, above)
+    unit = unit or unit_of_column(line, number.start, above)
+    return unit or _unit_of_heading(line, number, above)
+
+
+def _unit_of_heading(line: str, number: Number, above: Sequence[str]) -> UnitText:
+    """The unit in the heading above the rows that a line is one of: `error (mm):`, then `x 1.96`.
+
+    It is that of the number that ends its row, with no other number right before it. Rows are the
+    lines below, as far as they are indented, or all have the words of the first one.
+    """
+    label = line[: number.start].split()
+    if line[number.end :].strip() or (label and only_number(label[-1])):
+        return NO_UNIT
+    for count, heading in enumerate(reversed(above), 1):
+        if scan(heading) and not heading.rstrip().endswith(":"):
+            continue
+        rows = [*above[len(above) - count + 1 :], line]
+        is_heading = heading.rstrip().endswith(":") or not label
+        margin = len(heading) - len(heading.lstrip())
+        are_indented = all(len(row) - len(row.lstrip()) > margin for row in rows)
+        are_alike = all(_words(row) == _words(line) for row in rows)
+        are_rows = is_heading and (are_indented or are_alike)
+        return unit_of_header(heading.rstrip().removesuffix(":")) if are_rows else NO_UNIT
+    return NO_UNIT
+
+
+def _words(line: str) -> list[str]:
+    return [word for word in line.split() if not only_number(word)]
 
 
 def unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:

@@ -16,10 +16,9 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.numbers import scan
 from coursebuild.core.text.quantities import (
     are_different,
-    printed_unit,
     unit_behind,
-    unit_of_column,
     unit_of_header,
+    unit_of_printed,
 )
 from coursebuild.core.text.source import Source
 from coursebuild.features.arithmetic.symbol_values import check_formulas
@@ -85,8 +84,7 @@ def test_any_text_can_be_read_for_units(text: str) -> None:
         assert bool(unit) is bool(unit.readings)
         assert not are_different(unit, unit)
     for number in scan(lines[-1]):
-        printed_unit(lines[-1], number.start, number.end)
-        unit_of_column(lines[-1], number.start, lines[:-1])
+        unit_of_printed(lines[-1], number, lines[:-1])
 
 
 def test_each_sentence_has_its_verdict() -> None:
