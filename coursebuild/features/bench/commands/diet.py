@@ -23,7 +23,7 @@ from msgspec.structs import replace
 
 from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.core.engine.store import Store
-from coursebuild.core.files.errors import EffectError, require
+from coursebuild.core.files.errors import EffectError, UsageError, require
 from coursebuild.core.files.read import read_course
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model.diet_findings import DietReport
@@ -69,6 +69,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--record", action="store_true", help="write the findings to content/reports/"
     )
     parser.add_argument("--quick", action="store_true", help="short runs and rough times")
+    help = "look for findings of these kinds alone"
+    parser.add_argument("--only", nargs="*", default=[], metavar="KIND", help=help)
     add_format(parser, "text", "json")
     add_cache(parser)
     add_executors(parser)
@@ -77,7 +79,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Look at models, and mend them or record what was found."""
     require("mjbench", "measure", "`coursebuild diet`")
-    settings = {name: getattr(arguments, name) for name in ("quick", "fix", "record")}
+    settings = {name: getattr(arguments, name) for name in ("quick", "fix", "record", "only")}
     names = tuple(arguments.models)
     quiet = arguments.quiet and arguments.format == "text"
 
@@ -116,10 +118,11 @@ def diet(
     quick: bool = False,
     fix: bool = False,
     record: bool = False,
+    only: Sequence[str] = (),
 ) -> Measurement[DietReport]:
     """Look at the models that the names mean; without names, at all.
 
-    `fix`: what is proved is taken out, and the reports are about the rest. `record`: each report
+    `only`: the kinds of findings to look for; `fix`: what is proved is taken out, and the reports are about the rest. `record`: each report
     is also written into the course.
 
     Raises:
@@ -127,8 +130,11 @@ def diet(
     """
     if record:
         forbid_quick("--record", quick=quick)
+        if only:
+            raise UsageError("--record cannot be combined with --only")
     scenes = find_scenes(options.root, names)
     run = _DietRun(options, mjbench, scenes.diagnostics, quick=quick, fix=fix)
+    run.only = tuple(only)
     measurement = run.measure_each(scenes.value, run.look_at)
     if not record:
         return measurement
@@ -158,6 +164,8 @@ class _DietRun(MeasuringRun[DietReport]):
     stage, success = "looking at models", "looked at"
     function = f"{__name__}:measure_part"
     report_type = DietReport
+    only: tuple[str, ...] = ()
+    """The kinds of findings that are looked for; all if none is named."""
 
     def __init__(
         self,
@@ -184,7 +192,7 @@ class _DietRun(MeasuringRun[DietReport]):
     def tasks(self, scene: CourseScene) -> Iterator[tuple[Any, ...]]:
         """The model, if no report on it is stored."""
         model = DietModel(self.options.root, self.files, self.course, scene)
-        if self.load("diet", self._parts(model), bytes) is None:
+        if not self.only and self.load("diet", self._parts(model), bytes) is None:
             yield self._task(scene)
 
     def _task(self, scene: CourseScene) -> tuple[Any, ...]:
@@ -255,6 +263,7 @@ class _DietRun(MeasuringRun[DietReport]):
             modules=sorted(model.readers.modules),
             keeps=model.keeps,
             locked=model.locked,
+            only=self.only,
             quick=self.quick,
             rerun=with_course,
         )
@@ -264,6 +273,7 @@ class _DietRun(MeasuringRun[DietReport]):
         """Return all that a report depends on; first the digest of the model."""
         scene, machine = model.scene, self.facts.machine
         parts: list[object] = [scene.digest, scene.name, self.quick, self.code, machine]
+        parts += self.only
         for keep in scene.declarations.keep:
             place = keep.finding_span
             parts.append((keep.finding, keep.reason, place.line, place.column))
