@@ -122,8 +122,8 @@ def diet(
 ) -> Measurement[DietReport]:
     """Look at the models that the names mean; without names, at all.
 
-    `only`: the kinds of findings to look for; `fix`: what is proved is taken out, and the reports are about the rest. `record`: each report
-    is also written into the course.
+    `only`: the kinds of findings to look for; `fix`: what is proved is taken out, and the reports
+    are about the rest. `record`: each report is also written into the course.
 
     Raises:
         UsageError: no model is called so, or only a part is to be recorded.
