@@ -95,8 +95,6 @@ class Column(Struct, frozen=True):
 
     title: str
     cells: tuple[str, ...]
-    rank: int = 0
-    """Where there is no room for all, columns of higher rank come later; 0 is in every table."""
     left: bool = False
     """Whether its cells are aligned left, as words are; numbers are aligned right."""
 

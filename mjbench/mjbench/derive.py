@@ -73,7 +73,7 @@ def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
         missed=_missed(stable),
         cut_short=_is_cut_short(report),
     )
-    if main is not None:
+    if main is not None and report.own_row is not None:
         report = replace(report, rows=mark_luck(rows, largest_of(stable), main))
     report = replace(report, rows=tuple(mark_dominated(report)))
     if report.parts is not None:

@@ -111,6 +111,8 @@ class Diet(Struct, frozen=True, tag_field="job", tag="diet"):
     modules: frozenset[str] = frozenset()
     keeps: tuple[Keep, ...] = ()
     locked: Mapping[str, str] = {}
+    only: tuple[str, ...] = ()
+    """The kinds of findings to look for; all if none is named."""
     quick: bool = False
     rerun: bool = False
     """Whether the other program is asked for what it runs with the changed files."""
@@ -293,6 +295,7 @@ def answer(job: Job, host: Host) -> object:
                 modules=job.modules,
                 keeps=job.keeps,
                 locked=job.locked,
+                only=job.only,
                 quick=job.quick,
                 rerun=job.rerun,
             )

@@ -15,7 +15,7 @@ import copy
 import re
 from collections.abc import Iterator
 from itertools import islice
-from typing import Any, get_args
+from typing import Any
 
 import mujoco
 import mujoco.rollout
@@ -24,7 +24,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench.costs import Clock, Job, scenario_job, time_jobs
-from mjbench.declarations import DeclaredSweep, Expected, Place, SweepValue, Variation
+from mjbench.declarations import DeclaredSweep, SweepValue, Variation
 from mjbench.measure import (
     Pair,
     contact_speeds,
@@ -34,12 +34,10 @@ from mjbench.measure import (
     visible_error,
     visible_errors,
 )
-from mjbench.pilot import NUDGE, nudges, with_setting
-from mjbench.problem import STANDARD, Scenario, Setup
+from mjbench.pilot import NUDGE, nudges
+from mjbench.problem import Scenario, Setup
 from mjbench.reports import Interval
 from mjbench.reports.scene_report import (
-    FigureLine,
-    MeasuredSetting,
     SweepReport,
     SweepRow,
 )
@@ -333,72 +331,3 @@ def _rollouts(
         took, simulated = timing.nanoseconds, batch * steps * step * 1e9
         speed = Interval(simulated / took.value, simulated / took.high, simulated / took.low)
         yield SweepRow(THREADS, f"{count}", own=False, status="ok", throughput=speed)
-
-
-def measure_expected(model: Any, scene: Scene, baseline: MeasuredSetting) -> Iterator[FigureLine]:
-    """What is known in theory, under every integrator at the scene's own timestep."""
-    expected: dict[str, tuple[float, str]] = {
-        name: (value, "as declared") for name, value in scene.declaration.expected.items()
-    }
-    if scene.exact is not None:
-        data = initial_data(scene.scenario, model)
-        quantities = scene.exact.states(np.zeros(1), data.qpos.copy(), data.qvel.copy()).expected
-        unknown = sorted(quantities.keys() - set(get_args(Expected)))
-        if unknown:
-            message = f"`{scene.exact.path}` expects `{unknown[0]}`, which is not measured"
-            help = f"known: {', '.join(get_args(Expected))}"
-            raise SceneError(message, Place(scene.exact.path), help)
-        expected |= {name: (value, scene.exact.path) for name, value in quantities.items()}
-    for integrator in STANDARD if expected else ():
-        setting = replace(baseline, integrator=integrator.value)
-        variant = with_setting(model, setting)
-        row = SweepRow("integrator", integrator.value, own=False, status="ok")
-        row = with_contacts(scene.scenario, variant, row)
-        readings = _reading_figures(scene, variant) if expected.keys() & _OF_READINGS else {}
-        for name, (exact, source) in expected.items():
-            unit = {"penetration": "m", "slip": "m"}.get(name, "")
-            if name in _OF_READINGS:
-                unit = "s" if name == "crossing" else _UNIT.sub(r"\1", quantity_name(model, scene))
-                value = readings.get(name)
-            elif (value := getattr(row, name)) is None and name != "restitution":
-                value = 0.0  # nothing touched
-            yield FigureLine(name, unit, integrator.value, value, exact, source)
-
-
-_OF_READINGS = frozenset(("crossing", "last", "largest", "smallest"))
-"""Quantities of what a sensor reads at every step."""
-_UNIT = re.compile(r"[^\[]*(?:\[(.*)\])?")
-
-
-def _reading_figures(scene: Scene, model: Any) -> dict[str, float]:
-    """When a sensor's reading first changes its sign, its last value, the largest and smallest."""
-    from scipy.interpolate import CubicSpline
-
-    quantity = scene.declaration.observable
-    if quantity is None or quantity.kind != "sensor" or model.sensor(quantity.name).dim != 1:
-        message = "a quantity of a reading is expected, and `measure` names no sensor of one number"
-        raise SceneError(message, scene.declaration.place("expected"))
-    every_step = replace(scene.scenario, sample=float(model.opt.timestep))
-    run = simulate(Setup(scenario=every_step), model)
-    if not run.judgement.ok:
-        return {}
-    scene, data = replace(scene, scenario=every_step), initial_data(scene.scenario, model)
-    start = EngineStates(np.zeros(1), data.qpos[None], data.qvel[None], data.act[None])
-    readings = np.concatenate(
-        [quantity_values(model, scene, states)[:, 0] for states in (start, run.states)]
-    )
-    times = np.concatenate([start.times, run.states.times])
-    figures = {
-        "last": float(readings[-1]),
-        "largest": float(readings.max()),
-        "smallest": float(readings.min()),
-    }
-    signed = np.flatnonzero(readings)  # it may be exactly 0 on its way
-    changes = np.flatnonzero(np.diff(np.sign(readings[signed])))
-    if changes.size:
-        before, after = signed[changes[0]], signed[changes[0] + 1]
-        part = slice(max(0, before - 3), after + 4)
-        roots = CubicSpline(times[part], readings[part]).roots(extrapolate=False)
-        middle = (times[before] + times[after]) / 2
-        figures["crossing"] = float(roots[np.nanargmin(np.abs(roots - middle))])
-    return figures

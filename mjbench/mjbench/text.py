@@ -31,7 +31,7 @@ from mjbench.reports.shown_errors import (
     setting_text,
     status_text,
 )
-from mjbench.reports.terminal import Style, fitted_table, indented
+from mjbench.reports.terminal import Style, fitted_table, indented, printable
 
 _FIGURES = ("change", "penetration", "slip", "restitution", "residual", "iterations")
 _PLAIN = Style()
@@ -67,7 +67,7 @@ def scene_text(report: SceneReport, style: Style = _PLAIN) -> str:
         title = f"  {style.strong(sweep.name)}: {sweep.title}"
         lines += ["", title, *indented(_sweep(sweep, style))]
     lines += ["", *style.wrap(_machine_text(report.machine), "  ")]
-    return "\n".join(lines) + "\n"
+    return printable("\n".join(lines) + "\n")
 
 
 def scenario_lines(report: ScenarioReport, style: Style, *, plot: bool = True) -> Iterator[str]:
@@ -214,7 +214,7 @@ def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
         setting = f"{setting_text(scenario.setting)}, over {seconds_text(scenario.duration)}"
         lines += style.wrap(f"{setting}, against {scenario.source}", "    ")
         lines += indented(fitted_table(columns, style.width - 4))
-    return "\n".join(lines) + "\n"
+    return printable("\n".join(lines) + "\n")
 
 
 def _cost(seconds: Interval | None, remark: str) -> str:

@@ -44,7 +44,7 @@ from mjbench.reports.shown_errors import (
 )
 from mjbench.scene import Scene
 from mjbench.stability import run_trial, stable_rows
-from mjbench.sweep import measure_expected
+from mjbench.theory_figures import measure_expected
 
 _CONSERVED = 1e-8
 """The relative change, over the reference, below which a quantity counts as conserved."""

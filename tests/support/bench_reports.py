@@ -6,14 +6,19 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import msgspec
+from msgspec import structs
 
 from coursebuild.core.model import measurements
 from coursebuild.core.model.report_files import VERSION, ReportKind
 from coursebuild.core.model.results import Machine
+from mjbench.derive import derive_case, derive_scenario
+from mjbench.reports.case_report import CaseReport
+from mjbench.reports.model_report import SceneReport
+from mjbench.reports.scene_report import ScenarioReport
 from samples import cases, reports
 
 _T = TypeVar("_T")
-MACHINE = Machine(**msgspec.structs.asdict(reports.MACHINE))
+MACHINE = Machine(**structs.asdict(reports.MACHINE))
 
 
 def read(value: object, form: type[_T]) -> _T:
@@ -33,11 +38,32 @@ FIRST = read(reports.FIRST, measurements.FittedOrder)
 interval = _maker(reports.interval, measurements.Interval)
 row = _maker(reports.row, measurements.WorkPrecisionRow)
 diverged_row = _maker(reports.diverged_row, measurements.WorkPrecisionRow)
-scenario = _maker(reports.scenario, measurements.ScenarioReport)
-swing = _maker(reports.swing, measurements.ScenarioReport)
-awkward = _maker(reports.awkward, measurements.ScenarioReport)
-scene = _maker(reports.scene, measurements.SceneReport)
-case = _maker(cases.case, measurements.CaseReport)
+
+
+def derived(report: ScenarioReport) -> ScenarioReport:
+    """The report with all that mjbench says of it, but for its verdict."""
+    return structs.replace(derive_scenario(report, lambda _: ()), verdict=report.verdict)
+
+
+def _scenario(rows: list[dict[str, Any]], **fields: Any) -> ScenarioReport:
+    whole = reports.scenario([{"growth": None, **row} for row in rows], **fields)
+    return derived(msgspec.convert(msgspec.to_builtins(whole), ScenarioReport))
+
+
+def _case(*arguments: Any, **fields: Any) -> CaseReport:
+    whole = msgspec.to_builtins(cases.case(*arguments, **fields))
+    return derive_case(msgspec.convert(whole, CaseReport))
+
+
+def _scene(*scenarios: Any, **fields: Any) -> SceneReport:
+    return reports.scene(*(scenarios or [derived(reports.swing())]), **fields)
+
+
+scenario = _maker(_scenario, measurements.ScenarioReport)
+swing = _maker(lambda: derived(reports.swing()), measurements.ScenarioReport)
+awkward = _maker(lambda: derived(reports.awkward()), measurements.ScenarioReport)
+scene = _maker(_scene, measurements.SceneReport)
+case = _maker(_case, measurements.CaseReport)
 run = _maker(cases.run, measurements.ErrorLine)
 
 

@@ -15,6 +15,7 @@ from mjbench import jobs
 from mjbench.host import LocalHost
 from mjbench.reports.scene_report import ScenarioReport
 from samples.reports import swing
+from support.bench_reports import derived
 
 BOX = """\
 <mujoco>
@@ -39,7 +40,7 @@ class Fake(Mjbench):
 
     def __init__(self, *outcomes: ScenarioReport | Failure | BaseException) -> None:
         super().__init__(Path("/"), "a test")
-        self.outcomes = list(outcomes) or [swing()]
+        self.outcomes = list(outcomes) or [derived(swing())]
         self.calls: list[tuple[str, int, bool, bool]] = []
 
     def facts(self) -> Facts:

@@ -94,7 +94,7 @@ def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
     limits = {
         line.integrator: words(f"numerics.{line.largest}")
         if isinstance(line.largest, str)
-        else line.shown
+        else line.shown.partition(";")[0]
         for line in report.boundaries
     }
     orders = (fits.get(integrator) for integrator in INTEGRATORS)

@@ -16,7 +16,7 @@ from mjbench.reports.diet_report import (
     Saving,
     name_list,
 )
-from mjbench.reports.terminal import Style, count_text
+from mjbench.reports.terminal import Style, count_text, printable
 
 _EDITS, _LINES = 6, 6
 """The most changes that are shown of a finding, and the most lines of one."""
@@ -59,7 +59,7 @@ def diet_text(report: DietReport, command: str, declarations: str, style: Style)
         line for text in _summary(report, command, declarations) for line in style.wrap(text, "  ")
     ]
     lines += ["", *summary] if summary else []
-    return "\n".join([*lines, "", *style.wrap(_FOOTNOTE)]) + "\n"
+    return printable("\n".join([*lines, "", *style.wrap(_FOOTNOTE)]) + "\n")
 
 
 def _summary(report: DietReport, command: str, declarations: str) -> Iterator[str]:

@@ -22,7 +22,8 @@ def limit_text(row: StableRow) -> str:
     Theory at rest counts up to a tenth above: else the motion is lost far from rest. Where limits
     have islands, no digit is finer than the gaps between timesteps that were tried. It is never
     above them all: whoever takes it would lose the run. Where two digits do not hold, it is the
-    least limit, and what allows more is said.
+    least limit, and what allows more is said: the own start, theory, or elsewhere, another start or
+    another time.
     """
     if row.bracket is None:
         return reach_text(row.largest, row.searched)
@@ -39,10 +40,10 @@ def limit_text(row: StableRow) -> str:
         most = seconds_text(high, 2)
         if row.theory == high:
             why = f"theory allows {most}"
-        elif reach_bound(row.largest) >= high * (1 - 1e-9):
+        elif reach_bound(row.largest) >= 0.99 * high:
             why = f"from its own start {most}"
         else:
-            why = f"over another time, or from another start, {most}"
+            why = f"elsewhere {most}"
         return f"{seconds_text(low, 2)}; {why}"
     value = float(f"{low:.{digits}g}")
     if value > high:

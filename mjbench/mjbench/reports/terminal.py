@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
+import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 
 from msgspec import Struct
@@ -27,6 +29,22 @@ class Style(Struct, frozen=True):
     def inner(self, indent: int) -> Style:
         """The same for what is indented."""
         return Style(self.width - indent, self.colour)
+
+
+def printable(text: str) -> str:
+    """A text that cannot change the terminal, whatever the names in it are."""
+    parts = _STYLED.split(text)
+    return "".join(p if n % 2 else "".join(map(_visible, p)) for n, p in enumerate(parts))
+
+
+_STYLED = re.compile(r"(\x1b\[[01]m)")
+"""What `Style.strong` puts around a text."""
+
+
+def _visible(character: str) -> str:
+    if character == "\n" or not unicodedata.category(character).startswith("C"):
+        return character
+    return "\ufffd"
 
 
 def indented(lines: Iterable[str], by: int = 4) -> list[str]:

@@ -13,7 +13,8 @@ from coursebuild.features.bench.commands.measurement import Measurement
 from coursebuild.pipeline.options import UsageError
 from coursebuild.pipeline.scenes import find_scenes
 from mjbench.reports import records
-from mjbench.reports.scene_report import ScenarioReport, SceneReport
+from mjbench.reports.model_report import SceneReport
+from mjbench.reports.scene_report import ScenarioReport
 from samples.reports import interval, swing
 from support.measured_course import BOX, PATH, TOML, Fake, bench_course, options, write
 

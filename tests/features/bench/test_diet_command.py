@@ -20,9 +20,9 @@ MODEL = """<mujoco>
   <worldbody>
     <body name="bob" pos="0 0 1"><joint axis="0 1 0"/><geom size=".05" pos=".3 0 0"/></body>
   </worldbody>
-  <sensor>
-    <clock name="time"/> <!-- for the plot -->
-  </sensor>
+  <option>
+    <flag energy="enable"/> <!-- for the plot -->
+  </option>
 </mujoco>
 """
 LESSON = """## A
@@ -32,8 +32,8 @@ from mjcourse import model_path
 SCRIPT
 ```
 """
-CLEAN = MODEL.replace('    <clock name="time"/> <!-- for the plot -->\n', "").replace(
-    "  <sensor>\n  </sensor>\n", ""
+CLEAN = MODEL.replace('    <flag energy="enable"/> <!-- for the plot -->\n', "").replace(
+    "  <option>\n  </option>\n", ""
 )
 
 
@@ -62,8 +62,9 @@ def test_diet_shows_a_finding_as_text_and_as_json(course: Path, capsys: Capture)
     assert run(course) == run(course) == 1
     out, err = capsys.readouterr()
     assert err.count("swing: looked at after") == 1, "the model did not change"
-    assert "  sensor-unread: nothing reads the sensor time\n    proved; " in out
-    assert '    models/swing.xml:6:5\n    - <clock name="time"/>\n' in out
+    text = "  energy-flag: energy is computed in every step, and nothing reads it\n    proved; "
+    assert text in out and "shown by `coursebuild diet swing --only energy-flag`" in out
+    assert '    models/swing.xml:6:5\n    - <flag energy="enable"/>\n' in out
     assert "1 finding not explained, 1 of them for `coursebuild diet swing --fix`" in out
     assert "integrator and timestep are judged against a reference" in out
     status, value = values(course, capsys)
@@ -73,8 +74,14 @@ def test_diet_shows_a_finding_as_text_and_as_json(course: Path, capsys: Capture)
     assert [scenario["status"] for scenario in model["scenarios"]] == ["ok"]
     (finding,) = model["findings"]
     assert finding["label"] == "proved" and finding["fixable"]
-    element = 'mujoco/sensor/clock[@name="time"]'
-    place = {"name": "time", "element": element, "path": "models/swing.xml", "line": 6, "column": 5}
+    element = "mujoco/option/flag"
+    place = {
+        "name": "energy",
+        "element": element,
+        "path": "models/swing.xml",
+        "line": 6,
+        "column": 5,
+    }
     assert finding["places"] == [place]
     (edit,) = finding["edits"]
     assert MODEL[edit["start"] : edit["end"]] == edit["old"] and edit["new"] == ""
@@ -87,8 +94,8 @@ def test_fix_changes_only_what_is_in_vain_and_then_nothing(course: Path, capsys:
     file.write_bytes(text.replace("\n", "\r\n").encode())
     file.chmod(0o640)
     assert run(course, "--fix") == 0
-    assert "changed models/swing.xml: sensor-unread" in capsys.readouterr().out
-    expected = text.replace('<clock name="time"/> ', "").replace("\n", "\r\n").encode()
+    assert "changed models/swing.xml: energy-flag" in capsys.readouterr().out
+    expected = text.replace('<flag energy="enable"/> ', "").replace("\n", "\r\n").encode()
     assert file.read_bytes() == expected and file.stat().st_mode & 0o777 == 0o640
     status = file.stat()
     assert run(course, "--fix") == 0
@@ -119,28 +126,28 @@ def test_fix_takes_what_goes_together_and_leaves_what_only_runs_speak_for(
 
 def test_a_finding_is_kept_with_a_reason(course: Path, capsys: Capture) -> None:
     declarations = course / "models" / "swing.toml"
-    declarations.write_text('[[keep]]\nfinding = "sensor-unread time"\nreason = "shown in class"\n')
+    declarations.write_text('[[keep]]\nfinding = "energy-flag"\nreason = "shown in class"\n')
     assert run(course) == 0
     out = capsys.readouterr().out
     assert "    kept: shown in class\n" in out and "nothing else in it is proved useless" in out
     assert run(course, "--fix") == 0
     assert (course / "models" / "swing.xml").read_text() == MODEL
-    declarations.write_text('[[keep]]\nfinding = "sensor-unread tim"\nreason = "shown in class"\n')
+    declarations.write_text('[[keep]]\nfinding = "energy-flags"\nreason = "shown in class"\n')
     status, value = values(course, capsys)
     assert status == 1 and value["models"][0]["stale"] == [
-        {"finding": "sensor-unread tim", "path": "models/swing.toml", "line": 2, "column": 11}
+        {"finding": "energy-flags", "path": "models/swing.toml", "line": 2, "column": 11}
     ]
 
 
 @pytest.mark.long
-def test_sensor_that_a_lesson_reads_is_no_finding(course: Path, capsys: Capture) -> None:
+def test_energy_that_a_lesson_reads_is_no_finding(course: Path, capsys: Capture) -> None:
     lessons = course / "content" / "lessons"
     lessons.mkdir()
     lesson = lessons / "1.1-one.md"
     lesson.write_text(LESSON.replace("SCRIPT", 'print("another model")'))
     assert run(course) == 1
     for name in ('"sw" + "ing"', '"swing"'):
-        use = f'model_path({name})\nprint(data.sensor("time").data)'
+        use = f"model_path({name})\nprint(data.energy)"
         lesson.write_text(LESSON.replace("SCRIPT", use))
         assert run(course) == 0
     _, value = values(course, capsys)
@@ -150,7 +157,7 @@ def test_sensor_that_a_lesson_reads_is_no_finding(course: Path, capsys: Capture)
     assert run(course) == 1
     (course / "content" / "labs").mkdir()
     twin = course / "content" / "labs" / "twin.js"
-    twin.write_text("data.sensordata[0]")
+    twin.write_text("data.energy[0]")
     assert run(course) == 0
     # What a script imports may load the model for it, and what it hands on to may read.
     twin.unlink()
@@ -160,8 +167,8 @@ def test_sensor_that_a_lesson_reads_is_no_finding(course: Path, capsys: Capture)
     (course / "lib").mkdir()
     (course / "lib" / "swings.py").write_text('model_path("swing")\n')
     shows = course / "lib" / "shows.py"
-    shows.write_text("def show(data):\n    print(data.sensordata)\n")
-    lesson.write_text(LESSON.replace("SCRIPT", "import swings\nprint(data.sensordata)"))
+    shows.write_text("def show(data):\n    print(data.energy)\n")
+    lesson.write_text(LESSON.replace("SCRIPT", "import swings\nprint(data.energy)"))
     assert run(course) == 0
     lesson.write_text(LESSON.replace("SCRIPT", "import swings, shows"))
     assert run(course) == 0
@@ -191,7 +198,8 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
     course: Path, capsys: Capture
 ) -> None:
     keys = '  <keyframe><key name="go" qpos="1"/><key name="rest"/></keyframe>\n</mujoco>'
-    (course / "models" / "swing.xml").write_text(MODEL.replace("</mujoco>", keys))
+    sensor = '  <sensor><clock name="time"/></sensor>\n'
+    (course / "models" / "swing.xml").write_text(CLEAN.replace("</mujoco>", sensor + keys))
     declarations = course / "models" / "swing.toml"
     declarations.write_text('[[scenario]]\nname = "a"\nkeyframe = "go"\nmeasure = "sensor:time"\n')
     status, value = values(course, capsys)
@@ -202,6 +210,7 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
     status, value = values(course, capsys)
     findings = {finding["kind"]: finding for finding in value["models"][0]["findings"]}
     assert set(findings) == {"unused-keyframe", "sensor-unread"}
+    assert findings["sensor-unread"]["label"] == "interface", "its code may be elsewhere"
     assert [place["name"] for place in findings["unused-keyframe"]["places"]] == ["rest"]
     assert findings["unused-keyframe"]["unfixed"].startswith("scenarios give keyframes by number")
     declarations.write_text('[[scenario]]\nname = "a"\nkeyframe = "rest"\n')
@@ -211,7 +220,8 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
     sweep = '[[sweep]]\nname = "noise"\nvary = { "sensor:time.cutoff" = [1], "VARIED" = [1] }\n'
     # A ball of this size would hit the wall that the pendulum's cannot reach.
     wall = '<worldbody><geom size=".1" pos="2 0 1"/>'
-    (course / "models" / "swing.xml").write_text(MODEL.replace("<worldbody>", wall))
+    text = CLEAN.replace("<worldbody>", wall).replace("</mujoco>", sensor + "</mujoco>")
+    (course / "models" / "swing.xml").write_text(text)
     for varied, kinds in (("joint.damping", {"contact-off"}), ("geom.size[0]", set())):
         declarations.write_text(sweep.replace("VARIED", varied))
         status, value = values(course, capsys)
@@ -219,9 +229,7 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
         assert {finding["kind"] for finding in findings if finding["fixable"]} == kinds
 
 
-SHARED_PART = (
-    "<mujocoinclude>\n  <option/>\n  <sensor>\n    <clock/>\n  </sensor>\n</mujocoinclude>\n"
-)
+SHARED_PART = '<mujocoinclude>\n  <compiler/>\n  <option>\n    <flag energy="enable"/>\n  </option>\n</mujocoinclude>\n'
 
 
 def test_a_file_of_two_models_is_not_changed(course: Path, capsys: Capture) -> None:
@@ -230,7 +238,7 @@ def test_a_file_of_two_models_is_not_changed(course: Path, capsys: Capture) -> N
     text = CLEAN.replace("<mujoco>", '<mujoco>\n  <include file="part.xml"/>')
     (models / "swing.xml").write_text(text)
     assert run(course, "swing", "--fix") == 0
-    assert "<clock/>" not in (models / "part.xml").read_text()
+    assert "energy" not in (models / "part.xml").read_text()
     (models / "part.xml").write_text(SHARED_PART)
     (models / "other.xml").write_text(text)
     capsys.readouterr()
@@ -288,7 +296,7 @@ def test_a_report_is_recorded(course: Path, capsys: Capture) -> None:
     assert "wrote content/reports/swing.diet.json" in capsys.readouterr().out
     report = DIET.decode(path.read_bytes())
     assert report.model == "swing"
-    assert [finding.kind for finding in report.findings] == ["sensor-unread"]
+    assert [finding.kind for finding in report.findings] == ["energy-flag"]
 
 
 def test_what_is_recorded_is_whole_and_nothing_else_is_done(course: Path, capsys: Capture) -> None:
@@ -334,7 +342,7 @@ def test_a_scenario_that_diverges_is_reported(course: Path, capsys: Capture) -> 
     assert (
         "in no scenario scenario go: diverged: the state is not finite; MuJoCo warned of bad" in out
     )
-    assert "nothing is claimed from it" in out and "sensor-unread" not in out
+    assert "nothing is claimed from it" in out and "energy-flag" not in out
 
 
 @pytest.mark.slow

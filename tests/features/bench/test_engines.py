@@ -17,8 +17,6 @@ from coursebuild.core.model.measurements import (
 )
 from coursebuild.core.model.report_files import ENGINES
 from coursebuild.core.model.results import Reports
-from coursebuild.features.bench.commands.engines import engines_text
-from coursebuild.report.text import Style
 from support.bench_reports import MACHINE, swing
 from support.measured_course import TOML, bench_course, write
 from support.rendered_course import Make
@@ -77,30 +75,6 @@ def report() -> EngineReport:
     reference = ("ode", "a source", 1e-12, 1e-12)
     scenario = EngineScenario("swing", "A swing", 1.0, 0.5, *reference, setting, rows)
     return EngineReport("box", "0", False, MACHINE, 3.25, (scenario,))
-
-
-def test_the_text_of_a_report() -> None:
-    text = engines_text([report()], Style(width=160))
-    words = " ".join(text.split())
-    assert "MJX, 32 bits, A Card 0.00200" in words
-    assert "9 µs ×12 1 µs ×1.2 –" in words
-    assert "MJX, 64 bits: failed: TypeError: <int64>" in words
-    assert "X: refused: no cones" in words
-    assert "MJX, 32 bits, A Card, 4096 worlds: not tried: a step would take about 1e+02 s." in words
-    assert "When it began, about 3.2 other programs wanted to run" in words
-
-
-def test_no_column_is_left_out_where_the_terminal_is_narrow() -> None:
-    lines = engines_text([report()], Style(width=60)).splitlines()
-    start = lines.index("    Engine                Position (m or rad)")
-    assert [line.strip() for line in lines[start::5]][:5] == [
-        "Engine                Position (m or rad)",
-        "Engine                From MuJoCo (rad, or of the extent)",
-        "Engine                 1 world  64 worlds  4096 worlds",
-        "Engine                Velocity (m/s or rad/s)",
-        "Engine                Energy drift  To compile",
-    ]
-    assert lines[start + 11] == "    MJX, 32 bits, A Card  9 µs ×12  1 µs ×1.2            –"
 
 
 def test_the_pages_show_a_report(make: Make) -> None:

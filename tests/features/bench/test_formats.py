@@ -13,14 +13,18 @@ from coursebuild.core.syntax.course_schema import json_schema
 from mjbench.problems import all_problems
 from mjbench.reports import records
 from mjbench.schemas import schema_text
-from samples.reports import scene
+from samples.reports import scene, swing
+from support.bench_reports import derived
 from support.bench_reports import scene as shown_scene
 
 REPORTS = json.loads(schema_text("reports"))
 
 
 def test_a_report_is_read_as_it_is_written() -> None:
-    assert report_files.BENCH.decode(records.BENCH.encode(scene()), "arm") == shown_scene()
+    assert (
+        report_files.BENCH.decode(records.BENCH.encode(scene(derived(swing()))), "arm")
+        == shown_scene()
+    )
     assert report_files.VERSION == records.VERSION
     kinds = (report_files.BENCH, report_files.ENGINES, report_files.DIET, report_files.STABILITY)
     choices = {part["properties"]["holds"]["const"]: part for part in REPORTS["oneOf"]}

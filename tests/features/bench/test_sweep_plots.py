@@ -9,7 +9,6 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.measurements import Interval, SweepReport, SweepRow
 from coursebuild.features.bench.report_plots import sweep_svg
-from coursebuild.features.bench.shown_errors import shown_figures
 
 
 def table(*rows: SweepRow, show: tuple[str, ...] = ()) -> SweepReport:
@@ -24,9 +23,7 @@ ROWS = (
 )
 
 
-def test_figures_that_differ_are_shown_unless_others_are_named() -> None:
-    assert shown_figures(table(*ROWS)) == ("penetration",)
-    assert shown_figures(table(*ROWS, show=("slip",))) == ("slip",)
+def test_a_sweep_without_figures_has_no_plot() -> None:
     assert sweep_svg(table(), name="p") == ""
 
 

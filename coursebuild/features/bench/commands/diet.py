@@ -23,6 +23,9 @@ from msgspec.structs import replace
 
 from coursebuild.api import Diagnostic, EffectError, Options, Store
 from coursebuild.core.files.errors import require
+from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
+from coursebuild.core.engine.store import Store
+from coursebuild.core.files.errors import EffectError, UsageError, require
 from coursebuild.core.files.read import read_course
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model.diet_findings import DietReport
@@ -67,6 +70,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--record", action="store_true", help="write the findings to content/reports/"
     )
     parser.add_argument("--quick", action="store_true", help="short runs and rough times")
+    help = "look for findings of these kinds alone"
+    parser.add_argument("--only", nargs="*", default=[], metavar="KIND", help=help)
     add_format(parser, "text", "json")
     add_cache(parser)
     add_executors(parser)
@@ -75,7 +80,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Look at models, and mend them or record what was found."""
     require("mjbench", "measure", "`coursebuild diet`")
-    settings = {name: getattr(arguments, name) for name in ("quick", "fix", "record")}
+    settings = {name: getattr(arguments, name) for name in ("quick", "fix", "record", "only")}
     names = tuple(arguments.models)
     quiet = arguments.quiet and arguments.format == "text"
 
@@ -114,19 +119,23 @@ def diet(
     quick: bool = False,
     fix: bool = False,
     record: bool = False,
+    only: Sequence[str] = (),
 ) -> Measurement[DietReport]:
     """Look at the models that the names mean; without names, at all.
 
-    `fix`: what is proved is taken out, and the reports are about the rest. `record`: each report
-    is also written into the course.
+    `only`: the kinds of findings to look for; `fix`: what is proved is taken out, and the reports
+    are about the rest. `record`: each report is also written into the course.
 
     Raises:
         UsageError: no model is called so, or only a part is to be recorded.
     """
     if record:
         forbid_quick("--record", quick=quick)
+        if only:
+            raise UsageError("--record cannot be combined with --only")
     scenes = find_scenes(options.root, names)
     run = _DietRun(options, mjbench, scenes.diagnostics, quick=quick, fix=fix)
+    run.only = tuple(only)
     measurement = run.measure_each(scenes.value, run.look_at)
     if not record:
         return measurement
@@ -156,6 +165,8 @@ class _DietRun(MeasuringRun[DietReport]):
     stage, success = "looking at models", "looked at"
     function = f"{__name__}:measure_part"
     report_type = DietReport
+    only: tuple[str, ...] = ()
+    """The kinds of findings that are looked for; all if none is named."""
 
     def __init__(
         self,
@@ -182,7 +193,7 @@ class _DietRun(MeasuringRun[DietReport]):
     def tasks(self, scene: CourseScene) -> Iterator[tuple[Any, ...]]:
         """The model, if no report on it is stored."""
         model = DietModel(self.options.root, self.files, self.course, scene)
-        if self.load("diet", self._parts(model), bytes) is None:
+        if not self.only and self.load("diet", self._parts(model), bytes) is None:
             yield self._task(scene)
 
     def _task(self, scene: CourseScene) -> tuple[Any, ...]:
@@ -253,6 +264,7 @@ class _DietRun(MeasuringRun[DietReport]):
             modules=sorted(model.readers.modules),
             keeps=model.keeps,
             locked=model.locked,
+            only=self.only,
             quick=self.quick,
             rerun=with_course,
         )
@@ -262,6 +274,7 @@ class _DietRun(MeasuringRun[DietReport]):
         """Return all that a report depends on; first the digest of the model."""
         scene, machine = model.scene, self.facts.machine
         parts: list[object] = [scene.digest, scene.name, self.quick, self.code, machine]
+        parts += self.only
         for keep in scene.declarations.keep:
             place = keep.finding_span
             parts.append((keep.finding, keep.reason, place.line, place.column))

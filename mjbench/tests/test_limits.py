@@ -1,0 +1,61 @@
+"""Largest stable timesteps in words: no digit that is not known."""
+
+from __future__ import annotations
+
+import math
+
+from msgspec.structs import replace
+
+from mjbench.reports import reach, reach_bound
+from mjbench.reports.limits import limit_text, map_text, reach_text, widest_gaps
+from mjbench.reports.scene_report import StableRow
+
+LOW, HIGH = 1.0, 1000.0
+ROW = StableRow("RK4", 25.44, (LOW, HIGH), None, 5.0, 1, 9, None, (25.44, 25.48))
+TRIES = ((10.0, 10, 0), (11.5, 10, 0), (13.0, 10, 0), (24.0, 10, 3), (24.55, 10, 10))
+GRID = (9.0, 10.35, 11.9, *(13.0 * 1.0227**n for n in range(30)))
+"""A step of 15 % below half the limit, and of 2.3 % above."""
+
+
+def test_only_digits_on_which_spans_and_starts_agree_are_printed() -> None:
+    """Theory at rest counts as another limit where it is far above."""
+    assert limit_text(ROW) == "25.4 s"
+    assert limit_text(replace(ROW, theory=25.2)) == "25 s"
+    assert limit_text(replace(ROW, theory=40.0)) == "25.4 s", "that is another limit"
+    row = StableRow("RK4", 0.123456, (0.1, 1.0), None, 1.0, 8, 8, None)
+    assert limit_text(row) == "120 ms"
+    assert limit_text(replace(row, bracket=(0.01075, 0.010779))) == "10.7 ms", "10.8 ms are lost"
+    assert limit_text(replace(row, bracket=(0.19998, 0.2))) == "200 ms"
+
+
+def test_where_digits_do_not_hold_the_least_limit_is_given_and_why() -> None:
+    wide = replace(ROW, theory=16.0)
+    assert limit_text(wide) == "16 s; from its own start 25 s", "unstable where it comes to rest"
+    other = replace(ROW, bracket=(19.0, 40.0))
+    assert limit_text(other) == "19 s; elsewhere 40 s"
+    all_of_own = replace(ROW, largest="all", bracket=(500.0, HIGH))
+    assert limit_text(all_of_own) == "500 s; from its own start 1000 s"
+    none = replace(ROW, bracket=(0.0, 25.44))
+    assert limit_text(none) == "none from every start; from its own 25 s"
+    near = StableRow("RK4", 0.056, (0.1, 1.0), None, 1.0, 8, 8, None, (0.05502, 0.05656))
+    assert limit_text(near).startswith("55 ms; "), "not 60 ms"
+
+
+def test_all_and_none_are_values_of_their_own() -> None:
+    assert [reach(h) for h in (math.inf, 0.0, 0.5)] == ["all", "none", 0.5]
+    assert [reach_bound(limit) for limit in ("all", "none", 0.5)] == [math.inf, 0.0, 0.5]
+    assert reach_text("all", (LOW, HIGH)) == "all to 1000 s"
+    assert reach_text("none", (LOW, HIGH)) == "none from 1 s on"
+    assert reach_text(None, (LOW, HIGH)) == "", "not measured"
+
+
+def test_a_map_has_a_sign_for_each_timestep() -> None:
+    assert map_text(replace(ROW, tries=TRIES)) == "10 s ···∘• 25 s"
+    assert map_text(replace(ROW, tries=TRIES[:3])) == "", "nothing was lost"
+
+
+def test_where_limits_have_islands_digits_are_no_finer_than_the_gaps() -> None:
+    row = replace(ROW, islands=(60.0, 80.0), tries=tuple((step, 10, 0) for step in GRID))
+    assert limit_text(row) == "25 s"
+    near, far = widest_gaps([row])
+    assert (round(near, 4), round(far, 2)) == (1.0227, 1.15)

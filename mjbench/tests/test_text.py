@@ -1,0 +1,112 @@
+"""Reports in words: the verdict first, no wider than the terminal, nothing that changes it."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from mjbench.derive import derive_case, derive_scenario
+from mjbench.reports import Interval
+from mjbench.reports.diet_report import (
+    INTERFACE_LABEL,
+    PROVED_LABEL,
+    DietReport,
+    DietScenario,
+    Finding,
+    ModelPlace,
+    Saving,
+    TextEdit,
+)
+from mjbench.reports.diet_text import diet_text
+from mjbench.reports.page import scene_page
+from mjbench.reports.scene_report import WorkPrecisionRow
+from mjbench.reports.terminal import Style
+from mjbench.text import case_text, scene_text
+from samples.cases import case
+from samples.reports import MACHINE, awkward, row, scenario, scene, swing
+
+
+def test_the_verdict_comes_first_then_the_table_then_the_plot() -> None:
+    text = scene_text(scene(derive_scenario(swing(), lambda _: ())), Style(80))
+    parts = (
+        "Euler at 2 ms: 100 times real time",
+        "RK4 at 10 ms is better",
+        "\n    >",
+        "│",
+        "bounded  ",
+    )
+    places = [text.index(part) for part in parts]
+    assert places == sorted(places)
+    assert "no room for: " in text or "position" in text
+    assert max(map(len, text.splitlines())) < 140
+
+
+def test_a_report_that_is_hard_to_show_and_one_without_anything() -> None:
+    text = scene_text(scene(derive_scenario(awkward(), lambda _: ()), quick=True), Style(100))
+    assert "quick: fewer settings" in text and "velocities reached 12 times what can be" in text
+    empty = replace(scene(), scenarios=())
+    assert "nothing in it can move, so nothing was measured" in scene_text(empty)
+
+
+def test_names_cannot_change_the_terminal() -> None:
+    name = "a\x1b[31m\u202e名前"
+    odd = derive_scenario(scenario([row(name, own=True)], name=name, notes=(name,)), lambda _: ())
+    text = scene_text(scene(odd, model=name), Style(80, colour=True))
+    assert "\x1b[31m" not in text and "\u202e" not in text and "名前" in text
+    assert "\x1b[1m" in text, "what stands out still does"
+
+
+def test_a_hard_case_has_its_orders_limits_figures_and_runs() -> None:
+    text = case_text(derive_case(case()), Style(120))
+    for part in ("against the oscillator", "1.00 ± 0.01", "200 ms", "6.283"):
+        assert part in text, part
+    (near, _) = case().errors
+    near = replace(near, position=(5e-4, 5e-4))
+    text = case_text(derive_case(case(errors=(near,))))
+    assert "to err by 0.001, a simulated second takes Euler 100 µs\n" in text
+
+
+def test_a_page_needs_nothing_else_and_escapes_names() -> None:
+    report = derive_scenario(replace(swing(), title="<b>"), lambda _: ())
+    html = scene_page(scene(report, model="<arm>"))
+    assert html.count("<svg") == 1 and "<li>Euler at 2 ms: 100 times real time</li>" in html
+    assert "<b>" not in html and "&lt;arm&gt;" in html and "http" not in html
+    assert html.count("<circle") > 15 and "the state is not finite" in html
+
+
+def finding(kind: str, label: str, time: float | None, **fields: object) -> Finding:
+    place = ModelPlace(kind, "mujoco", "arm.xml", 9, 5)
+    edit = TextEdit("arm.xml", 9, 1, 0, 9, "<gyro/>", "")
+    values: dict[str, object] = {
+        "kind": kind, "message": f"nothing reads the {kind}", "places": (place,), "label": label,
+        "difference": 0.0, "scenarios": ("go",), "proof": "",
+        "saving": Saving(time, 0.01, True, 120, 40), "edits": (edit,),
+        "fixable": label == PROVED_LABEL, "unfixed": "", "kept": "", "doubt": "", **fields,
+    }  # fmt: skip
+    return Finding(**values)
+
+
+def diet(*findings: Finding) -> DietReport:
+    go = DietScenario("go", 10, "ok", ())
+    return DietReport("arm", "0", False, MACHINE, (), (go,), findings, (), None, None, None, ())
+
+
+def test_the_diet_names_what_shows_a_saving_and_folds_what_saves_little() -> None:
+    report = diet(
+        finding("energy-flag", PROVED_LABEL, 1.2),
+        finding("island", "the same in what was run", 1.3),
+        finding("cone", "the same in what was run", 1.02),
+        finding("sensor-unread", INTERFACE_LABEL, 1.4),
+    )
+    text = diet_text(report, "mjbench diet arm.xml", "arm.toml", Style(200))
+    assert "shown by `mjbench diet arm.xml --only island`" in text
+    assert "saves less than 5 %, or no time that was measured: nothing reads the cone" in text
+    assert "interface: nothing reads the sensor-unread, of the code that was looked at" in text
+    assert "1 finding not explained, 1 of them for `mjbench diet arm.xml --fix`" in text
+    assert '[[keep]] finding = "energy-flag energy-flag", reason = …' in text
+    assert not report.ok and diet(*report.findings[1:]).ok
+
+
+def test_costs_that_are_uncertain_say_so() -> None:
+    wide: WorkPrecisionRow = replace(row(own=True, seen=0.5), cost=Interval(1.0, 0.5, 2.0))
+    text = scene_text(scene(derive_scenario(scenario([wide]), lambda _: ())))
+    assert "1 ± 75 %" in text
