@@ -27,7 +27,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Document, Lesson
-from coursebuild.core.model.results import SiteFile
+from coursebuild.core.model.results import Results, SiteFile
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import ExportContext, PageContext
 from coursebuild.core.pages.library import Library
@@ -118,6 +118,8 @@ def make_files(
     if not report.ok:
         return report, None
     course, options = checked_course.course, checked_course.options
+    results: Results
+    failures: tuple[Diagnostic, ...]
     results, failures = with_downloads(course, checked_course.verification.results, options)
     assets = Assets(template_texts(), Bundle(), prepared_folder())
     try:
