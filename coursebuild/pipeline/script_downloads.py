@@ -148,8 +148,7 @@ def _make_download(
             modules = foreign_modules(text)
             packages = course_files.packages(modules)
             text = _metadata(packages, course_files.options) + _rename(text, path, name)
-            files = ((name, text.encode()),)
-            return ScriptDownload(path, files, name, packages, modules)
+            return ScriptDownload(path, ((name, text.encode()),), name, packages, modules)
     members, modules = _members(course_files, extraction, find_module)
     packages = course_files.packages(modules)
     members |= files

@@ -98,8 +98,7 @@ class _File:
         """What each name means in the file: the text of an import, or where it is defined."""
         self._imports: set[str] = set()
         self._namespaces: dict[str, dict[str, str]] = {}
-        self._users: dict[str, list[ModuleCode]] = {}
-        """The modules that use each namespace; the script's own is one of them."""
+        """What each name of a whole module has; a module of no code in `_modules` stands for it."""
         self._has_models = False
         statements = self._script.statements
         self._head = 0
@@ -222,13 +221,12 @@ class _File:
                     pass
         if count or self._meanings.setdefault(bound, whole) != whole:
             raise NotOneFileError(f"`{bound}` is used as more than a module")
-        namespace, users = self._namespaces.setdefault(bound, {}), self._users.setdefault(bound, [])
-        users.append(user)
+        place = self._module(f"{bound} =", CourseModule("", ""))
+        user.uses[place.name] = None
+        namespace = self._namespaces.setdefault(bound, {})
         for attribute in sorted(attributes):
             self._imports.add("from types import SimpleNamespace")
-            namespace[attribute] = self._need(user, whole, attribute)
-        for earlier_user in users:  # the namespace stands before the first, with all that it needs
-            earlier_user.uses |= user.uses
+            namespace[attribute] = self._need(place, whole, attribute)
 
     def _need(self, user: ModuleCode, module_name: str, name: str, new_name: str = "") -> str:
         """Take a name of a module and what it needs; return what it is called in the file."""
@@ -330,15 +328,13 @@ class _File:
             texts = {path: _literal(text) for path, text in belongings.data.items()}
             comment = "# What the script reads; a file that is there already stays as it is"
             sections.append(f"{comment}\nDATA = {_dictionary(texts)}\n{_DATA}")
-        written_names = set[str]()
-        for module in (*self._in_order(self._script, set()), self._script):
-            for name, users in self._users.items():
-                if name not in written_names and module in users and self._namespaces[name]:
-                    written_names.add(name)
-                    pairs = sorted(self._namespaces[name].items())
-                    rows = "".join(f"    {attribute}={ours},\n" for attribute, ours in pairs)
-                    sections.append(f"{name} = SimpleNamespace(\n{rows})")
-            if module.needed:
+        for module in self._in_order(self._script, set()):
+            bound, sign, _ = module.name.partition(" =")
+            if sign:
+                pairs = sorted(self._namespaces[bound].items())
+                rows = "".join(f"    {attribute}={ours},\n" for attribute, ours in pairs)
+                sections.append(f"{module.name} SimpleNamespace(\n{rows})")
+            elif module.needed:
                 sections.append(f"# --- from {module.source.path}\n\n\n{module.code()}")
         if any(section.startswith("# --- from") for section in sections):
             sections.append("# --- the script itself")
