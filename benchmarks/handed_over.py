@@ -46,16 +46,16 @@ class HandedOver(NamedTuple):
 
 def collect(site: Path) -> Iterator[HandedOver]:
     """What the pages of a site link to, each once."""
-    seen: set[Path] = set()
+    visited: set[Path] = set()
     for page in sorted(site.rglob("*.html")):
         text = page.read_text("utf-8")
         for pattern in (_DOWNLOAD, _CONFIG):
             for match in pattern.finditer(text):
                 address = unquote(html.unescape(match[1]))
                 path = (page.parent / address).resolve()
-                if path in seen or not path.is_file():
+                if path in visited or not path.is_file():
                     continue
-                seen.add(path)
+                visited.add(path)
                 yield from _read(path, is_lab=pattern is _CONFIG)
 
 
@@ -120,17 +120,17 @@ def main() -> None:
     parser.add_argument("--without", nargs="*", default=[], help="kinds to leave out")
     arguments = parser.parse_args()
     things = [t for t in collect(arguments.site) if t.kind not in arguments.without]
-    total, failed = Counter[str](), Counter[str]()
+    total, failure_counts = Counter[str](), Counter[str]()
     with ThreadPoolExecutor(arguments.jobs) as threads:
         results = threads.map(lambda thing: run(thing, arguments.python), things)
         for thing, failures in zip(things, results, strict=True):
             total[thing.kind] += 1
-            failed[thing.kind] += bool(failures)
+            failure_counts[thing.kind] += bool(failures)
             for entry, line in failures:
                 print(f"{thing.name}: {entry}: {line}")
     for kind in total:
-        print(f"{kind}: {failed[kind]} of {total[kind]} fail")
-    sys.exit(any(failed.values()))
+        print(f"{kind}: {failure_counts[kind]} of {total[kind]} fail")
+    sys.exit(any(failure_counts.values()))
 
 
 if __name__ == "__main__":

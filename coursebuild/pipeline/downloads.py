@@ -15,7 +15,8 @@ from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model.addresses import recorded_figures
-from coursebuild.core.model.results import CachedFile, OutputFile, ScriptDownload, SiteFile
+from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
+from coursebuild.core.model.script_download import ScriptDownload
 from coursebuild.core.pages import urls, zips
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.library import Library
@@ -73,9 +74,9 @@ class Downloads(Struct, frozen=True):
 def _handed_over(download: ScriptDownload) -> OutputFile:
     """The file of a script that readers get."""
     if not download.archive:
-        return OutputFile(download.path, download.files[0].data)
+        return OutputFile(download.path, download.files[0][1])
     folder = download.path.rpartition("/")[2].removesuffix(".zip")
-    files = {f"{folder}/{file.path}": file.data for file in download.files}
+    files = {f"{folder}/{path}": data for path, data in download.files}
     return OutputFile(download.path, zips.pack_files(files))
 
 

@@ -117,8 +117,8 @@ def make_files(
     report = checked_course.report()
     if not report.ok:
         return report, None
-    course, options = checked_course.course, checked_course.options
-    results, failures = with_downloads(course, checked_course.verification.results, options)
+    course, results = checked_course.course, checked_course.verification.results
+    results, failures = with_downloads(course, results, checked_course.options)
     assets = Assets(template_texts(), Bundle(), prepared_folder())
     try:
         outputs = make(make_library(course, results, assets, checked_course.reports))
@@ -127,14 +127,12 @@ def make_files(
                 if file.path.endswith(".html"):
                     file.make()
         report = checked_course.report(outputs.diagnostics)
+        whole_report = checked_course.report((*outputs.diagnostics, *failures))
     except TemplateFailure as failure:
         from coursebuild.pipeline.theme_files import template_diagnostic
 
         return checked_course.report((template_diagnostic(course, failure),)), None
-    is_sound = report.ok
-    if failures:  # their buttons are hidden
-        report = checked_course.report((*outputs.diagnostics, *failures))
-    return report, outputs if is_sound else None
+    return whole_report, outputs if report.ok else None  # of what failed the buttons are hidden
 
 
 def _find_exporter(options: Options, name: str) -> Exporter:

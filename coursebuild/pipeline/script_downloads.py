@@ -20,13 +20,11 @@ from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import (
     CompileResult,
-    DownloadState,
     Outcome,
-    OutputFile,
-    ScriptDownload,
     ScriptRun,
     Verdict,
 )
+from coursebuild.core.model.script_download import DownloadState, ScriptDownload
 from coursebuild.core.pages.library import models_named
 from coursebuild.core.run.alone import AloneJob, AloneRun, Runner
 from coursebuild.core.run.packages import distributions, module_files
@@ -118,7 +116,7 @@ def find_downloads(
     options: Options,
 ) -> tuple[ScriptDownload, ...]:
     """What is handed over of these scripts; nothing of those that fail as they are."""
-    around = _Course(course, scripts, options)
+    course_files = _Course(course, scripts, options)
     by_path = {run.path: run for run in runs}
     facts = {f"{_MODELS}{name}.xml": result.facts for name, result in models}
     includes = {path: fact.includes for path, fact in facts.items() if fact is not None}
@@ -126,59 +124,59 @@ def find_downloads(
     for extraction in scripts:
         run = by_path.get(extraction.path)
         if run is None or run.outcome in (Outcome.OK, Outcome.SKIPPED, Outcome.NORUN):
-            files = around.files_of(extraction, run, includes)
-            downloads.append(_make_download(around, extraction, files))
+            files = course_files.files_of(extraction, run, includes)
+            downloads.append(_make_download(course_files, extraction, files))
     return tuple(downloads)
 
 
 def _make_download(
-    around: _Course, extraction: Extraction, files: Mapping[str, bytes]
+    course_files: _Course, extraction: Extraction, files: Mapping[str, bytes]
 ) -> ScriptDownload:
     path, name = extraction.path, extraction.path.rpartition("/")[2]
     folder = _dotted(path.removeprefix(_EXAMPLES)).rpartition(".")[0]
-    find_module = functools.partial(around.find_module, folder)
+    find_module = functools.partial(course_files.find_module, folder)
     if not extraction.script.archive:
         try:
             belongings = _belongings(files)
             text = single_file(_dotted(name), extraction.text, find_module, belongings)
-            if "matplotlib" in foreign_modules(text) and around.style:
-                belongings = replace(belongings, style=around.style)
+            if "matplotlib" in foreign_modules(text) and course_files.style:
+                belongings = replace(belongings, style=course_files.style)
                 text = single_file(_dotted(name), extraction.text, find_module, belongings)
         except (NotOneFileError, RecursionError, SyntaxError):
             pass
         else:
             modules = foreign_modules(text)
-            packages = around.packages(modules)
-            text = _metadata(packages, around.options) + _rename(text, path, name)
-            file = OutputFile(name, text.encode())
-            return ScriptDownload(path, (file,), name, packages, modules)
-    members, modules = _members(around, extraction, find_module)
-    packages = around.packages(modules)
+            packages = course_files.packages(modules)
+            text = _metadata(packages, course_files.options) + _rename(text, path, name)
+            return ScriptDownload(path, ((name, text.encode()),), name, packages, modules)
+    members, modules = _members(course_files, extraction, find_module)
+    packages = course_files.packages(modules)
     members |= files
-    if "matplotlib" in modules and around.style:
-        members[_STYLE] = around.read(_STYLE)
+    if "matplotlib" in modules and course_files.style:
+        members[_STYLE] = course_files.read(_STYLE)
     members["requirements.txt"] = "".join(f"{line}\n" for line in packages).encode()
-    listed = tuple(OutputFile(member, data) for member, data in sorted(members.items()))
-    return ScriptDownload(path, listed, path, packages, modules, archive=True)
+    return ScriptDownload(
+        path, tuple(sorted(members.items())), path, packages, modules, archive=True
+    )
 
 
 def _members(
-    around: _Course, extraction: Extraction, find_module: Callable[[str], CourseModule | None]
+    course_files: _Course, extraction: Extraction, find_module: Callable[[str], CourseModule | None]
 ) -> tuple[dict[str, bytes], tuple[str, ...]]:
     """A script and the course's modules that it imports, by path, and the modules of others."""
-    beside = extraction.path.rpartition("/")[0]
+    folder = extraction.path.rpartition("/")[0]
     members = {extraction.path: extraction.data}
-    texts, seen, foreign = [extraction.text], set[str](), set[str]()
+    texts, visited, foreign = [extraction.text], set[str](), set[str]()
     for text in texts:
-        for name in set(foreign_modules(text)) - seen:
-            seen.add(name)
+        for name in set(foreign_modules(text)) - visited:
+            visited.add(name)
             module = find_module(name)
             if module is not None and module.path.startswith(_EXAMPLES):
                 members[module.path] = module.text.encode()
                 texts.append(module.text)
                 continue
-            files = around.files_of_module(name)
-            members |= {f"{beside}/{file.path}": file.data for file in files}
+            files = course_files.files_of_module(name)
+            members |= {f"{folder}/{file.path}": file.data for file in files}
             texts += [file.data.decode() for file in files if file.path.endswith(".py")]
             foreign |= set() if files else {name}
     return members, tuple(sorted(foreign))
@@ -195,10 +193,10 @@ def _belongings(files: Mapping[str, bytes]) -> Belongings:
         if "\r" in texts[path] or "\0" in texts[path]:
             raise NotOneFileError(f"{path} is no text with plain line ends")
     models = {p.removeprefix(_MODELS): t for p, t in texts.items() if p.startswith(_MODELS)}
-    others = {p: t for p, t in texts.items() if not p.startswith(_MODELS)}
-    if sum(map(len, others.values())) > _MOST_DATA:
+    data_texts = {p: t for p, t in texts.items() if not p.startswith(_MODELS)}
+    if sum(map(len, data_texts.values())) > _MOST_DATA:
         raise NotOneFileError("its data are long")
-    return Belongings(models, others)
+    return Belongings(models, data_texts)
 
 
 def _rename(text: str, path: str, name: str) -> str:
@@ -215,8 +213,8 @@ def _metadata(packages: Iterable[str], options: Options) -> str:
     version = platform.python_version() if interpreter is None else interpreter.version
     oldest = ".".join(version.split(".")[:2])
     rows = "".join(f'#     "{package}",\n' for package in packages)
-    listed = f"# dependencies = [\n{rows}# ]\n" if rows else "# dependencies = []\n"
-    return f'# /// script\n# requires-python = ">={oldest}"\n{listed}# ///\n'
+    dependencies = f"# dependencies = [\n{rows}# ]\n" if rows else "# dependencies = []\n"
+    return f'# /// script\n# requires-python = ">={oldest}"\n{dependencies}# ///\n'
 
 
 # --- their trial
@@ -240,17 +238,17 @@ def try_downloads(
     runs_by_path = {run.path: run for run in runs if run.outcome is Outcome.OK and not run.recorded}
     jobs = {d.script: _job(d, extractions[d.script]) for d in downloads if d.script in runs_by_path}
     runner = Runner(options.root, options.store, options.interpreter, options.sandbox, options.jobs)
-    known = {path: runner.known_run(job) for path, job in jobs.items()}
-    new_jobs = {path: job for path, job in jobs.items() if known[path] is None}
+    known_runs = {path: runner.known_run(job) for path, job in jobs.items()}
+    new_jobs = {path: job for path, job in jobs.items() if known_runs[path] is None}
     if new_jobs and not only_known:
         with options.progress.stage("running downloads", len(new_jobs)):
             new = runner.run(new_jobs.values(), options.progress.skip)
-            known |= dict(zip(new_jobs, new, strict=True))
-    alone_runs = {path: run for path, run in known.items() if run is not None}
+            known_runs |= dict(zip(new_jobs, new, strict=True))
+    alone_runs = {path: run for path, run in known_runs.items() if run is not None}
     problems = dict(_problems(course, runs_by_path, verdicts, alone_runs))
     states: dict[str, DownloadState] = dict.fromkeys(jobs, "ran")
     states |= dict.fromkeys(problems, "failed")
-    tried = tuple(replace(d, state=states.get(d.script, "unrun")) for d in downloads)
+    judged_downloads = tuple(replace(d, state=states.get(d.script, "unrun")) for d in downloads)
     diagnostics = tuple(
         diagnose(
             "download-failed",
@@ -260,7 +258,7 @@ def try_downloads(
         )
         for path, problem in problems.items()
     )
-    return tried, diagnostics
+    return judged_downloads, diagnostics
 
 
 def _help(extraction: Extraction) -> str:
@@ -298,12 +296,13 @@ def _problems(
             yield path, f"fails in an empty folder: {alone_run.failure}"
         elif alone_run.stdout != runs[path].stdout:
             other_runs.append(_as_run(runs[path], alone_run.stdout))
-    told = set[str]()
+    reported_paths = set[str]()
     for verdict in verify(course, other_runs) if other_runs else ():
         path = verdict.recording.script or ""
-        if verdict.status == "drift" and verdict.recording.span not in drifted and path not in told:
+        is_new = verdict.recording.span not in drifted and path not in reported_paths
+        if verdict.status == "drift" and is_new:
             change = verdict.changes[0]
-            told.add(path)
+            reported_paths.add(path)
             yield path, f"prints `{change.printed}` alone, where the page has `{change.recorded}`"
 
 

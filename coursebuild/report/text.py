@@ -174,25 +174,12 @@ def lab_line(line: TrialLine, style: Style) -> str:
         return f"{verdict} {line.name}  ({line.untried})"
     parts = [] if line.steps_per_second is None else [f"{line.steps_per_second:,} steps/s"]
     parts += [plural(line.tried, "thing") + " tried"] + ([line.parity] if line.parity else [])
-    parts += [_play_text(line)] if line.moved is not None else []
+    parts += [line.play] if line.play else []
     parts += [f"motion fills {100 * line.fill:.1f} %"] if line.fill is not None else []
     parts += [f"falls out of the scene: {body}" for body in line.fallen]
     parts += [f"no Python export: {line.unexported}"] if line.unexported else []
     parts += ["cached"] if line.cached else [f"{line.seconds:.2f} s"]
     return f"{verdict} {line.name}  {style.paint(', '.join(parts), FAINT)}"
-
-
-_LEAST_MOTION = 0.01
-"""Of the picture: less than that is not seen."""
-
-
-def _play_text(line: TrialLine) -> str:
-    """What a reader sees who presses Play and nothing else."""
-    assert line.moved is not None
-    if line.moved >= _LEAST_MOTION:
-        return f"Play moves {100 * line.moved:.1f} %"
-    reason = f"as said: {line.still}" if line.still else "and neither `start` nor `still` says more"
-    return f"Play alone moves nothing, {reason}"
 
 
 def diagnostic_text(diagnostic: Diagnostic, style: Style) -> str:

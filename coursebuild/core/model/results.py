@@ -10,6 +10,7 @@ from msgspec import Meta, Struct, field
 
 from coursebuild.core.model import Comparison, Limits, Recording
 from coursebuild.core.model.lesson_record import Address, Provenance
+from coursebuild.core.model.script_download import ScriptDownload
 from coursebuild.core.text.source import Span
 
 
@@ -123,8 +124,7 @@ class Trace(Struct, frozen=True, rename={"is_perturbed": "moved"}):
     written itself; the source in place of a compiled module."""
     folders: tuple[str, ...]
     outside: tuple[str, ...]
-    """Absolute paths of files read that belong neither to the project nor to an installed package
-    nor to Python."""
+    """Absolute paths of files read, of neither the project nor a package nor Python."""
     modules: tuple[str, ...]
     """Top-level names of installed packages' modules that it imported; none of Python's own."""
     opaque: str
@@ -133,8 +133,7 @@ class Trace(Struct, frozen=True, rename={"is_perturbed": "moved"}):
     divergences: tuple[Divergence, ...] = ()
     """The simulations that diverged, in the order in which that was noticed, without repeats."""
     is_perturbed: bool = False
-    """Of a run with a `ScriptJob.perturbation`: whether any initial state was moved, or any step
-    halved."""
+    """Of a run with a `ScriptJob.perturbation`: whether a state was moved, or a step halved."""
     states: tuple[EndState, ...] = ()
     """Of such a run, for each `MjData`, separated by blanks: its number in the order of first use,
     the length of `qpos`, the sizes that |qpos| and |qvel| are compared by (at least the largest
@@ -324,10 +323,8 @@ class TrialLine(Struct, frozen=True):
     """Why its page offers no Python script, in words."""
     fill: float | None = None
     """The share of its picture that its motion fills; `None` where nothing could move."""
-    moved: float | None = None
-    """The share of its picture in which something moves within 3 s after Play alone."""
-    still: str = ""
-    """Why nothing does."""
+    play: str = ""
+    """What Play alone moves, in words."""
     fallen: tuple[str, ...] = ()
     """What has fallen out of the scene, and to where."""
     untried: str = ""
@@ -367,32 +364,6 @@ class CachedFile(Struct, frozen=True):
 
 SiteFile: TypeAlias = OutputFile | CachedFile
 """A file, made now or when it is asked for."""
-
-
-DownloadState: TypeAlias = Literal["unrun", "ran", "failed"]
-
-
-class ScriptDownload(Struct, frozen=True):
-    """What readers are handed over of a script: a file that runs by itself, or an archive."""
-
-    script: str
-    """The script's path."""
-    files: tuple[OutputFile, ...]
-    """The one file, or those of the archive; with paths in the folder where they are to lie."""
-    entry: str
-    """The path of the file to run."""
-    packages: tuple[str, ...]
-    """What it needs, as installers take it: `mujoco==3.14.0`."""
-    modules: tuple[str, ...]
-    """The top-level modules that these bring."""
-    archive: bool = False
-    state: DownloadState = "unrun"
-    """Whether it was run in an empty folder, and how that ended."""
-
-    @property
-    def path(self) -> str:
-        """Its path in the site."""
-        return f"{self.script.removesuffix('.py')}.zip" if self.archive else self.script
 
 
 class PublishedTrials(Struct, frozen=True):

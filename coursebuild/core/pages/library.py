@@ -18,10 +18,10 @@ from coursebuild.core.model.results import (
     OutputFile,
     Reports,
     Results,
-    ScriptDownload,
     ScriptRun,
     Verdict,
 )
+from coursebuild.core.model.script_download import ScriptDownload
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.renderer import Renderer, Strings, known_mathml

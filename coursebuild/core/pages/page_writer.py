@@ -276,11 +276,11 @@ def run_commands(download: ShownDownload | None, args: Sequence[str]) -> tuple[s
     if not download.packages:
         return f"uv run {run}", f"python {run}"
     if download.is_archive:
-        listed = "-r requirements.txt"
+        packages = "-r requirements.txt"
         uv = f"uv run --with-requirements requirements.txt {run}"
     else:
-        listed, uv = shlex.join(download.packages), f"uv run {run}"
-    return uv, f"pip install {listed}", f"python {run}"
+        packages, uv = shlex.join(download.packages), f"uv run {run}"
+    return uv, f"pip install {packages}", f"python {run}"
 
 
 def numbered_lines(lines: Iterable[Markup], path: str, first: int = 1) -> Markup:

@@ -18,7 +18,6 @@ from msgspec import Struct
 from coursebuild.core.engine.digests import file_state
 from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Limits
-from coursebuild.core.model.results import OutputFile
 from coursebuild.core.run import gate
 from coursebuild.core.run.sandbox import Sandbox
 from coursebuild.core.run.script_environment import (
@@ -36,7 +35,7 @@ _KEPT_ERRORS = 4096
 class AloneJob(Struct, frozen=True):
     """A file to run, with what it comes with."""
 
-    files: tuple[OutputFile, ...]
+    files: tuple[tuple[str, bytes], ...]
     path: str
     """That of the file to run."""
     arguments: tuple[str, ...]
@@ -74,9 +73,9 @@ class Runner(Struct, frozen=True):
         """The runs of these jobs in order; `on_run` is told of each that is done now."""
 
         def get_or_run(job: AloneJob) -> AloneRun:
-            known = self.known_run(job)
-            if known is not None:
-                return known
+            known_run = self.known_run(job)
+            if known_run is not None:
+                return known_run
             run = self._run(job)
             on_run()
             return run
@@ -90,12 +89,12 @@ class Runner(Struct, frozen=True):
 
     def _key(self, job: AloneJob) -> str:
         program = file_state(str(_PROGRAM))
-        around = conditions(os.environ, self.interpreter)
-        return fingerprint((program, around, job, self.sandbox is not None))
+        run_conditions = conditions(os.environ, self.interpreter)
+        return fingerprint((program, run_conditions, job, self.sandbox is not None))
 
     def _run(self, job: AloneJob) -> AloneRun:
         request = {
-            "files": {file.path: base64.b64encode(file.data).decode() for file in job.files},
+            "files": {path: base64.b64encode(data).decode() for path, data in job.files},
             "path": job.path,
             "arguments": job.arguments,
             "figures": job.figures,

@@ -53,8 +53,8 @@ def _run(job: Any) -> None:
 
         resource.setrlimit(resource.RLIMIT_DATA, (job["memory"] << 20,) * 2)
     path = os.path.join(folder, job["path"])  # noqa: PTH118
-    beside = {entry.stem for entry in Path(path).parent.iterdir()}
-    sys.meta_path.insert(0, _Declared(folder, frozenset(job["modules"]) | beside))
+    neighbours = {entry.stem for entry in Path(path).parent.iterdir()}
+    sys.meta_path.insert(0, _Declared(folder, frozenset(job["modules"]) | neighbours))
     sys.addaudithook(_refuse_network)
     sys.argv = [job["path"], *job["arguments"]]
     sys.path.insert(0, os.path.dirname(path))  # noqa: PTH120

@@ -126,7 +126,7 @@ def bound_names(statement: ast.stmt) -> tuple[str, ...]:
                 return ()
             return tuple(a.asname or a.name.partition(".")[0] for a in statement.names)
         case _:
-            return tuple(sorted(_stored([statement])))
+            return tuple(sorted(_scope_names([statement])))
 
 
 def global_names(node: ast.AST, hidden: frozenset[str] = frozenset()) -> Iterator[ast.Name]:
@@ -145,11 +145,11 @@ def global_names(node: ast.AST, hidden: frozenset[str] = frozenset()) -> Iterato
             if not isinstance(node, ast.Lambda):
                 outer += [*node.decorator_list, *([node.returns] if node.returns else [])]
             shared = {name for n in inner for name in _declared_global(n)}
-            local = {arg.arg for arg in _arguments(arguments)} | _stored(inner)
+            local = {arg.arg for arg in _arguments(arguments)} | _scope_names(inner)
             inside = hidden | (local - shared)
         case ast.ListComp() | ast.SetComp() | ast.DictComp() | ast.GeneratorExp():
             inner = list(ast.iter_child_nodes(node))
-            inside = hidden | _stored([generator.target for generator in node.generators])
+            inside = hidden | _scope_names([generator.target for generator in node.generators])
         case _:
             inner, inside = list(ast.iter_child_nodes(node)), hidden
     for child in outer:
@@ -159,12 +159,12 @@ def global_names(node: ast.AST, hidden: frozenset[str] = frozenset()) -> Iterato
 
 
 def _arguments(arguments: ast.arguments) -> list[ast.arg]:
-    more = (arguments.vararg, arguments.kwarg)
+    variadic = (arguments.vararg, arguments.kwarg)
     positional = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
-    return [*positional, *(arg for arg in more if arg is not None)]
+    return [*positional, *(arg for arg in variadic if arg is not None)]
 
 
-def _stored(nodes: Iterable[ast.AST]) -> frozenset[str]:
+def _scope_names(nodes: Iterable[ast.AST]) -> frozenset[str]:
     """The names that are bound below these nodes, in the same scope."""
     names: set[str] = set()
     stack = list(nodes)

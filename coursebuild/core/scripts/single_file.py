@@ -98,8 +98,7 @@ class _File:
         """What each name means in the file: the text of an import, or where it is defined."""
         self._imports: set[str] = set()
         self._namespaces: dict[str, dict[str, str]] = {}
-        self._users: dict[str, list[ModuleCode]] = {}
-        """The modules that use each namespace; the script's own is one of them."""
+        """What each name of a whole module has; a module of no code in `_modules` stands for it."""
         self._has_models = False
         statements = self._script.statements
         self._head = 0
@@ -110,7 +109,7 @@ class _File:
             self._head += 1
 
     def write(self, belongings: Belongings) -> str:
-        removed = self._take_imports()
+        course_lines = self._take_imports()
         if self._has_models and not belongings.models:
             raise NotOneFileError("it is not known which models it loads")
         sections = self._sections(belongings)
@@ -123,8 +122,10 @@ class _File:
         opening = lines[:top]
         if not any(is_future(statement) for statement in statements[:start]):
             opening += ["", *(line for line in sorted(self._imports) if "__future__" in line)]
-        kept = "\n".join(lines[n - 1] for n in range(top + 1, end + 1) if n not in removed)
-        imports = _merge_imports(kept, self._imports)
+        own_imports = "\n".join(
+            lines[n - 1] for n in range(top + 1, end + 1) if n not in course_lines
+        )
+        imports = _merge_imports(own_imports, self._imports)
         parts = ["\n".join(opening), imports, *sections, "\n".join(lines[end:])]
         text, last = "", ""
         for part in filter(None, (part.strip("\n") for part in parts)):
@@ -135,7 +136,7 @@ class _File:
 
     def _take_imports(self) -> set[int]:
         """Take what the script imports of the course; return the lines of these imports."""
-        script, removed = self._script, set[int]()
+        script, course_lines = self._script, set[int]()
         ours: list[tuple[str, str, str]] = []
         for number, statement in enumerate(script.statements):
             course_imports = [
@@ -148,15 +149,15 @@ class _File:
             if not course_imports:
                 is_import = isinstance(statement, ast.Import | ast.ImportFrom)
                 for bound in bound_names(statement):
-                    same = ast.unparse(statement) if not is_import else None
-                    self._meanings[bound] = same or self._external(script, bound)
+                    text = ast.unparse(statement) if not is_import else None
+                    self._meanings[bound] = text or self._external(script, bound)
                 continue
             is_whole = isinstance(statement, ast.Import | ast.ImportFrom)
             names = statement.names if isinstance(statement, ast.Import | ast.ImportFrom) else ()
             if number >= self._head or not is_whole or len(course_imports) != len(names):
                 raise NotOneFileError(f"what line {statement.lineno} imports cannot stand there")
             ours += course_imports
-            removed |= {*range(statement.lineno, (statement.end_lineno or 0) + 1)}
+            course_lines |= {*range(statement.lineno, (statement.end_lineno or 0) + 1)}
         for node in ast.walk(ast.Module(script.statements, [])):
             if isinstance(node, ast.Global):
                 self._meanings |= dict.fromkeys(node.names, "assigned")
@@ -166,7 +167,7 @@ class _File:
             self._meanings[bound] = self._origin(module_name, name)
         for bound, module_name, name in sorted(ours, key=self._is_whole):
             self._take(bound, module_name, name)
-        return removed
+        return course_lines
 
     def _origin(self, module_name: str, name: str) -> object:
         """Where a name of a module is defined; a module's own name where it is one."""
@@ -208,32 +209,31 @@ class _File:
     ) -> None:
         """Take what these statements use of a module that they know by the name `bound`."""
         attributes: set[str] = set()
-        others = 0
+        count = 0
         for node in ast.walk(ast.Module([*statements], [])):
             match node:
                 case ast.Attribute(ast.Name(id), attribute, ast.Load()) if id == bound:
                     attributes.add(attribute)
-                    others -= 1
+                    count -= 1
                 case ast.Name(id) if id == bound:
-                    others += 1
+                    count += 1
                 case _:
                     pass
-        if others or self._meanings.setdefault(bound, whole) != whole:
+        if count or self._meanings.setdefault(bound, whole) != whole:
             raise NotOneFileError(f"`{bound}` is used as more than a module")
-        namespace, users = self._namespaces.setdefault(bound, {}), self._users.setdefault(bound, [])
-        users.append(user)
+        place = self._module(f"{bound} =", CourseModule("", ""))
+        user.uses[place.name] = None
+        namespace = self._namespaces.setdefault(bound, {})
         for attribute in sorted(attributes):
             self._imports.add("from types import SimpleNamespace")
-            namespace[attribute] = self._need(user, whole, attribute)
-        for other in users:  # the namespace stands before the first, with all that it needs
-            other.uses |= user.uses
+            namespace[attribute] = self._need(place, whole, attribute)
 
-    def _need(self, user: ModuleCode, module_name: str, name: str, wanted: str = "") -> str:
+    def _need(self, user: ModuleCode, module_name: str, name: str, new_name: str = "") -> str:
         """Take a name of a module and what it needs; return what it is called in the file."""
         source = self._find_module(module_name)
         if source is None:
             raise NotOneFileError(f"there is no module {module_name}")
-        if module_name == _LIBRARY and name == "model_path" and wanted in ("", name):
+        if module_name == _LIBRARY and name == "model_path" and new_name in ("", name):
             self._imports |= {"import tempfile", "from pathlib import Path"}
             self._has_models = True
             return name
@@ -244,34 +244,34 @@ class _File:
         if isinstance(statement, ast.Import | ast.ImportFrom):
             row = next(row for row in module.imported(statement) if row[0] == name)
             if self._find_module(row[1]) is None:
-                return self._keep(wanted or name, self._external(module, name))
+                return self._keep(new_name or name, self._external(module, name))
             if self._find_module(f"{row[1]}.{row[2]}") is not None or not row[2]:
                 raise NotOneFileError(f"{source.path} uses the module {row[1]} as a value")
-            return self._need(user, row[1], row[2], wanted)
-        return self._define(module, name, statement, wanted)
+            return self._need(user, row[1], row[2], new_name)
+        return self._define(module, name, statement, new_name)
 
-    def _define(self, module: ModuleCode, name: str, statement: ast.stmt, wanted: str) -> str:
+    def _define(self, module: ModuleCode, name: str, statement: ast.stmt, new_name: str) -> str:
         meaning = (module.name, name)
         number = module.numbers[name][0]
-        if number in module.needed and not wanted:
+        if number in module.needed and not new_name:
             return module.new_names.get(name, name)
-        same = isinstance(statement, ast.Assign) and ast.unparse(statement)
-        new = wanted or name
-        known = self._meanings.get(new)
-        if known not in (None, meaning, same) or (new in dir(builtins)):
-            new = f"{module.name.rpartition('.')[2]}_{name.strip('_')}"
-            if wanted or self._meanings.get(new, meaning) != meaning:
+        text = isinstance(statement, ast.Assign) and ast.unparse(statement)
+        file_name = new_name or name
+        meaning_there = self._meanings.get(file_name)
+        if meaning_there not in (None, meaning, text) or (file_name in dir(builtins)):
+            file_name = f"{module.name.rpartition('.')[2]}_{name.strip('_')}"
+            if new_name or self._meanings.get(file_name, meaning) != meaning:
                 raise NotOneFileError(f"`{name}` means two things in it")
-        if module.new_names.get(name, new) != new:
+        if module.new_names.get(name, file_name) != file_name:
             raise NotOneFileError(f"it imports `{name}` under two names")
-        self._meanings[new] = same if known == same else meaning
-        if new != name:
-            module.new_names[name] = new
+        self._meanings[file_name] = text if meaning_there == text else meaning
+        if file_name != name:
+            module.new_names[name] = file_name
         if number not in module.needed:
             module.check()
             module.needed.add(number)
             self._need_used(module, statement)
-        return new
+        return file_name
 
     def _need_used(self, module: ModuleCode, statement: ast.stmt) -> None:
         """Take what a statement of a module uses of that module."""
@@ -292,9 +292,9 @@ class _File:
                 if self._find_module(whole) is not None:
                     self._use_whole(module, node.id, whole, [statement])
                     continue
-            new = self._need(module, module.name, node.id)
-            if new != node.id:
-                module.new_names[node.id] = new
+            file_name = self._need(module, module.name, node.id)
+            if file_name != node.id:
+                module.new_names[node.id] = file_name
 
     def _external(self, module: ModuleCode, name: str) -> str:
         """The import of a name from another package, as a line."""
@@ -328,51 +328,46 @@ class _File:
             texts = {path: _literal(text) for path, text in belongings.data.items()}
             comment = "# What the script reads; a file that is there already stays as it is"
             sections.append(f"{comment}\nDATA = {_dictionary(texts)}\n{_DATA}")
-        written = set[str]()
-        for module in (*self._in_order(self._script, set()), self._script):
-            for name, users in self._users.items():
-                if name not in written and module in users and self._namespaces[name]:
-                    written.add(name)
-                    pairs = sorted(self._namespaces[name].items())
-                    rows = "".join(f"    {there}={here},\n" for there, here in pairs)
-                    sections.append(f"{name} = SimpleNamespace(\n{rows})")
-            if module.needed:
+        for module in self._in_order(self._script, set()):
+            bound, sign, _ = module.name.partition(" =")
+            if sign:
+                pairs = sorted(self._namespaces[bound].items())
+                rows = "".join(f"    {attribute}={ours},\n" for attribute, ours in pairs)
+                sections.append(f"{module.name} SimpleNamespace(\n{rows})")
+            elif module.needed:
                 sections.append(f"# --- from {module.source.path}\n\n\n{module.code()}")
         if any(section.startswith("# --- from") for section in sections):
             sections.append("# --- the script itself")
         return sections
 
-    def _in_order(self, module: ModuleCode, seen: set[str]) -> Iterator[ModuleCode]:
+    def _in_order(self, module: ModuleCode, visited: set[str]) -> Iterator[ModuleCode]:
         """The modules that one uses, each after those that it uses itself."""
         for name in module.uses:
-            if name not in seen:
-                seen.add(name)
-                yield from self._in_order(self._modules[name], seen)
+            if name not in visited:
+                visited.add(name)
+                yield from self._in_order(self._modules[name], visited)
                 yield self._modules[name]
 
 
-def _merge_imports(text: str, added: Iterable[str]) -> str:
+def _merge_imports(text: str, new_imports: Iterable[str]) -> str:
     """The script's imports and others: those of Python's own modules in the first group."""
     groups = [group.split("\n") for group in re.split(r"\n{2,}", text.strip("\n")) if group]
     present = {line for group in groups for line in group}
-    lines = [line for line in added if "__future__" not in line and line not in present]
-    for new, at in (
-        ([line for line in lines if _is_standard(line)], 0),
-        ([line for line in lines if not _is_standard(line)], len(groups)),
-    ):
-        there = groups[0] if at == 0 and groups else groups[-1] if groups else []
-        fits = bool(there) and all(_is_import(line, own=at == 0) for line in there)
-        group = there if fits else []
-        group += new
-        if fits:
-            group.sort(key=_import_order)
-        elif new:
-            groups.insert(at, sorted(new, key=_import_order))
+    lines = [line for line in new_imports if "__future__" not in line and line not in present]
+    for is_own, at in ((True, 0), (False, len(groups))):
+        new_lines = [line for line in lines if _is_standard(line) == is_own]
+        nearest = groups[at and -1] if groups else []
+        if nearest and all(_is_plain(line) and _is_standard(line) == is_own for line in nearest):
+            nearest.extend(new_lines)
+            nearest.sort(key=_import_order)
+        elif new_lines:
+            groups.insert(at, sorted(new_lines, key=_import_order))
     return "\n\n".join("\n".join(group) for group in groups)
 
 
-def _is_import(line: str, *, own: bool) -> bool:
-    return line.startswith(("import ", "from ")) and "(" not in line and _is_standard(line) == own
+def _is_plain(line: str) -> bool:
+    """Whether it is an import on a line of its own."""
+    return line.startswith(("import ", "from ")) and "(" not in line
 
 
 def _import_order(line: str) -> tuple[bool, str]:

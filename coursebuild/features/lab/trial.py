@@ -314,8 +314,7 @@ class _LabTrial(Struct, frozen=True):
             tried=len(reply.attempts),
             parity=_in_english(*comparison),
             fill=None if reply.main is None else reply.main["fill"],
-            moved=None if reply.main is None else reply.main["moved"],
-            still=lab.fields.still,
+            play=verdict.play_text(lab, reply.main),
             fallen=tuple(
                 f"`{body['name']}`, to z = {body['height']:.3g} m at t = {body['time']:.3g} s"
                 for body in ([] if reply.main is None else reply.main.get("fallen", []))

@@ -316,10 +316,10 @@ class DocumentWriter:
             return "\n\n".join(parts)
         download = self.page.inputs.downloads.get(block.path)
         if begins and not self.notebook and download is not None:
-            uv, *others = map(marks.code_span, run_commands(download, script.args))
+            uv, *commands = map(marks.code_span, run_commands(download, script.args))
             unpack = self.words("code.unpack", file=download.file) if download.is_archive else ""
-            other = f", {self.words('code.then')} ".join(others)
-            run = f"{self.words('code.run')}: {unpack} {uv}, {self.words('code.or')} {other}"
+            steps = f", {self.words('code.then')} ".join(commands)
+            run = f"{self.words('code.run')}: {unpack} {uv}, {self.words('code.or')} {steps}"
             run += "" if download.was_run else f" ({self.words('code.unrun')})"
             parts.insert(0, " ".join(run.split()))
         if script.parts:
