@@ -362,9 +362,13 @@ class Feature(Struct, frozen=True, kw_only=True):
     against: Callable[[Course, str], Iterable[Diagnostic]] | None = None
     """What the course would lose with the MuJoCo of another interpreter, of which the path is
     given, for `check --against`."""
+    check_document: Callable[[Document], Iterable[Diagnostic]] | None = None
+    """The diagnostics about a document, of which it sees the whole text and nothing else."""
     check: Callable[[Course, Collection[Document]], Iterable[Diagnostic]] | None = None
-    """The diagnostics about some documents of the course that parsing did not find."""
+    """The diagnostics about some documents that the whole course shows. It sees what blocks keep in
+    their summaries, and no prose."""
     check_runs: Callable[[Course, Iterable[ScriptRun]], Iterable[Diagnostic]] | None = None
+    """The diagnostics about what scripts did."""
     unproven: Callable[[Course], Iterable[Diagnostic]] | None = None
     """What the course states, and nothing in it gives, for `check --truth`."""
     check_models: (

@@ -226,13 +226,16 @@ def unproven(course: Course) -> tuple[Diagnostic, ...]:
 
 
 def summarize(document: Document, mathml: Mathml) -> Parsed[dict[str, Struct]]:
-    """The summaries of a document that features make, by feature, with their diagnostics."""
+    """The summaries of a document that features make, by feature, and what is wrong in it."""
     makers = {f.name: f.summary for f in features() if f.summary is not None}
     summaries = {name: make(document, mathml) for name, make in makers.items()}
     values = {
         name: summary.value for name, summary in summaries.items() if summary.value is not None
     }
-    return Parsed(values, tuple(d for summary in summaries.values() for d in summary.diagnostics))
+    diagnostics = [d for summary in summaries.values() for d in summary.diagnostics]
+    for check in (f.check_document for f in features() if f.check_document is not None):
+        diagnostics += check(document)
+    return Parsed(values, tuple(diagnostics))
 
 
 def read_references(
@@ -316,6 +319,7 @@ _RESULTS: dict[str, type] = {
     "draw": Markup,
     "markdown": str,
     "check": Iterable,
+    "check_document": Iterable,
     "check_runs": Iterable,
     "check_models": Iterable,
     "files": Iterable,

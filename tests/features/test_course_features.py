@@ -149,6 +149,16 @@ def test_the_walk_of_the_docs_ends_with_diagrams(course: Folder) -> None:
         assert f"error[mermaid-{rule}]: " in course.main("check").out
 
 
+@pytest.mark.site
+def test_the_rule_of_the_docs_sees_the_whole_text_of_each_document(course: Folder) -> None:
+    course.write("features/todo.py", EXAMPLES[0])
+    course.replace(MAP, '"features/shout.py"', '"features/todo.py"')
+    course.write(course.lesson(), "## Hello\n\nOne *and TODO two*.\n\n- TODO three\n\n`TODO`\n")
+    result = course.main("check")
+    places = re.findall(r"warning\[todo\]: a note to oneself\n  --> .*:(\d+:\d+)\n", result.out)
+    assert (result.status, places) == (0, ["3:6", "5:3"]), result.out
+
+
 def defined_name(node: ast.stmt) -> str:
     """The name that a statement defines; empty for imports."""
     target = node.targets[0] if isinstance(node, ast.Assign) else node
@@ -160,7 +170,7 @@ def defined_name(node: ast.stmt) -> str:
 
 @pytest.fixture
 def inventory(course: Folder) -> Folder:
-    course.write("features/inventory.py", EXAMPLES[0])
+    course.write("features/inventory.py", EXAMPLES[1])
     course.replace(MAP, '"features/shout.py"', '"features/shout.py", "features/inventory.py"')
     course.write("models/box.xml", "<mujoco><worldbody/></mujoco>\n")
     return course

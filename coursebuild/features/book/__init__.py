@@ -3,22 +3,22 @@
 from collections.abc import Callable, Iterable
 from importlib import import_module
 
-from coursebuild.api import ExportContext, Exporter, Feature, OutputFile, SiteFile
+from coursebuild.api import ExportContext, Exporter, Feature, SiteFile
 
 PDF_MARK = "/Keywords (coursebuild: the whole course"
 """The note that replaces that of the time."""
 
 
-def single_file(module: str, function: str) -> Callable[[ExportContext], Iterable[OutputFile]]:
-    """What makes a file; its module is imported when the export is asked for."""
-    return lambda context: (getattr(import_module(f"{__name__}.{module}"), function)(context),)
+def load(module: str, function: str) -> Callable[[ExportContext], Iterable[SiteFile]]:
+    """What makes files, or a single one; its module is imported when the export is asked for."""
 
+    def make(context: ExportContext) -> Iterable[SiteFile]:
+        files: SiteFile | Iterable[SiteFile] = getattr(
+            import_module(f"{__name__}.{module}"), function
+        )(context)
+        return (files,) if isinstance(files, SiteFile) else files
 
-def epub(context: ExportContext) -> Iterable[SiteFile]:
-    """The files of the e-book."""
-    from coursebuild.features.book.epub import epub_files
-
-    return epub_files(context)
+    return make
 
 
 EPUB = Exporter(
@@ -26,7 +26,7 @@ EPUB = Exporter(
     summary="the lessons as an e-book, EPUB 3",
     file="course.epub",
     mark="EPUB/package.opf",
-    make=epub,
+    make=load("epub", "epub_files"),
 )
 PAGE = Exporter(
     name="page",
@@ -34,7 +34,7 @@ PAGE = Exporter(
     file="course.html",
     mark='<meta name="generator" content="coursebuild: the whole course">',
     archive=False,
-    make=single_file("chapters", "page_file"),
+    make=load("chapters", "page_file"),
 )
 PDF = Exporter(
     name="pdf",
@@ -42,7 +42,7 @@ PDF = Exporter(
     file="course.pdf",
     mark=PDF_MARK,
     archive=False,
-    make=single_file("chapters", "pdf_file"),
+    make=load("chapters", "pdf_file"),
 )
 SLIDES = Exporter(
     name="slides",
@@ -51,6 +51,6 @@ SLIDES = Exporter(
     mark='<meta name="generator" content="coursebuild: slides">',
     archive=False,
     of_lesson=True,
-    make=single_file("slides", "slides_file"),
+    make=load("slides", "slides_file"),
 )
 FEATURE = Feature(name="book", exporters=(EPUB, PAGE, PDF, SLIDES))

@@ -21,7 +21,6 @@ from coursebuild.api import (
     Diagnostic,
     Document,
     Feature,
-    Parsed,
     Rule,
     Span,
     diagnose,
@@ -171,7 +170,7 @@ def _is_odd(number: str, unit: str) -> bool:
 
 FEATURE = Feature(
     name="hints",
-    summary=lambda document, mathml: Parsed(None, tuple(unread_marks(document))),
+    check_document=unread_marks,
     check=odd_angles,
     rules=(
         Rule("shown-as-written", "hint", "A character of Markdown would be shown."),

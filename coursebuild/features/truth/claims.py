@@ -37,7 +37,8 @@ from coursebuild.core.registry import kind_of_block
 from coursebuild.core.syntax.document import read_again
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import Number, point_decimals, scan_prose
-from coursebuild.core.text.units import UNIT_PATTERN, find_unit
+from coursebuild.core.text.quantities import unit_behind, unit_of_header
+from coursebuild.core.text.units import find_unit
 from coursebuild.features.arithmetic.evaluate import FormulaComparison, measure, read_numeral
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 from coursebuild.features.arithmetic.statements import FormulaSide, read_statements
@@ -52,9 +53,9 @@ _MODEL_PATH = re.compile(r"models/([\w/-]+)\.xml")
 
 _COUNTS = 12
 _YEARS = range(1600, 2100)
-_UNIT = re.compile(rf"(?:\s*×\s*[\d.]+)*[\s\u00a0\u202f]*({UNIT_PATTERN})")
-"""The unit behind a number, or behind those with which it is multiplied: `20 × 10 × 4 cm`."""
-_HEADER_UNIT = re.compile(r"[(\[]([^()\[\]]+)[)\]]\s*$")
+_OTHER = "\ufffc"
+"""Stands for code, a formula or a link behind a text: `in` is no unit before one."""
+_FACTORS = re.compile(r"(?:\s*×\s*[\d.]+)*")
 _DECIMAL = re.compile(r"\d\.\d")
 _MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
 """Every formula with claims matches this."""
@@ -246,8 +247,7 @@ class _Counter:
     def table(self, table: model.Table) -> None:
         """Add the claims of cells, a number alone in its cell with the unit of its column."""
         headers = (model.plain_text(cell.children) for cell in table.header)
-        matches = (_HEADER_UNIT.search(header) for header in headers)
-        units = [match[1] if match else "" for match in matches]
+        units = [unit_of_header(header).text for header in headers]
         for row in (table.header, *table.rows):
             for cell, unit in zip(row, units, strict=True):
                 text = model.plain_text(cell.children).strip()
@@ -272,7 +272,9 @@ class _Counter:
         row = tuple(inlines)
         for is_text, group in groupby(row, lambda i: isinstance(i, model.Text | model.SoftBreak)):
             if is_text:  # a unit may stand on the next line
-                self.open += _text_claims(group, self.comma)
+                pieces = [*group]
+                following = "" if pieces[-1] is row[-1] else _OTHER
+                self.open += _text_claims(pieces, following, self.comma)
         for inline in row:
             match inline:
                 case model.NumberBinding():
@@ -349,24 +351,33 @@ def find_numbers(text: str, comma: bool = False) -> Iterator[Number]:
             continue
         is_whole = number.is_integer or number.text.endswith(".")
         is_small = is_whole and (number.value in _YEARS or abs(number.value) <= _COUNTS)
-        if not is_small or _UNIT.match(text, number.end):
+        if not is_small or _unit_of(number, text):
             yield number
 
 
-def _text_claims(inlines: Iterable[model.Inline], comma: bool) -> Iterator[StatedNumber]:
+def _unit_of(number: Number, text: str) -> str:
+    """The unit behind a number, or behind those with which it is multiplied: `20 × 10 × 4 cm`."""
+    factors = _FACTORS.match(text, number.end)
+    return unit_behind(text, factors.end() if factors else number.end).text
+
+
+def _text_claims(
+    inlines: Iterable[model.Inline], following: str, comma: bool
+) -> Iterator[StatedNumber]:
     places: list[tuple[int, str, Span]] = []
     text = ""
     for inline in inlines:
         piece = inline.text if isinstance(inline, model.Text) else " "
         places.append((len(text), piece, inline.span))
         text += piece
+    if text[-1:].isspace():
+        text += following
     for number in find_numbers(text, comma):
         start, piece, span = places[bisect_right(places, number.start, key=itemgetter(0)) - 1]
         if span.end - span.start == len(piece):  # not so with escapes in it
             first = span.start + number.start - start
             span = Span(span.source, first, first + len(number.text))
-        unit = _UNIT.match(text, number.end)
-        yield _claim(number, span, unit[1] if unit else "")
+        yield _claim(number, span, _unit_of(number, text))
 
 
 def _claim(number: Number, span: Span, unit_text: str = "") -> StatedNumber:
