@@ -35,14 +35,9 @@ from coursebuild.api import (
     model,
     urls,
 )
+from coursebuild.core.checks.formulas import parse_mathml
 from coursebuild.core.model import Owner
 from coursebuild.core.pages import document_inputs
-from coursebuild.core import model
-from coursebuild.core.checks.formulas import parse_mathml
-from coursebuild.core.features import Feature, PageKind
-from coursebuild.core.model import Lesson, Owner
-from coursebuild.core.model.results import Mathml
-from coursebuild.core.pages import document_inputs, urls
 from coursebuild.core.pages.document_inputs import OwnerLink, OwnerLinks
 from coursebuild.core.pages.numbering import UNNAMED, fill_in, name_outside
 

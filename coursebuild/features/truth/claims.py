@@ -35,7 +35,6 @@ from msgspec.structs import replace
 from coursebuild.api import Diagnostic, Excerpt, Fix, Span, diagnose, did_you_mean, model
 from coursebuild.core.registry import kind_of_block
 from coursebuild.core.syntax.document import read_again
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import Number, point_decimals, scan_prose
 from coursebuild.core.text.quantities import unit_behind, unit_of_header
 from coursebuild.core.text.units import find_unit

@@ -21,11 +21,8 @@ import msgspec
 from msgspec import Raw, Struct
 from msgspec.structs import replace
 
-from coursebuild.api import Diagnostic, EffectError, Options, Store
+from coursebuild.api import Diagnostic, EffectError, Options, Store, UsageError
 from coursebuild.core.files.errors import require
-from coursebuild.cli.arguments import add_cache, add_executors, add_format, add_quiet
-from coursebuild.core.engine.store import Store
-from coursebuild.core.files.errors import EffectError, UsageError, require
 from coursebuild.core.files.read import read_course
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model.diet_findings import DietReport
