@@ -13,7 +13,7 @@ TIME ?= 600
 
 VENV := .venv
 BIN := $(VENV)/bin
-INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+INSTALL := $(BIN)/uv pip install --quiet --python $(BIN)/python --compile-bytecode
 # The packages of this repository that are installed from it.
 OURS := coursebuild mjbench coursebuild-cluster coursebuild-mermaid coursebuild-tabs
 SHELL := /bin/sh
@@ -172,14 +172,20 @@ $(VENV)/.made:
 	$(PYTHON) -m venv --clear $(VENV)
 	@printf '%s' '$(CURDIR)' > $@
 
-$(VENV)/.site: $(VENV)/.made $(BUILD_INPUTS)
+# It installs in a minute what takes pip ten.
+$(BIN)/uv: $(VENV)/.made
+	@sed -n '/^uv==/,/[^\\]$$/p' requirements.lock > $(VENV)/uv.txt
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $(VENV)/uv.txt
+	@touch $@
+
+$(VENV)/.site: $(BIN)/uv $(BUILD_INPUTS)
 	@echo 'installing coursebuild, mjbench and what they need (the first time takes minutes)'
 	@$(BIN)/python site/locked.py figures measure build > $(VENV)/requirements.txt
 	@$(INSTALL) --require-hashes -r $(VENV)/requirements.txt
 	@$(INSTALL) --no-deps --no-build-isolation --editable . --editable ./mjbench
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.made $(BUILD_INPUTS)
+$(VENV)/.dev: $(BIN)/uv $(BUILD_INPUTS)
 	@echo 'installing coursebuild, mjbench, what they and their tests need (the first time takes minutes)'
 	@$(INSTALL) --require-hashes -r requirements.lock
 	@$(INSTALL) --no-deps --no-build-isolation --editable . --editable ./mjbench

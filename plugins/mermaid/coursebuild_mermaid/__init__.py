@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import base64
 import re
+import sys
 from pathlib import Path
+from types import ModuleType
 
-import mmdr
 from markupsafe import Markup
 
 from coursebuild.core.features import Feature, FenceKind, IndexReader, MarkdownWriter
@@ -19,6 +20,13 @@ from coursebuild.core.pages.marks import fence as code_block
 from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Parsed, diagnose
 from coursebuild.core.text.rules import Rule
+
+# It draws pictures of pixels, of which none is needed, and as soon as it is loaded, each command
+# would end with 150 lines about what it leaves behind.
+sys.modules["novasvg"] = ModuleType("novasvg")
+import mmdr  # noqa: E402
+
+del sys.modules["novasvg"]
 
 SIZE = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
 
