@@ -13,7 +13,9 @@ TIME ?= 600
 
 VENV := .venv
 BIN := $(VENV)/bin
-INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+INSTALL := $(BIN)/uv pip install --quiet --python $(BIN)/python --compile-bytecode
+# The packages of this repository that are installed from it.
+OURS := coursebuild mjbench coursebuild-cluster coursebuild-mermaid coursebuild-tabs
 SHELL := /bin/sh
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -48,7 +50,7 @@ help:
 	@echo 'make lint       check style and formatting; make format mends what can be mended'
 	@echo 'make types      check types, of Python and of JavaScript'
 	@echo 'make vscode     try and make the extension for Visual Studio Code, in editors/vscode/dist/'
-	@echo 'make dist       wheels and source distributions of coursebuild and mjbench, in dist/'
+	@echo 'make dist       wheels and source distributions of all packages, in dist/'
 	@echo 'make lock       lock what pyproject.toml newly asks for; UPGRADE=--upgrade: all, in newest versions'
 	@echo 'make clean      remove what was built; make distclean also what was installed'
 
@@ -116,7 +118,7 @@ OF_THIS_ENGINE := tests/core/text/test_format_mistakes.py tests/mjcourse/test_ag
 
 test-oldest: $(VENV)/.dev npm
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(OLDEST)
-	$(BIN)/uv pip compile --quiet --resolution lowest-direct --no-emit-package mjbench pyproject.toml --extra lsp --extra figures --extra measure -o $(OLDEST)/packages.txt
+	$(BIN)/uv pip compile --quiet --resolution lowest-direct $(addprefix --no-emit-package ,$(OURS)) pyproject.toml --extra lsp --extra figures --extra measure -o $(OLDEST)/packages.txt
 	$(BIN)/uv pip install --quiet --python $(OLDEST) -c $(OLDEST)/packages.txt --group dev --editable '.[figures,lsp,measure]' --editable ./mjbench
 	PATH="$$PATH:$$($(BIN)/python site/bundle.py node)" $(OLDEST)/bin/python -m pytest $(QUICK) \
 	  $(addprefix --deselect ,$(OF_THIS_ENGINE))
@@ -142,13 +144,13 @@ vscode: $(VENV)/.site
 
 dist: $(VENV)/.site
 	rm -rf dist
-	$(BIN)/python -m hatchling build
-	cd mjbench && ../$(BIN)/python -m hatchling build -d ../dist
+	for folder in . mjbench plugins/*; do \
+	  (cd $$folder && '$(CURDIR)/$(BIN)/python' -m hatchling build -d '$(CURDIR)/dist') || exit; done
 
 # A MuJoCo Warp says itself of no MuJoCo that it is for.
 lock: $(VENV)/.dev
 	echo 'mujoco-warp<3.15' | $(BIN)/uv pip compile --quiet $(UPGRADE) --universal --python-version 3.11 --generate-hashes \
-	  --no-emit-index-url --no-emit-package mjbench --custom-compile-command 'make lock' \
+	  --no-emit-index-url $(addprefix --no-emit-package ,$(OURS)) --custom-compile-command 'make lock' \
 	  pyproject.toml --all-extras --group dev -c - -o requirements.lock
 
 clean:
@@ -170,14 +172,20 @@ $(VENV)/.made:
 	$(PYTHON) -m venv --clear $(VENV)
 	@printf '%s' '$(CURDIR)' > $@
 
-$(VENV)/.site: $(VENV)/.made $(BUILD_INPUTS)
+# It installs in a minute what takes pip ten.
+$(BIN)/uv: $(VENV)/.made
+	@sed -n '/^uv==/,/[^\\]$$/p' requirements.lock > $(VENV)/uv.txt
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $(VENV)/uv.txt
+	@touch $@
+
+$(VENV)/.site: $(BIN)/uv $(BUILD_INPUTS)
 	@echo 'installing coursebuild, mjbench and what they need (the first time takes minutes)'
 	@$(BIN)/python site/locked.py figures measure build > $(VENV)/requirements.txt
 	@$(INSTALL) --require-hashes -r $(VENV)/requirements.txt
 	@$(INSTALL) --no-deps --no-build-isolation --editable . --editable ./mjbench
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.made $(BUILD_INPUTS)
+$(VENV)/.dev: $(BIN)/uv $(BUILD_INPUTS)
 	@echo 'installing coursebuild, mjbench, what they and their tests need (the first time takes minutes)'
 	@$(INSTALL) --require-hashes -r requirements.lock
 	@$(INSTALL) --no-deps --no-build-isolation --editable . --editable ./mjbench

@@ -21,6 +21,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -153,13 +154,14 @@ class Copy:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, folder / name)
         shutil.copytree(ROOT / "site/dist", folder / "site/dist")
+        self.time = int(time.time())
         self.failing: list[str] = []  # as options that leave out these tests, also without a change
 
     def first_failure(self, tests: Iterable[str], *options: str) -> str:
         """The first test that fails; empty where none does."""
         words = ["-q", "-x", "-p", "no:cacheprovider", "-m", UNMEASURED, *options, *tests]
         paths = os.pathsep.join((str(self.folder), str(self.folder / "tests")))
-        variables = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
+        variables = {**os.environ, "PYTHONPATH": paths}
         try:
             result = subprocess.run(
                 (sys.executable, "-m", "pytest", *words),
@@ -176,6 +178,12 @@ class Copy:
             return "they cannot be run"
         return failed[0] if failed else ""
 
+    def write(self, file: Path, data: bytes) -> None:
+        """Write a module, with a time by which Python knows that it was compiled before."""
+        self.time += 10
+        file.write_bytes(data)
+        os.utime(file, (self.time, self.time))
+
     def try_out(self, mutant: Mutant) -> str:
         """A test that notices a change, and passes without it; empty where none does."""
         file = self.folder / mutant.path
@@ -183,9 +191,9 @@ class Copy:
         changed = source[: mutant.start] + mutant.new.encode() + source[mutant.end :]
         for tests in tests_of(mutant.path):
             while True:
-                file.write_bytes(changed)
+                self.write(file, changed)
                 failed = self.first_failure(tests, *self.failing)
-                file.write_bytes(source)
+                self.write(file, source)
                 if not failed:
                     break
                 if "::" not in failed or not self.first_failure([failed]):

@@ -36,6 +36,9 @@ PLACES = {
     "coursebuild/__init__.py": ['__version__ = "{}"\n'],
     "pyproject.toml": ['\nversion = "{}"\n'],
     "mjbench/pyproject.toml": ['\nversion = "{}"\n'],
+    "plugins/cluster/pyproject.toml": ['\nversion = "{}"\n'],
+    "plugins/mermaid/pyproject.toml": ['\nversion = "{}"\n'],
+    "plugins/tabs/pyproject.toml": ['\nversion = "{}"\n'],
     "CITATION.cff": ["\nversion: {}\n"],
     "editors/vscode/package.json": ['\n  "version": "{}",\n'],
     "editors/vscode/package-lock.json": [

@@ -21,11 +21,12 @@ def needs(names: Iterable[str] = (), folder: Path = ROOT) -> Iterator[str]:
     """The packages that a project needs with these extras and groups, itself or by one of ours."""
     text = tomllib.loads((folder / "pyproject.toml").read_text("utf-8"))
     project = text["project"]
+    ours = text.get("tool", {}).get("uv", {}).get("sources", {})
     optional = project.get("optional-dependencies", {}) | text.get("dependency-groups", {})
     for line in (*project["dependencies"], *(line for name in names for line in optional[name])):
         package, extras = re.findall(r"^([\w.-]+)(?:\[([\w,-]+)\])?", line)[0]
-        if (ROOT / package / "pyproject.toml").is_file():
-            yield from needs(filter(None, extras.split(",")), ROOT / package)
+        if package in ours:
+            yield from needs(filter(None, extras.split(",")), folder / ours[package]["path"])
         else:
             yield package
 

@@ -58,7 +58,7 @@ _OUR_NAMES = {
     "watch": "serve",
 }
 """The names here of commands that other tools have."""
-_OPTIONS_OF_PACKAGES = {"--cluster": "install `plugins/cluster` of coursebuild"}
+_OPTIONS_OF_PACKAGES = {"--cluster": "run `pip install 'coursebuild[cluster]'`"}
 """Where options come from that are not of the core."""
 _FILES_NEEDED = 64
 """For pipes of processes, the store, event loops, and what scripts open."""

@@ -68,9 +68,9 @@ _INSTALLED_BY = {
     "bench": "coursebuild with its recorded reports",
     "io": "coursebuild with its io cards",
     "lab": "coursebuild with its labs",
-    "mermaid": "`plugins/mermaid` of coursebuild",
+    "mermaid": "`coursebuild[mermaid]`",
     "quiz": "coursebuild with its quizzes",
-    "tabs": "`plugins/tabs` of coursebuild",
+    "tabs": "`coursebuild[tabs]`",
 }
 """Where the features come from that courses commonly use, for messages."""
 

@@ -46,15 +46,16 @@ def locked_requirements(root: Path, pyproject: dict) -> list[str]:
     """What is declared here and by the packages of this repository, but for these packages."""
     local = pyproject["tool"]["uv"]["sources"]
     lines = declared_requirements(pyproject)
-    for name in local:
-        text = (root / name / "pyproject.toml").read_text(encoding="utf-8")
+    for source in local.values():
+        text = (root / source["path"] / "pyproject.toml").read_text(encoding="utf-8")
         lines += declared_requirements(tomllib.loads(text))
-    return [line for line in lines if Requirement(line).name not in local]
+    ours = {"coursebuild", *local}
+    return [line for line in lines if Requirement(line).name not in ours]
 
 
 def declared_requirements(pyproject: dict) -> list[str]:
     project, groups = pyproject["project"], pyproject.get("dependency-groups", {})
-    extras = project["optional-dependencies"].values()
+    extras = project.get("optional-dependencies", {}).values()
     lines = [*project["dependencies"], *(line for extra in extras for line in extra)]
     return lines + [line for group in groups.values() for line in group if isinstance(line, str)]
 

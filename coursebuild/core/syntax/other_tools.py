@@ -21,7 +21,7 @@ from coursebuild.core.text.source import Excerpt
 
 _CALLOUT = "a callout is a quotation: `> [!note]`, and `> ` before each line of it"
 _TEXT = "write the text itself, or put it into backticks if readers should see it"
-_TABS = "tabs are a feature: `plugins/tabs` of coursebuild"
+_TABS = "tabs are a feature: install `coursebuild[tabs]`"
 _INCLUDE = "write the text itself; a fence with `source=` shows a part of a file"
 _MARKS = {
     "!!! ": ("an admonition of MkDocs", _CALLOUT),

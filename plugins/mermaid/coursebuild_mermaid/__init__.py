@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import base64
 import re
+import sys
 from pathlib import Path
+from types import ModuleType
 
-import mmdr
 from markupsafe import Markup
 
 from coursebuild.api import (
@@ -26,6 +27,13 @@ from coursebuild.api import (
     diagnose,
     marks,
 )
+
+# It draws pictures of pixels, of which none is needed, and as soon as it is loaded, each command
+# would end with 150 lines about what it leaves behind.
+sys.modules["novasvg"] = ModuleType("novasvg")
+import mmdr  # noqa: E402
+
+del sys.modules["novasvg"]
 
 SIZE = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
 

@@ -340,7 +340,7 @@ def test_what_is_not_there(
     result = folder.run("check", "--cluster", "local")
     assert (result.status, result.err) == (
         2,
-        "coursebuild: there is no option `--cluster`; install `plugins/cluster` of coursebuild\n",
+        "coursebuild: there is no option `--cluster`; run `pip install 'coursebuild[cluster]'`\n",
     )
     result = run(folder, "update", "--long", "--cluster", "local")
     assert result.err == "coursebuild: --long cannot be combined with --cluster\n"
