@@ -171,14 +171,6 @@ def _state(root: str, input_paths: list[str], began: int | None = None) -> str:
     return _hash((sys.executable, *variables), (*course, *_tool(), *input_paths), began)
 
 
-def tool_state() -> str | None:
-    """A hash over the tool, Python and the installed packages; `None` where it is not reliable."""
-    try:
-        return _hash((), _tool(), None)
-    except (OSError, _UnclearError):
-        return None
-
-
 def _tool() -> list[str]:
     package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     source = os.path.dirname(package)

@@ -187,7 +187,15 @@ def read_and_verify(
         return judge(None, parsed_course.diagnostics, began, strict=options.strict)
     selected = select(course, names, options.root)
     options = options.for_course(course)
-    verification = verify(course, options, selected, static=static, shard=shard, repeat=repeat)
+    verification = verify(
+        course,
+        options,
+        selected,
+        static=static,
+        shard=shard,
+        repeat=repeat,
+        imports=reader.imports,
+    )
     reports = shown_reports(options.root, course)
     diagnostics = (
         *parsed_course.diagnostics,

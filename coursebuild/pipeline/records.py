@@ -38,17 +38,24 @@ from coursebuild.pipeline.recordings import read_recorded
 
 
 def with_provenance(
-    runs: Mapping[str, ScriptRun], scripts: Iterable[Extraction], options: Options
+    runs: Mapping[str, ScriptRun],
+    scripts: Iterable[Extraction],
+    options: Options,
+    imports: Mapping[str, frozenset[str]],
 ) -> dict[str, ScriptRun]:
     """The runs, by path, each with what it ran with here.
 
-    One that was known before has it already, and one that the course keeps ran elsewhere.
+    One that was known before has it already, and one that the course keeps ran elsewhere. `imports`
+    has the modules that scripts import, as far as they are known.
     """
     texts = {script.path: script.text for script in scripts}
     new_runs = [
         run for run in runs.values() if run.did_run and run.provenance is None and not run.recorded
     ]
-    imports_by_path = {run.path: find_imports(texts[run.path]) for run in new_runs}
+    imports_by_path = {
+        run.path: imports[run.path] if run.path in imports else find_imports(texts[run.path])
+        for run in new_runs
+    }
     modules_by_path = {
         run.path: imports_by_path[run.path] if run.trace is None else frozenset(run.trace.modules)
         for run in new_runs
@@ -70,13 +77,13 @@ def with_provenance(
         return find_imports(text)
 
     def provenance(run: ScriptRun) -> Provenance:
-        imports = {*imports_by_path[run.path]}
+        names = {*imports_by_path[run.path]}
         for path in () if run.trace is None else run.trace.files:
             is_of_course = path.endswith(".py") and not path.startswith("mjcourse/")  # our package
-            imports |= imports_of(path) if is_of_course else frozenset()
-        imports |= {"mujoco"} if "mjcourse" in imports else set()
+            names |= imports_of(path) if is_of_course else frozenset()
+        names |= {"mujoco"} if "mjcourse" in names else set()
         all_packages = _versions(packages, modules_by_path[run.path])
-        direct = _versions(packages, imports & modules_by_path[run.path])
+        direct = _versions(packages, names & modules_by_path[run.path])
         requirements = tuple(pair for pair in all_packages if pair not in direct)
         return Provenance(python, surroundings["platform"], direct, requirements)
 

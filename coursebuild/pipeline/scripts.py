@@ -121,12 +121,14 @@ def run(
     known_runs: Mapping[str, ScriptRun] | None = None,
     *,
     only_recorded: bool = False,
+    imports: Mapping[str, frozenset[str]] = {},
 ) -> tuple[ScriptRun, ...]:
     """Return the results of scripts: remembered ones, and those of the others, which run now.
 
     `run_store` replaces that of the options. `perturbation`: with initial states moved, in the
     direction of this number. `known_runs`: results, by path, that are known to hold.
-    `only_recorded`: none runs of which nothing is recorded yet.
+    `only_recorded`: none runs of which nothing is recorded yet. `imports`: the modules that scripts
+    import, by path, as far as they are known.
     """
     extractions, tell = tuple(scripts), options.on_result
     if tell is not None:
@@ -155,7 +157,7 @@ def run(
             runs |= {path: ScriptRun(path, Outcome.UNRECORDED, 0, "", "", 0.0) for path in blank}
             jobs_to_run = [job for job in jobs_to_run if job.path not in blank]
         runs |= _run(jobs_to_run, inputs, options, stage, run_store, records)
-    runs = with_provenance(runs, extractions, options)
+    runs = with_provenance(runs, extractions, options, imports)
     return tuple(runs[job.path] for job in all_jobs)
 
 

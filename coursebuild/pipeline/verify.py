@@ -88,6 +88,7 @@ def verify(
     addresses: Addresses | None = None,
     known_runs: Mapping[str, ScriptRun] | None = None,
     other_runs: Mapping[str, ScriptRun] | None = None,
+    imports: Mapping[str, frozenset[str]] = {},
 ) -> Verification:
     """Verify a course, or only what stands in the documents with these paths.
 
@@ -95,7 +96,7 @@ def verify(
     from a script's only run must be borne out by another, now. `addresses`: where shown values
     held before, besides what is remembered; it gets where they hold now. A preview has
     `known_runs`, by path, that are known to hold, and `other_runs` of the same scripts, and repeats
-    nothing here.
+    nothing here. `imports`: the modules that scripts import, by path, as far as they are known.
     """
     options.store.listen(options.progress.say)
     options = options.for_course(course)
@@ -120,7 +121,7 @@ def verify(
     )
     runner = _ScriptRunner(course, options, extracted_scripts, scripts, known_runs, addresses)
     runs, (trial_results, trial_diagnostics) = _run_with_trials(
-        runner.run, trials, context, options.progress
+        lambda: runner.run(imports), trials, context, options.progress
     )
     verdicts, figure_diagnostics, lines = runner.judge(runs)
     if not is_preview:
@@ -206,7 +207,7 @@ class _ScriptRunner:
         self.addresses = addresses
         self.store = options.run_store()
 
-    def run(self) -> tuple[ScriptRun, ...]:
+    def run(self, imports: Mapping[str, frozenset[str]]) -> tuple[ScriptRun, ...]:
         return run(
             self.course,
             self.scripts,
@@ -214,6 +215,7 @@ class _ScriptRunner:
             run_store=self.store,
             known_runs=self.known_runs,
             only_recorded=self.known_runs is None,
+            imports=imports,
         )
 
     def find_doubtful(self, lines: Iterable[ScriptLine], *, repeat: bool) -> set[str]:

@@ -152,7 +152,7 @@ def _read_signs(mathml: str) -> _Signs | None:
 # --- letters
 
 
-def _letter_runs(elements: Sequence[Element], parent: str = "") -> Iterator[str]:
+def _letter_runs(elements: Iterable[Element], parent: str = "") -> Iterator[str]:
     """The letters that stand beside each other as names of their own; indices are words."""
     run = ""
     for at, child in enumerate(elements):
@@ -192,8 +192,9 @@ def _check_letters(
 # --- brackets
 
 
-def _brackets(children: Sequence[Element]) -> Iterator[tuple[int, ...]]:
+def _brackets(elements: Iterable[Element]) -> Iterator[tuple[int, ...]]:
     """What each bracket of a formula may be."""
+    children = [*elements]
     for before, child, after in zip(
         (None, *children), children, (*children[1:], None), strict=False
     ):

@@ -197,7 +197,7 @@ _FOREIGN = re.compile(r"[^\x00-\x7f]")
 def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:
     """The characters outside ASCII of a page's text and of its formulas; see `PageFacts`."""
     parts = FORMULA.split(html)
-    formulas = {" "} if len(parts) > 1 else set[str]()
+    formulas = frozenset(" " if len(parts) > 1 else "")
     return _characters("\n".join(parts[::2])), formulas.union(*map(_of_formula, parts[1::2]))
 
 

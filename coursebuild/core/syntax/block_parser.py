@@ -209,27 +209,11 @@ _WITH_TEXT = frozenset("fence code_block html_block paragraph_open math_block".s
 """Types of tokens whose content is the text that the last rule cut out."""
 
 
-_FIRST_SIGNS = {
-    "math": "$",
-    "footnote": "[",
-    "fence": "`~",
-    "blockquote": ">",
-    "hr": "*-_",
-    "list": "*+-0123456789",
-    "reference": "[",
-    "html_block": "<",
-    "heading": "#",
-}
-"""The characters with which the blocks of some rules begin: no other line is tried."""
-
-
-def _with_places(rule: BlockRule, first_signs: str) -> BlockRule:
+def _with_places(rule: BlockRule) -> BlockRule:
 
     def run(state: StateBlock, start: int, end: int, silent: bool) -> bool:
         assert isinstance(state, BlockState)
         begin = state.bMarks[start] + state.tShift[start]
-        if first_signs and state.src[begin : begin + 1] not in first_signs:
-            return False
         token_count = len(state.tokens)
         applies = rule(state, start, end, silent)
         if applies and len(state.tokens) > token_count:
@@ -278,5 +262,4 @@ _RULES: dict[str, tuple[BlockRule, list[str]]] = {
 """Our rules and those of markdown-it, each with the blocks that it may interrupt."""
 _MARKDOWN.block.ruler = Ruler()
 for _name, (_rule, _alt) in _RULES.items():
-    _placed_rule = _with_places(_rule, _FIRST_SIGNS.get(_name, ""))
-    _MARKDOWN.block.ruler.push(_name, _placed_rule, {"alt": _alt})
+    _MARKDOWN.block.ruler.push(_name, _with_places(_rule), {"alt": _alt})

@@ -43,6 +43,7 @@ _TOKEN = re.compile(
     rf"|(?P<number>(?:(?<![\w.)\]]){_SIGN})?{_MAGNITUDE}{_ENDS})"
     r"|(?P<word>[^\W\d]\w*(?:\.[0-9]\w*)*(?:-[0-9][\w.]*)*))"
 )
+_MAY_HOLD_NUMBERS = re.compile("[0-9]|nan|inf", re.IGNORECASE)
 _GROUPS = re.compile(
     r"(?<![0-9.,])[1-9][0-9]{0,2}(?:,[0-9]{3})+(?:\.[0-9]+)?(?!,?[0-9])(?!\.[0-9])"
 )
@@ -107,12 +108,16 @@ def has_groups(text: str) -> bool:
 def scan(text: str, is_grouped: bool = False) -> tuple[Number, ...]:
     """The numbers of a text, in order; if it is grouped, `1,234.5` is one."""
     numbers: list[Number] = []
-    for match in _TOKEN.finditer(text):
+    for match in _TOKEN.finditer(text) if _MAY_HOLD_NUMBERS.search(text) else ():
         kind = match.lastgroup
+        if kind not in ("number", "imaginary", "special"):
+            continue
         if is_grouped and numbers and match.start() < numbers[-1].end:
             continue
-        groups = _GROUPS.match(text, match.end() - len(match[0].lstrip("+-\u2212")))
-        if is_grouped and kind == "number" and groups is not None:
+        groups = None
+        if is_grouped and kind == "number":
+            groups = _GROUPS.match(text, match.end() - len(match[0].lstrip("+-\u2212")))
+        if groups is not None:
             digits = text[match.start() : groups.end()]
             value = Decimal(digits.replace("\u2212", "-").replace(",", ""))
             place = -len(digits.partition(".")[2])
@@ -120,7 +125,7 @@ def scan(text: str, is_grouped: bool = False) -> tuple[Number, ...]:
                 Number(match.start(), groups.end(), digits, value, place, "." not in digits)
             )
             continue
-        if kind in ("number", "imaginary", "special") and match.end() - match.start() <= _LONGEST:
+        if match.end() - match.start() <= _LONGEST:
             digits = match.group()
             value = Decimal(digits.replace("\u2212", "-"))
             exponent = value.as_tuple().exponent
