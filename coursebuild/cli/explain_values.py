@@ -13,7 +13,7 @@ from msgspec import Struct
 from coursebuild.core.model import Course, Document, NumberBinding, Table, find_inlines
 from coursebuild.core.model.lesson_record import known_addresses
 from coursebuild.core.scripts.bindings import check_bindings
-from coursebuild.core.scripts.bound_places import bound_values, find_texts
+from coursebuild.core.scripts.bound_places import BoundNumber, bound_values
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
@@ -58,7 +58,7 @@ def value_origins(course: Course, path: str, line: int) -> tuple[ValueOrigin, ..
     origins = [*_given_values(document)]
     for binding, value in bound_values(document, outputs):
         at = addresses.get(value, ())
-        bound = find_texts(binding, outputs, at)
+        bound = BoundNumber(binding, outputs, at)
         places = [place for texts in bound.groups for place in bound.look_up(texts)]
         spans = [place.span for place in places if place.span is not None]
         texts = tuple(f"number {a.place + 1} of {describe_line(a)}" for a in at)

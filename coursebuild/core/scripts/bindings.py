@@ -20,7 +20,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.lesson_record import Address, Addresses
+from coursebuild.core.model.lesson_record import Addresses
 from coursebuild.core.model.results import Change, DriftKind, Outcome, Verdict
 from coursebuild.core.scripts.bound_numbers import (
     BoundText,
@@ -31,8 +31,6 @@ from coursebuild.core.scripts.bound_places import (
     BoundNumber,
     bound_values,
     document_bindings,
-    find_texts,
-    following_text,
     place_note,
 )
 from coursebuild.core.scripts.lines import plain_text
@@ -73,7 +71,7 @@ def check_bindings(
     addresses = {} if addresses is None else addresses
     diagnostics: list[Diagnostic] = []
     for binding, value in bound_values(document, outputs):
-        diagnostic, places = _check(binding, outputs, addresses.get(value, ()))
+        diagnostic, places = _check(BoundNumber(binding, outputs, addresses.get(value, ())))
         if diagnostic is not None:
             diagnostics.append(_with_likely_scripts(document, binding, outputs, diagnostic))
         at = tuple(address for place in places if (address := place.address) is not None)
@@ -114,39 +112,32 @@ def _with_likely_scripts(
 _Finding: TypeAlias = tuple[Diagnostic | None, Sequence[PrintedPlace]]
 
 
-def _check(
-    binding: model.NumberBinding, outputs: PrintedOutputs, at: tuple[Address, ...]
-) -> _Finding:
+def _check(bound: BoundNumber) -> _Finding:
     """What is wrong with a binding, and where it holds: nowhere if it is unchecked, or a text."""
-    verdicts, path = outputs.of_binding(binding), outputs.script_of(binding)
-    if path is None or path not in outputs.scripts:
-        return _orphan_diagnostic(binding, path, outputs), ()
-    run = outputs.runs.get(path)
-    ran_well = run is not None and run.outcome is Outcome.OK
-    outputs_of_run = () if run is None else (run.output_of(v.recording.part) for v in verdicts)
-    printed = dict.fromkeys(outputs_of_run)
+    binding, run, verdicts = bound.binding, bound.run, bound.verdicts
+    if bound.path not in bound.outputs.scripts:
+        return _orphan_diagnostic(bound), ()
+    is_silent = not any(run.output_of(v.recording.part).strip() for v in verdicts) if run else False
     if run is not None and (
-        run.outcome in _SILENT_OUTCOMES or (verdicts and ran_well and not "".join(printed).strip())
+        run.outcome in _SILENT_OUTCOMES or (verdicts and bound.ran_well and is_silent)
     ):
         return None, ()
-    if not verdicts and not ran_well:
+    if not verdicts and not bound.ran_well:
         is_run = run is None or run.outcome is not Outcome.NORUN
-        return None if is_run else _orphan_diagnostic(binding, path, outputs), ()
-    bound = find_texts(binding, outputs, at)
+        return None if is_run else _orphan_diagnostic(bound), ()
     if not bound.text.numbers:
         lines = (line for texts in bound.groups for text in texts for line in text.lines)
         if next(text_places(bound.text.before, lines), None) is not None:
             return None, ()
     places = bound.places() if bound.text.numbers else []
     if places:
-        mismatch = _wrong_unit(binding, bound.text, path, places[:1])
+        mismatch = _wrong_unit(bound, bound.text, places[:1])
         if mismatch is not None:
             return mismatch, ()
         quantities = {place.quantity(binding.words) for place in places} - {None}
         return _ambiguous(bound, places) if len(quantities) > 1 else None, places
-    steady = [v for v in verdicts if v.comparison.mode is not model.Mode.VOLATILE]
-    varying = [v.recording for v in verdicts if v not in steady or v.comparison.volatile]
-    if varying and (not steady or bound.text.is_in(map(PrintedText.of_recording, varying))):
+    varying = [v.recording for v in verdicts if v not in bound.steady or v.comparison.volatile]
+    if varying and (not bound.steady or bound.text.is_in(map(PrintedText.of_recording, varying))):
         message = f"`{binding.text}` is bound to an output that differs from run to run"
         help = "remove `{out}`, or narrow `volatile` so that this number is compared"
         return diagnose("binding-volatile", binding.text_span, message, help=help), ()
@@ -168,51 +159,43 @@ _MAX_NOTES = 4
 
 
 def _wrong_unit(
-    binding: model.NumberBinding,
-    bound_text: BoundText,
-    path: str,
-    places: Iterable[PrintedPlace],
+    bound: BoundNumber, text: BoundText, places: Iterable[PrintedPlace]
 ) -> Diagnostic | None:
     """The diagnostic of a number whose unit is another than is printed with it at any place."""
-    mismatch = bound_text.wrong_unit(places, following_text(binding))
+    mismatch = text.wrong_unit(places, bound.following)
     if mismatch is None:
         return None
     number, printed_text, unit_text = mismatch
     quantity = with_unit(number.text, printed_text)
-    message = f"`{path}` printed `{quantity}`, and the unit here is `{unit_text}`"
+    message = f"`{bound.path}` printed `{quantity}`, and the unit here is `{unit_text}`"
     help = "write the unit that is printed, or let the script convert the number; where it is not"
     help += ' meant, write `{given="…"}` in place of `{out}`'
-    return diagnose("binding-mismatch", binding.text_span, message, help=help)
+    return diagnose("binding-mismatch", bound.binding.text_span, message, help=help)
 
 
-def unprinted_unit(binding: model.NumberBinding, outputs: PrintedOutputs) -> str:
+def unprinted_unit(bound: BoundNumber) -> str:
     """The unit of a bound number that is printed with none; empty if there is no such."""
-    if outputs.script_of(binding) not in outputs.scripts:
-        return ""
-    bound = find_texts(binding, outputs, ())
-    shown_units = bound.text.units(following_text(binding))
-    if not any(shown_units) or not bound.text.numbers:
-        return ""
-    printed_units = [place.units for place in bound.places()]
+    is_known = bound.path in bound.outputs.scripts and bound.text.numbers
+    shown_units = bound.text.units(bound.following) if is_known else []
+    printed_units = [place.units for place in bound.places()] if any(shown_units) else []
     for at, unit in enumerate(shown_units):
         if unit and printed_units and not any(units[at] for units in printed_units):
             return unit.text
     return ""
 
 
-def _orphan_diagnostic(
-    binding: model.NumberBinding, path: str | None, outputs: PrintedOutputs
-) -> Diagnostic:
+def _orphan_diagnostic(bound: BoundNumber) -> Diagnostic:
     """A binding that has no output: none above it, no such script, or one that is not run."""
-    if path is None:
+    binding, path, scripts = bound.binding, bound.path, bound.outputs.scripts
+    if not path:
         target = ", but there is no recorded output above it"
         help = "write it below the output, or name the script: `{out=examples/…}`"
-    elif path in outputs.scripts:
+    elif path in scripts:
         target = f" to `{path}`, which has no recorded output and is not run"
         help = "record its output below it"
     else:
         target = f" to `{path}`, which is not a script of the course"
-        help = did_you_mean(path, outputs.scripts)
+        help = did_you_mean(path, scripts)
         if isinstance(help, Fix):
             help = help.at(binding.span)
     message = f"`{binding.text}` is bound{target}"
@@ -263,7 +246,7 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
     elif stray and bare.is_in(outputs):
         message = f"`{path}` printed no `{stray}` beside the number in `{binding.text}`"
         help = Fix(f"remove the `{stray}`", "", stray)
-    elif mismatch := _wrong_unit(binding, bare, path, bare.shown_places(outputs)):
+    elif mismatch := _wrong_unit(bound, bare, bare.shown_places(outputs)):
         return mismatch
     elif pointed != binding.text and with_point.numbers and with_point.is_in(outputs):
         message = f"`{binding.text}` has a comma where outputs have a decimal point"

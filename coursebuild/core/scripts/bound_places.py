@@ -15,13 +15,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cached_property
 
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.model.lesson_record import Address, Addresses, ShownValue, shown_values
-from coursebuild.core.model.results import Outcome, Verdict
+from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.column_titles import ColumnTitle
 from coursebuild.core.scripts.lines import plain_text
@@ -106,16 +107,75 @@ def place_note(
     return Note(message, place.span, (edit,) if is_whole else ())
 
 
-class BoundNumber(Struct, frozen=True):
+class BoundNumber(Struct, frozen=True, dict=True):
     """A binding with the outputs in which it may be found."""
 
     binding: model.NumberBinding
-    path: str
-    text: BoundText
-    groups: tuple[tuple[PrintedText, ...], ...]
-    """Recorded texts, then what a run printed where that counts, too."""
-    addresses: tuple[Address, ...]
+    outputs: PrintedOutputs
+    addresses: tuple[Address, ...] = ()
     """Where it held before; none where that is not known."""
+
+    @cached_property
+    def verdicts(self) -> list[Verdict]:
+        """The recorded outputs that it depends on."""
+        return self.outputs.of_binding(self.binding)
+
+    @property
+    def path(self) -> str:
+        """The script that it depends on; empty where there is none above it."""
+        return self.binding.script or next((v.recording.script or "" for v in self.verdicts), "")
+
+    @property
+    def run(self) -> ScriptRun | None:
+        return self.outputs.runs.get(self.path)
+
+    @property
+    def ran_well(self) -> bool:
+        return self.run is not None and self.run.outcome is Outcome.OK
+
+    @cached_property
+    def steady(self) -> list[Verdict]:
+        """Those of the recorded outputs that are compared."""
+        return [v for v in self.verdicts if v.comparison.mode is not model.Mode.VOLATILE]
+
+    @cached_property
+    def recorded(self) -> list[PrintedText]:
+        return list(map(self.outputs.text, self.steady))
+
+    @property
+    def printed(self) -> list[PrintedText]:
+        """What this run printed in the parts of the recorded outputs; nothing if it failed."""
+        filters = [f for v in self.steady for f in v.comparison.own_filters]
+        parts = dict.fromkeys(v.recording.part for v in self.verdicts) or (None,)
+        texts = (self.outputs.text_of_run(self.path, filters, part) for part in parts)
+        return list(texts) if self.ran_well else []
+
+    @cached_property
+    def groups(self) -> list[list[PrintedText]]:
+        """Recorded texts, then what the run printed where that counts, too."""
+        counts = not self.verdicts or any(
+            v.comparison.ellipsis
+            or v.status == "drift"
+            or isinstance(v.recording.body, model.Table)
+            for v in self.steady
+        )
+        return [self.recorded, self.printed] if counts and self.ran_well else [self.recorded]
+
+    @cached_property
+    def text(self) -> BoundText:
+        """Its text; a comma in it may stand before decimals, or part numbers."""
+        binding, texts = self.binding, [text for group in self.groups for text in group]
+        with_comma = BoundText.of(binding.text, binding.comma)
+        as_printed = BoundText.of(binding.text)
+        is_list = with_comma.comma and as_printed.is_in(texts) and not with_comma.is_in(texts)
+        return as_printed if is_list else with_comma
+
+    @property
+    def following(self) -> str:
+        """What stands behind it, also on the next line of a quotation, or its own unit."""
+        end = self.binding.span.end
+        text = self.binding.span.source.text[end : end + 80]
+        return self.binding.unit or _LINE_END.sub(" ", text)
 
     def places(self) -> list[PrintedPlace]:
         """Where it holds: in recorded text, or else in the run."""
@@ -143,59 +203,15 @@ class BoundNumber(Struct, frozen=True):
 
     def search(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers that it may mean: a proposal, until one that it shows is remembered."""
-        return self.text.candidates(outputs, following_text(self.binding))
-
-
-def _find(address: Address, outputs: Iterable[PrintedText], count: int) -> PrintedPlace | None:
-    places = (output.find(address, count) for output in outputs)
-    return next((place for place in places if place is not None), None)
-
-
-def following_text(binding: model.NumberBinding) -> str:
-    """What stands behind a binding, also on the next line of a quotation, or its own unit."""
-    end = binding.span.end
-    return binding.unit or _LINE_END.sub(" ", binding.span.source.text[end : end + 80])
+        return self.text.candidates(outputs, self.following)
 
 
 _LINE_END = re.compile(r"(?<!\n)\n[ \t>]*(?!\n)")
 
 
-def _read_text(binding: model.NumberBinding, texts: Iterable[PrintedText]) -> BoundText:
-    """The text of a binding; a comma in it may stand before decimals, or part numbers."""
-    with_comma, as_printed = BoundText.of(binding.text, binding.comma), BoundText.of(binding.text)
-    if not with_comma.comma:
-        return as_printed
-    outputs = tuple(texts)
-    is_list = as_printed.is_in(outputs) and not with_comma.is_in(outputs)
-    return as_printed if is_list else with_comma
-
-
-def _run_texts(
-    outputs: PrintedOutputs, path: str, verdicts: Sequence[Verdict]
-) -> tuple[PrintedText, ...]:
-    """What a script printed in this run, in the parts of these recorded outputs."""
-    steady = (v for v in verdicts if v.comparison.mode is not model.Mode.VOLATILE)
-    filters = [f for v in steady for f in v.comparison.own_filters]
-    parts = dict.fromkeys(v.recording.part for v in verdicts) or (None,)
-    return tuple(outputs.text_of_run(path, filters, part) for part in parts)
-
-
-def find_texts(
-    binding: model.NumberBinding, outputs: PrintedOutputs, at: tuple[Address, ...]
-) -> BoundNumber:
-    """A binding to a script that is known, with the outputs in which it may be found."""
-    verdicts, path = outputs.of_binding(binding), outputs.script_of(binding) or ""
-    run = outputs.runs.get(path)
-    steady = [v for v in verdicts if v.comparison.mode is not model.Mode.VOLATILE]
-    partial = any(
-        v.comparison.ellipsis or isinstance(v.recording.body, model.Table) for v in steady
-    )
-    drifted = any(v.status == "drift" for v in steady)
-    groups = [tuple(map(outputs.text, steady))]
-    if (partial or drifted or not verdicts) and run is not None and run.outcome is Outcome.OK:
-        groups.append(_run_texts(outputs, path, verdicts))
-    texts = (text for group in groups for text in group)
-    return BoundNumber(binding, path, _read_text(binding, texts), tuple(groups), at)
+def _find(address: Address, outputs: Iterable[PrintedText], count: int) -> PrintedPlace | None:
+    places = (output.find(address, count) for output in outputs)
+    return next((place for place in places if place is not None), None)
 
 
 def follow_outputs(
@@ -210,18 +226,14 @@ def follow_outputs(
     written. Where an address is gone, or several of one number do not agree, nothing is written.
     """
     for binding, value in bound_values(document, outputs):
-        run = outputs.runs.get(value.script)
-        verdicts = outputs.of_binding(binding)
-        steady = [v for v in verdicts if v.comparison.mode is not model.Mode.VOLATILE]
-        if run is None or run.outcome is not Outcome.OK or (verdicts and not steady):
+        bound = BoundNumber(binding, outputs, addresses.get(value, ()))
+        texts = [text for v in bound.steady if (text := text_after(v)) is not None]
+        is_open = len(texts) < len(bound.steady) or (bound.verdicts and not bound.steady)
+        is_known = bool(bound.addresses or binding.words)
+        if not bound.ran_well or is_open or not bound.text.numbers or not is_known:
             continue
-        bound = find_texts(binding, outputs, addresses.get(value, ()))
-        texts = list(map(text_after, steady))
-        if not bound.text.numbers or not (bound.addresses or binding.words) or None in texts:
-            continue
-        texts += _run_texts(outputs, run.path, verdicts)
-        places = bound.look_up([text for text in texts if text is not None])
+        places = bound.look_up([*texts, *bound.printed])
         rewritten = {bound.text.rewrite(place) for place in places}
-        is_shown = all(bound.text.shows(place) for place in places)
-        if not is_shown and len(rewritten) == 1 and (text := rewritten.pop()):
-            yield Edit(binding.text_span, text)
+        is_shown = all(map(bound.text.shows, places))
+        if not is_shown and len(rewritten) == 1 and (new := rewritten.pop()):
+            yield Edit(binding.text_span, new)

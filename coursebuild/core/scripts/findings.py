@@ -26,7 +26,7 @@ from coursebuild.core.model.lesson_record import (
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts import bindings, failures
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
-from coursebuild.core.scripts.bound_places import document_bindings
+from coursebuild.core.scripts.bound_places import BoundNumber, document_bindings
 from coursebuild.core.scripts.column_titles import HEADER_HELP
 from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
@@ -250,7 +250,7 @@ def unproven_units(
                 for span, unit in matcher.unprinted_units():
                     yield _unproven_unit(span, unit)
         for binding in document_bindings(document):
-            if unit := bindings.unprinted_unit(binding, outputs):
+            if unit := bindings.unprinted_unit(BoundNumber(binding, outputs)):
                 yield _unproven_unit(binding.text_span, unit)
 
 
