@@ -67,7 +67,7 @@ def test_pages_and_exports_name_the_authors_and_say_how_to_cite(make: Make) -> N
 PREDICTION = """
 ```quiz
 {"id": "one", "questions": [
-  {"kind": "numeric", "text": "How many?", "answer": 2, "tolerance": 0, "explanation": "Two."}
+  {"kind": "numeric", "q": "How many?", "answer": 2, "tol": 0}
 ]}
 ```
 """
