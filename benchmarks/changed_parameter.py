@@ -78,17 +78,21 @@ class Course:
         return bool(edits)
 
     def _typed(self, error: dict[str, Any]) -> dict[str, Any] | None:
-        named = _NAMED.search(error["label"])
-        if named is None or error["line"] != error["end_line"]:
+        printed_value = _NAMED.search(error["label"])
+        if printed_value is None or error["line"] != error["end_line"]:
             return None
         line = (self.folder / error["path"]).read_text(encoding="utf-8").split("\n")
-        marked = line[error["line"] - 1][error["column"] - 1 : error["end_column"] - 1]
-        number = _NUMBER.search(marked)
+        old_text = line[error["line"] - 1][error["column"] - 1 : error["end_column"] - 1]
+        number = _NUMBER.search(old_text)
         if number is None:
             return None
         decimals = len(number[0].partition("e")[0].partition(".")[2])
         form = f".{decimals}{'e' if 'e' in number[0] else 'f'}"
-        text = marked[: number.start()] + format(float(named[1]), form) + marked[number.end() :]
+        text = (
+            old_text[: number.start()]
+            + format(float(printed_value[1]), form)
+            + old_text[number.end() :]
+        )
         return {**error, "text": text}
 
 
@@ -137,15 +141,15 @@ def main() -> None:
             if (arguments.course / folder).is_dir():
                 shutil.copytree(arguments.course / folder, course.folder / folder)
         shutil.copy(arguments.course / "matplotlibrc", course.folder)
-        kept = Path(name) / "content"
-        shutil.copytree(course.folder / "content", kept)
+        original = Path(name) / "content"
+        shutil.copytree(course.folder / "content", original)
         names = [lesson for lesson, _, _ in changes]
         print(course.run("check", *names).stdout, end="", flush=True)
         print("lesson  change           edits  commands  processor  seconds", flush=True)
         for lesson, old, new in changes:
             print(change(course, lesson, old, new), flush=True)
             shutil.rmtree(course.folder / "content")
-            shutil.copytree(kept, course.folder / "content")
+            shutil.copytree(original, course.folder / "content")
 
 
 if __name__ == "__main__":

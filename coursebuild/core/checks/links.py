@@ -198,7 +198,7 @@ class _Checker(Struct, frozen=True):
         if name.endswith(".md"):
             return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
         files = {posixpath.basename(f): f for f in targets.files if not f.endswith(".md")}
-        likely = nearest(name, files)
+        likely = name if name in files else nearest(name, files)
         if likely is None:
             return "files that pages may use lie in content/"
         new = posixpath.relpath(files[likely], posixpath.dirname(self.document.source.path))

@@ -54,7 +54,7 @@ def check_scheme(url: str, span: Span, *, image: bool = False) -> Diagnostic | N
     if match is None or match[1] in _COURSE_SCHEMES:
         return None
     scheme = match[1].lower()
-    if scheme in _FORBIDDEN_SCHEMES:
+    if scheme in _FORBIDDEN_SCHEMES or len(scheme) == 1:  # `C:/Users/me/a.csv`
         if image and _PICTURE.match(url.strip()):
             return None
         help = "link to an address with `https:`, to a file, or by "

@@ -186,6 +186,10 @@ class TextReader:
             label = self.state.take_label(braces, "tab")
             return replace(recording, body=replace(recording.body, label=label))
         message, help = "no table follows the caption of this label", "put one directly below it"
+        word, _, text = caption.text.partition(":")
+        if recording is None and text.strip() and caption_start(caption.text, words.output):
+            message = f"`{word}:` is the end of a caption"
+            help = f"write `{word}, {text.strip().rstrip('.')}:`"
         if recording is not None:
             message = "an output that is no table has no label"
             help = "write `{#lst:name}` on the first line of its script"
