@@ -53,9 +53,10 @@ FIGURES = (
 
 def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
     """The report with all that follows from what was measured; `starts` as for `judge_setting`."""
-    own = report.own_setting
+    baseline = report.own_setting
     rows = tuple(
-        replace(row, name=setting_text(row.setting, own), idle=is_idle(row)) for row in report.rows
+        replace(row, name=setting_text(row.setting, baseline), idle=is_idle(row))
+        for row in report.rows
     )
     figure = Quantity("figure", report.figure or "figure", report.least_figure)
     floors = report.floor, report.velocity_floor
@@ -136,7 +137,7 @@ def derive_sweep(report: SweepReport) -> SweepReport:
     """The report on a sweep with the figures to show."""
     if report.show:
         return report
-    shown = []
+    figures = []
     for name in FIGURES:
         values = []
         for row in report.rows:
@@ -144,8 +145,8 @@ def derive_sweep(report: SweepReport) -> SweepReport:
             if value is not None:
                 values.append(value.value if isinstance(value, Interval) else value)
         if values and max(values) > 1.01 * min(values):
-            shown.append(name)
-    return replace(report, show=tuple(shown))
+            figures.append(name)
+    return replace(report, show=tuple(figures))
 
 
 def known_cases(report: SceneReport) -> tuple[CaseReport, ...]:
@@ -154,8 +155,8 @@ def known_cases(report: SceneReport) -> tuple[CaseReport, ...]:
     for scenario in report.scenarios:
         if not scenario.source.endswith(EXACT_SUFFIX) and not scenario.figures:
             continue
-        own = scenario.own_setting
-        usual = None if own is None else own.solver_settings
+        baseline = scenario.own_setting
+        usual = None if baseline is None else baseline.solver_settings
         rows = [row for row in scenario.rows if row.setting.solver_settings == usual]
         steps = {
             row.setting.integrator: row.seconds.scale(row.setting.timestep)

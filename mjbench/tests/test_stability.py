@@ -243,8 +243,8 @@ def rows_of(mjcf: str, *names: str, **fields: Any) -> dict[str, StableRow]:
     table = DeclaredScenario("s", table=Place("m.xml"), duration=2.0, **fields)
     (scene,) = scenes(model, Declarations("m.xml", (table,)))
     fine = with_integrator(model, Integrator.RK4, min(scene.timesteps))
-    kept = simulate(Setup(scenario=scene.scenario), fine).states
-    rows = stable_rows(model, run_pilot(model, scene), kept, Parts(), quick=True)
+    states = simulate(Setup(scenario=scene.scenario), fine).states
+    rows = stable_rows(model, run_pilot(model, scene), states, Parts(), quick=True)
     return {row.integrator: row for row in rows}
 
 
