@@ -61,6 +61,8 @@ def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
     figure = Quantity("figure", report.figure or "figure", report.least_figure)
     floors = report.floor, report.velocity_floor
     present = quantities(rows, figure, report.least_seen, floors)
+    if all(row.step_error == row.seen for row in rows):  # no model of contacts adds to it
+        present = tuple(q for q in present if q.name != "seen" or rows[0].step_error is None)
     main = main_quantity(present, rows)
     stable = tuple(replace(r, shown=limit_text(r), map=map_text(r)) for r in report.stable)
     report = replace(

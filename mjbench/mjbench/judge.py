@@ -303,7 +303,7 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
         return ("the scene's own setting was not measured",)
     quantity = quantity_of(report)
     speed = f"{setting_text(row.setting)}: "
-    speed += "not timed" if row.realtime is None else f"{row.realtime:.3g} times real time"
+    speed += "not timed" if row.realtime is None else f"{_rounded(row.realtime)} times real time"
     error = "its error is not known"
     if row.status != "ok":
         error = f"it is lost: {'; '.join(row.reasons)}"
@@ -325,6 +325,11 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     if missing:
         lines.append("not known: " + "; ".join(missing))
     return tuple(filter(None, lines))
+
+
+def _rounded(value: float) -> str:
+    """A number in three digits, without a power of ten."""
+    return f"{float(f'{value:.3g}'):,.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def parts_text(parts: ErrorParts | None) -> str:
