@@ -34,6 +34,8 @@ from mjbench.reports.scene_report import (
 from mjbench.reports.shown_errors import (
     FEWEST_STEPS,
     INTEGRATORS,
+    SEEN,
+    STEPPED,
     Quantity,
     is_idle,
     main_quantity,
@@ -61,8 +63,9 @@ def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
     figure = Quantity("figure", report.figure or "figure", report.least_figure)
     floors = report.floor, report.velocity_floor
     present = quantities(rows, figure, report.least_seen, floors)
-    if all(row.step_error == row.seen for row in rows):  # no model of contacts adds to it
-        present = tuple(q for q in present if q.name != "seen" or rows[0].step_error is None)
+    is_apart = STEPPED.name in {quantity.name for quantity in present}
+    if is_apart and all(row.step_error == row.seen for row in rows):  # contacts add nothing to it
+        present = tuple(quantity for quantity in present if quantity.name != SEEN.name)
     main = main_quantity(present, rows)
     stable = tuple(replace(r, shown=limit_text(r), map=map_text(r)) for r in report.stable)
     report = replace(
