@@ -140,8 +140,8 @@ def read_subject(file: Path) -> Subject:
         if file_beside.is_file():
             digest.update(file_beside.read_bytes())
     is_mjcf = file.suffix == ".xml"
-    found = mujoco.mju_getXMLDependencies(str(folder / file.name)) if is_mjcf else []
-    for part in map(Path, found):
+    dependencies = mujoco.mju_getXMLDependencies(str(folder / file.name)) if is_mjcf else []
+    for part in map(Path, dependencies):
         if part.exists() and not part.samefile(file):
             digest.update(part.read_bytes())
             parts += part.stat().st_size
@@ -162,20 +162,20 @@ def read_subject(file: Path) -> Subject:
 def _subject_of_python(file: Path) -> Subject:
     """The model that a program makes: its `spec` or `model`, or what a function so called gives."""
     names = runpy.run_path(str(file))
-    made = names.get("spec", names.get("model"))
-    made = made() if callable(made) else made
-    if isinstance(made, mujoco.MjSpec):
-        made = made.compile()
-    if not isinstance(made, mujoco.MjModel):
+    product = names.get("spec", names.get("model"))
+    product = product() if callable(product) else product
+    if isinstance(product, mujoco.MjSpec):
+        product = product.compile()
+    if not isinstance(product, mujoco.MjModel):
         raise _UsageError(f"{file} defines no `spec` or `model` of MuJoCo's")
     folder = tempfile.TemporaryDirectory(prefix="mjbench-")
     atexit.register(folder.cleanup)
-    compiled = Path(folder.name, f"{file.stem}.mjb")
-    mujoco.mj_saveModel(made, str(compiled))
+    binary = Path(folder.name, f"{file.stem}.mjb")
+    mujoco.mj_saveModel(product, str(binary))
     table = file.with_suffix(".toml")
     if table.is_file():
-        compiled.with_suffix(".toml").write_bytes(table.read_bytes())
-    return read_subject(compiled)
+        binary.with_suffix(".toml").write_bytes(table.read_bytes())
+    return read_subject(binary)
 
 
 def _host(subject: Subject) -> LocalHost:
@@ -202,7 +202,7 @@ def _bench(arguments: argparse.Namespace) -> int:
     timed = arguments.check is None
     recorded = None if timed else BENCH.decode(arguments.check.read_bytes())
     compiled_model = bench.compile_subject(subject, host, quick=quick)
-    scene, stopped = _measure_scene(compiled_model, host, quick=quick, timed=timed)
+    scene, is_stopped = _measure_scene(compiled_model, host, quick=quick, timed=timed)
     if recorded is not None:
         departures = scene_departures(recorded, scene, compiled_model.declarations.bench)
         _print(arguments, departures, text.departures_text(departures))
@@ -210,7 +210,7 @@ def _bench(arguments: argparse.Namespace) -> int:
     _print(arguments, scene, text.scene_text(scene, _style()))
     if arguments.html is not None:
         arguments.html.write_text(scene_page(scene), "utf-8")
-    if stopped:
+    if is_stopped:
         print("mjbench: stopped; this is what is known", file=sys.stderr)
         return 130
     if not scene.scenarios and scene.failures:

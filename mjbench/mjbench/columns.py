@@ -49,8 +49,8 @@ def columns_of(row: WorkPrecisionRow, contact_model: Mapping[str, float]) -> Col
             values[name, WHOLE] = pair[0]
             if name not in row.halves:
                 values[name, END] = pair[1]
-    seen = "seen" if row.step_error is None else "step_error"
-    for name in (seen, "energy_drift", "momentum_drift", "slip"):
+    visible = "seen" if row.step_error is None else "step_error"
+    for name in (visible, "energy_drift", "momentum_drift", "slip"):
         if (value := getattr(row, name)) is not None:
             values[name, WHOLE] = abs(value)
     for name, halves in row.halves.items():
@@ -77,15 +77,17 @@ def leasts_of(report: ScenarioReport) -> dict[str, float]:
     }
 
 
-def ratios(own: Columns, other: Columns, leasts: Mapping[str, float]) -> dict[Column, float]:
+def ratios(
+    baseline: Columns, rival_columns: Columns, leasts: Mapping[str, float]
+) -> dict[Column, float]:
     """How many times as large other errors are, by columns that both have; 1 where none is known.
 
     Two errors that the reference does not resolve are alike.
     """
     result: dict[Column, float] = {}
-    for column in own.keys() & other.keys():
+    for column in baseline.keys() & rival_columns.keys():
         least = leasts.get(column[0], 0.0) * (1 + 1e-9)
-        before, now = (max(values[column], least) for values in (own, other))
+        before, now = (max(values[column], least) for values in (baseline, rival_columns))
         result[column] = now / before if before else (math.inf if now else 1.0)
     return result
 
@@ -123,11 +125,11 @@ class Spread(Struct, frozen=True):
 def spreads(starts: Sequence[Mapping[Column, float]]) -> list[Spread]:
     """The ratios of all starts together, the worst column first."""
     columns = {column for start in starts for column in start}
-    found = []
+    result = []
     for column in columns:
         values = [start[column] for start in starts if column in start]
-        found.append(Spread(column, min(values), max(values)))
-    return sorted(found, key=lambda part: (-part.low, -part.high, part.column[1] != WHOLE))
+        result.append(Spread(column, min(values), max(values)))
+    return sorted(result, key=lambda part: (-part.low, -part.high, part.column[1] != WHOLE))
 
 
 def times_text(low: float, high: float) -> str:
@@ -153,13 +155,13 @@ def mark_dominated(report: ScenarioReport) -> Rows:
         present = set()
 
     def worth(n: int) -> float:
-        seen = columns[n].get((report.main, WHOLE), 0.0)
+        visible = columns[n].get((report.main, WHOLE), 0.0)
         cost = rows[n].cost
-        return (0.0 if cost is None else cost.value) * max(seen, leasts.get(report.main, 0.0))
+        return (0.0 if cost is None else cost.value) * max(visible, leasts.get(report.main, 0.0))
 
-    def beats(rival: int, own: int) -> bool:
-        prices = [FrontPoint(cost, 0.0) for n in (rival, own) if (cost := rows[n].cost)]
-        changes = ratios(columns[own], columns[rival], leasts).values()
+    def beats(rival: int, baseline: int) -> bool:
+        prices = [FrontPoint(cost, 0.0) for n in (rival, baseline) if (cost := rows[n].cost)]
+        changes = ratios(columns[baseline], columns[rival], leasts).values()
         if any(change > 1 + ERROR_SLACK for change in changes):
             return False
         is_nearer = any(change * (1 + ERROR_SLACK) < 1 for change in changes)
@@ -172,8 +174,8 @@ def mark_dominated(report: ScenarioReport) -> Rows:
 
 def worse_columns(spread: Iterable[Spread]) -> Iterator[Spread]:
     """Columns that are worse, or not known to be no worse; one for each error, the worst."""
-    named: set[str] = set()
+    names: set[str] = set()
     for part in spread:
-        if (part.is_worse or part.is_doubtful) and part.column[0] not in named:
-            named.add(part.column[0])
+        if (part.is_worse or part.is_doubtful) and part.column[0] not in names:
+            names.add(part.column[0])
             yield part

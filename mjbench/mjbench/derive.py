@@ -34,6 +34,8 @@ from mjbench.reports.scene_report import (
 from mjbench.reports.shown_errors import (
     FEWEST_STEPS,
     INTEGRATORS,
+    SEEN,
+    STEPPED,
     Quantity,
     is_idle,
     main_quantity,
@@ -53,13 +55,17 @@ FIGURES = (
 
 def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
     """The report with all that follows from what was measured; `starts` as for `judge_setting`."""
-    own = report.own_setting
+    baseline = report.own_setting
     rows = tuple(
-        replace(row, name=setting_text(row.setting, own), idle=is_idle(row)) for row in report.rows
+        replace(row, name=setting_text(row.setting, baseline), idle=is_idle(row))
+        for row in report.rows
     )
     figure = Quantity("figure", report.figure or "figure", report.least_figure)
     floors = report.floor, report.velocity_floor
     present = quantities(rows, figure, report.least_seen, floors)
+    is_apart = STEPPED.name in {quantity.name for quantity in present}
+    if is_apart and all(row.step_error == row.seen for row in rows):  # contacts add nothing to it
+        present = tuple(quantity for quantity in present if quantity.name != SEEN.name)
     main = main_quantity(present, rows)
     stable = tuple(replace(r, shown=limit_text(r), map=map_text(r)) for r in report.stable)
     report = replace(
@@ -136,7 +142,7 @@ def derive_sweep(report: SweepReport) -> SweepReport:
     """The report on a sweep with the figures to show."""
     if report.show:
         return report
-    shown = []
+    figures = []
     for name in FIGURES:
         values = []
         for row in report.rows:
@@ -144,8 +150,8 @@ def derive_sweep(report: SweepReport) -> SweepReport:
             if value is not None:
                 values.append(value.value if isinstance(value, Interval) else value)
         if values and max(values) > 1.01 * min(values):
-            shown.append(name)
-    return replace(report, show=tuple(shown))
+            figures.append(name)
+    return replace(report, show=tuple(figures))
 
 
 def known_cases(report: SceneReport) -> tuple[CaseReport, ...]:
@@ -154,8 +160,8 @@ def known_cases(report: SceneReport) -> tuple[CaseReport, ...]:
     for scenario in report.scenarios:
         if not scenario.source.endswith(EXACT_SUFFIX) and not scenario.figures:
             continue
-        own = scenario.own_setting
-        usual = None if own is None else own.solver_settings
+        baseline = scenario.own_setting
+        usual = None if baseline is None else baseline.solver_settings
         rows = [row for row in scenario.rows if row.setting.solver_settings == usual]
         steps = {
             row.setting.integrator: row.seconds.scale(row.setting.timestep)

@@ -68,9 +68,9 @@ def _begin(model: Any) -> tuple[int | None, str, Any]:
     if names:
         number = names.index("home") if "home" in names else 0
         mujoco.mj_resetDataKeyframe(model, data, number)
-        data.ctrl[:] = _within(model, data.ctrl)
+        data.ctrl[:] = _clip(model, data.ctrl)
         return number, f"from the keyframe {names[number] or number}", data
-    data.ctrl[:] = _within(model, data.ctrl)
+    data.ctrl[:] = _clip(model, data.ctrl)
     variant = without_sleep(model)
     variant.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     steps = min(round(_SETTLING / float(model.opt.timestep)), MOST_STEPS)
@@ -83,11 +83,11 @@ def _begin(model: Any) -> tuple[int | None, str, Any]:
             data.qvel[:] = 0.0
             return None, "from where it comes to rest under no command", data
     mujoco.mj_resetData(model, data)
-    data.ctrl[:] = _within(model, data.ctrl)
+    data.ctrl[:] = _clip(model, data.ctrl)
     return None, "from the model's own state", data
 
 
-def _within(model: Any, commands: Array) -> Array:
+def _clip(model: Any, commands: Array) -> Array:
     limited = model.actuator_ctrllimited != 0
     low, high = np.where(limited[:, None], model.actuator_ctrlrange, (-np.inf, np.inf)).T
     clipped: Array = np.clip(commands, low, high)
@@ -105,7 +105,7 @@ def _commands(model: Any, middle: Array, seed: int, times: Array) -> Array:
         phases = random.uniform(0, 2 * math.pi, model.nu)
         parts = np.sin(2 * math.pi * wave / _SLOWEST * times[:, None] + phases) - np.sin(phases)
         rows += sizes / _WAVES * random.uniform(0.5, 1.0, model.nu) * parts
-    return np.array([_within(model, row) for row in rows])
+    return np.array([_clip(model, row) for row in rows])
 
 
 def _passive(

@@ -116,8 +116,8 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
     quantity, rows = quantity_of(report), report.rows
     own_index = next(number for number, row in enumerate(rows) if row.own)
     row = rows[own_index]
-    seen = row.seen is not None and max(1.0, row.seen) > report.least_seen
-    noticeable = row.seen is not None and row.seen >= 1 if seen else None
+    is_seen = row.seen is not None and max(1.0, row.seen) > report.least_seen
+    noticeable = row.seen is not None and row.seen >= 1 if is_seen else None
     if row.reasons:
         return _verdict_of_lost(rows, row, quantity)
     remark = "; whether the scene's own error can be seen is not known"
@@ -142,8 +142,8 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
         return RowVerdict(True, None, noticeable, text + remark, worse)
     text, is_better, worse = _judge_rival(report, row.dominated_by, starts)
     better = row.dominated_by if is_better else None
-    known = is_better or not text.startswith(_UNRESOLVED)
-    return RowVerdict(known and not is_better, better, noticeable, text + remark, worse)
+    is_known = is_better or not text.startswith(_UNRESOLVED)
+    return RowVerdict(is_known and not is_better, better, noticeable, text + remark, worse)
 
 
 _UNRESOLVED = "no setting can be called better: the reference resolves no error of "
@@ -151,9 +151,9 @@ _UNRESOLVED = "no setting can be called better: the reference resolves no error 
 
 def quantity_of(report: ScenarioReport) -> Quantity:
     """The error that settings are compared by first."""
-    for found in report.quantities:
-        if found.name == report.main:
-            return Quantity(found.name, found.label, found.least)
+    for matches in report.quantities:
+        if matches.name == report.main:
+            return Quantity(matches.name, matches.label, matches.least)
     return Quantity("seen", "", report.least_seen)
 
 
@@ -161,22 +161,22 @@ def _judge_rival(
     report: ScenarioReport, number: int, starts: Starts
 ) -> tuple[str, bool, tuple[str, ...]]:
     """What is said of a row that is better here, whether it is, and in which columns it is not."""
-    own, rival = next(r for r in report.rows if r.own), report.rows[number]
+    baseline, rival = next(r for r in report.rows if r.own), report.rows[number]
     leasts, figure, none = leasts_of(report), report.figure, "no difference that holds: "
-    pair = [columns_of(row, report.contact_model) for row in (own, rival)]
-    here = ratios(pair[0], pair[1], leasts)
-    resolved = [c for c in here if max(pair[0][c], pair[1][c]) > leasts[c[0]] * (1 + 1e-9)]
-    if not resolved and (own.seen is None or report.least_seen >= 1):
+    pair = [columns_of(row, report.contact_model) for row in (baseline, rival)]
+    own_ratios = ratios(pair[0], pair[1], leasts)
+    resolved = [c for c in own_ratios if max(pair[0][c], pair[1][c]) > leasts[c[0]] * (1 + 1e-9)]
+    if not resolved and (baseline.seen is None or report.least_seen >= 1):
         return f"{_UNRESOLVED}{rival.name}, or of the scene's own setting", False, ()
-    cost = rival.cost.value / own.cost.value if rival.cost and own.cost else 1.0
-    claim = f"{rival.name} {_advantage(cost, _gain([here]), figure)}"
-    if cost > 1 - _WORTH_SAYING and min(here.values()) > 1 - _WORTH_SAYING:
+    cost = rival.cost.value / baseline.cost.value if rival.cost and baseline.cost else 1.0
+    claim = f"{rival.name} {_advantage(cost, _gain([own_ratios]), figure)}"
+    if cost > 1 - _WORTH_SAYING and min(own_ratios.values()) > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, which is within what such runs differ by", False, ()
     nearby = starts(number)
     if nearby is None:
         text = f"{claim} here; whether that holds from starts nearby was not measured"
         return text, False, ()
-    everywhere = [here, *nearby]
+    everywhere = [own_ratios, *nearby]
     gain, worse = _gain(everywhere), tuple(worse_columns(spreads(everywhere)))
     if worse:
         texts = tuple(part.text(figure) for part in worse)
@@ -194,9 +194,9 @@ def _judge_rival(
 
 def _gain(starts: Sequence[Mapping[Column, float]]) -> Spread:
     """The column in which an error is smallest, relative to the other one, from all starts."""
-    found = [spread for spread in spreads(starts) if math.isfinite(spread.high)]
+    matches = [spread for spread in spreads(starts) if math.isfinite(spread.high)]
     none = Spread(("", ""), 1.0, 1.0)
-    return min(found, key=lambda part: (part.high, part.column[1] != WHOLE), default=none)
+    return min(matches, key=lambda part: (part.high, part.column[1] != WHOLE), default=none)
 
 
 def _advantage(cost: float, gain: Spread, figure: str) -> str:
@@ -216,7 +216,7 @@ def _describe_rival(
     report: ScenarioReport, own_place: FrontPoint, quantity: Quantity
 ) -> tuple[str, tuple[str, ...]]:
     """The cheapest setting that would be better by one number, and why it is not; empty if none."""
-    own = next(row for row in report.rows if row.own)
+    baseline = next(row for row in report.rows if row.own)
     points = [
         (point, row)
         for row in report.rows
@@ -227,11 +227,13 @@ def _describe_rival(
         return "", ()
     place, row = min(cheaper, key=lambda pair: pair[0].cost.value)
     cost = f"{place.cost.value / own_place.cost.value:.2g}"
-    pair = [columns_of(r, report.contact_model) for r in (own, row)]
-    here = ratios(pair[0], pair[1], leasts_of(report))
-    texts = tuple(part.text(report.figure) for part in worse_columns(spreads([here])))
+    pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
+    own_ratios = ratios(pair[0], pair[1], leasts_of(report))
+    texts = tuple(part.text(report.figure) for part in worse_columns(spreads([own_ratios])))
     if row.lucky or not texts:
-        gain = _advantage(place.cost.value / own_place.cost.value, _gain([here]), report.figure)
+        gain = _advantage(
+            place.cost.value / own_place.cost.value, _gain([own_ratios]), report.figure
+        )
         reason = row.lucky or "that is within what such runs differ by"
         return f"no difference that holds: {row.name} {gain} here, but {reason}", ()
     return f"no setting is better: {row.name} takes {cost} of the time, but {texts[0]}", texts
@@ -301,7 +303,7 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
         return ("the scene's own setting was not measured",)
     quantity = quantity_of(report)
     speed = f"{setting_text(row.setting)}: "
-    speed += "not timed" if row.realtime is None else f"{row.realtime:.3g} times real time"
+    speed += "not timed" if row.realtime is None else f"{_rounded(row.realtime)} times real time"
     error = "its error is not known"
     if row.status != "ok":
         error = f"it is lost: {'; '.join(row.reasons)}"
@@ -325,6 +327,11 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     return tuple(filter(None, lines))
 
 
+def _rounded(value: float) -> str:
+    """A number in three digits, without a power of ten."""
+    return f"{float(f'{value:.3g}'):,.0f}" if value >= 100 else f"{value:.3g}"
+
+
 def parts_text(parts: ErrorParts | None) -> str:
     """Which part of the error dominates, and what mends it."""
     if parts is None or not parts.dominant:
@@ -340,8 +347,8 @@ def parts_text(parts: ErrorParts | None) -> str:
 
 def _stability_line(report: ScenarioReport) -> str:
     """How long the timestep of the own integrator may be, and for what."""
-    own = report.own_setting
-    row = next((r for r in report.stable if own and r.integrator == own.integrator), None)
+    baseline = report.own_setting
+    row = next((r for r in report.stable if baseline and r.integrator == baseline.integrator), None)
     if row is None:
         return ""
     parts = [f"{row.integrator} stays bounded at {_upto(row, row.shown)}"]
@@ -364,34 +371,34 @@ def find_parts(report: ScenarioReport, parts: ErrorParts) -> ErrorParts:
     names = ("timestep", "solver", "contact_model", "rounding")
     sizes = {n: value for n in names if (value := getattr(parts, n)) is not None}
     name = max(sizes, key=lambda n: sizes[n], default="")
-    own = report.own_row
-    if not name or sizes[name] <= parts.least * (1 + 1e-9) or own is None:
+    baseline = report.own_row
+    if not name or sizes[name] <= parts.least * (1 + 1e-9) or baseline is None:
         return parts
-    return replace(parts, dominant=name, mend=_mend(report, own, name))
+    return replace(parts, dominant=name, mend=_mend(report, baseline, name))
 
 
-def _mend(report: ScenarioReport, own: WorkPrecisionRow, name: str) -> str:
+def _mend(report: ScenarioReport, baseline: WorkPrecisionRow, name: str) -> str:
     def halves(row: WorkPrecisionRow) -> bool:
-        setting, mine = row.setting, own.setting
+        setting, mine = row.setting, baseline.setting
         alike = setting.integrator == mine.integrator and setting.timestep == mine.timestep
         is_kind = {
             "timestep": setting.solver_settings == mine.solver_settings,
             "solver": alike and setting.cone == mine.cone and not row.own,
             "contact_model": alike and setting.cone != mine.cone,
         }.get(name, False)
-        return is_kind and row.seen is not None and 2 * row.seen <= (own.seen or 0.0)
+        return is_kind and row.seen is not None and 2 * row.seen <= (baseline.seen or 0.0)
 
-    found = [row for row in report.rows if row.status == "ok" and not row.lucky and halves(row)]
-    priced = [row for row in found if row.cost is not None]
-    if not found or own.seen is None:
+    matches = [row for row in report.rows if row.status == "ok" and not row.lucky and halves(row)]
+    priced = [row for row in matches if row.cost is not None]
+    if not matches or baseline.seen is None:
         return ""
-    row = min(priced, key=lambda r: r.cost.value if r.cost else 0.0) if priced else found[0]
-    less = number_text(own.seen / row.seen) if row.seen else "far"
+    row = min(priced, key=lambda r: r.cost.value if r.cost else 0.0) if priced else matches[0]
+    less = number_text(baseline.seen / row.seen) if row.seen else "far"
     price = ""
-    if row.cost is not None and own.cost is not None:
-        times = row.cost.value / own.cost.value
-        same = abs(times - 1) <= ERROR_SLACK
-        price = " for as much time" if same else f" for {number_text(times)} times the time"
+    if row.cost is not None and baseline.cost is not None:
+        times = row.cost.value / baseline.cost.value
+        is_same = abs(times - 1) <= ERROR_SLACK
+        price = " for as much time" if is_same else f" for {number_text(times)} times the time"
     return f"{row.name} errs {less} times less in all{price}"
 
 

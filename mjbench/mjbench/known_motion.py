@@ -7,7 +7,6 @@
    second. A course's own is believed after it was checked only: in a smooth scene two integrations
    that agree, and the engine that tends to them, outvote it; elsewhere the model must come nearer
    to it the stiffer its contacts and the shorter its timesteps are.
-   Rigid theory of soft equalities is held against stiffer ones in the same way.
 3. Where accelerations jump, the engine tends elsewhere, or the scene is too stiff for an
    integration in reasonable time, only the engine itself is left: in small steps, and again in
    steps twice as long under another integrator. This reference is called `self`.
@@ -77,7 +76,7 @@ _APPROACH, _NEAR, _ELSEWHERE = 0.8, 3.0, 5.0
 an exact motion is the engine's; how many times farther it is from stiff contacts than these moved
 at last, and can be known, where it is another one."""
 _NEARBY_GAP = 2.0
-"""How many times farther from the engine an exact motion may be from starts nearby."""
+"""The same from starts nearby."""
 _STEP = 1e-6
 """s, of the model whose accelerations are integrated: `refsafe` softens nothing then."""
 _TENDS_ELSEWHERE = "the engine with small steps converges to something else"
@@ -95,11 +94,9 @@ class KnownMotion(Struct, frozen=True):
     floor: Sizes
     """How far it may be off."""
     second: str
-    """The source of the second reference."""
     agreement: float
     """The largest difference of the two, in m, rad, m/s and rad/s."""
     horizon: float
-    """s."""
     note: str = ""
     """Why there is no better reference; empty where this is the best kind."""
 
@@ -207,11 +204,9 @@ def _check_exact(
                 _, rest = _stiff_gaps(model, pilot, states, precision, quick=quick)
                 if rest is not None:
                     return Sizes(rest, rest, second.floor.velocity).at_least(ROUNDING)
-            help = (
-                f"{clause} errs by {error:.2g} in {part}: two integrations of the model agree "
-                f"with each other to {floor:.1g}, and the engine tends to them; `precision` "
-                "says how far a formula that is meant to be no more than near may be off"
-            )
+            help = f"{clause} errs by {error:.2g} in {part}: two integrations of the model agree "
+            help += f"with each other to {floor:.1g}, and the engine tends to them; `precision` "
+            help += "says how far a formula that is meant to be no more than near may be off"
             raise SceneError(subject, Place(exact.path), help)
         return ROUNDING
     data = initial_data(pilot.scene.scenario, model)

@@ -163,8 +163,8 @@ def _initial_overlaps(model: Any, data: Any, half_thickness: Array) -> str:
             depths[pair] = max(depth, depths.get(pair, 0.0))
     deepest = sorted(depths.items(), key=lambda item: -item[1])
     parts = [f"{pair_names(model, pair)} by {depth:.3g} m" for pair, depth in deepest]
-    more = len(parts) - _MOST_OVERLAPS
-    return "; ".join(parts[:_MOST_OVERLAPS]) + (f"; and {more} more" if more > 0 else "")
+    rest = len(parts) - _MOST_OVERLAPS
+    return "; ".join(parts[:_MOST_OVERLAPS]) + (f"; and {rest} more" if rest > 0 else "")
 
 
 def position_distance(model: Any, first: Array, second: Array, units: Array | None = None) -> float:

@@ -82,9 +82,9 @@ def scenario_lines(report: ScenarioReport, style: Style, *, plot: bool = True) -
         exact = "" if line.exact is None else f", in theory {line.exact:.6g} ({line.source})"
         yield f"{line.name} under {line.integrator}: {_number(line.measured)} {line.unit}{exact}"
     yield ""
-    known = f"over {seconds_text(report.duration)}, against {report.source}"
-    known += f" (known to {report.floor:.1g}, velocities to {report.velocity_floor:.1g})"
-    for note in (known, *report.notes):
+    basis = f"over {seconds_text(report.duration)}, against {report.source}"
+    basis += f" (known to {report.floor:.1g}, velocities to {report.velocity_floor:.1g})"
+    for note in (basis, *report.notes):
         yield from style.wrap(note)
 
 
@@ -229,9 +229,9 @@ def case_text(report: CaseReport, style: Style = _PLAIN) -> str:
     """A hard case."""
     number = f"case {report.case}: " if report.case else ""
     lines = [f"{style.strong(report.name)}  {number}{report.title}"]
-    reached = [f"{name} {seconds_text(cost, 3)}" for name, cost in report.reached]
-    if reached:
-        text = f"to err by 0.001, a simulated second takes {', '.join(reached)}"
+    costs = [f"{name} {seconds_text(cost, 3)}" for name, cost in report.reached]
+    if costs:
+        text = f"to err by 0.001, a simulated second takes {', '.join(costs)}"
         lines += style.wrap(text, "  ")
     reference = report.reference
     lines += style.wrap(f"against {reference.source}, and {reference.second}", "  ")

@@ -15,22 +15,20 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from msgspec import Struct
-from msgspec.structs import asdict, replace
+from msgspec.structs import replace
 
 from mjbench import known_motion, measure, simulation
 from mjbench.columns import LOST, WHOLE, Column, columns_of, leasts_of, ratios
 from mjbench.costs import Clock, costs
 from mjbench.derive import derive_scenario
 from mjbench.detector import driving_force, pair_names
+from mjbench.measured_setting import Basis, measure_setting
 from mjbench.parts import Parts
 from mjbench.pilot import (
     Pilot,
     horizon_error,
-    horizon_errors,
     nudges,
     own_setting,
-    position_distances,
     run_pilot,
     settings,
     with_setting,
@@ -43,35 +41,11 @@ from mjbench.reports.shown_errors import (
     solving_parts,
 )
 from mjbench.scene import Scene
-from mjbench.stability import run_trial, stable_rows
+from mjbench.stability import stable_rows
 from mjbench.theory_figures import measure_expected
 
 _CONSERVED = 1e-8
 """The relative change, over the reference, below which a quantity counts as conserved."""
-
-
-class Basis(Struct, frozen=True, eq=False):
-    """What is known of a scene before its settings are measured."""
-
-    model: Any
-    pilot: Pilot
-    baseline: scene_report.MeasuredSetting
-    """The scene's own setting."""
-    cones: Mapping[str, known_motion.Cone]
-    energy: float | None
-    """The scale for changes of energy, J; `None` where energy is not conserved."""
-    momentum_conserved: bool
-    late_energy: float | None
-    """Mean kinetic energy after the horizon, J; `None` where it is the end."""
-    least_seen: float
-    """Below this nothing is known of what is seen."""
-    least_figure: float
-    """The same of the declared quantity."""
-
-    @property
-    def reference(self) -> known_motion.KnownMotion:
-        """The reference of the scene's own setting."""
-        return self.cones[self.baseline.cone].reference
 
 
 def measure_scenario(
@@ -105,14 +79,14 @@ def measure_scenario(
     choices = settings(model, pilot, quick=quick)
     rows = parts.collect(f"{scene.name}: settings", _measure_settings(basis, choices, tell))
     rows.sort(key=lambda row: choices.index(row.setting))
-    cost_of, nothing = None, scene_report.RowVerdict(False, None, None, "")
+    cost_of, no_verdict = None, scene_report.RowVerdict(False, None, None, "")
     if clock is not None and rows:
         timed = partial(_with_costs, basis, rows, clock, quick)
         result = parts.run(f"{scene.name}: times", timed, None)
         rows, cost_of = (rows, None) if result is None else result
     error_parts = parts.run(f"{scene.name}: errors apart", partial(_error_parts, basis), None)
-    known = reference.states
-    largest = stable_rows(model, pilot, known, parts, quick=quick)
+    states = reference.states
+    largest = stable_rows(model, pilot, states, parts, quick=quick)
     figures = partial(measure_expected, model, scene, baseline)
     expected = parts.collect(f"{scene.name}: what theory knows", figures())
     report = scene_report.ScenarioReport(
@@ -133,12 +107,12 @@ def measure_scenario(
         notes=_notes(basis, largest, rows, cost_of),
         figure=measure.quantity_name(model, scene),
         rows=tuple(rows),
-        orders=measure.fit_scene_orders(model, rows, baseline, known, reference.floor)
+        orders=measure.fit_scene_orders(model, rows, baseline, states, reference.floor)
         if pilot.smooth
         else (),
         figures=tuple(expected),
         stable=largest,
-        verdict=nothing,
+        verdict=no_verdict,
         least_seen=basis.least_seen,
         least_figure=basis.least_figure,
         cost_of=cost_of,
@@ -183,13 +157,13 @@ def _error_parts(basis: Basis) -> scene_report.ErrorParts | None:
     if not all(run.judgement.ok for run in runs):
         return None
     count = len(cone.reference.states.times)
-    own, *others = (run.states.head(count) for run in runs)
-    best = others[0] if pilot.constrained else own
+    own_states, *other_states = (run.states.head(count) for run in runs)
+    best = other_states[0] if pilot.constrained else own_states
     return scene_report.ErrorParts(
         timestep=measure.visible_error(model, scene, best, cone.reference.states),
-        solver=measure.visible_error(model, scene, own, best) if pilot.constrained else None,
+        solver=measure.visible_error(model, scene, own_states, best) if pilot.constrained else None,
         contact_model=cone.visible_model_error if pilot.contact else None,
-        rounding=measure.visible_error(model, scene, own, others[-1]),
+        rounding=measure.visible_error(model, scene, own_states, other_states[-1]),
         least=basis.least_seen,
     )
 
@@ -247,7 +221,7 @@ def _measure_settings(
         if setting.solver_settings in idle_solving and setting.timestep != baseline.timestep:
             continue
         tell(f"{basis.pilot.scene.name}: {setting_text(setting)}")
-        row, states = _measure_setting(basis, setting)
+        row, states = measure_setting(basis, setting)
         base_states = states if row.own else base_states
         is_alike = setting == replace(setting, timestep=baseline.timestep)
         is_alike = is_alike and setting.integrator == baseline.integrator and not row.own
@@ -261,7 +235,7 @@ def _measure_settings(
 def _nearby_ratios(
     basis: Basis,
     report: scene_report.ScenarioReport,
-    other: scene_report.MeasuredSetting,
+    rival: scene_report.MeasuredSetting,
     quick: bool,
 ) -> list[Mapping[Column, float]] | None:
     """From starts nearby, how many times as large errors are under another setting.
@@ -271,9 +245,9 @@ def _nearby_ratios(
     model, pilot = basis.model, basis.pilot
     scene, scenario = pilot.scene, pilot.scene.scenario
     starts = nudges(model, 2 * (_QUICK_STARTS if quick else _STARTS), _NEARBY)
-    part = max(other.timestep, basis.baseline.timestep) / (_PARTS * (len(starts) + 1))
+    part = max(rival.timestep, basis.baseline.timestep) / (_PARTS * (len(starts) + 1))
     fine = simulation.without_sleep(with_setting(model, replace(basis.baseline, timestep=part)))
-    found: list[Mapping[Column, float]] = []
+    result: list[Mapping[Column, float]] = []
     for number, (position, velocity) in enumerate(starts, 1):
         data = simulation.initial_data(scenario, model)
         mujoco.mj_integratePos(model, data.qpos, position, 1.0)
@@ -285,7 +259,7 @@ def _nearby_ratios(
         setup = replace(pilot.setup, scenario=nudged_scenario)
         near = replace(pilot, scene=replace(scene, scenario=nudged_scenario), setup=setup)
         pair = []
-        for setting in (basis.baseline, other):
+        for setting in (basis.baseline, rival):
             base = with_setting(model, replace(basis.baseline, cone=setting.cone))
             cone = basis.cones[setting.cone]
             exact = known_motion.find_nearby(base, near, cone.reference, quick=quick)
@@ -293,12 +267,12 @@ def _nearby_ratios(
                 return None
             reference = replace(cone.reference, states=exact)
             cones = {**basis.cones, setting.cone: replace(cone, reference=reference, sticks=None)}
-            row, _ = _measure_setting(replace(basis, pilot=near, cones=cones), setting)
+            row, _ = measure_setting(replace(basis, pilot=near, cones=cones), setting)
             if row.status != "ok":
-                return found if setting == basis.baseline else [*found, {(LOST, WHOLE): math.inf}]
+                return result if setting == basis.baseline else [*result, {(LOST, WHOLE): math.inf}]
             pair.append(columns_of(row, report.contact_model))
-        found.append(ratios(pair[0], pair[1], leasts_of(report)))
-    return found
+        result.append(ratios(pair[0], pair[1], leasts_of(report)))
+    return result
 
 
 _NEARBY, _PARTS = 1e-4, 8
@@ -383,101 +357,3 @@ def _with_costs(
         seconds = timing.nanoseconds.scale(1e-9 / scene.scenario.duration)
         timed_rows[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
     return timed_rows, None if base == baseline else base
-
-
-def _measure_setting(
-    basis: Basis, setting: scene_report.MeasuredSetting
-) -> tuple[scene_report.WorkPrecisionRow, simulation.EngineStates | None]:
-    """Run a scene under a setting and compare it with its reference; the cost is added later.
-
-    The states are those of the run; `None` where it was lost.
-    """
-    model, pilot, cone = basis.model, basis.pilot, basis.cones[setting.cone]
-    variant = with_setting(model, setting)
-    steps, energy = round(pilot.scene.scenario.duration / setting.timestep), basis.energy
-    figures: dict[str, Any] = dict.fromkeys(scene_report.WorkPrecisionRow.__struct_fields__) | {
-        "setting": setting,
-        "status": "diverged",  # as of a run that MuJoCo refuses
-        "reasons": (),
-        "penetration": 0.0,
-        "model_error": cone.model_error,
-        "refsafe": pilot.constrained and simulation.refsafe_active(variant, contact=pilot.contact),
-        "steps": steps,
-        "evaluations": steps * scene_report.step_evaluations(setting.integrator),
-        "own": setting == basis.baseline,
-        "halves": {},
-        **dict.fromkeys(("lucky", "name"), ""),
-        **dict.fromkeys(("front", "same", "idle"), False),
-    }
-    row = scene_report.WorkPrecisionRow(**figures)
-    try:
-        run = simulation.simulate(pilot.setup, variant)
-    except mujoco.FatalError as error:
-        return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None
-    row = replace(
-        row,
-        status=run.judgement.status.value,
-        reasons=run.judgement.reasons,
-        energy_drift=None if energy is None else measure.energy_drift(run.energy, energy),
-        momentum_drift=measure.momentum_drift(run.momentum) if basis.momentum_conserved else None,
-        mean_energy=measure.mean_energy(run, cone.reference.horizon, basis.late_energy),
-        penetration=run.penetration,
-    )
-    if not run.judgement.ok:
-        variant = with_setting(model, setting)
-        growth = run_trial(pilot.setup, variant, pilot.setup.scenario.duration).growth
-        has_grown = math.isfinite(growth) and growth > 1
-        return replace(row, growth=growth if has_grown else None), None
-    if pilot.constrained:
-        # A step of RK4 has four times the iterations of its last evaluation.
-        count = simulation.count_iterations(with_setting(model, setting), pilot.scene.scenario)
-        row = replace(row, iterations=count * row.evaluations / steps)
-    return _with_errors(basis, row, run), run.states
-
-
-def _with_errors(
-    basis: Basis, row: scene_report.WorkPrecisionRow, run: simulation.Run
-) -> scene_report.WorkPrecisionRow:
-    model, scene, cone = basis.model, basis.pilot.scene, basis.cones[row.setting.cone]
-    reference = cone.reference
-    states = run.states.head(len(reference.states.times))
-    motion, exact = (simulation.motion_of(model, s) for s in (states, reference.states))
-    creep = None if cone.sticks is None else measure.measure_slip(model, scene, states, cone.sticks)
-    if basis.pilot.lyapunov is not None:
-        unit = horizon_errors(model, scene)
-        gaps = position_distances(model, states.qpos, reference.states.qpos, unit)
-        far = np.flatnonzero(gaps >= 1)
-        if far.size:
-            # How far apart they are later depends on the last digit of the start.
-            return replace(row, parted=float(states.times[far[0]]), slip=creep)
-    sizes = measure.error_sizes(motion, exact)
-    sizes["step_error"] = measure.visible_errors(model, scene, states, reference.states)
-    leasts = {
-        "position": scene_report.FLOORS * reference.floor.position,
-        "attitude": scene_report.FLOORS * reference.floor.attitude,
-        "velocity": scene_report.FLOORS * reference.floor.velocity,
-        "step_error": basis.least_seen,
-        "figure": basis.least_figure,
-    }
-    if measure.quantity_name(model, scene):
-        sizes["figure"] = measure.quantity_errors(model, scene, states, reference.states)
-    middle = (len(states.times) + 1) // 2
-    halves = {
-        name: tuple(max(float(part.max()), leasts[name]) for part in (row[:middle], row[middle:]))
-        for name, row in sizes.items()
-        if len(row) > 1
-    }
-    step_error = max(float(sizes["step_error"].max(initial=0.0)), basis.least_seen)
-    figure = None
-    if "figure" in sizes:
-        ends = np.maximum([sizes["figure"].max(), sizes["figure"][-1]], basis.least_figure)
-        figure = float(ends[0]), float(ends[1])
-    return replace(
-        row,
-        **asdict(measure.errors(motion, exact, reference.floor)),
-        figure=figure,
-        step_error=step_error,
-        seen=step_error + cone.visible_model_error,
-        slip=creep,
-        halves=halves,
-    )

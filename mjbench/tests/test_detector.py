@@ -131,8 +131,8 @@ def test_what_comes_out_on_the_other_side_or_stays_inside_went_through() -> None
     model = mujoco.MjModel.from_xml_string(inside)
     run = simulate(Setup(scenario=Scenario(0.1, 0.02)), model)
     assert run.judgement.reasons == ("the world and leg stay inside each other at the end",)
-    known = Setup(scenario=Scenario(0.1, 0.02), passing=run.passing)
-    assert simulate(known, model).judgement.ok, "as in small steps"
+    setup = Setup(scenario=Scenario(0.1, 0.02), passing=run.passing)
+    assert simulate(setup, model).judgement.ok, "as in small steps"
 
 
 def test_what_sinks_in_after_the_scenario_is_not_lost_in_longer_runs() -> None:

@@ -200,8 +200,8 @@ def test_rigid_theory_of_a_soft_equality_is_what_stiffer_ones_tend_to(folder: Pa
     toml = '[[scenario]]\nname = "fall"\nduration = 0.2\nsample = 0.02\ntimesteps = [0.001]\n'
     scenario = report(folder, ATWOOD.format(share="2 / 3"), toml)
     assert scenario.reference == "closed"
-    wrong = mistake(folder, ATWOOD.format(share="0.66"), toml)
-    assert "is not this scene's motion" in wrong.message
+    error = mistake(folder, ATWOOD.format(share="0.66"), toml)
+    assert "is not this scene's motion" in error.message
 
 
 ROLL = """\

@@ -39,7 +39,7 @@ def judged(rows: Sequence[WorkPrecisionRow], starts: Ratios = (), **fields: Any)
     return derive_scenario(scenario(rows, **fields), lambda _: starts)
 
 
-def said(*points: Point, **fields: Any) -> str:
+def verdict_text(*points: Point, **fields: Any) -> str:
     return judged(rows_of(*points), **fields).verdict.text
 
 
@@ -63,10 +63,10 @@ def test_small_differences_are_none_and_lost_runs_are_on_no_front() -> None:
         ((None, None), [False, False]),
     ):
         assert [row.front for row in front(rows_of(*points), SEEN)] == on_front, points
-    own = FrontPoint(Interval(1.0, 0.8, 1.2), 1e-3)
+    baseline = FrontPoint(Interval(1.0, 0.8, 1.2), 1e-3)
     for high, is_cheaper in ((0.79, True), (0.8, False), (0.9, False)):
         rival = FrontPoint(Interval(0.7, 0.6, high), 1e-3)
-        assert rival.is_cheaper(own) == rival.beats(own) == is_cheaper, high
+        assert rival.is_cheaper(baseline) == rival.beats(baseline) == is_cheaper, high
 
 
 OWN_BEST = "no other setting is cheaper without being less accurate"
@@ -107,9 +107,18 @@ def test_verdicts(points: tuple[Point, ...], better: int | None, text: str) -> N
 def masked(**rival: Any) -> list[WorkPrecisionRow]:
     """A block under the pyramid, whose error all rows share, and a stone that falls beside it."""
     newton = {"solver": "Newton", "iterations": 100, "cone": "pyramidal", "velocity": None}
-    own = {"seen": 8.27, "step_error": 0.1, "position": (0.0049, 0.0049), **newton, "own": True}
-    other = {**own, "own": False, "position": (0.0102, 0.0102), **rival}
-    return [row("Euler", 0.002, cost=1.0, **own), row("implicit", 1 / 240, cost=0.47, **other)]
+    baseline = {
+        "seen": 8.27,
+        "step_error": 0.1,
+        "position": (0.0049, 0.0049),
+        **newton,
+        "own": True,
+    }
+    rival_fields = {**baseline, "own": False, "position": (0.0102, 0.0102), **rival}
+    return [
+        row("Euler", 0.002, cost=1.0, **baseline),
+        row("implicit", 1 / 240, cost=0.47, **rival_fields),
+    ]
 
 
 CONES = {"pyramidal": 8.17, "elliptic": 0.0}
@@ -239,8 +248,8 @@ def test_verdicts_claim_only_what_holds() -> None:
     ]
     text = judged(small).verdict.text
     assert text.startswith("no difference that holds: implicit at 2 ms takes 0.93 of the time")
-    assert "errs 1000 times less" in said((1, 1e-3), (0.5, 1e-6))
-    assert "errs 1000 times less" in (text := said((1, 1e-3), (0.5, 1e-6), least_seen=1e-6))
+    assert "errs 1000 times less" in verdict_text((1, 1e-3), (0.5, 1e-6))
+    assert "errs 1000 times less" in (text := verdict_text((1, 1e-3), (0.5, 1e-6), least_seen=1e-6))
     assert "or more: the reference resolves no more" in text
     resting = judged(rows_of((1, 0.0), (0.1, 0.0))).verdict
     assert resting.better is None and not resting.on_front
@@ -263,8 +272,8 @@ def test_what_is_not_resolved_makes_no_setting_better() -> None:
 
 def test_where_the_own_setting_is_lost_the_others_are_weighed() -> None:
     words = "RK4 at 10 ms the cheapest without an error that is seen, at 0.25 of its cost"
-    assert f"is the most accurate that does, {words}" in said(None, (2, 1e-5), (0.5, 1e-3))
-    text = said(None, (2, 1e-5), (0.5, 170.0))
+    assert f"is the most accurate that does, {words}" in verdict_text(None, (2, 1e-5), (0.5, 1e-3))
+    text = verdict_text(None, (2, 1e-5), (0.5, 170.0))
     assert text.endswith("is the most accurate that does"), "a wrong motion is not cheap"
 
 

@@ -31,8 +31,8 @@ def test_only_digits_on_which_spans_and_starts_agree_are_printed() -> None:
 def test_where_digits_do_not_hold_the_least_limit_is_given_and_why() -> None:
     wide = replace(ROW, theory=16.0)
     assert limit_text(wide) == "16 s; from its own start 25 s", "unstable where it comes to rest"
-    other = replace(ROW, bracket=(19.0, 40.0))
-    assert limit_text(other) == "19 s; elsewhere 40 s"
+    wide = replace(ROW, bracket=(19.0, 40.0))
+    assert limit_text(wide) == "19 s; elsewhere 40 s"
     all_of_own = replace(ROW, largest="all", bracket=(500.0, HIGH))
     assert limit_text(all_of_own) == "500 s; from its own start 1000 s"
     none = replace(ROW, bracket=(0.0, 25.44))

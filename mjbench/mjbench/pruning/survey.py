@@ -23,7 +23,6 @@ from mjbench.machine import Machine
 from mjbench.pruning.bystanders import couplings, far_bodies, resting_joints
 from mjbench.pruning.candidates import (
     KINDS,
-    SETTINGS,
     Item,
     contact_of_rest,
     idle_contacts,
@@ -44,7 +43,14 @@ from mjbench.pruning.comparison import (
 from mjbench.pruning.model_text import ModelText
 from mjbench.pruning.reachability import PREMISES
 from mjbench.pruning.readers import ModelReader, difference, unrelated_fields
-from mjbench.pruning.trials import PrunedModel, PruningTrials, largest_subset
+from mjbench.pruning.trials import (
+    PrunedGroup,
+    PrunedModel,
+    PruningTrials,
+    is_to_go,
+    largest_subset,
+    views_of,
+)
 from mjbench.pruning.xml_edits import ModelEdit, place_of
 from mjbench.reports.diet_report import (
     INTERFACE_LABEL,
@@ -56,7 +62,6 @@ from mjbench.reports.diet_report import (
     Keep,
     ModelPlace,
     RejectedTrial,
-    Saving,
     StaleKeep,
 )
 from mjbench.scene import Scene
@@ -76,13 +81,6 @@ class Survey(Struct, frozen=True):
     text: ModelText
     edits: tuple[ModelEdit, ...] = ()
     """All that `--fix` changes."""
-
-
-class _PrunedGroup(Struct, frozen=True, eq=False):
-    """Items that are taken out together, with the finding about them."""
-
-    items: tuple[Item, ...]
-    finding: Finding
 
 
 class Surveyor(Struct, kw_only=True, eq=False, dict=True):
@@ -183,7 +181,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         self.tell("all together")
         fixable = [item for group in groups if group.finding.fixable for item in group.items]
         fixed = self.trials.prune(largest_subset(fixable, self._is_needless)) if fixable else None
-        slim, slim_difference = self._save_most([g for g in groups if _goes(g.finding)])
+        slim, slim_difference = self.trials.save_most([g for g in groups if is_to_go(g.finding)])
         used_keys = {group.finding.kind for group in groups}
         used_keys |= {f"{item.kind} {item.name}" for group in groups for item in group.items}
         stale = {key: keep for key, keep in self.keeps.items() if key not in used_keys}
@@ -202,19 +200,19 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         )
         return Survey(report, self.text, () if fixed is None else fixed.edits)
 
-    def _settle(self, groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
+    def _settle(self, groups: Sequence[PrunedGroup]) -> list[PrunedGroup]:
         """Confirm groups, and try the rest without them, but for what is kept."""
         groups = self._confirm(groups) if groups else []
-        unkept = [group for group in groups if _goes(group.finding)]
+        unkept = [group for group in groups if is_to_go(group.finding)]
         self.trials.absences += tuple(item for group in unkept for item in group.items)
         return groups
 
-    def _confirm(self, groups: Sequence[_PrunedGroup]) -> list[_PrunedGroup]:
+    def _confirm(self, groups: Sequence[PrunedGroup]) -> list[PrunedGroup]:
         """The groups without which scripts and labs of the course print the same."""
         self.tell("scripts and labs")
         unkept = [group for group in groups if not group.finding.kept]
 
-        def change_nothing(groups: Sequence[_PrunedGroup]) -> bool:
+        def change_nothing(groups: Sequence[PrunedGroup]) -> bool:
             return self._prune(groups) is not None and not self._find_changed_output(groups)
 
         confirmed = largest_subset(unkept, change_nothing)
@@ -225,7 +223,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
                 self._reject(group.items, group.finding.difference, reason)
         return [group for group in groups if group.finding.kept or group in confirmed]
 
-    def _prove(self) -> list[_PrunedGroup]:
+    def _prove(self) -> list[PrunedGroup]:
         self.tell("what nobody needs")
         items = unread_elements(self.text, [run.scene.scenario for run in self.good_runs])
         if not any(reader.touches(PREMISES) for reader in self.readers):
@@ -270,7 +268,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
 
     def _is_unread(self, item: Item) -> bool:
         names = {item.name} | {node.get("class") or "" for e in item.removals for node in e.walk()}
-        reader = self._find_noticing_reader(names - {""}, _views([item]), ())
+        reader = self._find_noticing_reader(names - {""}, views_of([item]), ())
         if reader is not None:
             self._reject([item], None, reader.doubt)
         return reader is None
@@ -286,7 +284,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         trial = self.trials.prune(items)
         if trial is None:
             return False
-        kinds = _views(items)
+        kinds = views_of(items)
         own_fields = {field for item in items for field in KINDS[item.kind].fields.split()}
         if unrelated_fields(difference(self.text.model, trial.model), kinds) - own_fields:
             return False
@@ -303,9 +301,9 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         result = self.trials.compare(trial, self.trials.whole)
         return result is not None and result.identical
 
-    def _try_by_running(self, candidates: Iterable[Sequence[Item]]) -> list[_PrunedGroup]:
+    def _try_by_running(self, candidates: Iterable[Sequence[Item]]) -> list[PrunedGroup]:
         """Take out of each list of items as many of a kind as change no motion."""
-        groups: list[_PrunedGroup] = []
+        groups: list[PrunedGroup] = []
         absences = {element for item in self.trials.absences for element in item.removals}
         edits = {edit for item in self.trials.absences for edit in item.edits}
 
@@ -324,7 +322,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
                 groups += [] if group is None else [group]
         return groups
 
-    def _try_items(self, items: Sequence[Item], reason: str) -> _PrunedGroup | None:
+    def _try_items(self, items: Sequence[Item], reason: str) -> PrunedGroup | None:
         """Take out as many of these items as change no motion, if that saves time.
 
         A shape that stands for a mesh is another scene: it may differ by less than can be seen.
@@ -375,14 +373,14 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
 
     def _make_group(
         self, items: Sequence[Item], reason: str, label: str, comparison: MotionComparison
-    ) -> _PrunedGroup:
+    ) -> PrunedGroup:
         kind, trials, edits = items[0].kind, self.trials, self.trials.edits(items)
         rest = trials.prune(trials.absences) or trials.whole
         trial = trials.prune([*trials.absences, *items])
         # One that is proved may go only with what uses it.
         change = frozenset() if trial is None else trials.difference(trial, rest)
         timed = not kind.startswith("unused-") or kind == "unused-site"
-        reader = self._find_noticing_reader((), _views(items), change)
+        reader = self._find_noticing_reader((), views_of(items), change)
         unfixed = self._reason_unfixed(kind, reason, label, edits)
         places = []
         for item in items:
@@ -407,7 +405,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             starts=len(trials.runs),
             in_rest=bool(trials.absences),
         )
-        return _PrunedGroup(tuple(items), finding)
+        return PrunedGroup(tuple(items), finding)
 
     def _reason_unfixed(
         self, kind: str, keep_reason: str, label: str, edits: Iterable[ModelEdit]
@@ -429,48 +427,10 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         names = tuple(item.name for item in items)
         self.rejected.append(RejectedTrial(items[0].kind, message_of(items), names, finite, reason))
 
-    def _prune(self, groups: Sequence[_PrunedGroup]) -> PrunedModel | None:
+    def _prune(self, groups: Sequence[PrunedGroup]) -> PrunedModel | None:
         return self.trials.prune([item for group in groups for item in group.items])
 
-    def _find_changed_output(self, groups: Sequence[_PrunedGroup]) -> str:
+    def _find_changed_output(self, groups: Sequence[PrunedGroup]) -> str:
         """Which script or lab of the course prints something else without these groups."""
         trial = self._prune(groups)
         return self.rerun(self.text.files(trial.edits)) if trial and self.rerun else ""
-
-    def _save_most(self, groups: Sequence[_PrunedGroup]) -> tuple[Saving | None, float | None]:
-        """The saving and difference of all groups that go together, or of the best one alone."""
-
-        def moves_alike(groups: Sequence[_PrunedGroup]) -> bool:
-            trial = self._prune(groups)
-            result = None if trial is None else self.trials.compare(trial, self.trials.whole)
-            return result is not None and result.difference < ALIKE
-
-        groups = [group for group in groups if group.finding.difference < ALIKE]
-        by_time = sorted(groups, key=lambda group: -(group.finding.saving.time or 0.0))
-        best = largest_subset(
-            [group for group in by_time if group.finding.kind not in SETTINGS], moves_alike
-        )
-        trial = self._prune(best)
-        # What is quicker in the whole model need not be so in what is left of it.
-        for group in by_time:
-            variant = self._prune([*best, group]) if group.finding.kind in SETTINGS else None
-            if variant is None or trial is None or not moves_alike([*best, group]):
-                continue
-            saving = self.trials.measure_saving(variant.edits, variant, trial)
-            if saving.certain and (saving.time or 0.0) > 1.0:
-                best, trial = [*best, group], variant
-        result = self.trials.compare(trial, self.trials.whole) if best and trial else None
-        if trial is None or result is None:
-            return None, None
-        saving = self.trials.measure_saving(trial.edits, trial, self.trials.whole)
-        return saving, result.difference
-
-
-def _goes(finding: Finding) -> bool:
-    """Whether a finding is about something that is to go."""
-    return not finding.kept and finding.label != INTERFACE_LABEL
-
-
-def _views(items: Iterable[Item]) -> frozenset[str]:
-    """The kinds of things that items are to code."""
-    return frozenset(KINDS[item.kind].view for item in items) - {""}

@@ -11,8 +11,9 @@ import numpy as np
 from msgspec import Struct
 
 from mjbench.costs import Clock, Job, Timing, scenario_job, time_jobs
-from mjbench.pruning.candidates import Item
+from mjbench.pruning.candidates import KINDS, SETTINGS, Item
 from mjbench.pruning.comparison import (
+    ALIKE,
     KEY_SIZES,
     IndexMap,
     MotionComparison,
@@ -33,7 +34,7 @@ from mjbench.pruning.xml_edits import (
     merge_edits,
     remove_elements,
 )
-from mjbench.reports.diet_report import Saving
+from mjbench.reports.diet_report import INTERFACE_LABEL, Finding, Saving
 from mjbench.scene import Scene
 from mjbench.simulation import STATE, advance, full_state, initial_data, silent
 
@@ -73,6 +74,23 @@ class PrunedModel(Struct, frozen=True, eq=False):
     edits: tuple[ModelEdit, ...]
     model: Any
     index: IndexMap
+
+
+class PrunedGroup(Struct, frozen=True, eq=False):
+    """Items that are taken out together, with the finding about them."""
+
+    items: tuple[Item, ...]
+    finding: Finding
+
+
+def is_to_go(finding: Finding) -> bool:
+    """Whether a finding is about something that is to go."""
+    return not finding.kept and finding.label != INTERFACE_LABEL
+
+
+def views_of(items: Iterable[Item]) -> frozenset[str]:
+    """The kinds of things that items are to code."""
+    return frozenset(KINDS[item.kind].view for item in items) - {""}
 
 
 class PruningTrials(Struct, eq=False, dict=True):
@@ -191,6 +209,37 @@ class PruningTrials(Struct, eq=False, dict=True):
         states = [full_state(part.model, self._part(start, part)) for start in starts]
         actuators, timestep = part.index["nu"].tolist(), self.scenes[0].timestep
         return scenario_job(part.model, scenarios, timestep, states=states, actuators=actuators)
+
+    def save_most(self, groups: Sequence[PrunedGroup]) -> tuple[Saving | None, float | None]:
+        """The saving and difference of all groups that go together, or of the best one alone."""
+
+        def moves_alike(groups: Sequence[PrunedGroup]) -> bool:
+            trial = self._prune_groups(groups)
+            result = None if trial is None else self.compare(trial, self.whole)
+            return result is not None and result.difference < ALIKE
+
+        groups = [group for group in groups if group.finding.difference < ALIKE]
+        by_time = sorted(groups, key=lambda group: -(group.finding.saving.time or 0.0))
+        best = largest_subset(
+            [group for group in by_time if group.finding.kind not in SETTINGS], moves_alike
+        )
+        trial = self._prune_groups(best)
+        # What is quicker in the whole model need not be so in what is left of it.
+        for group in by_time:
+            variant = self._prune_groups([*best, group]) if group.finding.kind in SETTINGS else None
+            if variant is None or trial is None or not moves_alike([*best, group]):
+                continue
+            saving = self.measure_saving(variant.edits, variant, trial)
+            if saving.certain and (saving.time or 0.0) > 1.0:
+                best, trial = [*best, group], variant
+        result = self.compare(trial, self.whole) if best and trial else None
+        if trial is None or result is None:
+            return None, None
+        saving = self.measure_saving(trial.edits, trial, self.whole)
+        return saving, result.difference
+
+    def _prune_groups(self, groups: Sequence[PrunedGroup]) -> PrunedModel | None:
+        return self.prune([item for group in groups for item in group.items])
 
 
 def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], IndexMap]:

@@ -40,10 +40,10 @@ def diet_text(report: DietReport, command: str, declarations: str, style: Style)
             lost = f"scenario {scenario.name}: {status}; nothing is claimed from it"
             lines += style.wrap(lost, "  ")
     parts = [finding for finding in report.findings if finding.label != INTERFACE_LABEL]
-    shown = [f for f in parts if f.is_fault or f.kept or (f.saving.time or 0.0) >= _WORTHWHILE]
-    for finding in shown:
+    notable = [f for f in parts if f.is_fault or f.kept or (f.saving.time or 0.0) >= _WORTHWHILE]
+    for finding in notable:
         lines += ["", *_finding(finding, command, style)]
-    if small := [finding.message for finding in parts if finding not in shown]:
+    if small := [finding.message for finding in parts if finding not in notable]:
         text = f"saves less than 5 %, or no time that was measured: {'; '.join(small)}"
         lines += ["", *style.wrap(text, "  ")]
     for finding in report.findings:

@@ -39,12 +39,12 @@ def limit_text(row: StableRow) -> str:
     if digits < 2:
         most = seconds_text(high, 2)
         if row.theory == high:
-            why = f"theory allows {most}"
+            reason = f"theory allows {most}"
         elif reach_bound(row.largest) >= 0.99 * high:
-            why = f"from its own start {most}"
+            reason = f"from its own start {most}"
         else:
-            why = f"elsewhere {most}"
-        return f"{seconds_text(low, 2)}; {why}"
+            reason = f"elsewhere {most}"
+        return f"{seconds_text(low, 2)}; {reason}"
     value = float(f"{low:.{digits}g}")
     if value > high:
         value -= 10.0 ** (math.floor(math.log10(low)) + 1 - digits)

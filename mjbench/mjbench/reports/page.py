@@ -115,9 +115,9 @@ def _grid(chart: Chart, x: _Scale, y: _Scale) -> Iterator[str]:
 
 def _line(line: ChartLine, x: _Scale, y: _Scale) -> Iterator[str]:
     colour = _COLOURS[line.number % len(_COLOURS)]
-    joined = [_place(p, x, y) for p in line.points if p.y and not p.small]
-    if joined:
-        yield _path("M" + "L".join(f"{right:.1f} {down:.1f}" for right, down in joined), colour)
+    places = [_place(p, x, y) for p in line.points if p.y and not p.small]
+    if places:
+        yield _path("M" + "L".join(f"{right:.1f} {down:.1f}" for right, down in places), colour)
     for point in line.points:
         right, down = _place(point, x, y)
         if point.y is None:

@@ -20,8 +20,8 @@ def plot_lines(chart: Chart, width: int = 80) -> Iterator[str]:
     if not errors:
         return
     levels = [level for level in chart.levels if level.y > 0]
-    shown = [math.log10(level.y) for level in levels]
-    near = [y for y in shown if min(errors) - 1 <= y <= max(errors) + 1]
+    heights = [math.log10(level.y) for level in levels]
+    near = [y for y in heights if min(errors) - 1 <= y <= max(errors) + 1]
     x = _Axis([math.log10(point.x) for _, point in places], min(_WIDTH, width - 12))
     y = _Axis([*errors, *near], _HEIGHT)
     rows = [[" "] * x.cells for _ in range(y.cells)]
@@ -45,7 +45,7 @@ def plot_lines(chart: Chart, width: int = 80) -> Iterator[str]:
     names = [f"{_LETTERS[line.number % len(_LETTERS)]} {line.name}" for line in chart.lines]
     keys = [f"{_OWN} the model's own", f"{_LOST} lost", "capital: on the front"]
     yield "  ".join([*names, *keys])
-    texts = [level.text for level, at in zip(levels, shown, strict=True) if at in near]
+    texts = [level.text for level, at in zip(levels, heights, strict=True) if at in near]
     if texts:
         yield f"dotted: {', '.join(texts)}"
 

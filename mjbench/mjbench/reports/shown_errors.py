@@ -134,7 +134,7 @@ def front(rows: Rows, quantity: Quantity) -> tuple[WorkPrecisionRow, ...]:
     return mark_front(
         rows,
         {n: place.cost.value * place.error for n, place in places.items()},
-        lambda rival, own: places[rival].beats(places[own]),
+        lambda rival, baseline: places[rival].beats(places[baseline]),
     )
 
 

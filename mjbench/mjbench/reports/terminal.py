@@ -63,18 +63,18 @@ def fitted_table(columns: Sequence[tuple[str, Sequence[str]]], width: int) -> It
     What has no room is named below.
     """
     filled = [(title, cells) for title, cells in columns if any(cell.strip() for cell in cells)]
-    kept: list[tuple[str, Sequence[str], int]] = []
+    fitting: list[tuple[str, Sequence[str], int]] = []
     left: list[str] = []
     room = width
     for title, cells in filled:
         wide = max(len(title), *map(len, cells)) + 2
-        if kept and wide > room + 2:
+        if fitting and wide > room + 2:
             left.append(title)
             continue
-        kept.append((title, cells, wide))
+        fitting.append((title, cells, wide))
         room -= wide
-    for row in range(-1, len(kept[0][1]) if kept else -1):
-        cells = [(title if row < 0 else cells[row]).ljust(wide) for title, cells, wide in kept]
+    for row in range(-1, len(fitting[0][1]) if fitting else -1):
+        cells = [(title if row < 0 else cells[row]).ljust(wide) for title, cells, wide in fitting]
         yield "".join(cells).rstrip()
     if left:
         yield f"no room for: {'; '.join(left)}; --format json has all"

@@ -46,10 +46,10 @@ def scenario_charts(report: ScenarioReport) -> tuple[Chart, ...]:
 
     None where no row errs.
     """
-    found = next((q for q in report.quantities if q.name == report.main), None)
-    if found is None:
+    match = next((q for q in report.quantities if q.name == report.main), None)
+    if match is None:
         return ()
-    quantity = Quantity(found.name, found.label, found.least)
+    quantity = Quantity(match.name, match.label, match.least)
     if not any(quantity.value_of(row) for row in report.rows):
         return ()
     return tuple(
@@ -101,10 +101,10 @@ def _levels(report: ScenarioReport, quantity: Quantity) -> Iterator[ChartLevel]:
     if quantity.name not in (SEEN.name, STEPPED.name):
         return
     yield ChartLevel(1.0, "just visible")
-    own = report.own_setting
-    model = report.contact_model.get(own.cone, 0.0) if own is not None else 0.0
-    if quantity.name == STEPPED.name and own is not None and model:
-        yield ChartLevel(model, f"the {own.cone} cone's own error")
+    baseline = report.own_setting
+    model = report.contact_model.get(baseline.cone, 0.0) if baseline is not None else 0.0
+    if quantity.name == STEPPED.name and baseline is not None and model:
+        yield ChartLevel(model, f"the {baseline.cone} cone's own error")
 
 
 def _points(
@@ -180,8 +180,8 @@ def _describe(
     if parted := _parted(report):
         error = horizon_error_text(report.horizon_error)
         yield f"Runs are off by more than {error} under {', '.join(parted)}."
-    if (own := report.own_setting) is not None:
-        yield f"The scene’s own setting is {setting_text(own)}."
+    if (baseline := report.own_setting) is not None:
+        yield f"The scene’s own setting is {setting_text(baseline)}."
     if quantity.least > 0:
         yield f"No error below {quantity.least:.1e} is given."
 

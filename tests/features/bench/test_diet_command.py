@@ -229,7 +229,13 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_a_finding(
         assert {finding["kind"] for finding in findings if finding["fixable"]} == kinds
 
 
-SHARED_PART = '<mujocoinclude>\n  <compiler/>\n  <option>\n    <flag energy="enable"/>\n  </option>\n</mujocoinclude>\n'
+SHARED_PART = """<mujocoinclude>
+  <compiler/>
+  <option>
+    <flag energy="enable"/>
+  </option>
+</mujocoinclude>
+"""
 
 
 def test_a_file_of_two_models_is_not_changed(course: Path, capsys: Capture) -> None:

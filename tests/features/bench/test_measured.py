@@ -250,8 +250,8 @@ def test_a_hard_case_of_an_unknown_number_goes_by_its_own_title(make: Make) -> N
 
 
 def test_a_scenario_whose_motion_the_course_knows_is_a_hard_case(make: Make) -> None:
-    known = case("box/swing", 0, title="box: A pendulum swings")
-    model = scene(swing(), replace(awkward(), name="awkward"), model="box", cases=(known,))
+    case_report = case("box/swing", 0, title="box: A pendulum swings")
+    model = scene(swing(), replace(awkward(), name="awkward"), model="box", cases=(case_report,))
     page = pages(make, Reports({"box": model}, cases=(case("a", 4),)))["numerics/index.html"]
     words = text(page.replace("<details", "<div").replace("</details", "</div"))
     assert "Cases of this course box: " in words and "coursebuild" not in words

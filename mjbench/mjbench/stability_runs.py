@@ -1,0 +1,150 @@
+"""Runs of a model over a span, and what ends in them: bounds, nearness, passing through."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+from msgspec import Struct
+from msgspec.structs import replace
+
+from mjbench.detector import Passages, Peaks, RunStatus, has_bad_state, judge, update_peaks
+from mjbench.pilot import nudges, position_distance
+from mjbench.problem import Array, Setup
+from mjbench.simulation import EngineStates, initial_data, watch_steps
+
+STARTS, QUICK_STARTS, NEARBY = 5, 3, 1e-4
+"""The starts of runs, the own one among them, and how far the others are from it: rad, or relative
+to the model's extent."""
+_LOOKS = 500
+"""How often a run is looked at."""
+_TRANSIENT, _DECAY = 8, 0.75
+"""What shoots up in so many first steps is a transient, if it has decayed after that part of
+a run."""
+_AT_REST = 1e-100
+"""The part of its largest speed below which nothing begins to move: subnormal numbers are slow."""
+
+
+class StabilityTrial(Struct, frozen=True):
+    """A run at one timestep."""
+
+    timestep: float
+    """s."""
+    status: RunStatus
+    growth: float
+    """The factor by which velocities grow in a step, from half the run to its end; NaN where the
+    run was lost before."""
+    energy: float = -math.inf
+    """The most potential and kinetic energy on the way, J."""
+    reason: str = ""
+    """Why it was lost."""
+    astray: str = ""
+    """How it left the motion of small steps; empty where it did not, or nobody asked."""
+    through: str = ""
+    """What went through what."""
+
+    @property
+    def stable(self) -> bool:
+        """Whether the run stayed within what can be."""
+        return self.status is RunStatus.OK
+
+
+class KeptMotion(Struct, frozen=True, eq=False):
+    """The motion that small steps keep, as long as it can be predicted."""
+
+    states: EngineStates
+    units: Array
+    """What counts as far in each degree of freedom (nv,)."""
+    far: str
+    """The same in words."""
+
+    def distance(self, model: Any, data: Any, number: int) -> float:
+        """How far a state near the time of such a sample is from it, where 1 is far."""
+        qpos, qvel = self.states.qpos[number].copy(), self.states.qvel[number]
+        mujoco.mj_integratePos(model, qpos, qvel, data.time - float(self.states.times[number]))
+        return position_distance(model, qpos, data.qpos, self.units)
+
+
+def step_count(span: float, timestep: float) -> int:
+    """Steps that make up a span, both in s."""
+    return math.ceil(span / timestep * (1 - 1e-12))
+
+
+def run_trial(
+    setup: Setup, model: Any, span: float, motion: KeptMotion | None = None, *, start: int = 0
+) -> StabilityTrial:
+    """Run a model over a span (s) with its own timestep, or until it is lost.
+
+    `motion`: to compare it with; `start`: 0 for the scenario's own, else one near it. A command
+    changes with the first step that begins after its time: the timestep need not divide the hold.
+    """
+    data = initial_data(setup.scenario, model)
+    if start:
+        direction = nudges(model, STARTS - 1, NEARBY)[start - 1]
+        mujoco.mj_integratePos(model, data.qpos, direction[0], 1.0)
+        data.qvel[:] += direction[1]
+        data.act[:] += NEARBY * (-1) ** start
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    timestep = float(model.opt.timestep)
+    steps = step_count(span, timestep)
+    interval = max(2, steps // _LOOKS)
+    commands = {
+        min(math.ceil(begin / timestep - 1e-9), steps): command
+        for begin, _, command in setup.scenario.holds(span)
+    }
+    times = () if motion is None or start else motion.states.times.tolist()
+    samples = {round(time / timestep): number for number, time in enumerate(times)}
+    stops = sorted(
+        {*range(1, _TRANSIENT + 1), *range(0, steps, interval), steps, *commands, *samples}
+    )
+    passages, astray = Passages(model, setup), ""
+    sizes: list[tuple[int, float]] = []
+    limits, count, excess_end, energy, is_lost = setup, 0, 0.0, -math.inf, False
+    peak_speed = 0.0
+    for stop in (stop for stop in stops if stop <= steps):
+        try:
+            if stop > count:
+                watch_steps(model, data, stop - count, passages)
+        except mujoco.FatalError:  # MuJoCo does not run it
+            reason = "MuJoCo does not run it"
+            return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan, -math.inf, reason, reason)
+        count, now = stop, update_peaks(data, Peaks())
+        if not count:  # before the first step MuJoCo has computed no energy: it says 0
+            now = replace(now, energy=-math.inf)
+        energy = max(energy, now.energy)
+        if count <= _TRANSIENT:
+            fastest = max(limits.velocity_bound, now.velocity)
+            most = max(limits.energy_bound, now.energy)
+            limits = replace(limits, velocity_bound=fastest, energy_bound=most)
+        excess_end = excess_end if now.is_within(setup) else count * timestep
+        is_lost = not now.is_within(limits) or has_bad_state(data)
+        if is_lost or (count > max(commands) and now.velocity < _AT_REST * peak_speed):
+            break
+        peak_speed = max(peak_speed, now.velocity)
+        if motion is not None and count in samples and not astray:
+            distance = motion.distance(model, data, samples[count])
+            if not distance < 1:
+                astray = f"off by {motion.far} at {data.time:.3g} s"
+        if commands.get(stop):
+            data.ctrl[:] = commands[stop]
+        sizes.append((count, math.hypot(*data.qvel.tolist())))
+    is_lost = is_lost or excess_end > _DECAY * span  # it shot up, and has not come down
+    judgement = judge(model, data, count * timestep, now, setup if is_lost else limits)
+    status, reason = judgement.status, "; ".join(judgement.reasons)
+    if is_lost and status is RunStatus.OK:
+        status, reason = RunStatus.SLOW_GROWTH, "what shot up in the first steps did not come down"
+    through = "; ".join(passages.texts())
+    astray = astray or ("it is lost" if is_lost else "")
+    return StabilityTrial(timestep, status, _growth(sizes), energy, reason, astray, through)
+
+
+def _growth(sizes: list[tuple[int, float]]) -> float:
+    """The factor by which velocities grow in a step, from the middle of a run to its end."""
+    if len(sizes) < 2:
+        return math.nan
+    middle = next(n for n, (count, _) in enumerate(sizes) if 2 * count >= sizes[-1][0])
+    (before, small), (after, large) = sizes[min(middle, len(sizes) - 2)], sizes[-1]
+    if not 0 < small < math.inf or not 0 < large < math.inf:
+        return math.nan
+    return float((large / small) ** (1 / (after - before)))
