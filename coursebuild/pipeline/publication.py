@@ -11,6 +11,7 @@ import functools
 import os
 import zipfile
 from collections.abc import Callable, Iterable, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
@@ -127,7 +128,7 @@ def make_files(
                 if file.path.endswith(".html"):
                     file.make()
         report = checked_course.report(outputs.diagnostics)
-        whole_report = checked_course.report((*outputs.diagnostics, *failures))
+        whole_report = checked_course.report(chain(outputs.diagnostics, failures))
     except TemplateFailure as failure:
         from coursebuild.pipeline.theme_files import template_diagnostic
 

@@ -254,17 +254,11 @@ def try_downloads(
             "download-failed",
             extractions[path].script.path_span,
             f"what readers download of `{path}` {problem}",
-            help=_help(extractions[path]),
+            help="it gets an empty folder with what it imports and reads, and no network",
         )
         for path, problem in problems.items()
     )
     return judged_downloads, diagnostics
-
-
-def _help(extraction: Extraction) -> str:
-    if extraction.script.archive:
-        return "it runs in an empty folder, with nothing but what is in its archive"
-    return "it runs in an empty folder; `download=zip` hands over an archive instead"
 
 
 def _job(download: ScriptDownload, extraction: Extraction) -> AloneJob:

@@ -229,7 +229,8 @@ def level_view(
 def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageInputs:
     """The inputs of the page of a written lesson; its document's summary is enough."""
     place = urls.Place(urls.lesson_path(lesson))
-    scripts = tuple((script.path, place.href(script.path)) for script in document_scripts(document))
+    inputs = document_inputs(library, place, document, number_prefix(lesson.id))
+    scripts = tuple((path, download.href) for path, download in inputs.downloads.items())
     values = {
         **_common(library, place, lesson),
         "scripts": scripts,
@@ -257,7 +258,7 @@ def lesson_inputs(library: Library, lesson: Lesson, document: Document) -> PageI
         ),
         "lesson.html",
         values,
-        document_inputs=document_inputs(library, place, document, number_prefix(lesson.id)),
+        document_inputs=inputs,
     )
 
 

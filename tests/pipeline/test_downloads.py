@@ -1,0 +1,71 @@
+"""What readers download of scripts runs by itself; what does not has no button, and only that."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+from support.scratch_course import Make, block
+
+MODEL = '<mujoco><worldbody><body><freejoint/><geom size=".1"/></body></worldbody></mujoco>\n'
+HELPED = """\
+import mujoco
+from mjcourse import model_path
+
+from names import NAME
+
+model = mujoco.MjModel.from_xml_path(str(model_path("ball")))
+print(NAME, model.nq, open("runs/data.csv").read())
+"""
+LESSON = "## Files\n\n" + "".join(
+    (
+        block("helped.py", HELPED, "a ball 7 1,2"),
+        block("zipped.py", HELPED, "a ball 7 1,2", info="download=zip"),
+        block("names.py", 'NAME = "a ball"\n'),
+        block("astray.py", 'import os\n\nprint(os.path.isdir("content"))\n', "True"),
+        block("absent.py", "import torch\n\nprint(torch)\n", "1", info="requires=torch"),
+        block("args.py", "import sys\n\nprint(sys.argv[1:])\n", "['a b']", info="args=\"'a b'\""),
+    )
+)
+
+
+def run(folder: Path, entry: str, *args: str) -> str:
+    command = [sys.executable, entry, *args]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    return done.stdout + done.stderr
+
+
+def test_what_a_page_hands_over_runs_alone_or_has_no_button(make: Make, tmp_path: Path) -> None:
+    folder = make(LESSON)
+    folder.write("models/ball.xml", MODEL)
+    folder.write("runs/data.csv", "1,2")
+    build = folder.main("build")
+    assert build.status == 1
+    assert build.out.count("error[") == 1
+    assert "error[download-failed]: what readers download of `examples/astray.py`" in build.out
+    page = folder.text("public/lessons/1.1-one.html")
+    addresses = ("helped.py", "zipped.zip", "names.py", "astray.py", "absent.py", "args.py")
+    buttons = [f'href="../examples/{name}" download' in page for name in addresses]
+    assert buttons == [True, True, True, False, True, True]
+
+    (tmp_path / "helped.py").write_bytes(folder.read("public/examples/helped.py"))
+    assert run(tmp_path, "helped.py") == "a ball 7 1,2\n"
+    text = (tmp_path / "helped.py").read_text()
+    assert text.startswith("# /// script\n") and '#     "mujoco==' in text
+    with zipfile.ZipFile(io.BytesIO(folder.read("public/examples/zipped.zip"))) as archive:
+        archive.extractall(tmp_path)
+    assert run(tmp_path / "zipped", "examples/zipped.py") == "a ball 7 1,2\n"
+    assert (tmp_path / "zipped" / "requirements.txt").read_text().startswith("mujoco==")
+
+    assert "<code>uv run helped.py</code>" in page
+    assert "<code>uv run args.py &#39;a b&#39;</code>, or <code>python args.py" in page
+    assert "unpack zipped.zip, and in its folder <code>uv run --with-requirements" in page
+    assert page.count("not run alone") == 1
+
+    folder.write("content/lessons/1.1-one.md", LESSON.replace('isdir("content")', 'isdir(".")'))
+    mended = folder.main("build")
+    assert mended.status == 0, mended.out
+    assert 'astray.py" download' in folder.text("public/lessons/1.1-one.html")
