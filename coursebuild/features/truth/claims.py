@@ -177,8 +177,7 @@ def unbound_results(course: model.Course) -> Iterator[tuple[model.Owner, tuple[S
     parts = _Parts(course)
     for owner, document in course.owned_documents:
         if isinstance(owner, model.Lesson) or owner.menu:
-            summary = (document.summaries or {}).get("truth")
-            claims = summary if isinstance(summary, Claims) else document_claims(document)
+            claims = document.summary_of(Claims) or document_claims(document)
             inputs = parts.inputs(document).union(claims.inputs) if claims.open else ()
             yield owner, tuple(claim for claim in claims.open if not claim.is_in(inputs))
 
