@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild import api
+from support.run_code import run_code
 
 ROOT = Path(__file__).parents[1]
 FILE = Path(__file__).with_name("budgets.toml")
@@ -25,6 +26,22 @@ _JAVASCRIPT = re.compile(
     r"""(?P<comment>//[^\n]*|/\*.*?\*/)|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'|[\w$]+|[^\s\w]""",
     re.DOTALL,
 )
+
+
+MAP = """\
+[course]
+title = "A course"
+
+[[level]]
+id = "1"
+title = "One"
+
+[[level.lesson]]
+id = "1.1"
+slug = "first"
+title = "First"
+status = "complete"
+"""
 
 
 def part_of(path: Path) -> str:
@@ -111,6 +128,7 @@ def test_no_part_weighs_more_than_its_budget(request: pytest.FixtureRequest) -> 
         FILE.write_text(rewritten(FILE.read_text(encoding="utf-8")), encoding="utf-8")
     budgets = tomllib.loads(FILE.read_text(encoding="utf-8"))
     entries = budgets.pop("ledger")
+    budgets.pop("loaded")
     assert sorted(budgets) == sorted(measurements()), "each part has a budget, and is there"
     violations = [
         f"{part}: {key} is {number}, and may be {budgets[part][key]}"
@@ -121,6 +139,24 @@ def test_no_part_weighs_more_than_its_budget(request: pytest.FixtureRequest) -> 
     assert not violations, "\n".join(violations)
     assert [part for part, budget in budgets.items() if not budget["why"].strip()] == []
     assert [entry for entry in entries if {*entry} != {"issue", "what", "weight"}] == []
+
+
+@pytest.mark.site
+def test_a_check_of_one_line_loads_no_more_modules_than_before(tmp_path: Path) -> None:
+    lessons = tmp_path / "content/lessons"
+    lessons.mkdir(parents=True)
+    (tmp_path / "content/course.toml").write_text(MAP)
+    (lessons / "1.1-first.md").write_text("One line.\n")
+    done = run_code(
+        "import sys\n"
+        "from coursebuild.cli import main\n"
+        f"main(['-C', {str(tmp_path)!r}, 'check', '--no-cache'])\n"
+        "print(sum(name.split('.')[0] == 'coursebuild' for name in sys.modules))"
+    )
+    report, modules = done.stdout.splitlines()[-2:]
+    assert report == "1 lesson, 0 scripts run: everything holds"
+    budget = tomllib.loads(FILE.read_text(encoding="utf-8"))["loaded"]["modules"]
+    assert int(modules) <= budget, done.stdout
 
 
 def test_features_import_from_the_interface_what_it_offers() -> None:

@@ -197,8 +197,7 @@ def page_kind(name: str) -> PageKind | None:
 
 def model_parts() -> dict[str, ModelPart]:
     """What features add to the pages of models, by the name of the feature."""
-    parts = ((feature.name, feature.model_part) for feature in features())
-    return {name: part for name, part in parts if part is not None}
+    return dict(_offers("model_part"))
 
 
 def has_copies(page: str) -> bool:
@@ -221,19 +220,17 @@ def page_copies() -> tuple[PageCopy, ...]:
 
 def unproven(course: Course) -> tuple[Diagnostic, ...]:
     """What the course states, and nothing in it gives."""
-    makers = (feature.unproven for feature in features() if feature.unproven is not None)
-    return tuple(entry for list_unproven in makers for entry in list_unproven(course))
+    return tuple(entry for _, find in _offers("unproven") for entry in find(course))
 
 
 def summarize(document: Document, mathml: Mathml) -> Parsed[dict[str, Struct]]:
     """The summaries of a document that features make, by feature, and what is wrong in it."""
-    makers = {f.name: f.summary for f in features() if f.summary is not None}
-    summaries = {name: make(document, mathml) for name, make in makers.items()}
+    summaries = {name: make(document, mathml) for name, make in _offers("summary")}
     values = {
         name: summary.value for name, summary in summaries.items() if summary.value is not None
     }
     diagnostics = [d for summary in summaries.values() for d in summary.diagnostics]
-    for check in (f.check_document for f in features() if f.check_document is not None):
+    for _, check in _offers("check_document"):
         diagnostics += check(document)
     return Parsed(values, tuple(diagnostics))
 
@@ -242,29 +239,25 @@ def read_references(
     course: Course, store: Store, interpreter: Interpreter | None
 ) -> dict[str, Struct]:
     """What features read of the environment of the scripts, by feature."""
-    readers = {f.name: f.reference for f in features() if f.reference is not None}
-    references = {name: read(course, store, interpreter) for name, read in readers.items()}
+    references = {name: read(course, store, interpreter) for name, read in _offers("reference")}
     return {name: value for name, value in references.items() if value is not None}
 
 
 def losses_against(course: Course, python: str) -> tuple[Diagnostic, ...]:
     """What a course would lose with the MuJoCo of another interpreter."""
-    finders = (feature.against for feature in features() if feature.against is not None)
-    return tuple(diagnostic for find in finders for diagnostic in find(course, python))
+    return tuple(lost for _, find in _offers("against") for lost in find(course, python))
 
 
 def citations(library: Library, place: urls.Place, document: Document) -> Citations:
     """What a document's page shows of the sources that it cites."""
-    finders = (feature.citations for feature in features() if feature.citations is not None)
-    results = (find(library, place, document) for find in finders)
+    results = (find(library, place, document) for _, find in _offers("citations"))
     return next((citations for citations in results if citations.texts), Citations())
 
 
 def code_links(library: Library, place: urls.Place, document: Document) -> dict[int, str]:
     """The addresses of what inline code in a document names, by the offset of the code."""
-    finders = (feature.code_links for feature in features() if feature.code_links is not None)
     links: dict[int, str] = {}
-    for find in finders:
+    for _, find in _offers("code_links"):
         links |= find(library, place, document)
     return links
 
@@ -272,20 +265,18 @@ def code_links(library: Library, place: urls.Place, document: Document) -> dict[
 def check_runs(course: Course, runs: Iterable[ScriptRun]) -> tuple[Diagnostic, ...]:
     """The diagnostics of features about finished runs of scripts."""
     runs = tuple(runs)
-    checks = (feature.check_runs for feature in features() if feature.check_runs is not None)
-    return tuple(diagnostic for check in checks for diagnostic in check(course, runs))
+    return tuple(mistake for _, check in _offers("check_runs") for mistake in check(course, runs))
 
 
 def feature_trials(course: Course) -> dict[str, tuple[Trials, Trial]]:
     """The trials of all features by name, in order; each with its kind."""
-    kinds = (feature.trials for feature in features() if feature.trials is not None)
-    return {trial.name: (kind, trial) for kind in kinds for trial in kind.find(course)}
+    kinds = _offers("trials")
+    return {trial.name: (kind, trial) for _, kind in kinds for trial in kind.find(course)}
 
 
 def publish_trials(results: Results, assets: Assets) -> PublishedTrials:
     """The parts of trial results that a site needs."""
-    kinds = (feature.trials for feature in features() if feature.trials is not None)
-    parts = [kind.publish(results, assets) for kind in kinds]
+    parts = [kind.publish(results, assets) for _, kind in _offers("trials")]
     values = {name: value for part in parts for name, value in part.values.items()}
     return PublishedTrials(values, tuple(file for part in parts for file in part.files))
 
@@ -428,6 +419,12 @@ def _package_lines() -> tuple[str, ...]:
                 status = file.stat()
                 lines.append(f"{file}\0{status.st_size}\0{status.st_mtime_ns}")
     return tuple(lines)
+
+
+def _offers(field: str) -> Iterator[tuple[str, Any]]:
+    """What features offer in one field, with their names."""
+    offers = ((feature.name, getattr(feature, field)) for feature in features())
+    return ((name, offer) for name, offer in offers if offer is not None)
 
 
 def _names(features: Iterable[Feature], field: str) -> set[str]:

@@ -201,9 +201,9 @@ def test_a_note_that_cannot_be_written_costs_only_time(
 def test_looking_imports_next_to_nothing() -> None:
     process = run_code(program("imports_of_looking"))
     assert process.stdout.splitlines() == [
-        "['coursebuild.cli', 'coursebuild.output', 'coursebuild.cli.unchanged', "
-        "'coursebuild.core', 'coursebuild.core.files', 'coursebuild.core.files.course_root', "
-        "'coursebuild.core.files.trust']",
+        "['coursebuild.cli', 'coursebuild.cli.unchanged', 'coursebuild.core', "
+        "'coursebuild.core.files', 'coursebuild.core.files.course_root', "
+        "'coursebuild.core.files.trust', 'coursebuild.output']",
         "[]",
     ]
 

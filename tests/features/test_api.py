@@ -139,6 +139,8 @@ def first_sentence(text: str) -> str:
 def form(statement: ast.stmt) -> str:
     """A field with its type, a function with its arguments."""
     match statement:
+        case ast.AnnAssign(annotation=ast.Subscript(ast.Name("Annotated"), ast.Tuple([kind, *_]))):
+            return f"{ast.unparse(statement.target)}: {ast.unparse(kind)}"
         case ast.AnnAssign():
             return f"{ast.unparse(statement.target)}: {ast.unparse(statement.annotation)}"
         case ast.FunctionDef(name, arguments, returns=result):

@@ -32,11 +32,11 @@ from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt
 
-_GREEK = frozenset(
+GREEK = frozenset(
     """
     alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta iota kappa lambda mu nu xi pi
-    rho sigma tau upsilon phi varphi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi
-    Psi Omega
+    rho varrho sigma tau upsilon phi varphi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma
+    Upsilon Phi Psi Omega
     """.split()
 )
 _FUNCTIONS = frozenset(
@@ -111,7 +111,7 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
         span = tex.span(at, at + 1)
     help = ""
     if command := re.search(r"unknown command \\([A-Za-z]+)", error.message):
-        likely = nearest(command[1], _GREEK | _FUNCTIONS | _WITH_BRACES)
+        likely = nearest(command[1], GREEK | _FUNCTIONS | _WITH_BRACES)
         at = tex.text.find(command[1])
         if likely is not None and at >= 0:
             place = tex.span(at, at + len(command[1]))
@@ -177,7 +177,7 @@ def _check_letters(
     words = [*_LETTERS.finditer(tex.text)]
     for word in words:
         name, bracket, brace = word.groups()
-        is_name = name in _GREEK and not letters >= {*name}
+        is_name = name in GREEK and not letters >= {*name}
         is_call = name in _FUNCTIONS and (bracket or brace)
         if not (is_name or is_call or (name in _WITH_BRACES and brace)):
             continue

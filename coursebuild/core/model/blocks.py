@@ -7,12 +7,14 @@ import re
 from collections.abc import Mapping
 from decimal import Decimal
 from itertools import accumulate
-from typing import Annotated, ClassVar, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias, TypeVar
 
 from msgspec import Meta, Struct
 
 from coursebuild.core.model.inlines import Inline, Label, Located, RawHtml, SourceMark
 from coursebuild.core.text.source import Excerpt, Source, Span
+
+_S = TypeVar("_S", bound=Struct)
 
 _TITLE = re.compile(r"\ufeff?(?:[ \t\r]*\n)*# +(.*\S)")
 
@@ -414,3 +416,8 @@ class Document(Struct, frozen=True, dict=True):
     """Whether a comma may stand before the decimals of its numbers, as in its language."""
     summaries: Mapping[str, Struct] | None = None
     """Set in a summary only: those that features made of the text, by their names."""
+
+    def summary_of(self, kind: type[_S]) -> _S | None:
+        """The summary of this kind that a feature made of the text, if it made one."""
+        values = (self.summaries or {}).values()
+        return next((summary for summary in values if isinstance(summary, kind)), None)

@@ -70,9 +70,9 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
 
 def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
     """Yield a diagnostic for each identity that does not hold or is not understood."""
-    summaries = [_summary_of(document) for document in course.documents]
+    summaries = [document.summary_of(FormulaSummary) for document in course.documents]
     for document in documents:
-        document_summary = _summary_of(document)
+        document_summary = document.summary_of(FormulaSummary)
         if document_summary is None or not document_summary.identities:
             continue
         units: dict[str, set[str]] = {}
@@ -109,11 +109,6 @@ def _compare_at_points(
 ) -> tuple[FormulaComparison, ...]:
     """Cached, since it is the slowest check while a lesson is edited."""
     return tuple(check_identity(tex, dict(dimensions), read_domain(domain)))
-
-
-def _summary_of(document: Document) -> FormulaSummary | None:
-    summary = (document.summaries or {}).get("arithmetic")
-    return summary if isinstance(summary, FormulaSummary) else None
 
 
 FEATURE = Feature(

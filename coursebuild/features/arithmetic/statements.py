@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 from msgspec import Struct
 
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
-from coursebuild.features.arithmetic.tex import CONSTANTS, GREEK, SPACE, TOKEN, read_expression
+from coursebuild.features.arithmetic.tex import CONSTANTS, SPACE, SYMBOLS, TOKEN, read_expression
 
 _MAX_LENGTH = 5_000
 _DIGITS = re.compile("[0-9],[0-9]")
@@ -27,7 +27,7 @@ _ARABIC = {zero + n: str(n) for zero in (0x660, 0x6F0) for n in range(10)} | {0x
 _ENVIRONMENT = re.compile(r"\\(?:begin|end)\{(?:aligned|split|align\*?|gathered|equation\*?)\}")
 _WORDS = re.compile(
     r"\\(?:mathrm|text|textrm|begin|end)\s*(?:\{[^{}]*\}|\w)"
-    rf"|\\(?!(?:{'|'.join(GREEK - {'pi', 'infty'})})(?![A-Za-z]))[A-Za-z]+"
+    rf"|\\(?!(?:{'|'.join(SYMBOLS - {'pi', 'infty'})})(?![A-Za-z]))[A-Za-z]+"
 )
 """Commands and words whose letters are no symbols."""
 _MAY_BE_NUMERIC = re.compile(r"[0-9e]|\\pi")

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import re
 
+from coursebuild.core.checks import formulas
 from coursebuild.core.text.quantities import plain_unit
 from coursebuild.features.arithmetic.expressions import (
     Expression,
@@ -44,11 +45,7 @@ _UPRIGHT_UNIT = r"\{\s*(\\(?:mathrm|text)\s*(?:\{[^{}]+\}|[A-Za-z])(?:\^(?:\d|\{
 _UNIT_FRACTION = re.compile(rf"(?!\{{\s*\\mathrm\s*\{{?d\b)\s*{_UPRIGHT_UNIT}\s*{_UPRIGHT_UNIT}")
 _DEGREES = re.compile(r"\\circ|\{\s*\\circ\s*\}")
 _FUNCTIONS = frozenset("sin cos tan cot sec csc sinh cosh tanh arcsin arccos arctan exp ln".split())
-GREEK = frozenset(
-    "alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta iota kappa lambda mu nu xi"
-    " rho varrho sigma tau upsilon phi varphi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma"
-    " Upsilon Phi Psi Omega ell hbar infty pi".split()
-)
+SYMBOLS = formulas.GREEK | {"ell", "hbar", "infty"}
 _ACCENTS = frozenset("dot ddot hat bar tilde".split())
 _FRACTIONS = frozenset((r"\frac", r"\tfrac", r"\dfrac"))
 _BRACKET = re.compile(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
@@ -331,7 +328,7 @@ class _Reader:
             if not _LETTER.fullmatch(inner):
                 raise NotUnderstood("an accent stands over more than a letter", start, self.at)
             text = f"\\{name}{{{inner}}}"
-        elif re.fullmatch("[A-Za-z]", sign) or name in GREEK:
+        elif re.fullmatch("[A-Za-z]", sign) or name in SYMBOLS:
             text = sign
         else:
             self.at = start

@@ -23,7 +23,7 @@ from coursebuild.api import (
     diagnose,
     urls,
 )
-from coursebuild.features.names.claims import course_names, document_names, names_of
+from coursebuild.features.names.claims import DocumentNames, course_names, document_names
 from coursebuild.features.names.known_names import (
     EngineTable,
     KnownName,
@@ -47,7 +47,7 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
     free = {id(page.document) for page in course.pages if not page.names}
     resolver = resolver_of(course)
     for document in documents:
-        note = names_of(document)
+        note = document.summary_of(DocumentNames)
         if note is None or id(document) in free:
             continue
         for claim, code, span in note.claims:
@@ -67,7 +67,8 @@ def lost_names(course: Course, python: str) -> Iterator[Diagnostic]:
     resolver = resolver_of(course)
     uses = [
         (claim, span, note.names, meaning)
-        for note in filter(None, map(names_of, course.documents))
+        for document in course.documents
+        if (note := document.summary_of(DocumentNames)) is not None
         for claim, _, span in note.claims
         if isinstance(meaning := resolver.resolve(claim, note.names), KnownName) and meaning.engine
     ]
@@ -90,7 +91,7 @@ def lost_names(course: Course, python: str) -> Iterator[Diagnostic]:
 
 def code_links(library: Library, place: urls.Place, document: Document) -> dict[int, str]:
     """Return the addresses of what inline code names."""
-    note, links = names_of(document), dict[int, str]()
+    note, links = document.summary_of(DocumentNames), dict[int, str]()
     if note is None:
         return links
     resolver = resolver_of(library.course)

@@ -109,15 +109,10 @@ class DocumentNames(Struct, frozen=True, dict=True):
         return zip(self.names.claims, self.codes, self.places, strict=True)
 
 
-def names_of(document: model.Document) -> DocumentNames | None:
-    """Return the names of a document that the course has read."""
-    names = (document.summaries or {}).get("names")
-    return names if isinstance(names, DocumentNames) else None
-
-
 def course_names(course: model.Course) -> tuple[CodeNames, ...]:
     """Return the names of each document of a course."""
-    return tuple(note.names for note in map(names_of, course.documents) if note is not None)
+    notes = (document.summary_of(DocumentNames) for document in course.documents)
+    return tuple(note.names for note in notes if note is not None)
 
 
 def document_names(document: model.Document) -> DocumentNames | None:

@@ -19,8 +19,8 @@ from coursebuild.features.truth.claims import (
 
 def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
     """Yield an error for each number that its source does not hold."""
-    claims = ((document, (document.summaries or {}).get("truth")) for document in documents)
-    yield from check_sources(course, [(d, c) for d, c in claims if isinstance(c, Claims)])
+    claims = ((document, document.summary_of(Claims)) for document in documents)
+    yield from check_sources(course, [(d, c) for d, c in claims if c is not None])
 
 
 def unproven(course: Course) -> Iterator[Diagnostic]:

@@ -43,3 +43,23 @@ def test_what_a_lab_or_its_model_holds_is_no_result(tmp_path: Path) -> None:
     Layout.of(COURSE).write(tmp_path)
     results = [c.text for _, claims in unbound_results(load_course(tmp_path)) for c in claims]
     assert results == ["17.3"]
+
+
+UNITS = """\
+=== content/lessons/1.1-first.md
+A ball rolls for 2.5 s at 0.5 m/s, for 35 days, by 0.3 in `steps` or 0.4 in $x$.
+
+| length [cm] | count |
+| --- | --- |
+| 2.5 | 0.7 |
+
+{given="a book"}
+"""
+
+
+def test_a_unit_ends_where_its_phrase_does(tmp_path: Path) -> None:
+    """`s at` are no attoseconds, and `in` before code or a formula is a word."""
+    Layout.of(UNITS).write(tmp_path)
+    claims = document_claims(load_course(tmp_path).documents[0]).open
+    values = {claim.text: claim.values[-1][0] for claim in claims}
+    assert values == {"2.5": 2.5, "0.5": 0.5, "35": 35 * 86400, "0.3": 0.3, "0.4": 0.4}
