@@ -118,13 +118,14 @@ class _Checker(Struct, frozen=True):
         if isinstance(target, model.UrlTarget):
             yield from self.check_url(span, target.url)
             return
-        targets, lacks = self.targets, "is not in the course map"
+        targets = self.targets
         names: Collection[str]
         match target:
             case model.LessonTarget(id=name):
-                rule, names, missing = "link-lesson", targets.lessons, f"lesson {name} {lacks}"
-            case model.LevelTarget(id=name):
-                rule, names, missing = "link-level", targets.levels, f"level {name} {lacks}"
+                missing = f"lesson {name} is not in the course map"
+                rule, names = "link-lesson", targets.lessons
+            case model.LevelTarget():
+                return  # only a mention: without such a level it means another thing
             case model.PageTarget(id=name):
                 missing = f"no page `{name}` in the course map"
                 rule, names = "link-page", targets.pages
@@ -141,8 +142,6 @@ class _Checker(Struct, frozen=True):
         if name not in names:
             if isinstance(target, model.LessonTarget) and name in targets.levels:
                 help = f"{name} is a level: write `Level {name}`, which becomes a link"
-            elif isinstance(target, model.LevelTarget) and name in targets.lessons:
-                help = f"{name} is a lesson: write `Lesson {name}`, or link to `lesson:{name}`"
             else:
                 help = did_you_mean(name, names)
             yield diagnose(rule, span, missing, help=help)

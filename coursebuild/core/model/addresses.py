@@ -62,7 +62,9 @@ AnchorOwner: TypeAlias = (
 )
 """What an anchor of a document leads to; a source for the title of a page."""
 
-_HTML_ID = re.compile(r"""<[^<>]*?\sid\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE)
+_HTML_ID = re.compile(
+    r"""<(?:[^<>]*?\sid|a\s(?:[^<>]*?\s)?name)\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE
+)
 _NO_MARKUP = re.compile(
     r"<!--.*?(?:-->|\Z)|(<(script|style|textarea|title)\b[^<>]*>).*?(?:</\2\s*>|\Z)",
     re.IGNORECASE | re.DOTALL,

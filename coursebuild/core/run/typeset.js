@@ -29,6 +29,7 @@ const typeset = (() => {
     '\\N': '\\mathbb{N}',
     '\\Z': '\\mathbb{Z}',
     '\\textdegree': '\\degree',
+    '\\KaTeX': '\\text{KaTeX}',
   }
   for (const name in MACROS) temml.__defineMacro(name, MACROS[name])
 

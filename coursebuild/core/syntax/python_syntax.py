@@ -12,14 +12,12 @@ from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 _LINE_REFERENCE = re.compile(r"\b(on|at) line ([0-9]+)")
-_SHOWS = re.compile(
-    r"(?:matplotlib\.pyplot|plotly\.io)\.show|mediapy\.show_\w+|IPython\.display\.(?:display|Image|Video)"
-)
+_SHOWS = re.compile(r"(?:matplotlib\.pyplot|plotly\.io)\.show")
 
 
 def find_windows(code: Excerpt) -> Iterator[Diagnostic]:
     """Report the first picture that a script without figures shows and does not save."""
-    if not re.search("matplotlib|plotly|mediapy|IPython", code.text):
+    if not re.search("matplotlib|plotly", code.text):
         return
     try:
         tree = ast.parse(code.text)

@@ -133,7 +133,6 @@ GROUPS: dict[str, dict[str, str]] = {
     },
     "Links and bound numbers": {
         "link-lesson": "A link or mention names a lesson that is not in the map.",
-        "link-level": "A mention names a level that is not in the map.",
         "link-page": "A link names a page that is not in the map.",
         "link-text": "A link has no text or no address.",
         "link-term": "A link names a term that no lesson defines.",

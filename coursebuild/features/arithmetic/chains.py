@@ -100,6 +100,8 @@ def _check_chain(
                 terms = left.get_expression(), right.get_expression()
                 terms = (_strip_unit(terms[0]), _strip_unit(terms[1])) if has_common_unit else terms
                 mistake = _find_mistake(*terms, relation)
+                if mistake is not None and (reason := _other_reading(left, right, relation)):
+                    mistake = FormulaComparison("unread", left.start, right.end, reason)
                 letter = next((term.text for term in terms if _is_constant(term)), "")
                 if mistake is not None and letter:
                     reason = "it says what the letter stands for"
@@ -119,6 +121,24 @@ def _check_chain(
 def _is_constant(expression: Expression) -> bool:
     r"""Whether it is a letter alone: `\pi = 0.5` is no mistake, but says what the letter is."""
     return expression.kind == "symbol" and expression.text in CONSTANTS
+
+
+def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
+    """Return how a wrong relation may be meant; empty where numbers are what they say.
+
+    `0 = 1` ends a proof by contradiction, and of whole numbers `/` may be a division without rest.
+    """
+    if relation == "≈":
+        return ""
+    first, second = (side.tex[side.start : side.end].strip(" .") for side in (left, right))
+    if not re.fullmatch("[0-9]+", second):
+        return ""
+    if re.fullmatch("[0-9]+", first):
+        return "there is nothing to compute"
+    quotient = re.fullmatch(r"([0-9]+)\s*/\s*([1-9][0-9]*)", first)
+    if quotient is not None and int(quotient[1]) // int(quotient[2]) == int(second):
+        return "`/` may be the division of whole numbers"
+    return ""
 
 
 def _is_of_numbers(side: FormulaSide, symbols: Mapping[str, SymbolQuantity]) -> bool:

@@ -10,22 +10,30 @@ import contextlib
 import functools
 import json
 import re
+import textwrap
+import warnings
 from collections.abc import Mapping
 
 from msgspec.structs import replace
 
 from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.pages.marks import block_quote, fence
-from coursebuild.core.registry import CORE_FENCES, fence_names
+from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
-from coursebuild.features.importer.prose import LessonContext, display_formula, rewrite_prose
-from coursebuild.features.importer.segments import read_markdown
+from coursebuild.features.importer.jsx import without_jsx
+from coursebuild.features.importer.prose import (
+    LessonContext,
+    display_formula,
+    rewrite_prose,
+    to_anchor,
+)
+from coursebuild.features.importer.segments import lower_titles, read_markdown
 from coursebuild.features.importer.source_files import Segment, read_yaml
 
 _OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULTILINE)
 """An option of a cell, as Quarto and as MyST write it."""
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
-_WINDOW = re.compile(r"^plt\.show\(\)[ \t]*\n?", re.MULTILINE)
+_WINDOW = re.compile(r"^([ \t]*)plt\.show\(\)[ \t;]*$", re.MULTILINE)
 """What opens a window where there is none."""
 _FIGURE = re.compile(r"\b(?:plt|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
 _ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
@@ -78,8 +86,10 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
     text = _MAGIC.sub("", text)
     if _FIGURE.search(text):
         context.add_leftover("a figure: save it by `plt.savefig`, and name it by `figure=`")
-        text = _WINDOW.sub("", text)
+        text = _WINDOW.sub(lambda window: window[1] and f"{window[1]}pass", text)
     try:
+        with warnings.catch_warnings(action="ignore"):
+            compile(text, "cell", "exec", dont_inherit=True)  # `await` outside functions too
         tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError) as error:
         context.add_leftover(f"a cell that is not Python is shown and not run: {error}")
@@ -135,9 +145,13 @@ _QUOTED_KIND = re.compile(r"^((?: {0,3}>)+[ \t]*\[!)([\w-]+)(\])", re.MULTILINE)
 
 def convert_segment(segment: Segment, context: LessonContext) -> str:
     """Return a segment outside cells, or a cell within another block, as Markdown."""
+    return textwrap.indent(_convert(segment, context), segment.indent)
+
+
+def _convert(segment: Segment, context: LessonContext) -> str:
     context, head, text = context.at(segment.place), segment.head, segment.text
     if segment.kind == "prose":
-        text = rewrite_prose(text, context)
+        text = rewrite_prose(without_jsx(text, context) if context.is_mdx else text, context)
         return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
     if segment.kind == "cell":
         context.add_leftover("a cell inside another block is shown and not run")
@@ -158,15 +172,22 @@ def convert_segment(segment: Segment, context: LessonContext) -> str:
                 title, text = heading[1].strip(), text[heading.end() :]
             fold_mark = "-" if re.search(r"collapse=\"?true", segment.head) else ""
             return _write_callout(callout[1], title, text, context, fold_mark=fold_mark)
+        case "=":
+            return f"**{rewrite_prose(head, context)}**\n\n{_convert_nested(text, context)}"
         case "!" | "?":
             name, _, title = segment.head.partition(" ")
             return _write_callout(name, title.strip().strip('"'), segment.text, context)
         case _:
             kind = head.partition(" ")[0]
+            if head in ("{=html}", "{=markdown}"):
+                return _convert_nested(text, context) if head == "{=markdown}" else text
             if kind == "lab" and context.camera_is_position:
                 text = _CAMERA.sub(_reverse_camera, text)
-            if kind == "output":  # of a block that is not run here
-                head = "text"
+            if package := missing_package(kind):
+                message = f"a block of `{kind}` is shown as text: install {package}, and name it so"
+                context.add_leftover(message)
+            if kind in ("output", "text") or package:  # of a block that is not run here
+                head = "text illustration" if "illustration" in head else "text"
             elif kind not in (*CORE_FENCES, *fence_names()):
                 head = head.strip("{}. ").partition(" ")[0].rstrip(",}")
                 with contextlib.suppress(ValueError, RecursionError):
@@ -181,7 +202,10 @@ def _convert_nested(text: str, context: LessonContext) -> str:
         context.add_leftover(f"blocks that nest more than {_MAX_DEPTH} deep, shown as written")
         return fence("text", text)
     context = replace(context, depth=context.depth + 1)
-    parts = read_markdown(text, place=context.place)
+    parts = (
+        replace(part, text=lower_titles(part.text)) if part.kind == "prose" else part
+        for part in read_markdown(text, place=context.place)
+    )
     return "\n\n".join(convert_segment(part, context).strip("\n") for part in parts)
 
 
@@ -219,6 +243,17 @@ def _split_options(text: str) -> tuple[Mapping[str, str], str]:
 
 def _convert_directive(name: str, argument: str, text: str, context: LessonContext) -> str:
     options, text = _split_options(text)
+    label = options.get("name") or options.get("label")
+    if label and name != "math":
+        options = {key: value for key, value in options.items() if value != label}
+        block = _write_directive(name, argument, options, text, context)
+        return f'<a id="{to_anchor(label)}"></a>\n\n{block}'
+    return _write_directive(name, argument, options, text, context)
+
+
+def _write_directive(
+    name: str, argument: str, options: Mapping[str, str], text: str, context: LessonContext
+) -> str:
     match name:
         case "math":
             tex = "\n".join(part for part in (argument, text) if part.strip())
@@ -226,6 +261,8 @@ def _convert_directive(name: str, argument: str, text: str, context: LessonConte
         case "figure" | "image":
             caption = "\n\n" + _convert_nested(text, context) if text.strip() else ""
             alt = options.get("alt", "")
+            if not argument.strip():  # what it shows is in it
+                return caption
             return rewrite_prose(f"![{alt}]({argument.strip()})", context) + caption
         case "code" | "code-block" | "sourcecode":
             return fence(argument or "text", text)

@@ -23,6 +23,7 @@ from coursebuild.api import EffectError, Store, UsageError
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import FileChange, change_files
+from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.pages.marks import fence
 from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.blocks import (
@@ -33,7 +34,9 @@ from coursebuild.features.importer.blocks import (
     runnable_code,
 )
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
-from coursebuild.features.importer.prose import LessonContext, find_anchors
+from coursebuild.features.importer.jsx import is_mdx
+from coursebuild.features.importer.prose import LessonContext, find_anchors, to_anchor
+from coursebuild.features.importer.references import complete_texts
 from coursebuild.features.importer.source_files import (
     TEXTS,
     ImportedCourse,
@@ -156,9 +159,10 @@ def _convert_texts(
     ids: Mapping[str, str],
     files: SourceFiles,
 ) -> tuple[dict[str, bytes], LessonContext]:
+    targets = {stem_of(text.file): text.link for text in texts if text.file}
     texts = [text for text in texts if text.path]
     context = LessonContext(
-        targets={stem_of(text.file): text.link for text in texts},
+        targets=targets,
         ids=ids,
         labels={
             anchor: text.link
@@ -169,12 +173,24 @@ def _convert_texts(
         files=files,
         camera_is_position=course.camera_is_position,
     )
-    out = {}
+    new = {}
     for text in texts:
         try:
-            out[text.path] = _encode(_convert_text(text, context))
+            new[text.link] = text.title, _convert_text(text, context)
         except RecursionError:
             raise UsageError(f"{text.file} is nested too deeply") from None
+    files_of = {text.link: text.file for text in texts}
+
+    def resolve_label(link: str, anchor: str) -> str:
+        here = replace(context, path=files_of[link])
+        address = here.resolve_anchor(to_anchor(anchor))
+        if not address:
+            here.add_leftover(f"a link to `#{anchor}`, which no text sets")
+        return address
+
+    callouts = frozenset((*CALLOUTS, *context.callouts))
+    completed = complete_texts(new, resolve_label, callouts)
+    out = {text.path: _encode(new_text) for text, new_text in zip(texts, completed, strict=True)}
     return {**out, **context.copies}, context
 
 
@@ -182,6 +198,8 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
     """Return a lesson or page in Markdown of coursebuild, with its cells as parts of one script."""
     folder = posixpath.dirname(text.path)
     context = replace(course_context, path=text.file, folder=folder, pictures=text.pictures)
+    prose = (segment.text for segment in text.segments if segment.kind == "prose")
+    context = replace(context, is_mdx=any(map(is_mdx, prose)))
     words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
     script_path = f"examples/{'' if words and words[0].isalpha() else 'l'}{'_'.join(words)}.py"
     head = f"python file={script_path}"

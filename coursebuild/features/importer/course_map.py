@@ -248,6 +248,8 @@ def _read_file(
     if used_ids is not None:
         page = _free_id(page, (f"{page}-{n}" for n in itertools.count(2)), used_ids)
     path = f"content/lessons/{id}-{slug}.md" if id else f"content/pages/{page}.md"
+    if id and not any(segment.text.strip() for segment in read.segments):
+        path = ""  # a title alone: it is planned
     text = replace(text, summary=text.summary or read.summary)
     text = replace(text, segments=read.segments, pictures=read.pictures)
     return replace(text, id=id or page, slug=slug, title=title, path=path)

@@ -14,7 +14,13 @@ from urllib.parse import unquote, urlsplit
 from msgspec import Struct, field
 from msgspec.structs import replace
 
-from coursebuild.features.importer.source_files import Leftover, SourceFiles, stem_of, title_of_file
+from coursebuild.features.importer.source_files import (
+    TEXTS,
+    Leftover,
+    SourceFiles,
+    stem_of,
+    title_of_file,
+)
 
 
 class LessonContext(Struct, frozen=True, kw_only=True):
@@ -39,6 +45,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """The folder of the new file, such as `content/lessons`."""
     place: str = ""
     """The place in the lesson that is converted, as `line 12` or `cell 3`."""
+    is_mdx: bool = False
+    """Whether tags of the lesson may be components of JavaScript."""
     depth: int = 0
     """How many blocks are around the place."""
     leftovers: list[Leftover] = field(default_factory=list)
@@ -74,14 +82,23 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         if parts.scheme or parts.netloc or not parts.path:
             return address
         path = self.resolve_path(parts.path)
-        anchor = f"#{parts.fragment.lower()}" if parts.fragment else ""
+        anchor = f"#{parts.fragment}" if parts.fragment else ""
         target = self.targets.get(stem_of(path)) or self.targets.get(path)
         if target is not None:
             return target + anchor
         if path in self.files:
             return self.add_file(path)
+        if resolved := self.resolve_anchor(to_anchor(address)):
+            return resolved
         self.add_leftover(f"a link to `{address}`, which is not in the folder")
         return ""
+
+    def resolve_file(self, address: str) -> str:
+        """Return the new address of a file that HTML names; empty where the folder lacks it."""
+        path = self.resolve_path(urlsplit(address).path)
+        if path.endswith(TEXTS) or stem_of(path) in self.targets or path not in self.files:
+            return ""
+        return self.add_file(path)
 
     def resolve_anchor(self, anchor: str) -> str:
         """Return the address of an anchor; empty where no text of the course sets it."""
@@ -126,16 +143,20 @@ _LINE = re.compile(
     r"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>[^()\s]+)(?:[ \t]+\"[^\"\n]*\")?\)"
     r"(?:\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
-    r"\((?P<address>[^()\s]+)(?P<title>[ \t]+\"[^\"\n]*\")?\))"
+    r"\((?P<address>(?:[^()\s]|\([^()\s]*\))+)(?P<title>[ \t]+\"[^\"\n]*\")?\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     r"|(?P<math>\$\$?[^$\n]+\$\$?)"
     r"|(?P<paren>\\\((?P<inner>(?>(?:(?!\\[()])[^\n])+))\\\))"
     r"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst)-(?P<label>[\w-]+)\]?)"
-    r"|(?P<cite>\[-?@[\w:.-]+(?:[;,][^\[\]\n]*)?\])"
+    r"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@\w[\w:./-]*(?:[;,\s][^\[\]\n]*)?\])"
     r"|(?P<substitution>\{\{[^{}\n]*\}\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
+    r"|(?P<tail>\]\((?P<rest>[^()\s]+)(?=\)))"  # of a link whose text began a line above
+    r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
+    r"|(?P<tag><(?:a|img|source|video)[ \t][^<>\n]*>)"
 )
+_ATTRIBUTE = re.compile(r"(?<=[ \t])(href|src)(=[\"'])([^\"'\n]+)")
 _DISPLAY = re.compile(
     r"\$\$(?P<tex>(?:[^$\\]|\\.)+?)\$\$[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\})?",
     re.DOTALL,
@@ -153,10 +174,19 @@ _BRACKETS = re.compile(
 _TARGET = re.compile(
     r"^\((?P<name>[\w:.-]+)\)=[ \t]*(?:\n+(?P<heading>#{1,6}[ \t].*))?$", re.MULTILINE
 )
+GONE = "gone:"
+"""The address of a link by reference to what is not in the folder."""
+_CAPTION = re.compile(
+    r"^(?P<table>(?:\|.*\n)+)\n?:[ ]+(?P<caption>.*?)[ ]*(?:\{#tbl-(?P<label>[\w-]+)[^{}]*\})?$",
+    re.MULTILINE,
+)
+"""A caption of Quarto, below its table."""
 _LABEL = re.compile(r"\\label\{([^{}]*)\}")
+_WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 _FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
 """The first or last line of a block of code in a quotation or a list."""
-_COMMENT = re.compile(r"^%[^\n]*\n?", re.MULTILINE)
+_COMMENT = re.compile(r"^(?:%[^\n]*|\+\+\+(?:[ \t]+[{\[][^\n]*)?[ \t]*$)\n?", re.MULTILINE)
+"""A comment of MyST, or its break between two cells."""
 
 
 def rewrite_prose(text: str, context: LessonContext) -> str:
@@ -169,7 +199,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         return f"{match['heading'].rstrip()} {{#{anchor}}}"
 
     text = normalize_formulas(_COMMENT.sub("", text))
-    text = _TARGET.sub(write_target, text)
+    text = _CAPTION.sub(_move_caption, _TARGET.sub(write_target, text))
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
         fence_line = _FENCE.match(line)
@@ -197,10 +227,19 @@ def display_formula(tex: str, label: str) -> str:
     return f"$$\n{tex.strip()}\n$$" + (f" {{#eq:{formula_anchor(label)}}}" if label else "")
 
 
+def _move_caption(match: re.Match[str]) -> str:
+    label = f" {{#tab:{to_anchor(match['label'])}}}" if match["label"] else ""
+    return f"Table: {match['caption']}{label}\n\n{match['table']}"
+
+
 def _label_formula(match: re.Match[str]) -> str:
     inside = _LABEL.search(match["tex"])
     label = match["myst"] or match["quarto"] or (inside[1] if inside else "")
     tex = _LABEL.sub("", match["tex"])
+    tex = re.sub(r"\n(?:[ \t]*\n)+", "\n", tex)
+    bare = _WHOLE_ENVIRONMENT.sub("", tex)
+    if re.search(r"(?<!\\)&", bare):  # MyST aligns at `&`, and needs no environment
+        tex = f"\n\\begin{{aligned}}\n{tex.strip()}\n\\end{{aligned}}\n"
     if not label:
         return f"$${tex}$$"
     return f"$${tex}$$ {{#eq:{formula_anchor(label)}}}"
@@ -222,7 +261,8 @@ def find_anchors(text: str) -> set[str]:
     anchors |= {f"sec-{to_anchor(name)}" for name in re.findall(r"\{#sec-([\w-]+)\}", text)}
     for match in _DISPLAY.finditer(normalize_formulas(text)):
         anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", _label_formula(match)))
-    labels = re.findall(r"^\s*:label:[ \t]*(\S+)", text, re.MULTILINE)
+    labels = re.findall(r"^\s*:(?:label|name):[ \t]*(\S+)", text, re.MULTILINE)
+    anchors |= {to_anchor(label) for label in labels}
     return anchors | {f"eq:{formula_anchor(label)}" for label in labels}
 
 
@@ -247,8 +287,10 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             context.add_leftover(f"the picture `{source}`, which is not in the folder")
             return alt
         case "link":
-            text = _rewrite_line(match["text"], context)
-            return _write_link(text, context.resolve_link(match["address"]), match["title"] or "")
+            text, address = match["text"], context.resolve_link(match["address"])
+            if not text and not re.match("#|lesson:|page:", address):  # its tool knows a title
+                text = title_of_file(re.split("[:#]", match["address"])[-1])
+            return _write_link(_rewrite_line(text, context), address, match["title"] or "")
         case "paren":
             return f"${match['inner'].strip()}$"
         case "digits":  # no digit may follow the closing dollar sign
@@ -272,8 +314,30 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return whole if lesson_id is None else f"Lesson {lesson_id}"
         case "route":
             return context.resolve_link(whole) or whole
+        case "tail":
+            return f"]({context.resolve_link(match['rest']) or GONE}"
+        case "definition":
+            address = match["named"]
+            return whole.removesuffix(address) + (context.resolve_link(address) or GONE)
+        case "tag":
+            return _convert_tag(whole, context)
         case _:
             return whole
+
+
+def _convert_tag(tag: str, context: LessonContext) -> str:
+    """Return a tag of HTML with the new address of the file that it names."""
+    attribute = _ATTRIBUTE.search(tag)
+    if attribute is None or re.match(r"[a-z][a-z+.-]*:|//|#", attribute[3]):
+        return tag
+    before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
+    if address := context.resolve_file(attribute[3]):
+        return before + address + after
+    context.add_leftover(f"the file `{attribute[3]}`, which is not in the folder")
+    if tag.startswith("<img"):
+        alt = re.search(r"\salt=[\"']([^\"']*)", tag)
+        return alt[1] if alt else ""
+    return tag[: attribute.start()].rstrip() + after[1:]
 
 
 def _write_link(text: str, address: str, title: str = "") -> str:
@@ -296,10 +360,12 @@ def _convert_role(name: str, body: str, context: LessonContext) -> str:
             )
         case "download":
             return _write_link(words or target, context.resolve_link(target))
-        case "term" | "abbr" | "kbd" | "sub" | "sup":
+        case "term":
+            return words or target
+        case "abbr" | "kbd" | "sub" | "sup":
             return body
         case "code" | "file" | "command" | "func" | "class" | "mod" | "py:func" | "py:class":
-            return f"`{body}`"
+            return f"`{words or target}`"
         case _:
             context.add_leftover(f"the role `{{{name}}}`; its text is shown as code")
             return f"`{body}`"

@@ -21,14 +21,19 @@ from coursebuild.api import UsageError
 from coursebuild.features.importer.source_files import Segment, read_yaml
 
 _COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")
+_TAB = re.compile(r" {0,3}===[!+]?[ \t]+([\"'])(.*)\1[ \t]*\n?")
 _CELL = re.compile(r"\{code-cell\b.*|\{(?:python|ipython3?)[^}]*\}")
 _FRONT_MATTER = re.compile(
     r"---[ \t]*\n(?P<yaml>.*?\n)?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
     r"|\+\+\+[ \t]*\n(?P<toml>.*?\n)?\+\+\+[ \t]*(?:\n|\Z)",
     re.DOTALL,
 )
-_TITLE = re.compile(r"^#[ \t]+(.*?)(?:[ \t]+#+)?(?:[ \t]*\{[^{}]*\})?[ \t]*$", re.MULTILINE)
-"""A heading of level 1."""
+_TITLE = re.compile(
+    r"^#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?(?:[ \t]*\{[^{}]*\})?[ \t]*$"
+    r"|(?:\A|(?<=\n\n))(?P<line>[^\s#>].*)\n=+[ \t]*$",
+    re.MULTILINE,
+)
+"""A heading of level 1, of both forms."""
 
 
 _SUMMARIES = ("description", "abstract", "subtitle")
@@ -63,7 +68,13 @@ def read_segments(text: str, name: str) -> ReadText:
             metadata = notebook.get("metadata") or {}
             kernel, info = (metadata.get(key) or {} for key in ("kernelspec", "language_info"))
             language = str(kernel.get("language") or info.get("name") or "python").lower()
-            segments, pictures = _read_cells(notebook["cells"], language)
+            cells = list(notebook["cells"])
+            first = _join_lines(cells[0].get("source", "")) if cells else ""
+            match = _FRONT_MATTER.match(f"{first}\n")  # of MyST and Quarto, in a cell of its own
+            if match is not None and isinstance(value := _read_front_matter(match), dict):
+                metadata = {**metadata, **value}
+                cells[0] = {**cells[0], "source": first[match.end() :]}
+            segments, pictures = _read_cells(cells, language)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             raise UsageError(f"{name} is not a notebook of format 4") from None
     else:
@@ -75,8 +86,10 @@ def read_segments(text: str, name: str) -> ReadText:
     titles: list[str] = []
 
     def shift_heading(heading: re.Match[str]) -> str:
-        titles.append(heading[1])
-        return f"#{heading[0]}" if len(titles) > 1 else ""
+        titles.append(heading["text"] or heading["line"] or "")
+        if len(titles) == 1:
+            return ""
+        return f"## {heading['line']}" if heading["line"] else f"#{heading[0]}"
 
     shifted = [
         replace(segment, text=_TITLE.sub(shift_heading, segment.text))
@@ -98,6 +111,11 @@ def read_segments(text: str, name: str) -> ReadText:
     )
 
 
+def lower_titles(text: str) -> str:
+    """Return prose within another block with its headings of level 1 on level 2."""
+    return _TITLE.sub(lambda heading: f"## {heading['line'] or heading['text']}", text)
+
+
 def _read_front_matter(match: re.Match[str]) -> Any:
     if match["toml"] is None:
         return read_yaml(match["yaml"] or "{}")
@@ -110,30 +128,43 @@ def _read_front_matter(match: re.Match[str]) -> Any:
 def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[Segment]:
     """Yield the segments of a text; `place` replaces their lines, in a cell or a nested block.
 
-    Blocks in quotations and lists remain part of the prose.
+    Blocks in quotations, and plain ones in lists, remain part of the prose.
     """
     lines = text.split("\n")
-    blocks = [
-        (token.map, token.markup, token.info.strip(), token.content)
-        for token in _PARSER.parse(text)
-        if token.level == 0 and token.map and token.type in ("fence", "div", "admonition_open")
-    ]
     at = 0
-    for (start, end), mark, head, content in (*blocks, ([len(lines)] * 2, "", "", "")):
+    for (start, end), mark, head, content in (*_find_blocks(text), ([len(lines)] * 2, "", "", "")):
+        if start < at:  # within the block before
+            continue
         if any(line.strip() for line in lines[at:start]):
             prose = "\n".join(lines[at:start])
             yield Segment(kind="prose", place=place or f"line {first_line + at}", text=prose)
         at = end
         if mark:
-            if mark[0] in "!?":  # the parser gives an admonition's title as its content
+            if mark[0] in "!?=":  # the parser gives an admonition's title as its content
                 content = textwrap.dedent("\n".join(lines[start + 1 : end])).strip("\n")
+            indent = lines[start][: len(lines[start]) - len(lines[start].lstrip())]
+            is_cell = _CELL.fullmatch(head) and mark[0] != ":" and not indent
             yield Segment(
-                kind="cell" if _CELL.fullmatch(head) and mark[0] != ":" else "block",
+                kind="cell" if is_cell else "block",
                 place=place or f"line {first_line + start}",
                 text=content.removesuffix("\n"),
                 head=head,
                 mark=mark,
+                indent=indent,
             )
+
+
+def _find_blocks(text: str) -> Iterator[tuple[list[int], str, str, str]]:
+    """Yield lines, mark, head and content of blocks; in lists, of those that are not plain code."""
+    lines, quotes = text.split("\n"), 0
+    for token in _PARSER.parse(text):
+        quotes += token.nesting if token.type.startswith("blockquote") else 0
+        if quotes or token.map is None or token.type not in _BLOCKS:
+            continue
+        head = token.info.strip()
+        is_own_line = lines[token.map[0]].lstrip().startswith(token.markup)
+        if token.level == 0 or (is_own_line and (token.type != "fence" or head[:1] == "{")):
+            yield token.map, token.markup, head, token.content
 
 
 def _parse_div(state: StateBlock, start: int, end: int, silent: bool) -> bool:
@@ -159,8 +190,32 @@ def _parse_div(state: StateBlock, start: int, end: int, silent: bool) -> bool:
     return True
 
 
+def _parse_tab(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """Parse a tab of MkDocs: a title, and indented lines."""
+    title = _TAB.fullmatch(state.getLines(start, start + 1, state.blkIndent, False))
+    if title is None:
+        return False
+    if not silent:
+        indent, last = state.sCount[start] + 4, start
+        for number in range(start + 1, end):
+            if state.isEmpty(number):
+                continue
+            if state.sCount[number] < indent:
+                break
+            last = number
+        token = state.push("tab", "", 0)
+        token.markup, token.info = "===", title[2]
+        state.line = last + 1
+        token.map = [start, state.line]
+    return True
+
+
+_BLOCKS = ("fence", "div", "tab", "admonition_open")
+_ENDED = {"alt": ["paragraph", "list", "blockquote"]}
+"""What a block of another tool ends without a blank line."""
 _PARSER = MarkdownIt("commonmark").use(admon_plugin)
-_PARSER.block.ruler.before("fence", "div", _parse_div, {"alt": ["paragraph", "list", "blockquote"]})
+_PARSER.block.ruler.before("fence", "div", _parse_div, _ENDED)
+_PARSER.block.ruler.before("fence", "tab", _parse_tab, _ENDED)
 
 
 # --- notebooks

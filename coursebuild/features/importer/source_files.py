@@ -44,7 +44,9 @@ class Segment(Struct, frozen=True, kw_only=True):
     head: str = ""
     """The rest of the line after the opening mark; of a notebook's cell, its tags."""
     mark: str = "```"
-    """The opening mark: backticks, tildes, colons, or `!!!`."""
+    """The opening mark: backticks, tildes, colons, `!!!` or `===`."""
+    indent: str = ""
+    """What stands before each line of a block in a list."""
     shows_value: bool | None = None
     """Of a cell: whether the value of its last expression was shown; `None` where no output is
     recorded."""

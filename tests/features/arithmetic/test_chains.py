@@ -143,6 +143,21 @@ def test_what_is_too_large_or_no_whole_number_is_not_understood() -> None:
         assert (comparison.kind, comparison.message) == ("unread", reason)
 
 
+def test_what_can_be_meant_otherwise_is_not_judged() -> None:
+    reasons = {
+        "(123) = (13)(12)": "it may be a product of permutations",
+        "(1)(23) = (12)(3)": "it may be a product of permutations",
+        "0 = 1": "there is nothing to compute",
+        "3950/988 = 3": "`/` may be the division of whole numbers",
+    }
+    for tex, reason in reasons.items():
+        (comparison,) = check_arithmetic(tex)
+        assert (comparison.kind, comparison.message) == ("unread", reason)
+    for tex in ("3950/988 = 4", r"\frac{7}{2} = 3", "1 + 0 = 0", r"2\cdot(13) = 36", "0.5 = 0.6"):
+        (comparison,) = check_arithmetic(tex)
+        assert comparison.kind == "wrong", tex
+
+
 def test_deep_nesting_is_not_understood() -> None:
     for tex in ("(" * 2400 + "1" + ")" * 2400, r"\sqrt" * 900 + "1", "1 + " * 1200 + "1"):
         (comparison,) = check_arithmetic(tex + " = 1")

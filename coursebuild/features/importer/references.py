@@ -1,0 +1,134 @@
+"""What a text of another tool has from elsewhere: anchors, the text of links, macros of formulas.
+
+Every tool makes the anchor of a heading in a way of its own: Jupyter's for `## 2. The arm` is
+`2.-The-arm`, MkDocs's `2-the-arm`. They agree in letters and digits, by which they are found here.
+MyST shows the title of what a link without text leads to, and MathJax keeps a macro for all
+formulas below it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from unicodedata import normalize
+from urllib.parse import unquote
+
+from msgspec import Struct
+
+from coursebuild.core import model
+from coursebuild.core.scripts.edit import apply_edits
+from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.diagnostics import Edit
+from coursebuild.core.text.source import Source, Span
+from coursebuild.features.importer.prose import GONE
+from coursebuild.features.importer.source_files import title_of_file
+
+_DEFINITION = re.compile(
+    r"\\(?:(?:re)?newcommand\*?[ ]*\{?(\\[A-Za-z]+)\}?(?:\[\d\]){0,2}|def[ ]*(\\[A-Za-z]+)(?:#\d)*)"
+    r"[ ]*\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
+)
+_GONE = re.compile(rf"^[ ]{{0,3}}\[[^\[\]\n]+\]:[ \t]*{GONE}.*\n?", re.MULTILINE)
+_REFERENCE = re.compile(r"\[(.*?)\](?:\[[^\[\]]*\]|\([^()]*\))?", re.DOTALL)
+_COMMAND = re.compile(r"\\[A-Za-z]+")
+
+
+class _Text(Struct, frozen=True):
+    """A new lesson or page."""
+
+    document: model.Document
+    title: str
+    anchors: Mapping[str, str]
+    """Its anchors, by themselves and by their letters and digits."""
+    headings: Mapping[str, str]
+    """What its headings say, by their anchors."""
+
+
+def complete_texts(
+    texts: Mapping[str, tuple[str, str]],
+    resolve_label: Callable[[str, str], str],
+    callouts: frozenset[str],
+) -> Iterator[str]:
+    """Yield the new texts of lessons and pages, each by its link and with its title, completed.
+
+    `resolve_label` gives the address of an anchor for a link in a text; empty if no text sets it.
+    """
+    read = {link: _read(link, title, text, callouts) for link, (title, text) in texts.items()}
+    for link, text in read.items():
+        edits = {edit.span.start: edit for edit in _edit_links(link, read, resolve_label)}
+        edits |= {edit.span.start: edit for edit in _carry_macros(text.document)}
+        yield _GONE.sub("", apply_edits(text.document.source.text, edits.values()))
+
+
+def _read(link: str, title: str, text: str, callouts: frozenset[str]) -> _Text:
+    source = Source(link, text)
+    document = parse_document(source, callouts, lesson=link.startswith("lesson:")).value
+    names = [name for name, _, _ in model.document_anchors(document)]
+    headings = {
+        block.anchor: re.sub(r"^#+[ \t]*|[ \t]*(?:\{#[^{}]*\}|#+)?\s*$", "", block.span.text)
+        for block in model.find_blocks(document, model.Heading)
+    }
+    anchors = {
+        _letters(re.sub("<[^<>]*>", "", words)): name for name, words in reversed(headings.items())
+    }
+    anchors |= {_letters(name): name for name in reversed(names)} | {name: name for name in names}
+    return _Text(document, title, anchors, headings)
+
+
+def _letters(anchor: str) -> str:
+    """The letters and digits of an anchor, without accents, in lower case; with a mark before."""
+    letters = normalize("NFKD", unquote(anchor)).casefold()
+    return " " + "".join(letter for letter in letters if letter.isalnum())
+
+
+def _edit_links(
+    link: str, texts: Mapping[str, _Text], resolve_label: Callable[[str, str], str]
+) -> Iterator[Edit]:
+    for inline in model.find_inlines(texts[link].document, model.Link):
+        span, target = inline.target_span, inline.target
+        match target:
+            case model.LessonTarget() | model.PageTarget():
+                kind = "lesson" if isinstance(target, model.LessonTarget) else "page"
+                start, anchor = f"{kind}:{target.id}", target.anchor or ""
+            case model.UrlTarget(url=url) if url.startswith("#"):
+                start, anchor = "", url[1:]
+            case model.UrlTarget(url=url) if url == GONE:
+                if words := _REFERENCE.fullmatch(inline.span.text):
+                    yield Edit(inline.span, words[1])
+                continue
+            case _:
+                continue
+        text = texts.get(start or link)
+        if text is None or inline.mention or not span.text.startswith(start):
+            continue
+        found = text.anchors.get(anchor) or text.anchors.get(_letters(anchor)) or ""
+        if anchor and found != anchor:
+            address = f"{start}#{found}" if found else resolve_label(link, anchor)
+            start, _, found = address.partition("#")
+            text = texts.get(start or link, text)
+            if found not in text.anchors:
+                words = _REFERENCE.fullmatch(inline.span.text)
+                if words is not None:
+                    yield Edit(inline.span, words[1] or title_of_file(anchor))
+                continue
+            yield Edit(span, address)
+        if inline.span.text.startswith("[]("):
+            words = text.headings.get(found, "")
+            words = words if words and "](" not in words else text.title
+            at = inline.span.start + 1
+            if ":" not in found:  # what is numbered is called by its number
+                yield Edit(Span(inline.span.source, at, at), words)
+
+
+def _carry_macros(document: model.Document) -> Iterator[Edit]:
+    """Define macros anew in each formula below that uses them: here they hold in one."""
+    macros: dict[str, str] = {}
+    for _, formula in model.find_formulas(document):
+        tex, used = formula.tex.text, ""
+        own = {match[1] or match[2]: match[0] for match in _DEFINITION.finditer(tex)}
+        for name, definition in reversed(macros.items()):
+            if name not in own and name in _COMMAND.findall(tex + used):
+                used = definition + used
+        if used:
+            start = formula.tex.span().start
+            yield Edit(Span(document.source, start, start), used)
+        macros |= own
