@@ -15,11 +15,9 @@ from urllib.parse import unquote
 
 from msgspec import Struct
 
-from coursebuild.core import model
+from coursebuild.api import Edit, Source, Span, model
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.document import parse_document
-from coursebuild.core.text.diagnostics import Edit
-from coursebuild.core.text.source import Source, Span
 from coursebuild.features.importer.prose import GONE
 from coursebuild.features.importer.source_files import title_of_file
 
