@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.files.trust import store_key
+from coursebuild.core.run.environments import latest_version
 from coursebuild.core.run.script_environment import engine_version
 from support.scratch_course import CommandResult, Folder, Make, block, kill_at_end, wait_until_alone
 from support.waiting import wait_for_file
@@ -441,3 +442,16 @@ def test_only_the_environments_used_last_stay(make: Make, wheels: Path, installe
         os.utime(old, (number, number))
     assert check_against(course, "-q").status == 0
     assert environments(course) == ["8.2", "8.3", "8.4", NEW_VERSION]
+
+
+@pytest.mark.usefixtures("wheels")
+def test_pip_starts_no_compiler_to_say_its_version(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rustc = tmp_path / "bin/rustc"
+    rustc.parent.mkdir()
+    rustc.write_text('#!/bin/sh\necho "$0" > "$0.called"\n')
+    rustc.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{rustc.parent}:{os.environ['PATH']}")
+    assert latest_version() == NEW_VERSION
+    assert [path.name for path in rustc.parent.iterdir()] == ["rustc"]
