@@ -144,9 +144,9 @@ def _read_signs(mathml: str) -> _Signs | None:
     tree = parse_mathml(mathml)
     if tree is None:
         return None
-    shown = tree[0][:-1]
-    runs = (run for run in _letter_runs(shown) if len(run) > 1)
-    return _Signs(tuple(runs), tuple(_brackets(shown)))
+    elements = tree[0][:-1]
+    runs = (run for run in _letter_runs(elements) if len(run) > 1)
+    return _Signs(tuple(runs), tuple(_brackets(elements)))
 
 
 # --- letters

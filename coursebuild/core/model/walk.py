@@ -212,18 +212,18 @@ def _with_empty_line(code: Excerpt) -> Excerpt:
 
 def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
     """Every inline in order, a container before its content."""
-    found: list[Inline] = []
-    _collect(inlines, found)
-    return iter(found)
+    nodes: list[Inline] = []
+    _collect(inlines, nodes)
+    return iter(nodes)
 
 
-def _collect(inlines: Iterable[Inline], found: list[Inline]) -> None:
+def _collect(inlines: Iterable[Inline], nodes: list[Inline]) -> None:
     for inline in inlines:
-        found.append(inline)
+        nodes.append(inline)
         if isinstance(inline, _INLINE_CONTAINERS):
-            _collect(inline.children, found)
+            _collect(inline.children, nodes)
         elif isinstance(inline, Math) and inline.value is not None:
-            found.append(inline.value)
+            nodes.append(inline.value)
 
 
 def inlines_by_block(document: Document) -> tuple[tuple[Block, tuple[Inline, ...]], ...]:

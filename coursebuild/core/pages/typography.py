@@ -37,7 +37,7 @@ LONG = 20
 WIDE = 22
 """Characters; a shorter piece fits into the narrowest window."""
 
-FORMULA = re.compile(r"(<math\b(?:[^<]++|<(?!/math>))*+</math>)")
+FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
 """A formula of any kind; splitting a page by it gives texts and formulas in turn."""
 
 _CACHE_SIZE = 2048
