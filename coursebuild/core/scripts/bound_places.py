@@ -101,7 +101,8 @@ def place_note(
     end = binding.text_span.end
     attribute = binding.span.source.text[end : binding.span.end]
     braces = binding.span.source.span(end + attribute.find("{"), binding.span.end)
-    edit = Edit(braces, f"{{out={target}{binding.quote}{words}{binding.quote}}}")
+    quote = '\\"' if binding.in_string else '"'
+    edit = Edit(braces, f"{{out={target}{quote}{words}{quote}}}")
     is_whole = attribute.endswith("}") and "{" in attribute
     message = f'`{{out={target}"{words}"}}` chooses `{line}`'
     return Note(message, place.span, (edit,) if is_whole else ())
