@@ -192,15 +192,16 @@ class BoundNumber(Struct, frozen=True, dict=True):
         None where one of the addresses is gone.
         """
         count, words = len(self.text.numbers), self.binding.words
-        named = [p for output in outputs for p in output.find_words(words, count)] if words else []
-        if len(named) == 1:
-            return named
-        found = [_find(address, outputs, count) for address in self.addresses]
-        places = [place for place in found if place is not None and (place in named or not words)]
+        at_addresses = [_find(address, outputs, count) for address in self.addresses]
+        places = [place for place in at_addresses if place is not None]
         if not words:
-            is_gone = len(places) < len(found)
+            is_gone = len(places) < len(at_addresses)
             return [] if is_gone else places or self.search(outputs)
-        return places or list(filter(self.text.shows, named)) or named
+        behind_words = [p for output in outputs for p in output.find_words(words, count)]
+        if len(behind_words) == 1:
+            return behind_words
+        chosen_places = [place for place in places if place in behind_words]
+        return chosen_places or list(filter(self.text.shows, behind_words)) or behind_words
 
     def search(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers that it may mean: a proposal, until one that it shows is remembered."""
