@@ -124,7 +124,7 @@ class BoundNumber(Struct, frozen=True, dict=True):
     @property
     def path(self) -> str:
         """The script that it depends on; empty where there is none above it."""
-        return self.binding.script or next((v.recording.script or "" for v in self.verdicts), "")
+        return self.outputs.script_of(self.binding) or ""
 
     @property
     def run(self) -> ScriptRun | None:

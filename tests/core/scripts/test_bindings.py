@@ -321,6 +321,15 @@ def test_a_title_and_the_beginning_of_a_row_choose_a_number() -> None:
         assert (mistake is None) is holds, words
 
 
+def test_choice_in_a_quiz_is_written_as_json_needs_it() -> None:
+    printed = "measured 2.5, formula 2.5\n"
+    quiz = '{"id": "q", "questions": [{"kind": "open", "q": "`2.5`{out}?", "reference": "Yes."}]}'
+    text = f"{script()}{output(printed)}\n```quiz\n{quiz}\n```\n"
+    (diagnostic,) = check(text, make_run(printed))
+    edits = [edit.text for note in diagnostic.notes for edit in note.edits]
+    assert edits == [r"{out=\"measured\"}", r"{out=\"formula\"}"]
+
+
 def test_a_number_in_a_caption_is_one_of_its_own_output() -> None:
     text = script() + "\nOutput, after `1.5`{out} s:\n\n```text\nt 1.5\n```\n"
     assert check(text, make_run("t 1.5\n")) == ()
