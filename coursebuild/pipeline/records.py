@@ -149,7 +149,7 @@ def _recorded(
     run: ScriptRun | None,
 ) -> Iterator[Recorded]:
     """How a recording was made: as is known, or else as in the run that bears it out."""
-    if (known := record.find(script, digest)) is not None:
-        yield replace(known, of=name)
+    if (recorded_before := record.find(script, digest)) is not None:
+        yield replace(recorded_before, of=name)
     elif run is not None and run.outcome is Outcome.OK and run.provenance is not None:
         yield Recorded(name, digest, comparison, run.provenance)

@@ -47,7 +47,7 @@ def drawing_lesson(middle: float = 1, font: int = 10) -> str:
 
 def three_scripts(numbers: str = "123") -> str:
     return "## Three\n\n" + "".join(
-        f"{block(f'{name}.py', f'print({number})', '0')}The number {name}.\n\n"
+        f"{block(f'{name}.py', f'print({number})', '0')}The number {name}: `0`{{out}}.\n\n"
         for name, number in zip("abc", numbers, strict=True)
     )
 
@@ -178,6 +178,7 @@ def test_branches_that_record_other_outputs_merge(make: Make) -> None:
     before = folder.read(RECORD)
     assert folder.main("update").status == 0
     assert folder.read(RECORD) == before, "each branch's line is the one of its recording"
+    assert [f'"text":"{n}"' in before.decode() for n in (7, 9, 3)] == [True] * 3
 
 
 def test_branches_that_begin_a_record_merge_as_a_new_course_says(

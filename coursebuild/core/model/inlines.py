@@ -72,8 +72,8 @@ class NumberBinding(Located, frozen=True):
     """Whether a comma may stand before its decimals, as in the language of the text."""
     words: str = ""
     """Those of `{out="words"}`, printed right before it; empty where it has only one place."""
-    quote: str = '"'
-    """A quotation mark as it is written here."""
+    in_string: bool = False
+    """Whether it is in a string of a data text, where a quotation mark is behind a backslash."""
 
 
 class SourceMark(Located, frozen=True):

@@ -102,7 +102,9 @@ class BoundText(Struct, frozen=True):
 
         for test in (has_unit, self._is_verbatim):
             places = list(filter(test, places)) or places
-        unique = {(plain_text(p.line.text), p.first): p for p in reversed(places)}
+        unique = {
+            (p.output.heading(p.at), plain_text(p.line.text), p.first): p for p in reversed(places)
+        }
         return list(reversed(unique.values()))
 
     def _is_verbatim(self, place: PrintedPlace) -> bool:

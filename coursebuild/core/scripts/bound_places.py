@@ -101,7 +101,8 @@ def place_note(
     end = binding.text_span.end
     attribute = binding.span.source.text[end : binding.span.end]
     braces = binding.span.source.span(end + attribute.find("{"), binding.span.end)
-    edit = Edit(braces, f"{{out={target}{binding.quote}{words}{binding.quote}}}")
+    quote = '\\"' if binding.in_string else '"'
+    edit = Edit(braces, f"{{out={target}{quote}{words}{quote}}}")
     is_whole = attribute.endswith("}") and "{" in attribute
     message = f'`{{out={target}"{words}"}}` chooses `{line}`'
     return Note(message, place.span, (edit,) if is_whole else ())
@@ -123,7 +124,7 @@ class BoundNumber(Struct, frozen=True, dict=True):
     @property
     def path(self) -> str:
         """The script that it depends on; empty where there is none above it."""
-        return self.binding.script or next((v.recording.script or "" for v in self.verdicts), "")
+        return self.outputs.script_of(self.binding) or ""
 
     @property
     def run(self) -> ScriptRun | None:
@@ -191,15 +192,16 @@ class BoundNumber(Struct, frozen=True, dict=True):
         None where one of the addresses is gone.
         """
         count, words = len(self.text.numbers), self.binding.words
-        named = [p for output in outputs for p in output.find_words(words, count)] if words else []
-        if len(named) == 1:
-            return named
-        found = [_find(address, outputs, count) for address in self.addresses]
-        places = [place for place in found if place is not None and (place in named or not words)]
+        at_addresses = [_find(address, outputs, count) for address in self.addresses]
+        places = [place for place in at_addresses if place is not None]
         if not words:
-            is_gone = len(places) < len(found)
+            is_gone = len(places) < len(at_addresses)
             return [] if is_gone else places or self.search(outputs)
-        return places or list(filter(self.text.shows, named)) or named
+        behind_words = [p for output in outputs for p in output.find_words(words, count)]
+        if len(behind_words) == 1:
+            return behind_words
+        chosen_places = [place for place in places if place in behind_words]
+        return chosen_places or list(filter(self.text.shows, behind_words)) or behind_words
 
     def search(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers that it may mean: a proposal, until one that it shows is remembered."""

@@ -68,10 +68,10 @@ def _candidates(titles: Sequence[ColumnTitle], stdout: str) -> Iterator[_Candida
         words = tuple(line.text[: line.numbers[0].start].split())
         rest = masked(line.text[line.numbers[0].start :])
         for has_name, columns in ((False, titles), (True, titles[1:])):
-            named = [title.best_places(output.labels(at)) for title in columns]
+            places_of_titles = [title.best_places(output.labels(at)) for title in columns]
             numbers = line.numbers
-            if len(numbers) > len(columns) and all(len(place) == 1 for place in named):
-                numbers = tuple(line.numbers[place[0]] for place in named)
+            if len(numbers) > len(columns) and all(len(place) == 1 for place in places_of_titles):
+                numbers = tuple(line.numbers[place[0]] for place in places_of_titles)
             if len(numbers) == len(columns) == len({*numbers}) and (words or not has_name):
                 kind = (output.heading(at), rest, "" if has_name else " ".join(words))
                 places = tuple(PrintedPlace(output, at, (number,)) for number in numbers)

@@ -231,8 +231,7 @@ def count_unproven(
         figures = recorded_figures(document)
         recorded += (figure.script for figure in figures if not figure.path.endswith(".csv"))
         for binding in document_bindings(document):
-            of_binding = outputs.of_binding(binding)
-            bound.append(binding.script or (of_binding[0].recording.script if of_binding else None))
+            bound.append(outputs.script_of(binding))
     return {path: (recorded.count(path), bound.count(path)) for path in unrun}
 
 

@@ -271,17 +271,19 @@ class PrintedText:
 
         `rivals`: these others; by default all of the output.
         """
-        others = [p for p in rivals or self.places(1) if (p.at, p.first) != (place.at, place.first)]
-        contexts = [c for p in others for c in p.output._contexts(p)]
+        rival_places = [
+            p for p in rivals or self.places(1) if (p.at, p.first) != (place.at, place.first)
+        ]
+        contexts = [c for p in rival_places for c in p.output._contexts(p)]
         in_heading = len(_split(self.heading(place.at)))
-        found: list[str] = []
+        choices: list[str] = []
         for context in self._contexts(place):
             numbers = [at for at, (_, is_number) in enumerate(context) if is_number]
-            plain = ["#" if is_number else word for word, is_number in context]
-            named = [*plain]
+            plain_words = ["#" if is_number else word for word, is_number in context]
+            row_words = [*plain_words]
             for at in [at for at in numbers if at >= in_heading][:1]:  # it may name its line
-                named[at] = context[at][0]
-            for words in (plain, named):
+                row_words[at] = context[at][0]
+            for words in (plain_words, row_words):
                 for start in range(len(words) - 1, -1, -1):
                     is_unit = start - 1 in numbers and bool(unit_behind(words[start]))
                     sought = _split(" ".join(words[start:]))
@@ -289,10 +291,10 @@ class PrintedText:
                         continue
                     if _FORBIDDEN.search(" ".join(words[start:])):
                         break
-                    if not any(_ends_with(other, sought) for other in contexts):
-                        found.append(" ".join(words[start:]))
+                    if not any(_ends_with(rival, sought) for rival in contexts):
+                        choices.append(" ".join(words[start:]))
                         break
-        return min(found, key=lambda words: ("#" in words, words.count(" ")), default="")
+        return min(choices, key=lambda words: ("#" in words, words.count(" ")), default="")
 
     def _contexts(self, place: PrintedPlace) -> list[_Words]:
         """All words before numbers, also the heading's, and again with the title of the column.

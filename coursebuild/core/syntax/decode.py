@@ -107,7 +107,8 @@ class _Decoder:
     ) -> object:
         """The value of a node of a declared type; `remarks` are the `extra` of its `Meta`."""
         extra = type.extra if isinstance(type, inspect.Metadata) else None
-        if isinstance(node, StringNode) and (extra or {}).get("text") == "number":
+        is_bound = isinstance(node, StringNode) and "{out" in node.value
+        if isinstance(node, StringNode) and is_bound and (extra or {}).get("text") == "number":
             return self.decode_bound_number(node, name)
         if not accepts(type, node):
             return self.report_wrong_type(node, type, name)

@@ -304,7 +304,7 @@ class _TokenReader:
             source=collapse_spaces(token.info) if is_given else None,
             comma=self.state.has_decimal_comma,
             words="" if is_given else collapse_spaces(token.meta["words"]),
-            quote=self.state.quote,
+            in_string=self.state.in_string,
         )
 
     def _read_html(self, token: PositionedToken, span: Span) -> model.RawInline:

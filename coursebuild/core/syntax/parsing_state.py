@@ -31,8 +31,8 @@ class ParsingState:
         self.lesson = lesson
         self.words = words
         self.has_decimal_comma = "," in words.decimal
-        self.quote = '"'
-        """A quotation mark as it is written in what is read: in JSON behind a backslash."""
+        self.in_string = False
+        """Whether what is read is in a string of a data text, such as JSON."""
         self.references: References = {}
         """The link definitions of the document, which its inner texts may use."""
         self.diagnostics: list[Diagnostic] = []

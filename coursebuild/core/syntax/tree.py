@@ -396,12 +396,12 @@ class NestedTextParser:
 
     def _read(self, excerpt: Excerpt, read: Callable[[], T]) -> Parsed[T]:
         state, start = self._state, excerpt.offset(0)
-        outer, is_string = state.quote, excerpt.source.text[start - 1 : start] == '"'
-        state.quote = '\\"' if is_string else outer
+        outer = state.in_string
+        state.in_string = outer or excerpt.source.text[start - 1 : start] == '"'
         try:
             return state.collect_diagnostics(read)
         finally:
-            state.quote = outer
+            state.in_string = outer
 
     def _references(self) -> References:
         """A copy of the document's link definitions, as those in a text hold in it only."""

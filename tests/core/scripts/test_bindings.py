@@ -298,6 +298,38 @@ def test_words_before_a_number_choose_it() -> None:
     assert check(text, make_run(printed)) == ()
 
 
+def test_numbers_with_labels_of_their_own_are_different_quantities() -> None:
+    """Those of one label or column, and those that nothing names, are shown together."""
+    for printed, is_ambiguous in (
+        ("measured 2.5 s, formula 2.5 s", True),
+        ("mass = 2.5\nlength = 2.5", True),
+        ("Euler:\nerror 2.5\nRK4:\nerror 2.5", True),
+        ("step  measured  formula\n0.1  2.5  2.5", True),
+        ("step  error\n0.1  2.5\n0.2  2.5", False),
+        ("after 0.1 s tau = 2.5\nafter 0.2 s tau = 2.5", False),
+        ("2.5 2.5", False),
+        ("tau = 2.5\ntau = 2.5", False),
+    ):
+        mistake = find_mistake("`2.5`{out}", f"{printed}\n")
+        assert (mistake is not None) is is_ambiguous, (printed, mistake)
+
+
+def test_a_title_and_the_beginning_of_a_row_choose_a_number() -> None:
+    printed = "step  measured  formula\n0.1  2.5  2.5\n0.2  3.5  2.5\n"
+    for words, holds in (("measured", True), ("0.1 formula", True), ("0.2 measured", False)):
+        mistake = find_mistake(f'`2.5`{{out="{words}"}}', printed)
+        assert (mistake is None) is holds, words
+
+
+def test_choice_in_a_quiz_is_written_as_json_needs_it() -> None:
+    printed = "measured 2.5, formula 2.5\n"
+    quiz = '{"id": "q", "questions": [{"kind": "open", "q": "`2.5`{out}?", "reference": "Yes."}]}'
+    text = f"{script()}{output(printed)}\n```quiz\n{quiz}\n```\n"
+    (diagnostic,) = check(text, make_run(printed))
+    edits = [edit.text for note in diagnostic.notes for edit in note.edits]
+    assert edits == [r"{out=\"measured\"}", r"{out=\"formula\"}"]
+
+
 def test_a_number_in_a_caption_is_one_of_its_own_output() -> None:
     text = script() + "\nOutput, after `1.5`{out} s:\n\n```text\nt 1.5\n```\n"
     assert check(text, make_run("t 1.5\n")) == ()
