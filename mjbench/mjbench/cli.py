@@ -302,6 +302,8 @@ def _diet(arguments: argparse.Namespace) -> int:
     modules = frozenset(file.stem for file in arguments.code if file.suffix == ".py")
     while True:
         subject = read_subject(arguments.model)
+        if subject.is_binary:
+            raise _UsageError("the diet edits the source of a model, and this one has none")
         keeps = tuple(_keeps(subject))
         result = diet.look_at(
             subject,

@@ -62,7 +62,8 @@ def columns_of(row: WorkPrecisionRow, contact_model: Mapping[str, float]) -> Col
 
 def leasts_of(report: ScenarioReport) -> dict[str, float]:
     """Below which errors mean nothing, by the name of a column."""
-    place, speed = FLOORS * report.floor, FLOORS * report.velocity_floor
+    floors = report.floors or (report.floor, report.velocity_floor)
+    place, speed = (FLOORS * floor for floor in floors)
     return {
         "figure": report.least_figure,
         "seen": report.least_seen,

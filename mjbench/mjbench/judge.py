@@ -313,7 +313,7 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     elif (value := quantity.value_of(row)) is not None:
         is_known = value > quantity.least * (1 + 1e-9)
         error = f"errs by {'' if is_known else 'less than '}{value:.2g} in {quantity.label}"
-        if row.seen is not None and row.seen > value:
+        if quantity.name == "step_error" and row.seen is not None and row.seen > value:
             error += f", and by {row.seen:.2g} with the model of contacts"
     better, *_ = report.verdict.text.split("; the scene's own error")
     lines = [speed, error + parts_text(report.parts), better, _stability_line(report)]

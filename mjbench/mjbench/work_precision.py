@@ -117,6 +117,10 @@ def measure_scenario(
         least_figure=basis.least_figure,
         cost_of=cost_of,
         horizon_error=horizon_error(model, scene),
+        floors=(
+            max(cone.reference.floor.place for cone in cones.values()),
+            max(cone.reference.floor.velocity for cone in cones.values()),
+        ),
         contact_model={name: cone.visible_model_error for name, cone in cones.items() if name},
         parts=error_parts,
     )

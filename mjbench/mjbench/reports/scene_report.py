@@ -381,6 +381,9 @@ class ScenarioReport(Record, frozen=True):
     """The errors at which predictions end, by unit. Empty in older reports, where it is a tenth of
     a radian or of the model's extent."""
 
+    floors: tuple[float, float] | None = None
+    """The largest floors under any cone, of places and of velocities: rows of two cones are
+    compared down to ten of these; `None` where only those of the own cone were recorded."""
     contact_model: Mapping[str, float] = {}
     """What the model of contacts errs by, as it is seen, by cone; empty where it was not measured
     apart, or nothing touches."""

@@ -1,0 +1,49 @@
+"""A scenario for a model whose author declares none."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from mjbench.fair import fair_declarations
+from mjbench.scene import scenes
+
+ARM = """<mujoco><option timestep="0.002"/><worldbody>
+  <body pos="0 0 1"><joint name="j" axis="0 1 0" damping="9"/><geom size=".05" pos=".3 0 0"/></body>
+</worldbody>{}</mujoco>"""
+MOTORS = """<actuator><motor joint="j" ctrllimited="true" ctrlrange="-2 6"/>
+  <motor joint="j"/></actuator>"""
+KEYS = '<keyframe><key name="other"/><key name="home" qpos="0.5" ctrl="3 0"/></keyframe>'
+
+
+def test_commands_are_smooth_within_their_ranges_and_differ_by_seed() -> None:
+    model = mujoco.MjModel.from_xml_string(ARM.format(MOTORS + KEYS))
+    measured = scenes(model, fair_declarations(model, "arm.xml", quick=False), quick=False)
+    assert [scene.name for scene in measured] == ["seed-1", "seed-2", "seed-3"]
+    assert measured[0].title.startswith("from the keyframe home, then smooth random commands")
+    tables = [np.array(scene.scenario.controls) for scene in measured]
+    for table in tables:
+        assert table[0] == pytest.approx([3.0, 0.0]), "as the keyframe has them"
+        assert table[:, 0].min() >= -2 and table[:, 0].max() <= 6
+        assert np.abs(np.diff(table, axis=0)).max() < 1.0 < np.ptp(table[:, 0])
+    assert not np.array_equal(tables[0], tables[1])
+    again = fair_declarations(model, "arm.xml", quick=True).scenarios
+    assert len(again) == 2 and again[0].controls == measured[0].scenario.controls
+
+
+def test_without_a_keyframe_it_begins_where_the_model_comes_to_rest() -> None:
+    model = mujoco.MjModel.from_xml_string(ARM.format(MOTORS))
+    (first, *_) = fair_declarations(model, "arm.xml", quick=True).scenarios
+    assert first.title is not None and first.title.startswith("from where it comes to rest")
+    assert first.qpos[0] == pytest.approx(np.pi / 2, abs=1e-2), "it hangs"
+
+
+def test_what_would_not_move_gets_velocities_and_what_cannot_has_no_scenario() -> None:
+    weightless = ARM.replace("<option", '<option gravity="0 0 0"').format("")
+    still = mujoco.MjModel.from_xml_string(weightless)
+    (scenario,) = fair_declarations(still, "arm.xml", quick=True).scenarios
+    assert scenario.title is not None and "random velocities" in scenario.title
+    assert scenario.qvel and scenario.qvel[0] != 0
+    fixed = mujoco.MjModel.from_xml_string("<mujoco/>")
+    assert fair_declarations(fixed, "a.xml", quick=True).scenarios == ()
