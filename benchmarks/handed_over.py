@@ -66,7 +66,7 @@ def _read(path: Path, *, is_lab: bool) -> Iterator[HandedOver]:
         export = config.get("exportPython")
         if export:
             values = [control["value"] for control in config["controls"]]
-            text = _PLACE.sub(lambda match: json.dumps(values[int(match[1])]), export["text"])
+            text = _PLACE.sub(lambda match: _literal(values[int(match[1])]), export["text"])
             yield HandedOver(
                 "export", export["name"], {export["name"]: text.encode()}, [export["name"]]
             )
@@ -82,6 +82,12 @@ def _read(path: Path, *, is_lab: bool) -> Iterator[HandedOver]:
         scripts = [name for name in sorted(files) if re.fullmatch(r"examples/[^/]+\.py", name)]
         kind = "archive" if "README.md" in files else "download"
         yield HandedOver(kind, path.name, files, scripts)
+
+
+def _literal(value: float | str) -> str:
+    """A value as the page writes it."""
+    is_whole = isinstance(value, float) and value.is_integer()
+    return json.dumps(int(value) if is_whole else value)
 
 
 def run(thing: HandedOver, python: str | None) -> list[tuple[str, str]]:

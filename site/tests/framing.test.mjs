@@ -3,6 +3,7 @@
 import assert from 'node:assert/strict'
 import { before, test } from 'node:test'
 import { Framing, cameraAxes } from '../js/lab/core/framing.js'
+import { Motion } from '../js/lab/trial/motion.js'
 import { Lab } from '../js/lab/core/lab.js'
 import { code, compile, config, newEngine } from './helpers.mjs'
 
@@ -148,4 +149,26 @@ test('the camera does not follow what falls out of the scene', () => {
   }
   for (const around of ['', '<geom size=".1" pos="0 0 1.5"/>']) assert.ok(run(scene(around), 100).fit().distance > 50, 'there is nothing else to see')
   assert.equal(run(scene('<geom type="plane" size="1 1 .1"/>').replaceAll(pass, ''), 100).fallen.size, 0, 'it lies on the floor')
+})
+
+test('what is seen to move counts, and only in the first three seconds', () => {
+  const share = (geom, { qvel = [], seconds = 1, gravity = '0 0 0' } = {}) => {
+    const xml = `<mujoco><option gravity="${gravity}"/><worldbody><body pos="0 0 1"><freejoint/>${geom}</body></worldbody></mujoco>`
+    const lab = new Lab(engine, compile(engine, xml), config(), code({}))
+    lab.start()
+    lab.data.qvel.set(qvel)
+    const motion = new Motion(lab)
+    for (const end = lab.time + seconds; lab.time < end; lab.step(20)) motion.observe(lab)
+    lab.dispose()
+    return motion.share({ ...DIRECTION, distance: 4, target: [0, 0, 1] })
+  }
+  const [ball, rod] = ['<geom size=".1"/>', '<geom type="box" size=".5 .02 .02"/>']
+  assert.equal(share(ball), 0)
+  assert.equal(share(ball, { qvel: [0, 0, 0, 3, 0, 0] }), 0, 'a ball looks the same however it turns')
+  assert.equal(share(ball, { qvel: [0, 0, 1e-4, 0, 0, 0] }), 0, 'that is too little')
+  assert.ok(share(rod, { qvel: [0, 0, 0, 0, 0, 3] }) > 0.01)
+  const fall = share(ball, { gravity: '0 0 -1', seconds: 1 })
+  assert.ok(fall > 0.005 && fall < 0.1, `${fall}`)
+  const late = share(ball, { gravity: '0 0 -0.0001', seconds: 3 })
+  assert.equal(late, 0)
 })

@@ -85,10 +85,10 @@ def swing(lesson: Lesson) -> Iterator[Locator]:
 
 def reach_rest(lab_element: Locator) -> None:
     """A lab that is there and does not run."""
-    expect(lab_element).to_have_attribute("data-state", re.compile("paused|playing"))
+    expect(lab_element).to_have_attribute("data-state", re.compile("asleep|paused|playing"))
     if lab_element.get_attribute("data-state") == "playing":
         press(lab_element, "Pause")
-    expect(lab_element).to_have_attribute("data-state", "paused")
+    expect(lab_element).to_have_attribute("data-state", re.compile("asleep|paused"))
 
 
 def pictures(page: Page, count: int) -> None:
@@ -111,7 +111,23 @@ def native(course: Site, steps: int, angle: float, gravity: float = -9.8) -> np.
 # ------------------------------------------------------------------------------ the swing
 
 
-def test_engine_is_fetched_once_and_only_when_a_lab_is_near(lesson: Lesson, swing: Locator) -> None:
+def test_engine_is_fetched_only_when_something_is_asked_of_a_lab(
+    browsers: Mapping[str, Browser], base: str
+) -> None:
+    with browsers["webgl"].new_context() as context:
+        page, _ = watch_page(context)
+        engines: list[str] = []
+        page.on("worker", lambda worker: engines.append(worker.url))
+        page.goto(base + PAGE)
+        swing = lab(page, SWING, None)
+        expect(swing).to_have_attribute("data-state", "asleep")
+        assert engines == []
+        press(swing, "Play")
+        reach(page, SWING, "playing")
+        assert len(engines) == 1
+
+
+def test_engine_is_fetched_once(lesson: Lesson, swing: Locator) -> None:
     assert not [url for url in lesson.requests if "/labs/" in url and not url.endswith(".png")]
     entries = "() => performance.getEntriesByType('resource').map(({ name }) => name)"
     addresses: list[str] = lesson.page.evaluate(entries)
