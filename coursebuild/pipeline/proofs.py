@@ -17,7 +17,15 @@ import msgspec
 from msgspec import Struct
 
 from coursebuild.core.engine.store import Store
-from coursebuild.core.model import Course, Document, Recording, Table, find_blocks
+from coursebuild.core.model import (
+    Course,
+    Document,
+    Link,
+    Recording,
+    Table,
+    find_blocks,
+    find_inlines,
+)
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.bound_places import document_bindings
@@ -25,7 +33,7 @@ from coursebuild.core.text.source import Source, Span
 from coursebuild.core.values import fingerprint
 from coursebuild.report.values import plural
 
-Kind: TypeAlias = Literal["output", "table", "value", "figure", "lab"]
+Kind: TypeAlias = Literal["output", "table", "value", "figure", "lab", "link"]
 KIND = "proofs"
 """That of entries of the store: what was proved of a document, by the hash of its path."""
 
@@ -52,6 +60,8 @@ class Proof(Struct, frozen=True):
                 return f"the figure `{self.text}`"
             case "lab":
                 return "the lab"
+            case "link":
+                return f"the link to `{self.text}`"
             case "output" | "table":
                 return f"the {self.kind} of `{self.script}`"
 
@@ -179,6 +189,9 @@ def _of_document(document: Document, scripts: Collection[str] | None) -> Iterato
     for figure in recorded_figures(document):
         if is_run(figure.script):
             yield _proved("figure", figure.name, figure.span, figure.script)
+    for link in find_inlines(document, Link):
+        if not link.mention and link.target_span.text:
+            yield _proved("link", link.target_span.text, link.span)
 
 
 def _proved(kind: Kind, text: str, span: Span, script: str = "") -> _ProvedText:

@@ -84,3 +84,21 @@ def test_a_table_without_its_caption_is_told(make: Make) -> None:
     assert folder.main("check").status == 0, folder.main("check").out
     folder.write(folder.lesson(1), lesson.replace("Output:", "Table: Data"))
     assert "the table of `examples/t.py` in line 11 was proved" in folder.main("check").out
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "remark"),
+    [
+        ("[there](", "there](", "1.1: the link to `#fall` in line 3 was proved before"),
+        ("[there](#fall)", "[here](#fall)", ""),
+        ("[there](#fall)", "there", ""),
+    ],
+)
+def test_a_link_that_became_text_is_told(make: Make, old: str, new: str, remark: str) -> None:
+    lesson = "## Fall\n\nAs [there](#fall).\n"
+    folder = make(lesson)
+    assert folder.main("check").status == 0
+    folder.write(folder.lesson(1), lesson.replace(old, new))
+    out = folder.main("check").out
+    assert remark in out
+    assert ("is not now" in out) is bool(remark)

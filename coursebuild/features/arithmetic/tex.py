@@ -189,11 +189,9 @@ class _Reader:
                     factor = Expression("-", start, self.at, (factor,))
                 is_run = self.tex[start].isdigit() or self.tex[start] == "."
                 is_run &= SPACE.sub("", self.tex[product.start : start])[-1:] != "!"
+                is_run |= re.search(r"\([0-9]+\)\s*\([0-9]+\)$", self.tex[: self.at]) is not None
                 if not sign and (is_run or is_mixed(product, factor)):
                     raise factor.not_understood("two numbers stand side by side")
-                is_cycle = factor.kind == product.kind == "number"
-                if not sign and is_cycle and self.tex[start] == "(":
-                    raise factor.not_understood("it may be a product of permutations")
                 is_spaced = self.tex[:start].rstrip().endswith(r"\,")
                 if not (sign or is_spaced) and product.kind == "symbol" and self.tex[start] in "([":
                     # The symbol can be a function of what the bracket holds.

@@ -187,6 +187,8 @@ _FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
 """The first or last line of a block of code in a quotation or a list."""
 _COMMENT = re.compile(r"^(?:%[^\n]*|\+\+\+(?:[ \t]+[{\[][^\n]*)?[ \t]*$)\n?", re.MULTILINE)
 """A comment of MyST, or its break between two cells."""
+_CONTENTS = re.compile(r'<div class="toc">.*?</div>', re.DOTALL)
+"""What an extension of Jupyter writes into the first cell; the page has its own."""
 
 
 def rewrite_prose(text: str, context: LessonContext) -> str:
@@ -198,7 +200,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
             return f'<a id="{anchor}"></a>'
         return f"{match['heading'].rstrip()} {{#{anchor}}}"
 
-    text = normalize_formulas(_COMMENT.sub("", text))
+    text = normalize_formulas(_COMMENT.sub("", _CONTENTS.sub("", text)))
     text = _CAPTION.sub(_move_caption, _TARGET.sub(write_target, text))
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):

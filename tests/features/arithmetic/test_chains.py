@@ -145,8 +145,8 @@ def test_what_is_too_large_or_no_whole_number_is_not_understood() -> None:
 
 def test_what_can_be_meant_otherwise_is_not_judged() -> None:
     reasons = {
-        "(123) = (13)(12)": "it may be a product of permutations",
-        "(1)(23) = (12)(3)": "it may be a product of permutations",
+        "(123) = (13)(12)": "two numbers stand side by side",
+        "(1)(23) = (12)(3)": "two numbers stand side by side",
         "0 = 1": "there is nothing to compute",
         "3950/988 = 3": "`/` may be the division of whole numbers",
     }
