@@ -134,7 +134,7 @@ def run(
     if tell is not None:
 
         def tell_provenance(run: ScriptRun) -> None:
-            tell(with_provenance({run.path: run}, extractions, options)[run.path])
+            tell(with_provenance({run.path: run}, extractions, options, imports)[run.path])
 
         options = replace(options, on_result=tell_provenance)
     run_store = options.run_store() if run_store is None else run_store
