@@ -224,7 +224,7 @@ class Exporter(Struct, frozen=True, kw_only=True):
 
     name: str
     summary: str
-    """A few words on what it writes, for `coursebuild export --help`."""
+    """A few words on what it writes, for the help of `coursebuild export`."""
     file: str
     """Its name where `--out` gives none."""
     mark: str
