@@ -165,12 +165,13 @@ class _Updater:
         refusals: list[Diagnostic] = []
         refused_outputs: set[tuple[str, int]] = set()
         outputs = self._outputs(self.course, runs)
-        for recording in self.recordings:
-            if (good_run := good_runs.get(recording.script or "")) is None:
+        documents = self._chosen_documents(self.course)
+        for verdict in (v for document in documents for v in outputs.of_document(document)):
+            recording, good_run = verdict.recording, good_runs.get(verdict.recording.script or "")
+            if good_run is None or not recording.readable:
                 continue
-            comparison = self.course.comparison_of(recording)
-            at = outputs.row_addresses(recording)
-            edit = update_body(recording, comparison, good_run.output_of(recording.part), at)
+            printed = good_run.output_of(recording.part)
+            edit = update_body(recording, verdict.comparison, printed, verdict.row_addresses)
             if isinstance(edit, Edit):
                 edits.setdefault(recording.span.source, []).append(edit)
             elif edit is not None:
@@ -181,7 +182,7 @@ class _Updater:
             is_refused = recording_key(verdict.recording) in refused_outputs
             return None if is_refused else outputs.updated_text(verdict)
 
-        for document in self._chosen_documents(self.course):
+        for document in documents:
             check_bindings(document, outputs, self.addresses)
             followers = list(follow_outputs(document, outputs, self.addresses, text_after))
             if followers:

@@ -6,7 +6,6 @@ from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 
 from coursebuild.core import model
-from coursebuild.core.model.lesson_record import Address
 from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.scripts.printed_text import PrintedLine, PrintedText
 from coursebuild.core.scripts.table_cells import row_text
@@ -63,12 +62,6 @@ class PrintedOutputs:
             filters = verdict.comparison.own_filters
             self._texts[key] = PrintedText.of_recording(verdict.recording, filters)
         return self._texts[key]
-
-    def row_addresses(self, recording: model.Recording) -> tuple[tuple[Address, ...], ...]:
-        """Where the rows of a recorded table were printed, as far as that is known."""
-        key = recording_key(recording)
-        verdicts = self._by_document.get(recording.span.path, ())
-        return next((v.row_addresses for v in verdicts if recording_key(v.recording) == key), ())
 
     def updated_text(self, verdict: Verdict) -> PrintedText:
         """The lines of a recorded output as `update` writes it."""

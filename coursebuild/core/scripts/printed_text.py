@@ -303,9 +303,11 @@ class PrintedText:
         """
         heading, title = self.heading(place.at), self.title(place.at, place.numbers[0])
         before, line = f"{heading} {place.before}", place.line
-        end = line.numbers[0].end + len(unit_behind(line.text, line.numbers[0].end).text) + 1
-        row = f"{heading} {line.text[:end]}"
-        return [_split(text) for text in (before, f"{before} {title}", f"{row} {title}")]
+        texts = [before, f"{before} {title}"] if title else [before]
+        if title and place.first > 0:
+            end = line.numbers[0].end + len(unit_behind(line.text, line.numbers[0].end).text) + 1
+            texts.append(f"{heading} {line.text[:end]} {title}")
+        return list(map(_split, texts))
 
 
 def masked(text: str) -> str:
