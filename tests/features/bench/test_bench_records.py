@@ -16,6 +16,7 @@ from mjbench.reports import records
 from mjbench.reports.model_report import SceneReport
 from mjbench.reports.scene_report import ScenarioReport
 from samples.reports import interval, swing
+from support.bench_reports import derived
 from support.measured_course import BOX, PATH, TOML, Fake, bench_course, options, write
 
 pytestmark = pytest.mark.site
@@ -42,7 +43,7 @@ def test_what_is_recorded_is_checked(course: Path) -> None:
     paths = ("content/reports/arms/left arm.bench.json", PATH)
     assert measurement.remarks == tuple(f"wrote {path}" for path in paths)
     report = recorded(course)
-    assert report.model == "box" and report.scenarios == (swing(),)
+    assert report.model == "box" and report.scenarios == (derived(swing()),)
     assert report.digest == find_scenes(course, ("box",)).value[0].digest
     fake = Fake()
     check_again = check(options(course), fake)
