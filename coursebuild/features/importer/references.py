@@ -92,8 +92,8 @@ def _edit_links(
             case model.UrlTarget(url=url) if url.startswith("#"):
                 start, anchor = "", url[1:]
             case model.UrlTarget(url=url) if url == GONE:
-                if words := _REFERENCE.fullmatch(inline.span.text):
-                    yield Edit(inline.span, words[1])
+                if reference := _REFERENCE.fullmatch(inline.span.text):
+                    yield Edit(inline.span, reference[1])
                 continue
             case _:
                 continue
@@ -106,9 +106,8 @@ def _edit_links(
             start, _, target_anchor = address.partition("#")
             text = texts.get(start or link, text)
             if target_anchor not in text.anchors:
-                words = _REFERENCE.fullmatch(inline.span.text)
-                if words is not None:
-                    yield Edit(inline.span, words[1] or title_of_file(anchor))
+                if reference := _REFERENCE.fullmatch(inline.span.text):
+                    yield Edit(inline.span, reference[1] or title_of_file(anchor))
                 continue
             yield Edit(span, address)
         if inline.span.text.startswith("[]("):
