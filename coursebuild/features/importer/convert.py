@@ -182,10 +182,10 @@ def _convert_texts(
     files_of = {text.link: text.file for text in texts}
 
     def resolve_label(link: str, anchor: str) -> str:
-        here = replace(context, path=files_of[link])
-        address = here.resolve_anchor(to_anchor(anchor))
+        text_context = replace(context, path=files_of[link])
+        address = text_context.resolve_anchor(to_anchor(anchor))
         if not address:
-            here.add_leftover(f"a link to `#{anchor}`, which no text sets")
+            text_context.add_leftover(f"a link to `#{anchor}`, which no text sets")
         return address
 
     callouts = frozenset((*CALLOUTS, *context.callouts))

@@ -21,7 +21,7 @@ _PART = re.compile(
     rf"|(?P<statement>{_STATEMENT})"
     r"|(?P<comment>\{/\*.*?\*/\})"
     r"|<(?P<end>/?)(?P<name>[A-Za-z][\w.]*)"
-    rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*+)>",
+    rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*)>",
     re.MULTILINE | re.DOTALL,
 )
 _COMPUTED = re.compile(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")

@@ -90,30 +90,29 @@ def _edit_links(
             case model.UrlTarget(url=url) if url.startswith("#"):
                 start, anchor = "", url[1:]
             case model.UrlTarget(url=url) if url == GONE:
-                if words := _REFERENCE.fullmatch(inline.span.text):
-                    yield Edit(inline.span, words[1])
+                if reference := _REFERENCE.fullmatch(inline.span.text):
+                    yield Edit(inline.span, reference[1])
                 continue
             case _:
                 continue
         text = texts.get(start or link)
         if text is None or inline.mention or not span.text.startswith(start):
             continue
-        found = text.anchors.get(anchor) or text.anchors.get(_letters(anchor)) or ""
-        if anchor and found != anchor:
-            address = f"{start}#{found}" if found else resolve_label(link, anchor)
-            start, _, found = address.partition("#")
+        target_anchor = text.anchors.get(anchor) or text.anchors.get(_letters(anchor)) or ""
+        if anchor and target_anchor != anchor:
+            address = f"{start}#{target_anchor}" if target_anchor else resolve_label(link, anchor)
+            start, _, target_anchor = address.partition("#")
             text = texts.get(start or link, text)
-            if found not in text.anchors:
-                words = _REFERENCE.fullmatch(inline.span.text)
-                if words is not None:
-                    yield Edit(inline.span, words[1] or title_of_file(anchor))
+            if target_anchor not in text.anchors:
+                if reference := _REFERENCE.fullmatch(inline.span.text):
+                    yield Edit(inline.span, reference[1] or title_of_file(anchor))
                 continue
             yield Edit(span, address)
         if inline.span.text.startswith("[]("):
-            words = text.headings.get(found, "")
+            words = text.headings.get(target_anchor, "")
             words = words if words and "](" not in words else text.title
             at = inline.span.start + 1
-            if ":" not in found:  # what is numbered is called by its number
+            if ":" not in target_anchor:  # what is numbered is called by its number
                 yield Edit(Span(inline.span.source, at, at), words)
 
 
@@ -121,12 +120,12 @@ def _carry_macros(document: model.Document) -> Iterator[Edit]:
     """Define macros anew in each formula below that uses them: here they hold in one."""
     macros: dict[str, str] = {}
     for _, formula in model.find_formulas(document):
-        tex, used = formula.tex.text, ""
-        own = {match[1] or match[2]: match[0] for match in _DEFINITION.finditer(tex)}
+        tex, definitions = formula.tex.text, ""
+        own_macros = {match[1] or match[2]: match[0] for match in _DEFINITION.finditer(tex)}
         for name, definition in reversed(macros.items()):
-            if name not in own and name in _COMMAND.findall(tex + used):
-                used = definition + used
-        if used:
+            if name not in own_macros and name in _COMMAND.findall(tex + definitions):
+                definitions = definition + definitions
+        if definitions:
             start = formula.tex.span().start
-            yield Edit(Span(document.source, start, start), used)
-        macros |= own
+            yield Edit(Span(document.source, start, start), definitions)
+        macros |= own_macros

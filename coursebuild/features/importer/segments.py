@@ -211,11 +211,9 @@ def _parse_tab(state: StateBlock, start: int, end: int, silent: bool) -> bool:
 
 
 _BLOCKS = ("fence", "div", "tab", "admonition_open")
-_ENDED = {"alt": ["paragraph", "list", "blockquote"]}
-"""What a block of another tool ends without a blank line."""
 _PARSER = MarkdownIt("commonmark").use(admon_plugin)
-_PARSER.block.ruler.before("fence", "div", _parse_div, _ENDED)
-_PARSER.block.ruler.before("fence", "tab", _parse_tab, _ENDED)
+for _name, _parse in (("div", _parse_div), ("tab", _parse_tab)):
+    _PARSER.block.ruler.before("fence", _name, _parse, {"alt": ["paragraph", "list", "blockquote"]})
 
 
 # --- notebooks
