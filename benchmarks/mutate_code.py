@@ -136,11 +136,11 @@ def tests_of(path: str) -> Iterator[tuple[str, ...]]:
     for folder in (Path(path).parent.relative_to("coursebuild"), Path("pipeline")):
         stages.append([file for file in files if file.is_relative_to(ROOT / "tests" / folder)])
     stages[1].append(ROOT / "tests/core/text/test_rules.py")
-    seen: set[Path] = set()
+    earlier_files: set[Path] = set()
     for stage in stages:
-        if new := [file for file in stage if file not in seen]:
+        if new := [file for file in stage if file not in earlier_files]:
             yield tuple(str(file.relative_to(ROOT)) for file in new)
-        seen |= {*stage}
+        earlier_files |= {*stage}
 
 
 class Copy:
@@ -149,8 +149,8 @@ class Copy:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         words = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard")
-        listed = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
-        for name in filter(None, listed.stdout.split("\0")):
+        listing = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+        for name in filter(None, listing.stdout.split("\0")):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, folder / name)
         shutil.copytree(ROOT / "site/dist", folder / "site/dist")
@@ -173,10 +173,10 @@ class Copy:
             )
         except subprocess.TimeoutExpired:
             return "they do not come to an end"
-        failed = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", result.stdout, re.MULTILINE)
-        if result.returncode not in (0, 5) and not failed:
+        failure = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", result.stdout, re.MULTILINE)
+        if result.returncode not in (0, 5) and not failure:
             return "they cannot be run"
-        return failed[0] if failed else ""
+        return failure[0] if failure else ""
 
     def write(self, file: Path, data: bytes) -> None:
         """Write a module, with a time by which Python knows that it was compiled before."""
@@ -192,13 +192,13 @@ class Copy:
         for tests in tests_of(mutant.path):
             while True:
                 self.write(file, changed)
-                failed = self.first_failure(tests, *self.failing)
+                failure = self.first_failure(tests, *self.failing)
                 self.write(file, source)
-                if not failed:
+                if not failure:
                     break
-                if "::" not in failed or not self.first_failure([failed]):
-                    return failed
-                self.failing.append(f"--deselect={failed}")
+                if "::" not in failure or not self.first_failure([failure]):
+                    return failure
+                self.failing.append(f"--deselect={failure}")
         return ""
 
 
@@ -209,13 +209,13 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=20)
     arguments = parser.parse_args()
     files = sorted(file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py"))
-    everything = [mutant for file in files for mutant in mutants(file)]
-    drawn = random.Random(arguments.seed).sample(everything, arguments.count)
-    print(f"{arguments.count} of {len(everything)} changes, seed {arguments.seed}", flush=True)
+    candidates = [mutant for file in files for mutant in mutants(file)]
+    sample = random.Random(arguments.seed).sample(candidates, arguments.count)
+    print(f"{arguments.count} of {len(candidates)} changes, seed {arguments.seed}", flush=True)
     survivors = 0
     with tempfile.TemporaryDirectory() as folder:
         place = Copy(Path(folder))
-        for number, mutant in enumerate(drawn, 1):
+        for number, mutant in enumerate(sample, 1):
             test = place.try_out(mutant)
             survivors += not test
             print(f"{number:3} {mutant}\n    {test or 'SURVIVES'}", flush=True)

@@ -27,19 +27,19 @@ def versions(lock: str) -> dict[str, str]:
 
 def transitive_needs(lines: Iterable[str]) -> set[str]:
     """What these requirements need on this machine, by what is installed."""
-    seen, waiting = set(), [*map(Requirement, lines)]
-    while waiting:
-        requirement = waiting.pop()
+    packages, queue = set(), [*map(Requirement, lines)]
+    while queue:
+        requirement = queue.pop()
         for extra in ("", *requirement.extras):
-            if (requirement.name, extra) not in seen:
-                seen.add((requirement.name, extra))
+            if (requirement.name, extra) not in packages:
+                packages.add((requirement.name, extra))
                 needs = map(Requirement, importlib.metadata.requires(requirement.name) or ())
-                waiting += [
+                queue += [
                     need
                     for need in needs
                     if need.marker is None or need.marker.evaluate({"extra": extra})
                 ]
-    return {canonicalize_name(name) for name, _ in seen}
+    return {canonicalize_name(name) for name, _ in packages}
 
 
 def locked_requirements(root: Path, pyproject: dict) -> list[str]:
@@ -86,10 +86,10 @@ def test_the_lock_holds_what_is_declared_and_what_is_installed(root: Path, pypro
 def test_what_is_taken_from_the_lock_is_what_was_asked_for_and_what_that_needs(
     root: Path, pyproject: dict
 ) -> None:
-    declared = pyproject["project"]["dependencies"] + pyproject["dependency-groups"]["build"]
+    requirements = pyproject["project"]["dependencies"] + pyproject["dependency-groups"]["build"]
     command = (sys.executable, "-I", "-S", str(root / "site/locked.py"), "build")
-    taken = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert {*versions(taken)} == transitive_needs(declared)
+    part = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert {*versions(part)} == transitive_needs(requirements)
 
 
 def test_the_lock_names_no_address(root: Path) -> None:

@@ -47,10 +47,10 @@ def locked_requirements(names: Iterable[str]) -> str:
     entries = re.findall(r"(?m)^(([\w.-]+)==.*\n(?:    --hash.*\n)+)((?:    #.*\n)*)", text)
     # uv names below each package, in comments, those that it is locked for.
     asked_by = {(entry, name): {*re.findall(r"[\w.-]+", via)} for entry, name, via in entries}
-    needed = {re.sub(r"[-_.]+", "-", name).lower() for name in names}
-    while more := {name for (_, name), via in asked_by.items() if via & needed} - needed:
-        needed |= more
-    return "".join(entry for entry, name in asked_by if name in needed)
+    closure = {re.sub(r"[-_.]+", "-", name).lower() for name in names}
+    while additions := {name for (_, name), via in asked_by.items() if via & closure} - closure:
+        closure |= additions
+    return "".join(entry for entry, name in asked_by if name in closure)
 
 
 class Bundle(Mapping[str, bytes]):

@@ -131,12 +131,12 @@ def test_ellipsis_takes_what_a_regular_expression_takes(recorded: str, printed: 
 
 
 def test_a_script_that_ends_otherwise_when_it_is_repeated_is_unclear() -> None:
-    good, failed = (
+    good, failure = (
         RunStanding(ScriptRun("examples/a.py", outcome, status, "1\n", "", 0.1), is_compared=True)
         for status, outcome in enumerate((Outcome.OK, Outcome.FAILED))
     )
-    assert judge(good, good, failed, "3.14.0") == ("unclear", "two runs of it there differed")
-    assert judge(failed, good, failed, "3.14.0") == ("fails", "")
+    assert judge(good, good, failure, "3.14.0") == ("unclear", "two runs of it there differed")
+    assert judge(failure, good, failure, "3.14.0") == ("fails", "")
 
 
 @settings(max_examples=50)
