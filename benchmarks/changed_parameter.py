@@ -18,12 +18,13 @@ import json
 import re
 import resource
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
+
+from coursebuild.core.run import gate
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("content", "models", "lib", "runs")
@@ -52,18 +53,18 @@ class Course:
         self.folder, self.python = folder, python
         self.commands = 0
 
-    def run(self, *words: str) -> subprocess.CompletedProcess[str]:
+    def run(self, *words: str) -> gate.Completed:
         """Run a command of coursebuild."""
         self.commands += 1
-        command = [self.python, "-m", "coursebuild", *words, "-q"]
-        return subprocess.run(command, cwd=self.folder, capture_output=True, text=True)
+        command = gate.python_command("-m", "coursebuild", *words, "-q", program=self.python)
+        return gate.finish(command, gate.environment(*gate.TOOL), folder=self.folder)
 
     def errors(self, lesson: str) -> list[dict[str, Any]]:
         """The errors of a check of one lesson."""
         result = self.run("check", lesson, "--format", "json")
-        if not result.stdout.startswith("{"):
-            sys.exit(result.stdout + result.stderr)
-        return [d for d in json.loads(result.stdout)["diagnostics"] if d["severity"] == "error"]
+        if not result.output.startswith(b"{"):
+            sys.exit(result.last_line())
+        return [d for d in json.loads(result.output)["diagnostics"] if d["severity"] == "error"]
 
     def mend(self, error: dict[str, Any]) -> bool:
         """Make the edit that an error proposes, or type the number that it names."""
@@ -144,7 +145,7 @@ def main() -> None:
         original = Path(name) / "content"
         shutil.copytree(course.folder / "content", original)
         names = [lesson for lesson, _, _ in changes]
-        print(course.run("check", *names).stdout, end="", flush=True)
+        print(course.run("check", *names).output.decode(), end="", flush=True)
         print("lesson  change           edits  commands  processor  seconds", flush=True)
         for lesson, old, new in changes:
             print(change(course, lesson, old, new), flush=True)

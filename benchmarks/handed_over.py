@@ -18,7 +18,6 @@ import io
 import json
 import os
 import re
-import subprocess
 import sys
 import tempfile
 import zipfile
@@ -28,6 +27,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import unquote
+
+from coursebuild.core.run import gate
 
 _PLACE = re.compile(r"\{\{control:(\d+)\}\}")
 _DOWNLOAD = re.compile(r'<a href="([^"]+\.(?:py|zip))" download>')
@@ -103,15 +104,12 @@ def run(thing: HandedOver, python: str | None) -> list[tuple[str, str]]:
         for entry in thing.entries:
             command = ["uv", "run", "--offline", entry] if python is None else [python, entry]
             try:
-                done = subprocess.run(
-                    command, cwd=folder, env=environment, capture_output=True, timeout=_SECONDS
-                )
-            except subprocess.TimeoutExpired:
-                failures.append((entry, "takes too long"))
+                done = gate.finish(command, environment, folder=folder, seconds=_SECONDS)
+            except TimeoutError as error:
+                failures.append((entry, str(error)))
                 continue
-            if done.returncode:
-                lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
-                failures.append((entry, lines[-1] if lines else f"status {done.returncode}"))
+            if done.status:
+                failures.append((entry, done.last_line() or f"status {done.status}"))
     return failures
 
 

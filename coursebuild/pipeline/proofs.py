@@ -13,10 +13,9 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from typing import Literal, TypeAlias
 
-import msgspec
 from msgspec import Struct
 
-from coursebuild.core.engine.store import Store
+from coursebuild.core.engine.store import Store, value_reader
 from coursebuild.core.model import (
     Course,
     Document,
@@ -131,7 +130,7 @@ def remarks_on_proofs(
         if documents is not None and path not in documents:
             continue
         key = fingerprint(path)
-        before = store.peek(KIND, key, _decode) or ()
+        before = store.peek(KIND, key, value_reader(tuple[Proof, ...])) or ()
         losses = [
             f"{loss.proof.describe()} in line {loss.span.line}"
             for loss in find_losses(course, path, before)
@@ -151,10 +150,6 @@ def _describe_counts(proofs: Sequence[Proof]) -> str:
     counts = Counter(proof.kind for proof in proofs)
     words = [plural(count, kind) for kind, count in counts.items()]
     return f"proved: {', '.join(words) or 'nothing'}"
-
-
-def _decode(data: bytes) -> tuple[Proof, ...]:
-    return msgspec.json.decode(data, type=tuple[Proof, ...])
 
 
 def _identity(proof: Proof) -> tuple[Kind, str, str]:

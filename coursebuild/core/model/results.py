@@ -44,8 +44,7 @@ class ScriptJob(Struct, frozen=True):
     """Seconds."""
     requires: tuple[str, ...]
     perturbation: int = 0
-    """From 1 on, initial states are moved a little, in one of several directions; at 0 nothing is
-    changed; at −1 each step is made as two of half the timestep."""
+    """From 1 on, the direction in which initial states are moved a little; −1 halves timesteps."""
     packages: tuple[str, ...] = ()
     environment: tuple[tuple[str, str], ...] = ()
     writes: tuple[str, ...] = ()

@@ -327,8 +327,6 @@ class HtmlWriter:
         title = f' title="{escape(link.title)}"' if link.title else ""
         href = escape(self.href(link.target))
         inner = self._inlines(link.children) or escape(self.reference(link.target))
-        if not href:
-            return inner
         url_class = ' class="url"' if inner == href else ""  # an address as its own text
         return f'<a href="{href}"{title}{url_class}>{inner}</a>'
 

@@ -18,10 +18,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 
-import msgspec
-
 from coursebuild.core.engine.digests import file_state
-from coursebuild.core.engine.store import Store
+from coursebuild.core.engine.store import Store, value_reader
 from coursebuild.core.model.results import OutputFile
 from coursebuild.core.run.script_environment import installed_distributions
 
@@ -112,8 +110,7 @@ def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str
             contents[-1] = sorted(os.listdir(folder))  # noqa: PTH208
     key = hashlib.sha256(repr((sys.version, *contents)).encode()).hexdigest()
     # It is no result of the course, so that `--no-cache` does not make it again.
-    decode = functools.partial(msgspec.json.decode, type=dict[str, str])
-    names = store.peek("installed", key, decode)
+    names = store.peek("installed", key, value_reader(dict[str, str]))
     if names is None:
         names_by_module: dict[str, set[str]] = {}
         seen_names: set[str] = set()

@@ -245,8 +245,6 @@ class DocumentWriter:
             return source
         href = self.href(node.target)
         text = text or marks.escape_marks(self.link_text(node.target))
-        if not href:
-            return text
         return marks.link(text, href.replace("|", "%7C") if room == "cell" else href, node.title)
 
     # --- what depends on the page

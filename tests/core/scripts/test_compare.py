@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model import Comparison, Filter
 from coursebuild.core.model.results import DriftKind, Outcome, ScriptRun
-from coursebuild.core.scripts.compare import RunStanding, judge
 from coursebuild.core.scripts.lines import MappedText, apply_filters
+from coursebuild.pipeline.other_version import RunStanding, judge
 from support.fixture_cases import fixture_tables
 from support.sample_lessons import (
     DIGITS,
