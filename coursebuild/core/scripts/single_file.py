@@ -221,6 +221,9 @@ class _File:
                     pass
         if count or self._meanings.setdefault(bound, whole) != whole:
             raise NotOneFileError(f"`{bound}` is used as more than a module")
+        source = self._find_module(whole)
+        if source is not None:
+            self._module(whole, source).check()
         place = self._module(f"{bound} =", CourseModule("", ""))
         user.uses[place.name] = None
         namespace = self._namespaces.setdefault(bound, {})
@@ -238,13 +241,14 @@ class _File:
             self._has_models = True
             return name
         module = self._module(module_name, source)
+        module.check()
         if module is not user:
             user.uses[module_name] = None
         statement = module.statement_of(name)
         if isinstance(statement, ast.Import | ast.ImportFrom):
             row = next(row for row in module.imported(statement) if row[0] == name)
             if self._find_module(row[1]) is None:
-                return self._keep(new_name or name, self._external(module, name))
+                return self._keep(module, name, new_name)
             if self._find_module(f"{row[1]}.{row[2]}") is not None or not row[2]:
                 raise NotOneFileError(f"{source.path} uses the module {row[1]} as a value")
             return self._need(user, row[1], row[2], new_name)
@@ -268,7 +272,6 @@ class _File:
         if file_name != name:
             module.new_names[name] = file_name
         if number not in module.needed:
-            module.check()
             module.needed.add(number)
             self._need_used(module, statement)
         return file_name
@@ -296,23 +299,28 @@ class _File:
             if file_name != node.id:
                 module.new_names[node.id] = file_name
 
-    def _external(self, module: ModuleCode, name: str) -> str:
+    def _external(self, module: ModuleCode, name: str, new_name: str = "") -> str:
         """The import of a name from another package, as a line."""
         statement = module.statements[module.numbers[name][-1]]
         assert isinstance(statement, ast.Import | ast.ImportFrom)
         aliases = [a for a in statement.names if (a.asname or a.name.partition(".")[0]) == name]
+        if new_name not in ("", name):
+            if any("." in alias.name and not alias.asname for alias in aliases):
+                raise NotOneFileError(f"{module.source.path} imports more than `{name}`")
+            aliases = [ast.alias(alias.name, new_name) for alias in aliases]
         if isinstance(statement, ast.Import):
             return ast.unparse(ast.Import(aliases))
         return ast.unparse(ast.ImportFrom(statement.module, aliases, statement.level))
 
-    def _keep(self, name: str, line: str) -> str:
-        """Let the file import a name of another package."""
-        if self._meanings.get(name, line) != line:
-            raise NotOneFileError(f"`{name}` means two things in it")
-        if name not in self._meanings:
-            self._meanings[name] = line
-            self._imports.add(line)
-        return name
+    def _keep(self, module: ModuleCode, name: str, new_name: str) -> str:
+        """Let the file import a name of another package, which is what a module imports."""
+        meaning, file_name = self._external(module, name), new_name or name
+        if self._meanings.get(file_name, meaning) != meaning:
+            raise NotOneFileError(f"`{file_name}` means two things in it")
+        if new_name or file_name not in self._meanings:
+            self._meanings[file_name] = meaning
+            self._imports.add(self._external(module, name, file_name))
+        return file_name
 
     def _sections(self, belongings: Belongings) -> list[str]:
         sections: list[str] = []

@@ -55,6 +55,12 @@ def test_one_file_prints_what_script_and_modules_print(case: Case, tmp_path: Pat
 
 REFUSED = {
     "a module that prints": ("from m import a\n", "print(1)\na = 2\n"),
+    "a module that prints, of which an import is used": (
+        "from m import math\n",
+        "import math\nprint(1)\n",
+    ),
+    "a module that prints, of which nothing is used": ("import m\n", "print(1)\n"),
+    "a package that a module imports a part of": ("from m import os as o\n", "import os.path\n"),
     "a module that is a value": ("import m\nprint(m)\n", "a = 2\n"),
     "a name that is bound twice": ("from m import a\n", "a = 1\na = a + 1\n"),
     "everything of a module": ("from m import *\n", "a = 1\n"),
