@@ -19,17 +19,17 @@ KEYS = '<keyframe><key name="other"/><key name="home" qpos="0.5" ctrl="3 0"/></k
 
 def test_commands_are_smooth_within_their_ranges_and_differ_by_seed() -> None:
     model = mujoco.MjModel.from_xml_string(ARM.format(MOTORS + KEYS))
-    measured = scenes(model, fair_declarations(model, "arm.xml", quick=False), quick=False)
-    assert [scene.name for scene in measured] == ["seed-1", "seed-2", "seed-3"]
-    assert measured[0].title.startswith("from the keyframe home, then smooth random commands")
-    tables = [np.array(scene.scenario.controls) for scene in measured]
+    seeded_scenes = scenes(model, fair_declarations(model, "arm.xml", quick=False), quick=False)
+    assert [scene.name for scene in seeded_scenes] == ["seed-1", "seed-2", "seed-3"]
+    assert seeded_scenes[0].title.startswith("from the keyframe home, then smooth random commands")
+    tables = [np.array(scene.scenario.controls) for scene in seeded_scenes]
     for table in tables:
         assert table[0] == pytest.approx([3.0, 0.0]), "as the keyframe has them"
         assert table[:, 0].min() >= -2 and table[:, 0].max() <= 6
         assert np.abs(np.diff(table, axis=0)).max() < 1.0 < np.ptp(table[:, 0])
     assert not np.array_equal(tables[0], tables[1])
     again = fair_declarations(model, "arm.xml", quick=True).scenarios
-    assert len(again) == 2 and again[0].controls == measured[0].scenario.controls
+    assert len(again) == 2 and again[0].controls == seeded_scenes[0].scenario.controls
 
 
 def test_without_a_keyframe_it_begins_where_the_model_comes_to_rest() -> None:

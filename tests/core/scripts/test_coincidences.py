@@ -100,9 +100,9 @@ def update(page: Document, lines: list[str], addresses: Addresses) -> tuple[Docu
     check_bindings(page, outputs, addresses)
     edits: list[Edit] = []
     refused: list[Recording] = []
-    for shown in outputs.of_document(page):
-        recording, at = shown.recording, shown.row_addresses
-        edit = update_body(recording, shown.comparison, "\n".join(lines), at)
+    for table_output in outputs.of_document(page):
+        recording, at = table_output.recording, table_output.row_addresses
+        edit = update_body(recording, table_output.comparison, "\n".join(lines), at)
         if isinstance(edit, Edit):
             edits.append(edit)
         elif edit is not None:
