@@ -67,6 +67,7 @@ def test_no_page_is_wider_than_its_window(
 
 def test_wide_things_scroll_in_themselves(open_page: OpenPage) -> None:
     page = open_page(width=360)
+    page.evaluate(OPEN_ALL)
     for selector in (".formula", ".formula-inline", ".table", ".script pre", ".output pre"):
         box = page.locator(selector).first
         room = box.evaluate("b => [b.scrollWidth - b.clientWidth, b.tabIndex]")
@@ -81,6 +82,7 @@ def test_wide_things_scroll_in_themselves(open_page: OpenPage) -> None:
 def test_the_end_of_a_long_line_of_code_keeps_clear_of_the_edge(open_page: OpenPage) -> None:
     for width in (360, 1000):
         page = open_page(width=width)
+        page.evaluate(OPEN_ALL)
         box = page.locator(".script pre:has(code)").first
         room = """box => {
           const text = document.createRange()
