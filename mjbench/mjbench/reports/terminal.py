@@ -21,9 +21,17 @@ class Style(Struct, frozen=True):
         return f"\x1b[1m{text}\x1b[0m" if self.colour else text
 
     def wrap(self, text: str, indent: str = "") -> list[str]:
-        """A text in lines that fit; further lines hang."""
+        """A text in lines that fit, if its words do; further lines hang.
+
+        Words are never broken: a path or a command is copied as it stands.
+        """
         return textwrap.wrap(
-            text, self.width, initial_indent=indent, subsequent_indent=f"{indent}  "
+            text,
+            self.width,
+            initial_indent=indent,
+            subsequent_indent=f"{indent}  ",
+            break_long_words=False,
+            break_on_hyphens=False,
         )
 
     def inner(self, indent: int) -> Style:
