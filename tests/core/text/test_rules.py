@@ -51,7 +51,8 @@ def catalogue_page() -> str:
 # Rules
 
 Errors ({counts["error"]} rules) keep the site from being published,
-`download-failed` only its button; warnings ({counts["warning"]}) can be [silenced](course-map.md#silence);
+`download-failed` only its button; warnings
+({counts["warning"]}) can be [silenced](course-map.md#silence);
 [hints](../explanation/mistakes.md#hints) ({counts["hint"]}) change nothing. `coursebuild explain
 RULE` prints an entry. Where `--fix` stands over a message, [that option](commands.md#fix) mends it;
 where `--propose` does, a human decides.
