@@ -204,12 +204,14 @@ def test_an_address_of_no_line_does_no_harm(open_page: OpenPage) -> None:
         page.reload()
         wait_until_settled(page)
         assert marked_ids(page) == [], address
+    page.evaluate(OPEN_ALL)
     expect(page.locator(".lines").first).to_be_visible()
 
 
 def test_lines_are_marked_by_pointer_and_by_keys(open_page: OpenPage) -> None:
     page = open_page()
-    column = page.locator(".script > pre > .lines").first
+    page.evaluate(OPEN_ALL)
+    column = page.locator(".script pre > .lines").first
     column.scroll_into_view_if_needed()
     first = int(column.get_attribute("aria-valuemin"))
     box = column.bounding_box()
@@ -238,12 +240,14 @@ def test_numbers_are_neither_copied_nor_selected(
     button.click()
     has_been(button, "Copied")
     text = page.evaluate("navigator.clipboard.readText()")
-    assert text == (sites["nasty"].public / "examples/sub/wide.py").read_text()
+    assert text == (sites["nasty"].root / "examples/sub/wide.py").read_text()
+    page.evaluate(OPEN_ALL)
     selection = page.evaluate(
         "() => { const chosen = getSelection()\n"
         "chosen.selectAllChildren(document.querySelector('.script pre'))\n"
         "return chosen.toString() }"
     )
+    assert "import math" in selection
     assert not re.search(r"^\d+$", selection, re.MULTILINE)
 
 
