@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, CDPSession, Page
 
-from support.lab_page import MOUNT, PAGE, SWING, until, wait_for_condition, watch_page
+from support.lab_page import MOUNT, PAGE, SWING, until, wait_for_condition, wake, watch_page
 
 pytestmark = pytest.mark.browser
 
@@ -87,6 +87,7 @@ def phone(screen: Phone) -> Iterator[Phone]:
     page, _, console = screen
     page.evaluate("() => window.made?.dispose()")
     page.evaluate(MOUNT, SWING)
+    wake(page, SWING)
     until(page, "() => made.state === 'paused' && made.view.frame !== null && made.view.height > 0")
     page.evaluate(RESTS, 10)
     yield screen
