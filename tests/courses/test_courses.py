@@ -67,9 +67,10 @@ def outputs(root: Path) -> dict[str, str]:
         if name.endswith(".zip"):
             members = zipfile.ZipFile(path).namelist()
             names += {
-                f"{replace_varying(name)}: {re.sub('/mjcourse/.*', '/mjcourse/…', m)}" for m in members
+                f"{replace_varying(name)}: {re.sub('/mjcourse/.*', '/mjcourse/…', m)}"
+                for m in members
             }
-        elif name.startswith("public/examples/") or re.fullmatch("public/models/.*xml", name):
+        elif re.fullmatch("public/models/.*xml", name):
             assert path.read_bytes() == (root / name.removeprefix("public/")).read_bytes()
         elif name.endswith(READ) and not name.startswith("public/assets/"):
             texts[name] = main_part(name, replace_varying(path.read_text("utf-8")))
@@ -92,6 +93,7 @@ def replace_varying(text: str) -> str:
     text = re.sub(r"(assets/[\w./%-]+?)\.[0-9a-f]{8}\.", r"\1.HASH.", text)
     text = re.sub(r"; [^;]*nativem? MuJoCo[^<]*", "; PARITY", text)  # differs by processor
     text = text.replace(f"NumPy {version('numpy')}", "NumPy NUMPY")
+    text = text.replace(f"mujoco=={version('mujoco')}", "mujoco==MUJOCO")
     return text.replace(f"Python {platform.python_version()}", "Python PYTHON")
 
 
