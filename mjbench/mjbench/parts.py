@@ -32,8 +32,8 @@ class Parts:
         if self.stopped:
             self.failures.append(PartFailure(name, STOPPED))
             return default
-        self.tell(name)
         try:
+            self.tell(name)
             return measure()
         except SceneError:
             raise
