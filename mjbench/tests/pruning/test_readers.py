@@ -112,7 +112,9 @@ def test_no_hostile_script_loses_a_part() -> None:
         assert any(kind in finding for finding in whole), kind
         survey = run_survey(MODEL, lesson=HEAD + script, declarations=GO)
         findings = [finding for finding in proved_findings(survey) if kind in finding.kind]
-        lost += [(title, one.kind) for one in findings if not name or name in names(one)]
+        lost += [
+            (title, finding.kind) for finding in findings if not name or name in names(finding)
+        ]
     assert lost == []
 
 
