@@ -149,13 +149,14 @@ def test_a_figure_that_left_its_band(course: Path, capsys: Capture) -> None:
     path.write_bytes(records.STABILITY.encode((changed_case,)))
     capsys.readouterr()
     assert run(course, "projectile", "--check") == 1
-    head, remark, _, name, _, figure = capsys.readouterr().out.splitlines()
+    head, remark, _, name, _, figure, _, faults = capsys.readouterr().out.splitlines()
     assert head == f"stability  1 figure not as recorded in {STABILITY.path()}"
     assert remark.startswith("  recorded with MuJoCo 3.7.0, measured with ")
     assert name == "  projectile"
     assert figure.startswith(
         "    Euler    error of the height after 1 s at 10 ms, against theory  -0.01095  "
     )
+    assert faults == "1 figure not as recorded"
     assert run(course, "projectile", "--check", "--format", "json") == 1
     document = json.loads(capsys.readouterr().out)
     assert sorted(document) == ["cases", "checked", "diagnostics", "failures", "remarks"]
@@ -173,6 +174,7 @@ def test_where_there_is_no_report_or_a_damaged_one(course: Path, capsys: Capture
     assert capsys.readouterr().out == (
         f"error: {STABILITY.path()} holds no report of `coursebuild stability`\n"
         "  help: make it again with `coursebuild stability --record`\n"
+        "\n1 error\n"
     )
     assert run(course, "projectile", "--record") == 1
     assert "holds no report of" in capsys.readouterr().out
