@@ -69,18 +69,19 @@ def test_includes_are_changed_where_they_stand() -> None:
         ),
         "models/parts/arm.xml": """<mujocoinclude>
   <!-- the arm -->
-  <include file="parts/sensors.xml"/>
+  <include file="parts/spare.xml"/>
   <worldbody><body><joint name="j" axis="0 1 0"/><geom size=".1" pos=".2 0 0"/>
     <site name="idle"/></body></worldbody>
 </mujocoinclude>""",
-        "models/parts/sensors.xml": "<x>\n<sensor>\n  <clock/>\n</sensor>\n</x>\n",
+        "models/parts/spare.xml": '<x>\n<default>\n  <default class="spare"/>\n</default>\n</x>\n',
     }
     survey = run_survey(files)
-    assert set(findings_by_kind(survey)) >= {"sensor-unread", "unused-site", "unused-default"}
-    (place,) = findings_by_kind(survey)["sensor-unread"].places
-    assert place.path == "models/parts/sensors.xml"
-    assert fixed_text(survey, "models/parts/sensors.xml") == files["models/parts/sensors.xml"]
-    assert '<include file="parts/sensors.xml"/>' not in fixed_text(survey, "models/parts/arm.xml")
+    assert set(findings_by_kind(survey)) == {"unused-default", "unused-material", "unused-site"}
+    places = findings_by_kind(survey)["unused-default"].places
+    assert [place.path for place in places] == [PATH, "models/parts/spare.xml"]
+    assert fixed_text(survey, "models/parts/spare.xml") == files["models/parts/spare.xml"]
+    arm = fixed_text(survey, "models/parts/arm.xml")
+    assert '<include file="parts/spare.xml"/>' not in arm and '<site name="idle"/>' in arm
     main = fixed_text(survey)
     assert main.count("\r\n") == main.count("\n") == 5 and "idle" not in main
     whole(files)
@@ -128,7 +129,7 @@ def test_what_is_repeated_is_one_element() -> None:
     findings = findings_by_kind(survey)
     assert names(findings["far-body"]) == ["mujoco/worldbody/replicate[2]/body"]
     assert left.count("<replicate") == 3 and 'pos="80 0 1"' in left
-    assert "idle" not in left and "jointpos" not in left
+    assert 'class="idle"' not in left and '<site name="idle"/>' in left and "jointpos" in left
 
 
 def test_tendons_equalities_and_excluded_pairs() -> None:
@@ -150,14 +151,14 @@ def test_tendons_equalities_and_excluded_pairs() -> None:
     <fixed name="f"><joint joint="jb" coef="1"/></fixed>
   </tendon>
   <equality><joint joint1="ja" joint2="jc" polycoef="0 1 0 0 0"/></equality>
-  <sensor><tendonpos tendon="t"/><framepos objtype="geom" objname="gd"/></sensor>
+  <sensor><tendonpos tendon="t"/></sensor>
 </mujoco>
 """
     survey, left = whole(text)
     findings = findings_by_kind(survey)
     assert names(findings["far-body"]) == ["d"]  # `c` is coupled to what matters
     assert any("<contact>" in edit.old for edit in findings["far-body"].edits)
-    assert "<sensor>" not in left and "<equality>" in left and left.count("<site") == 4
+    assert "<sensor>" in left and "<equality>" in left and left.count("<site") == 4
 
 
 def test_composites_and_flexes_stay_as_they_are(
