@@ -288,7 +288,7 @@ def parts_of(parsed_course: Parsed[Course | None]) -> Iterator[object]:
     yield extracted.diagnostics
     yield [(e.path, e.text, e.owner, e.script) for e in extracted.value]
     yield [(v.recording.span, v.recording.body, v.status, v.changes) for v in verdicts]
-    yield script_findings(course, course.owned_documents, extracted.value, runs, verdicts)
+    yield script_findings(course, course.shown_texts, extracted.value, runs, verdicts)
     yield list(check_runs(course, runs))
     yield [
         (name, trial.owner, trial.block.span) for name, (_, trial) in feature_trials(course).items()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 from collections.abc import Iterator
@@ -109,7 +110,9 @@ def test_scripts_run_when_they_are_saved(editor: Editor) -> None:
     new, record = editor.apply_edits({c.text_document.uri: c.edits for c in changes}).values()
     expected = typed.replace("at 1.000 m", "at 2.000 m").replace("`1.000`", "`2.000`")
     assert new == f"A line more.\n\n{expected}"  # with the number that is bound to it
-    assert re.search("^recorded [0-9a-f]+: exact; Python .* imports mujoco", record, re.MULTILINE)
+    recording = next(json.loads(line) for line in record.splitlines() if '"is":"recording"' in line)
+    assert (recording["of"], recording["comparison"]) == ("examples/fall.py output 1", "exact")
+    assert [name for name, _ in recording["provenance"]["packages"]] == ["mujoco"]
     editor.write(FIRST_LESSON, new)
     editor.until(FIRST_LESSON)
 
