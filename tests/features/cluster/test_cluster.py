@@ -34,11 +34,11 @@ pytestmark = pytest.mark.long
 
 PENDULUM = """\
 <mujoco>
+  <asset><material name="unused"/></asset>
   <worldbody>
     <body name="arm">
       <joint name="hinge" axis="0 1 0" damping="0.01"/>
       <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02"/>
-      <site name="unused"/>
     </body>
   </worldbody>
 </mujoco>
@@ -208,7 +208,7 @@ def test_measurements_are_the_same_as_on_one_machine(
     assert "measured here" not in second.err
     assert second_course.read("models/arm.xml") == first_course.read("models/arm.xml")
     assert b"unused" not in second_course.read("models/arm.xml")
-    assert "changed models/arm.xml: unused-site" in second.out
+    assert "changed models/arm.xml: unused-material" in second.out
 
     arguments = ("stability", "projectile", "--format", "json")
     first, second = (
