@@ -271,14 +271,18 @@ def without_seconds(text: str) -> str:
 
 
 WAIT_FOR_GO = """import pathlib, posix, time
-while True:
+def is_there(name):
     try:
-        posix.stat("go")
-        break
+        return bool(posix.stat(name))
     except OSError:
-        time.sleep(0.01)
+        return False
+while is_there("content") and not is_there("go"):
+    time.sleep(0.01)
 """
-"""The beginning of a script that goes on when there is a file `go`, which the tool does not see."""
+"""The beginning of a script that goes on when there is a file `go`, which the tool does not see.
+
+Away from its course, as readers run it, it waits for nothing.
+"""
 FIRST = "## One\n\n" + block("one.py", "print(1)", "1")
 SECOND = "## Two\n\n" + block("two.py", "print(2)", "2")
 DRIFTED_LESSON = "## One\n\n" + block("one.py", "print('value', 1.25)", "value 1.35", "digits")
