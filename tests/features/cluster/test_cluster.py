@@ -217,7 +217,9 @@ def test_measurements_are_the_same_as_on_one_machine(
     )
     reports = [json.loads(result.out) for result in (first, second)]
     for report in reports:
-        assert [case.pop("costs") != [] for case in report] == [True]
+        assert [case["costs"] != [] for case in report] == [True]
+        for name in ("costs", "charts", "reached"):  # what holds times
+            report[0].pop(name)
     assert reports[1] == reports[0]
     assert "measured here" not in second.err
 
