@@ -116,7 +116,7 @@ def test_outputs_are_those_of_their_parts_and_everything_else_has_the_whole_file
     assert ["checked True" in text for text in bare] == [False, False, False, False, True]
     assert ["<details" in figure for figure in figures] == [False, True, False, False, False]
     assert ["download>" in figure for figure in figures] == [True, False, False, False, False]
-    assert ["python examples/heat.py" in text for text in bare] == [True] + [False] * 4
+    assert ["python heat.py" in text for text in bare] == [True] + [False] * 4
     assert f'<div hidden="until-found">{figures[3]}' in page and page.count("until-found") == 1
     assert all(page.count(f'id="heat.L{line}"') == 1 for line in (1, 5, 7, 9, 12, 14, 16))
     assert folder.main("export", "epub").status == 0
@@ -125,7 +125,8 @@ def test_outputs_are_those_of_their_parts_and_everything_else_has_the_whole_file
     assert "hidden" not in text and all(f'id="heat.L{line}"' in text for line in (1, 9, 16))
     archive = zipfile.ZipFile(io.BytesIO(folder.read("public/lessons/1.1-one.zip")))
     (name,) = [name for name in archive.namelist() if name.endswith("heat.py")]
-    assert archive.read(name) == folder.read("public/examples/heat.py") == FILE.encode()
+    assert archive.read(name) == FILE.encode()
+    assert folder.text("public/examples/heat.py").endswith(f"dependencies = []\n# ///\n{FILE}")
     cells = json.loads(folder.read("public/lessons/1.1-one.ipynb"))["cells"]
     scripts = ["".join(c["source"]) for c in cells if c["id"].startswith("code-")]
     assert scripts == [f"%%example examples/heat.py\n{FILE.rstrip()}"]

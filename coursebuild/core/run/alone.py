@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import secrets
 import sys
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -56,6 +57,8 @@ class AloneRun(Struct, frozen=True):
     failure: str
     """Why it failed, in words; empty where it did not."""
     stdout: str
+    kept_back: str = ""
+    """The end of it, which the C library held until then."""
 
 
 class Runner(Struct, frozen=True):
@@ -93,6 +96,7 @@ class Runner(Struct, frozen=True):
         return fingerprint((program, run_conditions, job, self.sandbox is not None))
 
     def _run(self, job: AloneJob) -> AloneRun:
+        mark = secrets.token_hex()
         request = {
             "files": {path: base64.b64encode(data).decode() for path, data in job.files},
             "path": job.path,
@@ -100,6 +104,7 @@ class Runner(Struct, frozen=True):
             "figures": job.figures,
             "modules": job.modules,
             "memory": job.memory,
+            "mark": mark,
         }
         environment = {**clean_environment(os.environ), **dict(job.environment)}
         enclose: gate.Enclose | None = None
@@ -119,11 +124,15 @@ class Runner(Struct, frozen=True):
             )
         except TimeoutError as error:
             return AloneRun(str(error), "")
-        stdout = completed.output.decode("utf-8", "backslashreplace").replace("\r\n", "\n")
+        output = completed.output.decode("utf-8", "backslashreplace").replace("\r\n", "\n")
+        printed, *rest = output.split(
+            mark
+        )  # each copy of the process that comes to its end has one
+        kept_back = "".join(rest)
         failure = ""
         if completed.status:
             last = completed.last_line() or f"it ends with status {completed.status}"
             failure = last[-_KEPT_ERRORS:]
-        result = AloneRun(failure, stdout)
+        result = AloneRun(failure, printed + kept_back, kept_back)
         self.store.put_value("alone", self._key(job), result)
         return result

@@ -1,8 +1,9 @@
 """The program that runs what readers are handed over as it would run for one of them.
 
 It reads a JSON object from its input: files by path in Base64, the path of the one to run, its
-arguments, the figures that it draws, the top-level modules of other packages that it declares, and
-how many MiB it may take. The files are put into a new folder, which holds nothing else.
+arguments, the figures that it draws, the top-level modules of other packages that it declares, how
+many MiB it may take, and a mark to print before what the C library has kept back until the end. The
+files are put into a new folder, which holds nothing else.
 
 There is no network. The files may import what they declare, each other and what Python brings; what
 a package imports for itself is its own matter.
@@ -60,7 +61,11 @@ def _run(job: Any) -> None:
     sys.path.insert(0, os.path.dirname(path))  # noqa: PTH120
     script = sys.modules["__main__"] = ModuleType("__main__")
     script.__file__ = path
+    output = os.dup(1)
     exec(compile(Path(path).read_bytes(), path, "exec", dont_inherit=True), script.__dict__)
+    with contextlib.suppress(AttributeError, OSError, ValueError):  # a script's own, or closed
+        sys.stdout.flush()
+    os.write(output, job["mark"].encode())
     undrawn = [name for name in job["figures"] if not Path(folder, name).is_file()]
     if undrawn:
         sys.exit(f"it has not drawn {', '.join(undrawn)}")
