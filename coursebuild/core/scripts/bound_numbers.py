@@ -20,7 +20,6 @@ from coursebuild.core.text.numbers import (
     write_comma,
 )
 from coursebuild.core.text.quantities import (
-    NO_UNIT,
     UnitText,
     are_different,
     is_same_unit,
@@ -95,7 +94,7 @@ class BoundText(Struct, frozen=True):
         places = self.shown_places(outputs)
         if self.stray:
             places = list(filter(self.has_context, places))
-        unit = NO_UNIT if self.after else unit_behind(following)
+        unit = unit_behind(self.after or following)
 
         def has_unit(place: PrintedPlace) -> bool:
             return bool(unit) and is_same_unit(unit, place.units[-1])
@@ -161,8 +160,11 @@ class BoundText(Struct, frozen=True):
     def _context_tests(self) -> Iterator[Callable[[PrintedPlace], bool]]:
         """Tests of whether printed numbers have the same text after, and before, them."""
         if self.after:
-            after = re.compile(_whole_words(self.after))
-            yield lambda place: after.match(place.after) is not None
+            after, unit = re.compile(_whole_words(self.after)), unit_behind(self.after)
+            if unit.text == self.after.strip():  # it need not be printed, nor be spelt so
+                yield lambda place: not place.units[-1] or is_same_unit(unit, place.units[-1])
+            else:
+                yield lambda place: after.match(place.after) is not None
         if self.before:
             before = re.compile(_whole_words(self.before) + r"\Z")
             reach = 4 * len(self.before) + 200

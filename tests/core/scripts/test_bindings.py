@@ -143,6 +143,14 @@ def test_text_next_to_the_number_narrows_the_choice() -> None:
     assert find_mistake("`E 6.1`{out}", wide_columns) is None
 
 
+def test_a_unit_that_is_not_printed_holds_beside_numbers_with_units() -> None:
+    printed = "start 20.00 °C\nend 70.19\nforce 5.20 N m\npower 8.00 W\n"
+    for binding in ("70.19 °C", "5.20 N·m", "20.00 °C", "70.2 kg"):
+        assert find_mistake(f"`{binding}`{{out}}", printed) is None, binding
+    for binding in ("8.00 N", "70.18 °C", "20.00 K"):
+        assert find_mistake(f"`{binding}`{{out}}", printed) is not None, binding
+
+
 def test_a_decimal_comma_is_named() -> None:
     mistake = find_mistake("`6,64`{out}")
     assert mistake is not None
