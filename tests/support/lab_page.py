@@ -153,7 +153,8 @@ def wait_until_still(page: Page, view: Locator) -> bytes:
 
 
 def time_of(lab: Locator) -> float:
-    return float(lab.locator(".lab-time").inner_text().removesuffix("s").strip())
+    text = lab.locator(".lab-time").inner_text().removesuffix("s").strip()
+    return float(text or "nan")  # a lab whose engine is not loaded yet shows none
 
 
 def state_of(page: Page, lab: Locator) -> dict[str, object]:
