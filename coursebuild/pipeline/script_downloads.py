@@ -98,14 +98,18 @@ class _Course:
         rows = re.findall(r"^[ \t]*([\w.]+)[ \t]*:[ \t]*((?:\"[^\"\n]*\"|[^#\n])*)", text, re.M)
         return {name: value.strip() for name, value in rows}
 
-    def packages(self, modules: Iterable[str]) -> tuple[str, ...]:
-        """What brings these modules, for installers; with versions, where they are installed."""
+    def packages(self, modules: Iterable[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """What brings these modules, for installers, and those that nothing installed here brings.
+
+        A package need not be called as its module is, so that of these it is not known.
+        """
         interpreter = self.options.interpreter
         folders = None if interpreter is None else interpreter.packages
         names = sorted(set(modules))
         rows = distributions(self.options.store, names, folders)
         lines = {module: f"{name}=={version}" for module, name, version in rows}
-        return tuple(sorted({lines.get(name, name) for name in names}, key=str.lower))
+        packages = tuple(sorted(set(lines.values()), key=str.lower))
+        return packages, tuple(name for name in names if name not in lines)
 
 
 def find_downloads(
@@ -146,17 +150,19 @@ def _make_download(
             pass
         else:
             modules = foreign_modules(text)
-            packages = course_files.packages(modules)
-            text = _metadata(packages, course_files.options) + _rename(text, path, name)
-            return ScriptDownload(path, ((name, text.encode()),), name, packages, modules)
+            packages, unknown = course_files.packages(modules)
+            text = _metadata(packages, unknown, course_files.options) + _rename(text, path, name)
+            files_of_one = ((name, text.encode()),)
+            return ScriptDownload(path, files_of_one, name, packages, modules, unknown)
     members, modules = _members(course_files, extraction, find_module)
-    packages = course_files.packages(modules)
+    packages, unknown = course_files.packages(modules)
     members |= files
     if "matplotlib" in modules and course_files.style:
         members[_STYLE] = course_files.read(_STYLE)
-    members["requirements.txt"] = "".join(f"{line}\n" for line in packages).encode()
+    lines = (*packages, *map(_unknown_package, unknown))
+    members["requirements.txt"] = "".join(f"{line}\n" for line in lines).encode()
     return ScriptDownload(
-        path, tuple(sorted(members.items())), path, packages, modules, archive=True
+        path, tuple(sorted(members.items())), path, packages, modules, unknown, archive=True
     )
 
 
@@ -207,12 +213,17 @@ def _rename(text: str, path: str, name: str) -> str:
     return "\n".join([*(line.replace(path, name) for line in lines[:end]), *lines[end:]])
 
 
-def _metadata(packages: Iterable[str], options: Options) -> str:
+def _unknown_package(module: str) -> str:
+    return f"# the package of the module {module} was not known"
+
+
+def _metadata(packages: Iterable[str], unknown_modules: Iterable[str], options: Options) -> str:
     """The block by which installers know what a script needs (PEP 723)."""
     interpreter = options.interpreter
     version = platform.python_version() if interpreter is None else interpreter.version
     oldest = ".".join(version.split(".")[:2])
     rows = "".join(f'#     "{package}",\n' for package in packages)
+    rows += "".join(f"#     {_unknown_package(module)}\n" for module in unknown_modules)
     dependencies = f"# dependencies = [\n{rows}# ]\n" if rows else "# dependencies = []\n"
     return f'# /// script\n# requires-python = ">={oldest}"\n{dependencies}# ///\n'
 

@@ -51,6 +51,11 @@ def test_what_a_page_hands_over_runs_alone_or_has_no_button(make: Make, tmp_path
     buttons = [f'href="../examples/{name}" download' in page for name in addresses]
     assert buttons == [True, True, True, False, True, True]
 
+    absent = page.partition('data-script="examples/absent.py"')[2].partition("</figure>")[0]
+    assert "<code>python absent.py</code>" in absent and "needs torch" in absent
+    assert "pip install" not in absent and "uv run" not in absent, "the package is not known"
+    assert "package of the module torch was not known" in folder.text("public/examples/absent.py")
+
     (tmp_path / "helped.py").write_bytes(folder.read("public/examples/helped.py"))
     assert run(tmp_path, "helped.py") == "a ball 7 1,2\n"
     text = (tmp_path / "helped.py").read_text()

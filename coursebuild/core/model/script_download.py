@@ -21,7 +21,9 @@ class ScriptDownload(Struct, frozen=True):
     packages: tuple[str, ...]
     """What it needs, as installers take it: `mujoco==3.14.0`."""
     modules: tuple[str, ...]
-    """The top-level modules that these bring."""
+    """The top-level modules that it imports of others."""
+    unknown_modules: tuple[str, ...] = ()
+    """Those of them whose package is not known here."""
     archive: bool = False
     state: DownloadState = "unrun"
     """Whether it was run in an empty folder, and how that ended."""

@@ -55,6 +55,8 @@ class ShownDownload(Struct, frozen=True):
     """The file to run; in an archive, its path there."""
     packages: tuple[str, ...]
     """As installers take them."""
+    unknown_modules: tuple[str, ...]
+    """What it imports besides, of packages that are not known here."""
     was_run: bool
     """Whether it was run in an empty folder."""
 

@@ -81,6 +81,7 @@ def document_inputs(
                 download.path.rpartition("/")[2],
                 download.entry,
                 download.packages,
+                download.unknown_modules,
                 download.state == "ran",
             )
             for path, download in downloads.items()

@@ -268,19 +268,23 @@ def _not_run(words: Strings, run: ShownRun | None) -> Receipt:
     return Receipt("unverified", words("receipt.unchecked"))
 
 
-def run_commands(download: ShownDownload | None, args: Sequence[str]) -> tuple[str, ...]:
-    """How a reader runs what is handed over: with uv, or, with nothing but Python, in steps."""
+def run_commands(
+    download: ShownDownload | None, args: Sequence[str]
+) -> tuple[tuple[str, ...], ...]:
+    """The ways to run what is handed over, each in steps: with uv, or with nothing but Python."""
     if download is None:
         return ()
     run = shlex.join((download.entry, *args))
     if not download.packages:
-        return f"uv run {run}", f"python {run}"
+        uv_steps = () if download.unknown_modules else ((f"uv run {run}",),)
+        return *uv_steps, (f"python {run}",)
     if download.is_archive:
         packages = "-r requirements.txt"
         uv = f"uv run --with-requirements requirements.txt {run}"
     else:
         packages, uv = shlex.join(download.packages), f"uv run {run}"
-    return uv, f"pip install {packages}", f"python {run}"
+    steps = (f"pip install {packages}", f"python {run}")
+    return (steps,) if download.unknown_modules else ((uv,), steps)
 
 
 def numbered_lines(lines: Iterable[Markup], path: str, first: int = 1) -> Markup:

@@ -316,10 +316,14 @@ class DocumentWriter:
             return "\n\n".join(parts)
         download = self.page.inputs.downloads.get(block.path)
         if begins and not self.notebook and download is not None:
-            uv, *commands = map(marks.code_span, run_commands(download, script.args))
             unpack = self.words("code.unpack", file=download.file) if download.is_archive else ""
-            steps = f", {self.words('code.then')} ".join(commands)
-            run = f"{self.words('code.run')}: {unpack} {uv}, {self.words('code.or')} {steps}"
+            then, otherwise = (f", {self.words(name)} " for name in ("code.then", "code.or"))
+            ways = run_commands(download, script.args)
+            commands = otherwise.join(then.join(map(marks.code_span, steps)) for steps in ways)
+            run = f"{self.words('code.run')}: {unpack} {commands}"
+            if download.unknown_modules:
+                modules = self.page.words.join(download.unknown_modules)
+                run += f" ({self.words('code.requires', modules=modules)})"
             run += "" if download.was_run else f" ({self.words('code.unrun')})"
             parts.insert(0, " ".join(run.split()))
         if script.parts:
