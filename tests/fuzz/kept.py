@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from coursebuild.core.engine.manifest import KIND, MARKER
 from coursebuild.core.engine.publish import publish
-from coursebuild.core.engine.store import Store
+from coursebuild.core.engine.store import Store, value_reader
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.trust import FOLDER, seal, store_key
 from coursebuild.core.files.write import journal_path, undo_changes
@@ -47,11 +47,19 @@ class _Kind(NamedTuple):
 
 _SOURCE = Source(PATH, "## One\n\nWords `1`{out}.\n")
 _ENTRIES = (
-    _Kind(lambda data: decode(msgspec.msgpack.encode(json.loads(data)), Parsed, _SOURCE), encode),
+    _Kind(lambda data: decode(_repacked(data), Parsed, _SOURCE), encode),
     _Kind(from_bytes, msgspec.json.encode),
-    _Kind(lambda data: msgspec.json.decode(data, type=CompileResult), msgspec.json.encode),
-    _Kind(lambda data: msgspec.json.decode(data, type=LabExport), msgspec.json.encode),
+    _Kind(lambda data: value_reader(CompileResult)(_repacked(data)), msgspec.msgpack.encode),
+    _Kind(lambda data: value_reader(LabExport)(_repacked(data)), msgspec.msgpack.encode),
 )
+
+
+def _repacked(data: bytes) -> bytes:
+    """JSON, whose bytes are easier to vary, as the MessagePack that is kept; all else unchanged."""
+    try:
+        return msgspec.msgpack.encode(json.loads(data))
+    except (*DAMAGE, OverflowError):
+        return data
 
 
 def entry(data: bytes) -> None:
@@ -198,10 +206,11 @@ def manifest(data: bytes) -> None:
         publish(root, out, _site("one"))
         folder = Store(root).folder / KIND
         (file,) = folder.iterdir()
-        ((_, entry_parts), *_) = msgspec.json.decode(file.read_bytes()[32:]).items()
+        ((_, entry_parts), *_) = msgspec.msgpack.decode(file.read_bytes()[32:]).items()
         words = zip((b"DIGEST", b"SIZE", b"TIME", b"INODE"), entry_parts[1:], strict=True)
         for word, value in words:
             payload = payload.replace(word, str(value).encode())
+        payload = payload if form == _MARKER else _repacked(payload)
         if form == _MARKER:
             (out / MARKER).write_bytes(payload)
         elif form == WHOLE:
