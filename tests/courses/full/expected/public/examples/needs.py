@@ -1,7 +1,7 @@
 # /// script
 # requires-python = ">=3.11"
 # dependencies = [
-#     "no_such_module_here",
+#     # the package of the module no_such_module_here was not known
 # ]
 # ///
 import no_such_module_here
