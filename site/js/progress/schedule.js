@@ -3,7 +3,7 @@
  *
  * S. Leitner's boxes (So lernt man lernen, 1972): a missed question lies in the first box; each time that it is answered right when it
  * is due it moves on by one, and from the last box it leaves; missed again, it starts from the first. The boxes wait 1, 3, 7, 16 and
- * 35 days, each about twice as long as the one before: growing gaps lead to better memory for the same work (N. Cepeda and others,
+ * 35 days, each two to three times as long as the one before: growing gaps lead to better memory for the same work (N. Cepeda and others,
  * “Spacing effects in learning”, Psychological Science 19, 2008). An answer given before its day shows that it was just read, not
  * that it is known, and changes nothing; misses within an hour count as one.
  *
