@@ -149,8 +149,9 @@ def test_the_tool_imports_no_mujoco_and_has_no_course_on_its_path(
 
 
 def test_traps_work(traps: TrapFolder) -> None:
-    """Whoever starts Python in the folder, as the tool must not, runs one."""
+    """Python that is started in the folder, as the tool must not do it, runs one."""
     command = [sys.executable, "-c", "import colorsys"]
     subprocess.run(command, cwd=traps.folder.root, check=False, capture_output=True)
-    assert "module colorsys" in traps.marks()
+    # Python 3.13 imports modules of its own for `-c`, and meets a trap there.
+    assert any(mark.startswith("module ") for mark in traps.marks())
     assert processes(traps.folder) == []

@@ -188,8 +188,10 @@ def package_version(name: str, folders: Iterable[str] | None = None) -> str:
     path = list(sys.path if folders is None else folders)
     for distribution in installed_distributions(path, name):
         # What an interrupted installation left may say no version, or have no metadata.
-        with contextlib.suppress(FileNotFoundError, KeyError):
-            return distribution.version or "none"
+        with contextlib.suppress(FileNotFoundError):
+            metadata = distribution.metadata
+            if "Version" in metadata:
+                return metadata["Version"] or "none"
     return "none"
 
 
