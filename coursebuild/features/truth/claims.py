@@ -15,7 +15,8 @@ neither a script, a formula nor a source gives.
 5. A source that is a part of the course must have the number: in the unit of the text or in base
    units, perhaps with more digits. A model may have half of it, since MJCF writes radii and
    half-lengths. Any other source is for readers to judge.
-6. What the lesson's own scripts, models and labs hold is an input, not a result.
+6. What the map says of a lesson has claims too, unless the same number is bound in the map.
+7. What the lesson's own scripts, models and labs hold is an input, not a result.
 """
 
 from __future__ import annotations
@@ -177,11 +178,22 @@ def check_sources(
 def unbound_results(course: model.Course) -> Iterator[tuple[model.Owner, tuple[StatedNumber, ...]]]:
     """Yield the results that each lesson and page of the menu states, and nothing gives."""
     parts = _Parts(course)
+    bound = {part.text for number in course.bound_numbers for part in scan_prose(number.text)}
     for owner, document in course.owned_documents:
         if isinstance(owner, model.Lesson) or owner.menu:
             claims = document_claims(read_again(course, owner, document))
-            inputs = parts.inputs(document).union(claims.inputs) if claims.open else ()
-            yield owner, tuple(claim for claim in claims.open if not claim.is_in(inputs))
+            of_map = _map_claims(owner, document.comma)
+            stated = [*claims.open, *(claim for claim in of_map if claim.text not in bound)]
+            inputs = parts.inputs(document).union(claims.inputs) if stated else ()
+            yield owner, tuple(claim for claim in stated if not claim.is_in(inputs))
+
+
+def _map_claims(owner: model.Owner, comma: bool) -> Iterator[StatedNumber]:
+    """Yield the numbers in what the map says about a lesson, which may be bound there."""
+    if isinstance(owner, model.Lesson):
+        for text in (owner.title, owner.summary, *owner.objectives):
+            numbers = find_numbers(text, comma)
+            yield from (_claim(n, owner.span, _unit_of(n, text)) for n in numbers)
 
 
 # --- found in a document

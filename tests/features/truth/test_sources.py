@@ -45,6 +45,36 @@ def test_what_a_lab_or_its_model_holds_is_no_result(tmp_path: Path) -> None:
     assert results == ["17.3"]
 
 
+MAP = """\
+=== content/course.toml
+[course]
+title = "A course"
+
+[[level]]
+id = "1"
+title = "Level"
+
+[[level.lesson]]
+id = "1.1"
+slug = "first"
+title = "Falls in 2.5 s"
+summary = "From `17.3 m`{out=examples/fall.py} to 4.34 cm, in 3 steps."
+status = "complete"
+=== content/lessons/1.1-first.md
+```python file=examples/fall.py
+print("height 17.3 m")
+```
+
+It falls for 2.5 s. {given="a book"}
+"""
+
+
+def test_what_the_map_states_of_a_lesson_is_bound_or_listed(tmp_path: Path) -> None:
+    Layout.of(MAP).write(tmp_path)
+    results = [c.text for _, claims in unbound_results(load_course(tmp_path)) for c in claims]
+    assert results == ["4.34"]
+
+
 UNITS = """\
 === content/lessons/1.1-first.md
 A ball rolls for 2.5 s at 0.5 m/s, for 35 days, by 0.3 in `steps` or 0.4 in $x$.
