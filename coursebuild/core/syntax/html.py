@@ -117,7 +117,8 @@ class Balance:
     def add(self, tag: Tag, html: Excerpt) -> None:
         """Record a tag of a piece of HTML, and report its mistakes."""
         name, span, text = tag.name, html.span(tag.start, tag.end), html.text
-        if name == "img" and not any(name == "alt" for name, *_ in _attributes(text, tag)):
+        is_picture = name == "img" and not tag.is_end_tag
+        if is_picture and not any(name == "alt" for name, *_ in _attributes(text, tag)):
             message, help = "the image has no alternative text", 'write what it shows: `alt="…"`'
             self._report(diagnose("image-alt", span, message, help=help))
         for attribute, start, end in _attributes(text, tag):

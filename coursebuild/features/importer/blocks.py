@@ -18,7 +18,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.pages.marks import block_quote, fence
-from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
+from coursebuild.core.registry import fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.importer.jsx import without_jsx
 from coursebuild.features.importer.prose import (
@@ -136,7 +136,7 @@ _MAX_DEPTH = 20
 _TITLED_DIRECTIVES = ("admonition", "dropdown", "sidebar", "topic", "exercise", "example", "margin")
 """Directives whose argument is a title; that of others is their first line."""
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
-_TITLE = re.compile(r"title=(?:\"([^\"]*)\"|'([^']*)')")
+_TITLE = re.compile(r"\b(?:title|tab|filename)=(?:\"([^\"]*)\"|'([^']*)')")
 _MYST_OPTION = re.compile(r":([\w-]+):[ \t]*(.*)")
 _CAMERA = re.compile(r'"camera"\s*:\s*\{(?:[^{}])*\}')
 _ANGLE = re.compile(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
@@ -172,6 +172,9 @@ def _convert(segment: Segment, context: LessonContext) -> str:
                 title, text = heading[1].strip(), text[heading.end() :]
             fold_mark = "-" if re.search(r"collapse=\"?true", segment.head) else ""
             return _write_callout(callout[1], title, text, context, fold_mark=fold_mark)
+        case ">":
+            quotation = block_quote(_convert_nested(text, context))
+            return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], quotation)
         case "=":
             return f"**{rewrite_prose(head, context)}**\n\n{_convert_nested(text, context)}"
         case "!" | "?":
@@ -179,8 +182,10 @@ def _convert(segment: Segment, context: LessonContext) -> str:
             return _write_callout(name, title.strip().strip('"'), segment.text, context)
         case _:
             kind = head.partition(" ")[0]
-            if head in ("{=html}", "{=markdown}"):
-                return _convert_nested(text, context) if head == "{=markdown}" else text
+            if raw := re.fullmatch(r"\{?=(\w+)\}?", head):
+                if raw[1] == "markdown":
+                    return _convert_nested(text, context)
+                return text if raw[1] == "html" else fence("text", text)
             if kind == "lab" and context.camera_is_position:
                 text = _CAMERA.sub(_reverse_camera, text)
             if package := missing_package(kind):
@@ -188,13 +193,17 @@ def _convert(segment: Segment, context: LessonContext) -> str:
                 context.add_leftover(message)
             if kind in ("output", "text") or package:  # of a block that is not run here
                 head = "text illustration" if "illustration" in head else "text"
-            elif kind not in (*CORE_FENCES, *fence_names()):
+            elif kind in ("mjcf", *fence_names()) or (kind == "python" and "file=" in head):
+                return fence(head, text)
+            else:
                 head = head.strip("{}. ").partition(" ")[0].rstrip(",}")
                 with contextlib.suppress(ValueError, RecursionError):
                     if head != "json" and isinstance(json.loads(text), dict):
                         context.add_leftover(f"a block `{head}`, which is shown as JSON")
                         head = "json"
-            return fence(head, text)
+            title = _TITLE.search(segment.head)
+            words = re.sub(r"(?<!\\)[_*`]", r"\\\g<0>", title[1] or title[2] or "") if title else ""
+            return (f"**{words}**\n\n" if words else "") + fence(head, text)
 
 
 def _convert_nested(text: str, context: LessonContext) -> str:
@@ -206,7 +215,8 @@ def _convert_nested(text: str, context: LessonContext) -> str:
         replace(part, text=lower_titles(part.text)) if part.kind == "prose" else part
         for part in read_markdown(text, place=context.place)
     )
-    return "\n\n".join(convert_segment(part, context).strip("\n") for part in parts)
+    texts = (convert_segment(part, context).strip("\n") for part in parts)
+    return "\n\n".join(text for text in texts if text.strip())
 
 
 def _callout_kind(kind: str, context: LessonContext) -> str:

@@ -199,7 +199,7 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
     folder = posixpath.dirname(text.path)
     context = replace(course_context, path=text.file, folder=folder, pictures=text.pictures)
     prose = (segment.text for segment in text.segments if segment.kind == "prose")
-    context = replace(context, is_mdx=any(map(is_mdx, prose)))
+    context = replace(context, is_mdx=text.file.endswith(".mdx") or any(map(is_mdx, prose)))
     words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
     script_path = f"examples/{'' if words and words[0].isalpha() else 'l'}{'_'.join(words)}.py"
     head = f"python file={script_path}"
@@ -233,7 +233,7 @@ def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator
                     yield f"src/{name}/{path.removeprefix(f'{root}/')}", files.read(path)
 
 
-_OTHER_TEXTS = tuple(".adoc .docx .htm .html .markdown .mdx .org .pdf .rmd .rst .tex .txt".split())
+_OTHER_TEXTS = tuple(".adoc .docx .htm .html .markdown .org .pdf .rmd .rst .tex .txt".split())
 _MOST_NAMES = 20
 
 

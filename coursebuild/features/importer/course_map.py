@@ -22,6 +22,7 @@ from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
 from coursebuild.features.importer.segments import read_segments
 from coursebuild.features.importer.source_files import (
+    TEXTS,
     ImportedCourse,
     ImportedLevel,
     ImportedText,
@@ -128,7 +129,7 @@ class _Reader:
     def find_file(self, lesson: dict[str, Any]) -> str:
         """Return the file of a lesson: the one it names, or one whose name begins with its id."""
         file, id, slug = (_read_text(lesson, key) for key in ("file", "id", "slug"))
-        paths = [path for path in self.files if path.endswith((".md", ".qmd", ".ipynb"))]
+        paths = [path for path in self.files if path.endswith(TEXTS)]
         suffix = "/" + file.lstrip("./")
         exact = self.files.find(posixpath.normpath(file))
         matches = [

@@ -135,6 +135,12 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         return posixpath.relpath(path, self.folder).replace(" ", "%20")
 
 
+_ATTRIBUTES = (
+    r"\{(?:[ ]*(?:[#.][\w:.-]+|[\w:-]+=(?:\"[^\"\n]*\"|'[^'\n]*'|[^\s{}\"']+)|-))+[ ]*\}"
+    r"|\{:[^{}\n]*\}"
+)
+_ATTRIBUTES = rf"(?:{_ATTRIBUTES})"
+"""Attributes of Pandoc or of Python's Markdown, which follow what they belong to."""
 # A formula holds no beginning of another: so each character is looked at a few times, not once for
 # each beginning before it.
 _LINE = re.compile(
@@ -154,16 +160,19 @@ _LINE = re.compile(
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
     r"|(?P<tail>\]\((?P<rest>[^()\s]+)(?=\)))"  # of a link whose text began a line above
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
-    r"|(?P<tag><(?:a|img|source|video)[ \t][^<>\n]*>)"
+    r"|(?P<tag><(?i:a|img|source|video)[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
+    r"|(?P<markdown>(?P<before><[a-z]\w*(?:[ ][^<>\n]*?)?)[ ]markdown(?:=[\"'\w]+)?(?=[ >]))"
+    rf"|(?P<attributes>(?:(?<=[^\s$])|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
+    rf"|(?P<span>\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
-_ATTRIBUTE = re.compile(r"(?<=[ \t])(href|src)(=[\"'])([^\"'\n]+)")
+_ATTRIBUTE = re.compile(r"(?<=[ \t])(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
 _DISPLAY = re.compile(
     r"\$\$(?P<tex>(?:[^$\\]|\\.)+?)\$\$[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\})?",
     re.DOTALL,
 )
 _ENVIRONMENT = re.compile(
     r"(?P<before>(?:\A|\n[ \t]*\n))[ \t]*"
-    r"(?P<tex>\\begin\{(?P<env>align|equation|gather|multline|alignat)(?P<star>\*?)\}"
+    r"(?P<tex>\\begin\{(?P<env>align|aligned|alignat|eqnarray|equation|flalign|gather|multline|split)(?P<star>\*?)\}"
     r"(?>(?:(?!\\(?:begin|end)\{(?P=env)(?P=star)\}).)*)"
     r"\\end\{(?P=env)(?P=star)\})(?P<after>[ \t]*(?=\n|\Z))",
     re.DOTALL,
@@ -187,6 +196,10 @@ _FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
 """The first or last line of a block of code in a quotation or a list."""
 _COMMENT = re.compile(r"^(?:%[^\n]*|\+\+\+(?:[ \t]+[{\[][^\n]*)?[ \t]*$)\n?", re.MULTILINE)
 """A comment of MyST, or its break between two cells."""
+_ACTIVE = re.compile(
+    r"^[ ]{0,3}<(?P<name>style|script)\b.*?</(?P=name)>[ \t]*\n?", re.DOTALL | re.M | re.I
+)
+"""What changes how a page looks or what it does."""
 _CONTENTS = re.compile(r'<div class="toc">.*?</div>', re.DOTALL)
 """What an extension of Jupyter writes into the first cell; the page has its own."""
 
@@ -200,7 +213,9 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
             return f'<a id="{anchor}"></a>'
         return f"{match['heading'].rstrip()} {{#{anchor}}}"
 
-    text = normalize_formulas(_COMMENT.sub("", _CONTENTS.sub("", text)))
+    for active in _ACTIVE.finditer(text):
+        context.add_leftover(f"`<{active['name'].lower()}>`, which a page cannot have")
+    text = normalize_formulas(_COMMENT.sub("", _CONTENTS.sub("", _ACTIVE.sub("", text))))
     text = _CAPTION.sub(_move_caption, _TARGET.sub(write_target, text))
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
@@ -322,23 +337,47 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             address = match["named"]
             return whole.removesuffix(address) + (context.resolve_link(address) or GONE)
         case "tag":
-            return _convert_tag(whole, context)
+            is_in_link = match.string.rfind("<a ", 0, match.start()) > match.string.rfind(
+                "</a", 0, match.start()
+            )
+            return _convert_tag(whole, is_in_link, context)
+        case "markdown":  # a tag whose text is Markdown, as it always is here
+            return match["before"]
+        case "attributes":
+            line, before = match.string, match.string[: match.start()]
+            is_heading, is_whole = line.startswith("#"), whole == line.rstrip()
+            if not (is_heading or is_whole or before.endswith(tuple('`)]*>:"'))):
+                return whole  # an index in a formula
+            id = re.search(r"#([\w:.-]+)", whole)
+            if id is None or not (":" in id[1] or is_heading):
+                return ""
+            return whole if ":" in id[1] else f" {{#{to_anchor(id[1])}}}"
+        case "span":
+            return _rewrite_line(match["words"], context)
         case _:
             return whole
 
 
-def _convert_tag(tag: str, context: LessonContext) -> str:
+def _convert_tag(tag: str, is_in_link: bool, context: LessonContext) -> str:
     """Return a tag of HTML with the new address of the file that it names."""
-    attribute = _ATTRIBUTE.search(tag)
-    if attribute is None or re.match(r"[a-z][a-z+.-]*:|//|#", attribute[3]):
+    attribute, name = _ATTRIBUTE.search(tag), tag[1:].split()[0].lower()
+    if attribute is None:
         return tag
+    address, alt = attribute[3], re.search(r"\s(?i:alt)=[\"']([^\"']*)", tag)
+    words = alt[1] if alt else ""
+    if re.match(r"[a-z][a-z+.-]*:|//|#", address):
+        if name not in ("img", "source") or not re.match("https?://|//", address):
+            return tag
+        context.add_leftover(f"a picture from another host, `{address}`; it is a link now")
+        words = words or posixpath.basename(urlsplit(address).path)
+        link = words if is_in_link else f'<a href="{address}">{words}</a>'
+        return link if name == "img" else ""
     before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
-    if address := context.resolve_file(attribute[3]):
-        return before + address + after
-    context.add_leftover(f"the file `{attribute[3]}`, which is not in the folder")
-    if tag.startswith("<img"):
-        alt = re.search(r"\salt=[\"']([^\"']*)", tag)
-        return alt[1] if alt else ""
+    if new_address := context.resolve_file(address):
+        return before + new_address + after
+    context.add_leftover(f"the file `{address}`, which is not in the folder")
+    if name == "img":
+        return words
     return tag[: attribute.start()].rstrip() + after[1:]
 
 

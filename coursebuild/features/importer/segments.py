@@ -128,7 +128,8 @@ def _read_front_matter(match: re.Match[str]) -> Any:
 def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[Segment]:
     """Yield the segments of a text; `place` replaces their lines, in a cell or a nested block.
 
-    Blocks in quotations, and plain ones in lists, remain part of the prose.
+    Plain blocks in quotations and lists remain part of the prose. Around others, a quotation is a
+    block.
     """
     lines = text.split("\n")
     at = 0
@@ -155,15 +156,24 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
 
 
 def _find_blocks(text: str) -> Iterator[tuple[list[int], str, str, str]]:
-    """Yield lines, mark, head and content of blocks; in lists, of those that are not plain code."""
-    lines, quotes = text.split("\n"), 0
+    """Yield lines, mark, head and content of blocks; inside others, if they are not plain code."""
+    lines, quotation = text.split("\n"), None
     for token in _PARSER.parse(text):
-        quotes += token.nesting if token.type.startswith("blockquote") else 0
-        if quotes or token.map is None or token.type not in _BLOCKS:
+        if token.type == "blockquote_open" and token.level == 0:
+            quotation = token.map
+        elif token.type == "blockquote_close" and token.level == 0:
+            quotation = None
+        if token.map is None or token.type not in _BLOCKS:
             continue
         head = token.info.strip()
-        is_own_line = lines[token.map[0]].lstrip().startswith(token.markup)
-        if token.level == 0 or (is_own_line and (token.type != "fence" or head[:1] == "{")):
+        is_plain = token.type == "fence" and head[:1] != "{" and " " not in head
+        if quotation is not None:
+            if not is_plain:
+                quoted = (_QUOTE.sub("", line) for line in lines[slice(*quotation)])
+                yield quotation, ">", "", "\n".join(quoted)
+        elif token.level == 0 or (
+            not is_plain and lines[token.map[0]].lstrip().startswith(token.markup)
+        ):
             yield token.map, token.markup, head, token.content
 
 
@@ -210,6 +220,7 @@ def _parse_tab(state: StateBlock, start: int, end: int, silent: bool) -> bool:
     return True
 
 
+_QUOTE = re.compile(r"^ {0,3}> ?")
 _BLOCKS = ("fence", "div", "tab", "admonition_open")
 _PARSER = MarkdownIt("commonmark").use(admon_plugin)
 for _name, _parse in (("div", _parse_div), ("tab", _parse_tab)):

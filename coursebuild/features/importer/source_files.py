@@ -44,7 +44,7 @@ class Segment(Struct, frozen=True, kw_only=True):
     head: str = ""
     """The rest of the line after the opening mark; of a notebook's cell, its tags."""
     mark: str = "```"
-    """The opening mark: backticks, tildes, colons, `!!!` or `===`."""
+    """The opening mark: backticks, tildes, colons, `!!!`, `===` or `>`."""
     indent: str = ""
     """What stands before each line of a block in a list."""
     shows_value: bool | None = None
@@ -154,7 +154,7 @@ def title_of_file(path: str) -> str:
     return title[:1].upper() + title[1:]
 
 
-TEXTS = (".md", ".qmd", ".ipynb", ".myst")
+TEXTS = (".md", ".qmd", ".ipynb", ".mdx", ".myst")
 """Extensions of the files that can be lessons."""
 _SKIPPED = (
     "_build",
