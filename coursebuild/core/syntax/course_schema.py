@@ -21,7 +21,7 @@ from coursebuild.core.drawing.contrast import (
     contrast,
     legible,
 )
-from coursebuild.core.model import Filter, LessonTable, Limits, Silence
+from coursebuild.core.model import CoursePath, Filter, LessonTable, Limits, Silence
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
 from coursebuild.core.model.fields import (
     Author,
@@ -350,6 +350,7 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
     ] = {}
     silence: tuple[Silence, ...] = ()
     level: tuple[LevelTable, ...] = ()
+    path: tuple[CoursePath, ...] = ()
     page: tuple[PageTable, ...] = ()
 
 

@@ -51,6 +51,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "lesson-empty": "A complete lesson has no text, or only headings.",
         "draft-empty": "The file of a draft is empty.",
         "prerequisite-unknown": "A prerequisite is not a lesson of the map.",
+        "path-unknown": "A path leads to what is no lesson of the map.",
         "prerequisite-cycle": "Lessons require each other in a circle.",
         "page-missing": "A page of the map has no file.",
         "engine-version": "The installed MuJoCo is not the version that the course needs.",
