@@ -184,8 +184,8 @@ class _Updater:
         doubtful = ("file-encoding", "merge-conflict")
         doubtful_paths = {d.span.path for d in self.diagnostics if d.rule in doubtful}
         parts = [d for d in self.diagnostics if d.rule == "source-part"]
-        chosen = [d for d in parts if self.documents is None or d.span.path in self.documents]
-        all_edits = [*edits, *(edit for d in chosen for edit in d.edits)]
+        stale = [d for d in parts if self.documents is None or d.span.path in self.documents]
+        all_edits = [*edits, *(edit for d in stale for edit in d.edits)]
         all_edits = [edit for edit in all_edits if edit.span.path not in doubtful_paths]
         for source, new in edited_texts(all_edits).items():
             try:

@@ -77,8 +77,8 @@ class _Course:
 
     def imports(self, extraction: Extraction) -> frozenset[str]:
         """The top-level modules that a script imports."""
-        known = self._imports.get(extraction.path)
-        return find_imports(extraction.text) if known is None else known
+        modules = self._imports.get(extraction.path)
+        return find_imports(extraction.text) if modules is None else modules
 
     def find_module(self, script: str, name: str) -> CourseModule | None:
         """The module that the script at a path in `examples/` gets by this name."""

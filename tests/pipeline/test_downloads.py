@@ -132,7 +132,7 @@ def test_an_archive_of_a_lesson_holds_what_its_scripts_need(make: Make, tmp_path
         unknown = archive.read("1.2-two/requirements.txt").decode()
     assert unknown == "# the package of the module torch was not known\n"
     with zipfile.ZipFile(io.BytesIO(folder.read("public/examples.zip"))) as archive:
-        everything = {path.partition("/")[2] for path in archive.namelist()}
-    assert everything >= {"examples/absent.py", "examples/helped.py", "runs/data.csv"}
+        paths = {path.partition("/")[2] for path in archive.namelist()}
+    assert paths >= {"examples/absent.py", "examples/helped.py", "runs/data.csv"}
     assert folder.main("build", "--no-cache", "--out", "again").status == 0
     assert folder.read("again/lessons/1.1-one.zip") == data
