@@ -1,6 +1,6 @@
 """Run a script with slightly moved initial states or half steps: which printed digits hold?
 
-`perturb` or `DividedSteps` changes the process of such a run. Of moved states:
+`perturb`, `DividedSteps` or `ShiftedSteps` changes the process of such a run. Of moved states:
 
 1. What the script has put into `qpos`, `qvel` and `act` since MuJoCo last computed anything from
    them is an initial state: all of it for new data and after the clock went back. Before MuJoCo
@@ -25,6 +25,7 @@ The model, the time, controls and forces stay as they are.
 from __future__ import annotations
 
 import contextlib
+import copy
 import threading
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -309,6 +310,18 @@ def _model_and_data(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple
 
 # --- shorter steps
 
+
+def change_steps(mujoco: ModuleType, numpy: ModuleType, run: int) -> None:
+    """Change the steps of this process from now on.
+
+    The run's number: −1 makes each step as two, −2 as four; −3 and −4 shift steps by thirds.
+    """
+    if run >= -2:
+        DividedSteps(mujoco, numpy, 2**-run)
+    else:
+        ShiftedSteps(mujoco, (-run - 2) / 3)
+
+
 _INTEGRATORS = ("mj_Euler", "mj_implicit", "mj_RungeKutta")
 """Integrators; a script has computed the accelerations itself before it calls one."""
 
@@ -409,3 +422,38 @@ class DividedSteps:
             mujoco_tracing.active_tracer().note("p")
 
         return rollout
+
+
+# --- other instants
+
+
+class ShiftedSteps:
+    """Lets each simulation of this process be ahead of its clock by a part of a timestep.
+
+    Before the first step of new data, or after the clock went back, a step of that part is made of
+    which the script sees nothing but the state. So the script looks at the same motion at other
+    instants, and a time that it finds by looking at every step differs by a timestep or not at all.
+    """
+
+    def __init__(self, mujoco: Any, part: float) -> None:
+        self._part = part
+        self._step = mujoco.mj_step
+        self._last_times: dict[int, tuple[Any, float]] = {}
+        mujoco_tracing.wrap_functions(mujoco, ("mj_step", "mj_step1"), self._before, self._after)
+
+    def _before(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
+        model, data = _model_and_data(args, keywords)
+        owner, last_time = self._last_times.get(id(data), (None, 0.0))
+        if owner is not None and owner() is data and data.time >= last_time:
+            return
+        timestep, time = float(model.opt.timestep), data.time
+        model = copy.copy(model)  # threads may share it
+        model.opt.timestep = self._part * timestep
+        self._step(model, data)
+        data.time = time
+        mujoco_tracing.active_tracer().note("p")
+        mujoco_tracing.active_tracer().note(f"h{timestep.hex()}")
+
+    def _after(self, args: tuple[Any, ...], keywords: Mapping[str, Any], result: Any) -> None:
+        data = _model_and_data(args, keywords)[1]
+        self._last_times[id(data)] = weakref.ref(data), data.time

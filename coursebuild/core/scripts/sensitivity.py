@@ -9,6 +9,10 @@
    timesteps give two changes, of which each says what the error of a method of first order is; the
    larger one counts. Where the second is not clearly the smaller one, the values do not tend
    anywhere yet, however near the first two happen to lie: then ten times the larger one counts.
+   A time that a script finds by looking at every step is right to a timestep only, and no shorter
+   steps within its own show that. It is told by runs that look a part of a timestep later: they
+   print it alike, or exactly a timestep more or less, where a state would change little by little
+   and a time that was chosen beforehand not at all.
 3. The final states of a pair of runs, which began in opposite directions, show how fast states
    part: relative to the largest positions and velocities since the simulation began, not to those
    that it happens to end with.
@@ -45,9 +49,9 @@ PERTURBATION = 1e-12
 RUNS = 4
 """Runs with moved states of each script: two pairs in opposite directions, the second pair half as
 far away."""
-FINER_RUNS = (-1, -2)
-"""The numbers of the runs in which each step is made as 2 and as 4: two raised to the number less
-its sign."""
+FINER_RUNS, SHIFTED_RUNS = (-1, -2), (-3, -4)
+"""The numbers of the runs in which each step is made as 2 and as 4, and of those in which a script
+sees states of a third and of two thirds of a timestep later."""
 CHAOTIC = 1e8
 """A simulation is chaotic if its states are more than this many times as far apart at the end as at
 the beginning: fewer than eight of a number's sixteen digits are left."""
@@ -85,6 +89,9 @@ class Doubt(Struct, frozen=True):
     halved: str
     """The text printed in its place with half the timestep; empty where not known."""
     quartered: str
+    sampled: str
+    """The timestep to which it is known, s, as a time that was looked for at every step; empty for
+    other numbers."""
     instead: str
     """The number with only the digits that repeat and converge; empty if none does, or a count."""
     compared: bool
@@ -139,22 +146,26 @@ def sensitivity(
     base: ScriptRun,
     moved_runs: Sequence[ScriptRun],
     finer_runs: Sequence[ScriptRun] = (),
+    shifted_runs: Sequence[ScriptRun] = (),
 ) -> Sensitivity:
     """What runs of a script with moved states, and with shorter steps, show of its output.
 
     `base` is its ordinary run; there are no `moved_runs` where they would have no point.
-    `finer_runs`: with half and with a quarter of the timestep, or none.
+    `finer_runs`: with half and with a quarter of the timestep, or none; `shifted_runs`: with states
+    of a part of a timestep later, or none.
     """
     compared = _compared_recordings(course, recordings)
     standing = _standing(compared, base, moved_runs)
     if standing is not Standing.MEASURED:
         return Sensitivity(path, owner, standing)
     reason_unhalved = _reason_unhalved(finer_runs)
-    usable_runs = () if reason_unhalved else finer_runs
+    usable_runs = _RunsByKind(moved_runs)
+    if not reason_unhalved:
+        usable_runs = _RunsByKind(moved_runs, finer_runs, _usable_shifted(shifted_runs))
     findings = [
         finding
         for recording, comparison in compared
-        for finding in _find_doubts(recording, comparison, base, moved_runs, usable_runs)
+        for finding in _find_doubts(recording, comparison, base, usable_runs)
     ]
     numbers = sum(
         len(line.numbers)
@@ -177,6 +188,24 @@ def _reason_unhalved(runs: Sequence[ScriptRun]) -> str:
         if run.trace is None or not run.trace.is_perturbed:
             return "no step of it can be halved"
     return ""
+
+
+class _RunsByKind(Struct, frozen=True):
+    """The runs of a script beside its ordinary one."""
+
+    moved: Sequence[ScriptRun]
+    finer: Sequence[ScriptRun] = ()
+    shifted: Sequence[ScriptRun] = ()
+
+    @property
+    def timesteps(self) -> set[float]:
+        """Those of the simulations that are shifted, s."""
+        return {h for run in self.shifted if run.trace is not None for h in run.trace.timesteps}
+
+
+def _usable_shifted(runs: Sequence[ScriptRun]) -> Sequence[ScriptRun]:
+    is_usable = all(run.outcome is Outcome.OK and run.trace is not None for run in runs)
+    return runs if is_usable else ()
 
 
 def is_worth_moving(course: Course, recordings: Iterable[Recording], base: ScriptRun) -> bool:
@@ -220,10 +249,9 @@ def _find_doubts(
     recording: Recording,
     comparison: Comparison,
     base: ScriptRun,
-    moved_runs: Sequence[ScriptRun],
-    finer_runs: Sequence[ScriptRun],
+    runs: _RunsByKind,
 ) -> Iterator[Doubt | Flip]:
-    """Numbers and texts of a recording that moved states or shorter steps change, in order."""
+    """Numbers and texts of a recording that other runs change, in order."""
     exact = replace(comparison, mode=Mode.EXACT)
 
     def find_changes(run: ScriptRun) -> dict[tuple[int, int], Change]:
@@ -231,7 +259,7 @@ def _find_doubts(
         return {(change.span.start, change.span.end): change for change in changes}
 
     changes_of_base = find_changes(base)
-    changes_by_run = [find_changes(run) for run in (*moved_runs, *finer_runs)]
+    changes_by_run = [find_changes(run) for run in (*runs.moved, *runs.finer, *runs.shifted)]
     first_changes = {place: c for changes in changes_by_run[::-1] for place, c in changes.items()}
     for place, first_change in sorted(first_changes.items()):
         recorded = first_change.recorded
@@ -239,11 +267,40 @@ def _find_doubts(
             changes[place].printed if place in changes else recorded
             for changes in (changes_of_base, *changes_by_run)
         )
-        if any(value != printed for value in values):
-            count = len(moved_runs)
+        finer_end = len(runs.moved) + len(runs.finer)
+        moved, finer = values[: len(runs.moved)], values[len(runs.moved) : finer_end]
+        tick = _sampling_step(printed, finer, values[finer_end:], runs.timesteps)
+        if tick or any(value != printed for value in values[:finer_end]):
             yield from _judge_number(
-                first_change.span, (recorded, printed), values[:count], values[count:], comparison
+                first_change.span, (recorded, printed), moved, finer, tick, comparison
             )
+
+
+def _sampling_step(
+    printed: str, finer: Sequence[str], shifted: Sequence[str], timesteps: Iterable[float]
+) -> Decimal | None:
+    """The timestep to which a time is known that was looked for at every step, as printed.
+
+    In s or in ms. `None` where a number is none: then runs with shorter steps, or with steps that
+    are shifted, change it by anything else than whole timesteps, or not at all.
+    """
+    number, *others = map(only_number, (printed, *finer, *shifted))
+    numbers = [n for n in others if n is not None]
+    if number is None or len(numbers) < len(others) or not shifted:
+        return None
+    if not all(n.is_finite for n in (number, *numbers)):
+        return None
+    unit_printed = unit(number.place)
+    changes = [difference(number.value, n.value) for n in numbers]
+    for tick in (Decimal(repr(h)) * scale for h in timesteps for scale in (1, 1000) if h > 0):
+        whole = [round(change / tick) for change in changes]
+        is_whole = all(
+            abs(change - count * tick) < unit_printed
+            for change, count in zip(changes, whole, strict=True)
+        )
+        if unit_printed < tick and is_whole and max(whole[len(finer) :]) == 1:
+            return tick
+    return None
 
 
 def _judge_number(
@@ -251,12 +308,13 @@ def _judge_number(
     texts: tuple[str, str],
     values: Sequence[str],
     finer: Sequence[str],
+    tick: Decimal | None,
     comparison: Comparison,
 ) -> Iterator[Doubt | Flip]:
     """What moved states and shorter steps say of a number or text.
 
     `texts` are what is recorded and what was printed; `values` were printed with moved states,
-    `finer` with half and with a quarter of the timestep.
+    `finer` with half and with a quarter of the timestep. `tick`: see `_sampling_step`.
     """
     recorded, printed = texts
     recorded_number, number = only_number(recorded), only_number(printed)
@@ -279,6 +337,8 @@ def _judge_number(
             least, most = ordered_numbers[0].text, ordered_numbers[-1].text
             repeat = _count_repeating(number, spread)
     converged = _count_converged(number, finer) if finer else None
+    if converged is not None and tick is not None:
+        converged = min(converged, _count_repeating(number, tick))
     halved, quartered = (text.strip() for text in finer or ("", ""))
     yield Doubt(
         span,
@@ -290,6 +350,7 @@ def _judge_number(
         most,
         halved,
         quartered,
+        "" if tick is None else f"{float(tick):.6g}",
         _round_to(number, repeat if converged is None else min(repeat, converged)),
         compared,
     )
