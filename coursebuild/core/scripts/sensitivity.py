@@ -16,17 +16,12 @@
 3. The final states of a pair of runs, which began in opposite directions, show how fast states
    part: relative to the largest positions and velocities since the simulation began, not to those
    that it happens to end with.
-4. A warning is given where the verification would take a difference for drift: what a tolerance or
-   `digits` allows for is no mistake. Nor is a number that moved no further than its initial states
-   did: more than about twelve of its digits cannot be judged, unless it has more than the fifteen
-   that any floating-point number holds.
 """
 
 from __future__ import annotations
 
 import enum
 import math
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 from itertools import pairwise
@@ -37,10 +32,8 @@ from msgspec.structs import replace
 from coursebuild.core.model import Comparison, Course, Mode, Recording
 from coursebuild.core.model.results import Change, Outcome, ScriptRun
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.diff import quote
 from coursebuild.core.scripts.lines import same_number
 from coursebuild.core.scripts.printed_text import PrintedText
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.numbers import Number, difference, only_number, round_like, unit
 from coursebuild.core.text.source import Span
 
@@ -128,14 +121,9 @@ class Sensitivity(Struct, frozen=True):
         return self.amplification is not None and self.amplification > CHAOTIC
 
 
-_MAX_NOTES = 20
-_AS_MOVED = 11
-"""Digits that repeat of a number that moves at most ten times as far as the initial states."""
 _SHRINKING = Decimal("0.75")
 """The part of a change that the next one may be where values tend to something: half in first
 order, and some room."""
-_EXACT_DIGITS = sys.float_info.dig
-_WIDTH = 40
 
 
 def sensitivity(
@@ -268,11 +256,11 @@ def _find_doubts(
             for changes in (changes_of_base, *changes_by_run)
         )
         finer_end = len(runs.moved) + len(runs.finer)
-        moved, finer = values[: len(runs.moved)], values[len(runs.moved) : finer_end]
+        start_values, finer = values[: len(runs.moved)], values[len(runs.moved) : finer_end]
         tick = _sampling_step(printed, finer, values[finer_end:], runs.timesteps)
         if tick or any(value != printed for value in values[:finer_end]):
             yield from _judge_number(
-                first_change.span, (recorded, printed), moved, finer, tick, comparison
+                first_change.span, (recorded, printed), start_values, finer, tick, comparison
             )
 
 
@@ -284,9 +272,9 @@ def _sampling_step(
     In s or in ms. `None` where a number is none: then runs with shorter steps, or with steps that
     are shifted, change it by anything else than whole timesteps, or not at all.
     """
-    number, *others = map(only_number, (printed, *finer, *shifted))
-    numbers = [n for n in others if n is not None]
-    if number is None or len(numbers) < len(others) or not shifted:
+    values = (*finer, *shifted)
+    number, numbers = only_number(printed), [n for v in values if (n := only_number(v)) is not None]
+    if number is None or len(numbers) < len(values) or not shifted:
         return None
     if not all(n.is_finite for n in (number, *numbers)):
         return None
@@ -351,7 +339,7 @@ def _judge_number(
         halved,
         quartered,
         "" if tick is None else f"{float(tick):.6g}",
-        _round_to(number, repeat if converged is None else min(repeat, converged)),
+        round_to(number, repeat if converged is None else min(repeat, converged)),
         compared,
     )
 
@@ -387,7 +375,7 @@ def _count_repeating(number: Number, spread: Decimal) -> int:
     return min(_digits(number), max(0, number.value.adjusted() - place + 1))
 
 
-def _round_to(number: Number, digits: int) -> str:
+def round_to(number: Number, digits: int) -> str:
     """A printed number with so many significant digits; empty for no digits, and for a count."""
     if digits < 1 or number.is_integer or not number.is_finite:
         return ""
@@ -428,58 +416,3 @@ def amplification(moved_runs: Sequence[ScriptRun]) -> float | None:
                     growth = gap / (max(size, other_size, *map(abs, mine)) or 1.0)
                     factors.append(growth / initial_gap if math.isfinite(growth) else math.inf)
     return max(factors, default=None)
-
-
-# --- warnings
-
-
-def noise_warnings(sensitivity: Sensitivity) -> Iterator[Diagnostic]:
-    """A warning where the verification compares what moved states change."""
-    warnings: list[tuple[Span, str]] = []
-    for doubt in sensitivity.doubts:
-        if not doubt.compared or (doubt.repeat >= _AS_MOVED and doubt.digits <= _EXACT_DIGITS):
-            continue
-        text = "no digit repeats"
-        if doubt.repeat:
-            text = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
-            number = only_number(doubt.printed)
-            instead = "" if number is None else _round_to(number, doubt.repeat)
-            text += f", print {instead}" if instead else ""
-        warnings.append((doubt.span, f"{text}: printed from {doubt.least} to {doubt.most}"))
-    for flip in (flip for flip in sensitivity.flips if flip.compared):
-        text = f"printed as {quote(flip.other, _WIDTH)} too"
-        if not flip.other.strip():
-            text = "not always printed"
-        elif not flip.printed.strip():
-            text = f"{quote(flip.other, _WIDTH)} is printed here as well"
-        warnings.append((flip.span, text))
-    warnings.sort(key=lambda warning: (warning[0].path, warning[0].start))
-    if not warnings:
-        return
-    (span, label), *rest = warnings
-    notes = [Note(text, place) for place, text in rest[:_MAX_NOTES]]
-    if len(rest) > _MAX_NOTES:
-        notes.append(Note(f"and {len(rest) - _MAX_NOTES} more"))
-    if sensitivity.chaotic:
-        notes.append(Note(f"its simulation is chaotic: {describe_growth(sensitivity)}"))
-    yield diagnose(
-        "output-noise",
-        span,
-        f"`{sensitivity.path}` prints digits that are noise: a change of its initial states by "
-        f"{PERTURBATION:.0e} changes them",
-        label=label,
-        help=(
-            "print what holds: fewer digits, a shorter run, a mean of many runs"
-            if sensitivity.chaotic
-            else "print fewer digits, or say how to compare: `digits`, or `rtol` and `atol`"
-        ),
-        notes=notes,
-    )
-
-
-def describe_growth(sensitivity: Sensitivity) -> str:
-    """How fast the states of a script part, in words."""
-    size = sensitivity.amplification
-    if size is None or not math.isfinite(size):
-        return "its states part without bounds"
-    return f"states end {size:.0e} times as far apart as they began"
