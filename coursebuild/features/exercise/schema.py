@@ -10,7 +10,7 @@ from msgspec import Meta, Struct
 from coursebuild.core.model.fields import Blocks, Digits, OptionalBlocks, Text
 from coursebuild.features.lab.schema import JAVASCRIPT_NAME, Camera, Height, Plot
 
-LONGEST_TRIAL = 60.0
+LONGEST_TRIAL = 60
 """Simulated seconds: a reader waits for all trials."""
 
 

@@ -23,6 +23,7 @@ from coursebuild.api import (
     diagnose,
 )
 from coursebuild.core.model.results import TrialLine
+from coursebuild.core.run.mjcf import readable_error
 from coursebuild.core.run.v8 import LimitError, ScriptError
 from coursebuild.core.values import fingerprint
 from coursebuild.features.exercise.inputs import ExerciseOutput, exercise_inputs
@@ -185,4 +186,4 @@ def _seen(verdict: Verdict) -> str:
 
 
 def _one_line(message: str) -> str:
-    return " ".join(message.split()).rstrip(".")
+    return " ".join(readable_error(message).split()).rstrip(".")
