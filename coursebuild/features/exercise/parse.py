@@ -102,7 +102,7 @@ def _check(
 def _exercise(
     fence: Fence, subject: Subject, node: ObjectNode, fields: ExerciseFile, prose: Prose
 ) -> Exercise:
-    wrong = zip(node.objects("wrong"), fields.wrong, strict=True)
+    mistakes = zip(node.objects("wrong"), fields.wrong, strict=True)
     return Exercise(
         span=fence.span,
         id=fields.id,
@@ -112,7 +112,7 @@ def _exercise(
         names=fields.names,
         start=_text(node, "start"),
         solution=_text(node, "solution"),
-        wrong=tuple(Wrong(_text(n, "text"), w.fails, n.place("fails")) for n, w in wrong),
+        wrong=tuple(Wrong(_text(n, "text"), w.fails, n.place("fails")) for n, w in mistakes),
         trials=fields.trials,
         trial_places=tuple(trial.place("name") for trial in node.objects("trials")),
         lab=_lab(subject, node, fields),

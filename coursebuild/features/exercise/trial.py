@@ -127,8 +127,8 @@ class ExerciseTrials:
 
     def _judge_all(self, trial: Trial, exercise: Exercise, mjb: bytes) -> Judgements:
         start, module = time.time(), compile_lab(exercise.lab, trial.name)
-        wrong = (attempt.text.text for attempt in exercise.wrong)
-        texts = (exercise.solution.text, exercise.start.text, *wrong)
+        mistakes = (attempt.text.text for attempt in exercise.wrong)
+        texts = (exercise.solution.text, exercise.start.text, *mistakes)
         judgements = tuple(self._judge(module, exercise, text, mjb) for text in texts)
         return Judgements(judgements, round(time.time() - start, 4), int(start))
 
@@ -155,7 +155,7 @@ def _model_of(context: TrialContext, exercise: Exercise) -> Source | None:
 
 def _diagnose(exercise: Exercise, judgements: Sequence[Judgement]) -> Iterator[Diagnostic]:
     """Report a solution that fails, a start that is solved, and wrong attempts that pass."""
-    solution, start, *wrong = judgements
+    solution, start, *mistakes = judgements
     trials = list(zip(exercise.trials, exercise.trial_places, strict=True))
     solution_place = exercise.solution.span().first_line()
     if solution.refused:
@@ -163,24 +163,24 @@ def _diagnose(exercise: Exercise, judgements: Sequence[Judgement]) -> Iterator[D
         yield diagnose("exercise-solution", solution_place, message)
     for (trial, place), verdict in zip(trials, solution.verdicts, strict=False):
         if not verdict.passed:
-            message = f"the solution fails the trial `{trial.name}`: {_seen(verdict)}"
+            message = f"the solution fails the trial `{trial.name}`: {_describe(verdict)}"
             notes = [Note("the solution begins here", solution_place)]
             yield diagnose("exercise-solution", place, message, notes=notes)
     if not start.refused and all(verdict.passed for verdict in start.verdicts):
         message = "the start passes all trials, so there is nothing to do"
         yield diagnose("exercise-start", exercise.start.span().first_line(), message)
     names = [trial.name for trial in exercise.trials]
-    for attempt, judgement in zip(exercise.wrong, wrong, strict=True):
+    for attempt, judgement in zip(exercise.wrong, mistakes, strict=True):
         if judgement.refused:
             message = f"this attempt cannot be tried: {_one_line(judgement.refused)}"
             yield diagnose("exercise-wrong", attempt.text.span().first_line(), message)
         elif (verdict := judgement.verdicts[names.index(attempt.fails)]).passed:
-            message = f"this attempt passes the trial `{attempt.fails}`: {_seen(verdict)}"
+            message = f"this attempt passes the trial `{attempt.fails}`: {_describe(verdict)}"
             help = "name the trial that it fails, or make the bounds narrower"
             yield diagnose("exercise-wrong", attempt.place, message, help=help)
 
 
-def _seen(verdict: Verdict) -> str:
+def _describe(verdict: Verdict) -> str:
     value = "" if verdict.seen is None else f"it sees {verdict.seen:.6g}"
     return ", ".join(filter(None, (value, verdict.failure)))
 
