@@ -12,13 +12,11 @@ from coursebuild.api import (
     Assets,
     Course,
     Inputs,
-    OutputFile,
     PublishedTrials,
     Results,
     Trial,
     find_blocks,
 )
-from coursebuild.core.pages.assets import hashed_name
 from coursebuild.core.text.source import key_of
 from coursebuild.features.exercise.model import Exercise
 from coursebuild.features.lab.compile import compile_lab, inputs_of
@@ -28,13 +26,6 @@ class ExerciseOutput(Struct, frozen=True):
     """Stands for an exercise that was tried."""
 
     name: str
-
-
-class PublishedExercise(Struct, frozen=True):
-    """An exercise that readers can do on its page."""
-
-    script: str
-    """Site path of the script that runs on the page, the same for all exercises."""
 
 
 def exercise_trials(course: Course) -> Iterator[Trial]:
@@ -56,11 +47,5 @@ def exercise_inputs(trial: Trial) -> Inputs | None:
 
 
 def publish_exercises(results: Results, assets: Assets) -> PublishedTrials:
-    """Publish the script of exercises, if there are any; their labs publish all the rest."""
-    names = [t.output.name for t in results.trials if isinstance(t.output, ExerciseOutput)]
-    if not names:
-        return PublishedTrials()
-    data = assets.file("js/exercise.js")
-    path = hashed_name("assets/labs/exercise.js", data)
-    exercises = {name: PublishedExercise(path) for name in names}
-    return PublishedTrials(exercises, (OutputFile(path, data),))
+    """Publish nothing: an exercise runs on the files of its lab."""
+    return PublishedTrials()

@@ -14,7 +14,6 @@ from coursebuild.core.pages.marks import escape_line, escape_marks, fence, link,
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.pages.typography import number
 from coursebuild.core.text.quantities import with_unit
-from coursebuild.features.exercise.inputs import PublishedExercise
 from coursebuild.features.exercise.model import FORMULA, LANGUAGES, Exercise
 from coursebuild.features.exercise.schema import HiddenTrial
 from coursebuild.features.lab.reply import PublishedLab
@@ -22,13 +21,12 @@ from coursebuild.features.lab.reply import PublishedLab
 
 def draw_exercise(page: PageContext, block: Exercise) -> Markup:
     """Draw an exercise without its editor."""
-    exercise = page.inputs.trials.get(block.span.start)
     lab = page.inputs.trials.get(block.lab.span.start)
     language, words = LANGUAGES[block.subject], page.renderer.words
     config = script = name = ""
-    if isinstance(exercise, PublishedExercise) and isinstance(lab, PublishedLab):
+    if isinstance(lab, PublishedLab):
         name, config = lab.name, page.place.href(lab.config)
-        script = page.place.href(exercise.script)
+        script = page.place.href(lab.script)
 
     def code(text: str) -> Markup:
         html = page.highlight(language, text.rstrip())
