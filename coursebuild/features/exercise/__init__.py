@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from coursebuild.api import (
+    Assets,
     Course,
     Diagnostic,
     Document,
@@ -16,18 +17,15 @@ from coursebuild.api import (
     FenceKind,
     Note,
     PagePart,
+    PublishedTrials,
+    Results,
     TrialContext,
     TrialRun,
     Trials,
     diagnose,
     find_blocks,
 )
-from coursebuild.features.exercise.inputs import (
-    exercise_inputs,
-    exercise_trials,
-    publish_exercises,
-)
-from coursebuild.features.exercise.model import Exercise
+from coursebuild.features.exercise.model import Exercise, exercise_inputs, exercise_trials
 from coursebuild.features.exercise.page import draw_exercise, exercise_markdown, index_exercise
 from coursebuild.features.exercise.parse import parse_fence
 from coursebuild.features.exercise.schema import ExerciseFile
@@ -55,6 +53,11 @@ def start(context: TrialContext) -> TrialRun:
     return ExerciseTrials(context)
 
 
+def publish(results: Results, assets: Assets) -> PublishedTrials:
+    """Publish nothing: an exercise runs on the files of its lab."""
+    return PublishedTrials()
+
+
 FEATURE = Feature(
     name="exercise",
     needs=("lab",),
@@ -70,8 +73,6 @@ FEATURE = Feature(
     ),
     check=check_exercises,
     parts=(PagePart(mark="data-exercise=", texts=("exercise.live.",)),),
-    trials=Trials(
-        find=exercise_trials, start=start, inputs=exercise_inputs, publish=publish_exercises
-    ),
+    trials=Trials(find=exercise_trials, start=start, inputs=exercise_inputs, publish=publish),
     schemas={"exercise": (ExerciseFile, "An exercise fence")},
 )

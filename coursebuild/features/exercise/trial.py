@@ -26,14 +26,13 @@ from coursebuild.core.model.results import TrialLine
 from coursebuild.core.run.mjcf import readable_error
 from coursebuild.core.run.v8 import LimitError, ScriptError
 from coursebuild.core.values import fingerprint
-from coursebuild.features.exercise.inputs import ExerciseOutput, exercise_inputs
-from coursebuild.features.exercise.model import MODEL, Exercise
+from coursebuild.features.exercise.model import MODEL, Exercise, ExerciseOutput, exercise_inputs
 from coursebuild.features.lab.compile import LabModule, compile_lab, trial_data
 from coursebuild.features.lab.engines.native import NativeError
 from coursebuild.features.lab.trial import Engines, find_model, save_model
 
 
-class Verdict(Struct, frozen=True):
+class TrialVerdict(Struct, frozen=True):
     """What a trial says of an attempt."""
 
     passed: bool
@@ -48,7 +47,7 @@ class Judgement(Struct, frozen=True):
 
     refused: str = ""
     """Why it cannot be tried; then there are no verdicts."""
-    verdicts: tuple[Verdict, ...] = ()
+    verdicts: tuple[TrialVerdict, ...] = ()
 
 
 class Judgements(Struct, frozen=True):
@@ -180,7 +179,7 @@ def _diagnose(exercise: Exercise, judgements: Sequence[Judgement]) -> Iterator[D
             yield diagnose("exercise-wrong", attempt.place, message, help=help)
 
 
-def _describe(verdict: Verdict) -> str:
+def _describe(verdict: TrialVerdict) -> str:
     value = "" if verdict.seen is None else f"it sees {verdict.seen:.6g}"
     return ", ".join(filter(None, (value, verdict.failure)))
 
