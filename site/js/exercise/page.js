@@ -162,6 +162,7 @@ export class Exercise extends Instrument {
   watch(i) {
     const { button, t } = this.config.exercise.trials[i]
     this.load(this.checkedText)
+    ;[...this.readouts.element.children].forEach((row, n) => (row.hidden = n !== i))
     this.whenReady(() => {
       this.simulation.replay({ values: this.initial, events: button === null ? [] : [[0, button]], end: t })
     })
