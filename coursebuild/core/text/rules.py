@@ -228,6 +228,12 @@ GROUPS: dict[str, dict[str, str]] = {
         "lab-timeout": "Trying a lab takes too much time or memory.",
         "lab-engine": "An engine ended while a lab was tried, or refused its model.",
     },
+    "Exercises": {
+        "exercise-id-repeated": "Two exercises of the course have the same id.",
+        "exercise-solution": "The solution of an exercise fails a trial, or cannot be tried.",
+        "exercise-start": "The start of an exercise passes all its trials.",
+        "exercise-wrong": "A wrong attempt passes the trial that it names, or cannot be tried.",
+    },
     "Quizzes": {
         "quiz-id-repeated": "Two quizzes of the course have the same id.",
         "question-id-repeated": "Two questions of a quiz have the same id.",

@@ -4,6 +4,7 @@
  * The worker's functions are handed in, so that the tests can run this module outside a worker.
  */
 
+import { confine, watchableCode } from '../../exercise/attempt.js'
 import { EngineError, createEngine } from '../core/engine.js'
 import { Session } from './session.js'
 
@@ -70,7 +71,8 @@ export class Host {
       if (this.queues.get(id) !== queue) return // disposed of, or loaded again
       const session = new Session(id, post, now)
       this.sessions.set(id, session)
-      session.open(engine, source, config, code)
+      if (config.attempt !== undefined) confine() // its worker is dedicated
+      session.open(engine, source, config, config.attempt === undefined ? code : watchableCode(config, code))
       this.queues.delete(id)
       queue.forEach((message) => session.receive(message))
       session.show()
