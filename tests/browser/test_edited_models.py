@@ -9,7 +9,16 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.axe import violations
-from support.lab_page import EDITED_LAB, PAGE, lab, press, until, watch_page
+from support.lab_page import (
+    EDITED_LAB,
+    PAGE,
+    lab,
+    press,
+    until,
+    wait_for_change,
+    wait_until_still,
+    watch_page,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -69,6 +78,53 @@ def test_mistakes_are_told_at_their_lines_and_a_mended_model_runs(page: Page) ->
     press(lab_element, "Back to my model")
     expect(text).to_have_value(re.compile("0.04"))
     expect(lab_element).to_have_attribute("data-state", "playing")
+
+
+CART = """<mujoco>
+  <worldbody>
+    <camera name="behind" pos="0 -3 0" xyaxes="1 0 0 0 0 1"/>
+    <body><joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1"/></body>
+  </worldbody>
+  <actuator><motor name="push" joint="slide" ctrllimited="true" ctrlrange="-4 8"/></actuator>
+  <sensor><jointpos name="place" joint="slide"/></sensor>
+  <keyframe><key name="near" qpos="0"/><key name="far" qpos="3"/></keyframe>
+</mujoco>"""
+
+
+def test_panel_of_a_model_has_its_actuators_sensors_cameras_and_keyframes(page: Page) -> None:
+    lab_element, text = editor_of(page)
+    text.fill(CART)
+    press(lab_element, "Compile and run")
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    push = lab_element.get_by_label("push")
+    expect(push).to_have_count(0)
+    lab_element.get_by_text("Model", exact=True).click()
+    expect(push).to_have_attribute("min", "-4")
+    expect(push).to_have_attribute("max", "8")
+    place = lab_element.locator(".lab-model dd")
+    expect(place).to_have_text(re.compile(r"^\s0\.000$"))
+    push.fill("4")
+    expect(place).to_have_text(re.compile(r"^\s[1-9]\d*\.\d{3}$"))
+    assert violations(page, ".lab") == []
+    press(lab_element, "Pause")
+    expect(lab_element).to_have_attribute("data-state", "paused")
+    press(lab_element, "far")
+    expect(place).to_have_text(re.compile(r"^\s3\.000$"))
+    expect(push).to_have_attribute("aria-valuetext", "0.000")
+    view = lab_element.locator(".lab-view")
+    free = wait_until_still(page, view)
+    lab_element.get_by_label("Camera", exact=True).select_option(label="behind")
+    wait_for_change(page, view, free)
+    view.press("ArrowLeft")  # which shows the focus, too
+    behind = wait_until_still(page, view)
+    view.press("ArrowLeft")
+    assert wait_until_still(page, view) == behind, "no hand turns a camera of the model"
+    lab_element.get_by_label("Camera", exact=True).select_option(label="free")
+    wait_for_change(page, view, behind)
+    text.fill("<mujoco/>")
+    press(lab_element, "Compile and run")
+    expect(lab_element.locator(".lab-model")).to_have_text(re.compile("no actuators, sensors"))
+    lab_element.get_by_text("Model", exact=True).click()
 
 
 def test_link_carries_the_edited_model(page: Page, base: str) -> None:

@@ -14,6 +14,7 @@ import { Drag } from './drag.js'
 import { environment } from './environment.js'
 import { Pictures } from './frame.js'
 import { keyframe, siteOf } from './names.js'
+import { Panel } from './panel.js'
 import { call, readable } from './piece.js'
 import { generator } from './random.js'
 import { Sampler } from './sampler.js'
@@ -37,6 +38,7 @@ export class Lab {
     this.code = code
     this.host = host
     this.recorder = null // records each step for the trial
+    this.panel = null // while the reader looks at the model's actuators and sensors
     this.handles = engine.load(source)
     try {
       this.build()
@@ -89,8 +91,8 @@ export class Lab {
     this.prepare()
   }
 
-  toKeyframe() {
-    const { engine, model, data, key } = this
+  toKeyframe(key = this.key) {
+    const { engine, model, data } = this
     if (key < 0) engine.mj.mj_resetData(model, data)
     else engine.mj.mj_resetDataKeyframe(model, data, key)
     this.draw = generator(this.config.seed ?? 0)
@@ -153,7 +155,7 @@ export class Lab {
     this.act([i, value], () => {
       this.controls.take(i, value)
       this.engine.mj.mj_forward(this.model, this.data)
-      this.controls.apply(i)
+      this.watched(() => this.controls.apply(i))
       if (this.config.controls[i].reset) this.reset()
       else this.settle()
     })
@@ -179,6 +181,44 @@ export class Lab {
     if (this.log !== log) this.log = { values, events: [[0, ...event]] }
     else if (log.events.length < MOST_EVENTS) log.events.push([time, ...event])
     else this.log = null
+  }
+
+  // --- the model's own actuators and keyframes, which no control of the lab stands for
+
+  /** Look at what the model offers, or no longer; returns its description (see panel.js). */
+  inspect(on) {
+    this.panel = on ? new Panel(this) : null
+    return this.panel?.describe() ?? null
+  }
+
+  /** Run code that may set actuators. */
+  watched(code) {
+    if (this.panel === null) code()
+    else this.panel.watch(code)
+  }
+
+  /** Set the control signal of an actuator. It stays until code or the reader sets another, or the simulation is reset. */
+  actuate(i, value) {
+    const { model, data } = this
+    if (!(i >= 0 && i < model.nu && Number.isFinite(value))) throw new RangeError(`actuator ${i} cannot be set to ${value}`)
+    data.ctrl[i] = value
+    this.leaveControls()
+    this.settle()
+  }
+
+  /** Begin a new run at a keyframe, without the lab's own start. */
+  startAt(key) {
+    if (!(key >= 0 && key < this.model.nkey)) throw new RangeError(`the model has no keyframe ${key}`)
+    this.toKeyframe(key)
+    this.forget()
+    this.leaveControls()
+    this.settle()
+  }
+
+  /** The reader has done what no control does: the motion has no log any more. */
+  leaveControls() {
+    this.log = null
+    this.queue = []
   }
 
   // --- the log: what was done in a run since its reset; `null` if the controls alone do not determine the motion
@@ -253,7 +293,7 @@ export class Lab {
   stepOnce() {
     const { engine, model, data, drag, recorder } = this
     recorder?.begin()
-    if (this.code.controller) call(['controller'], () => this.code.controller(this.env))
+    if (this.code.controller) this.watched(() => call(['controller'], () => this.code.controller(this.env)))
     recorder?.controlled()
     const before = data.time
     drag.push()
@@ -332,8 +372,7 @@ export class Lab {
    */
   perturb(request) {
     if (request === null) return this.drag.release()
-    this.log = null
-    this.queue = []
+    this.leaveControls()
     if (request.point) {
       this.engine.mj.mj_forward(this.model, this.data)
       this.drag.grab(request.body, request.point)

@@ -13,6 +13,7 @@ import { fillScript } from './export.js'
 import { GoalView } from './goal.js'
 import { Notices } from './notices.js'
 import { formatReadout, formatTime } from './numbers.js'
+import { ModelPanel } from './panel.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
 import { copyLink, writeLink, writeLog } from './share.js'
@@ -80,6 +81,12 @@ export class Instrument {
     const { arrows, boxes } = buildOverlays(config, words, (name, isOn) => this.simulation.overlay(name, isOn))
     if (arrows !== null) this.transport.speed.after(arrows)
     this.readouts = buildReadouts(config.readouts, formatReadout)
+    this.panel = new ModelPanel(words, {
+      inspect: (on) => this.simulation.inspect(on),
+      actuate: (index, value) => this.simulation.actuate(index, value, !this.hasStarted),
+      startAt: (index) => this.simulation.startAt(index),
+      look: (camera) => this.view.look(camera),
+    })
     this.plots = config.plots.map((plot) => new Plot(plot, words))
     const goal = config.goal && element.querySelector('.lab-goal')
     this.goal = goal
@@ -130,6 +137,7 @@ export class Instrument {
       act(...this.shareAction()),
       config.exportPython ? act('export', () => this.export()) : null,
       document.querySelector('script[data-state]') && !config.kind ? this.makeLogButton() : null,
+      this.panel.element,
       help,
     )
   }
@@ -141,6 +149,7 @@ export class Instrument {
     return {
       state: (state, reason) => this.onStateChange(state, reason),
       ready: ({ values }) => this.onReady(values),
+      model: (model) => this.panel.open(model),
       samples: (samples, fresh) => this.collect(samples, fresh),
       refresh: (frame, now) => this.refresh(frame, now),
       controls: (values) => {
@@ -197,12 +206,13 @@ export class Instrument {
   }
 
   /** Update numbers and plots, less often than the picture. */
-  refresh({ time, readouts, realtime, goal }, now) {
+  refresh({ time, readouts, realtime, goal, panel }, now) {
     const resting = this.state !== 'playing'
     if (resting || now - this.textAt >= TEXT_EVERY) {
       this.goal?.show(goal)
       this.textAt = now
       if (readouts !== null) this.readouts.show(readouts)
+      this.panel.show(panel)
       this.transport.setTime(time)
       this.showPlay(!resting)
       this.transport.setRatio(resting ? 1 : realtime)

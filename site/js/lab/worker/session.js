@@ -16,6 +16,9 @@
  *   speed {factor}                    simulated seconds for each real one
  *   control {index, value, play}      set a number or an option; with `play` the lab then runs, unless its code pauses
  *   press {index, play}               press a button; `play` likewise
+ *   inspect {on}                      begin or stop to send what the model offers (core/panel.js)
+ *   actuate {index, value, play}      set the control signal of an actuator; `play` as above
+ *   keyframe {index}                  begin again at a keyframe of the model
  *   overlay {name, on}                one of `OVERLAYS` in core/frame.js
  *   visible {on}                      a lab out of sight makes no steps and sends no frames
  *   perturb {body, point, target}     with `point` (m, world) take hold of the body there; draw it to `target`; `null` lets go
@@ -28,7 +31,8 @@
  * To the page:
  *
  *   ready {version, scene, values, time}  `scene` of core/scene.js; `values` of the controls, `null` for none yet
- *   frame {time, buffer, readouts, samples, realtime, contacts, goal}
+ *   model {model}                     what the model offers, or `null`: the answer to `inspect`
+ *   frame {time, buffer, readouts, samples, realtime, contacts, goal, panel}
  *   playing
  *   paused {reason}                   `user`, `stopAt`, `code`, `diverged`, `error`, `offscreen`
  *   controls {values}                 after anything that lab code may have changed
@@ -43,7 +47,7 @@
  * time one number for each trace of all plots in turn, NaN for a gap; a new `epoch` means that the run began again. `realtime` is how
  * much of the time due in the last second was simulated: 1 unless the model is too slow. `goal` is `null` or `{held, reached,
  * counts}`: for how long its condition has held (s), when it was reached (s or `null`), and whether the reader has used the controls
- * alone.
+ * alone. `panel` is `null` or, of a lab that is inspected, `{ctrl, sensors, driven}`.
  */
 
 import { Clock } from '../core/clock.js'
@@ -228,7 +232,8 @@ export class Session {
     const frame = lab.frame(this.buffers.pop())
     const samples = lab.sampler.take()
     const realtime = this.playing ? this.clock.ratio() : 1
-    const rest = { time: lab.time, buffer: frame.buffer, readouts, samples, realtime, contacts: lab.data.ncon, goal: lab.goal }
+    const panel = lab.panel?.read() ?? null
+    const rest = { time: lab.time, buffer: frame.buffer, readouts, samples, realtime, contacts: lab.data.ncon, goal: lab.goal, panel }
     this.post('frame', rest, [frame.buffer, samples.times.buffer, samples.values.buffer])
   }
 }
@@ -252,6 +257,16 @@ const HANDLERS = {
   speed: (session, { factor }) => session.clock.setSpeed(factor),
   control: (session, { index, value, play }) => session.act((lab) => lab.setControl(index, value), play),
   press: (session, { index, play }) => session.act((lab) => lab.press(index), play),
+  inspect(session, { on }) {
+    session.post('model', { model: session.lab.inspect(on) })
+    session.stale = true
+  },
+  actuate: (session, { index, value, play }) => session.act((lab) => lab.actuate(index, value), play),
+  keyframe(session, { index }) {
+    session.lab.startAt(index)
+    session.clock.stop()
+    session.afterChange()
+  },
   overlay(session, { name, on }) {
     session.lab.pictures.setOverlay(name, on)
     session.stale = true
