@@ -258,6 +258,36 @@ def test_body_is_pulled_by_a_spring(lesson: Lesson, swing: Locator) -> None:
     page.mouse.up()
 
 
+def test_body_of_a_paused_lab_is_moved_by_the_hand_alone(lesson: Lesson, swing: Locator) -> None:
+    page = lesson.page
+    view = swing.locator(".lab-view")
+    view.scroll_into_view_if_needed()
+    box = view.bounding_box()
+    assert box is not None
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    scale = box["height"] / (2 * 2.5 * np.tan(np.pi / 8))
+    end = (middle[0] - 0.4 * np.sin(2.5) * scale, middle[1] + 0.4 * np.cos(2.5) * scale)
+    hand = swing.get_by_role("button", name="Grab bodies")
+    hand.click()
+    expect(hand).to_have_attribute("aria-pressed", "true")
+    page.mouse.move(*end)
+    page.mouse.down()
+    page.mouse.move(middle[0], middle[1] + 0.45 * scale, steps=3)
+    page.mouse.up()
+    wait_for_condition(page, lambda: abs(float(readout(swing, "angle"))) < 0.1)
+    expect(swing.locator(".lab-time")).to_have_text(re.compile(r"^0\.00"))
+    expect(swing).to_have_attribute("data-state", "paused")
+    before = wait_until_still(page, view)
+    page.mouse.move(box["x"] + 20, box["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 60, box["y"] + 20)
+    page.mouse.up()
+    wait_for_change(page, view, before)  # where nothing is, the hand turns the view
+    view.press("0")
+    hand.click()
+    expect(hand).to_have_attribute("aria-pressed", "false")
+
+
 def test_lab_out_of_sight_waits_and_goes_on_when_it_is_back(lesson: Lesson, swing: Locator) -> None:
     page = lesson.page
     press(swing, "Play")

@@ -365,12 +365,13 @@ export class Lab {
   // --- dragging
 
   /**
-   * Drag a body by a spring.
+   * Drag a body: by a spring, or while time stands still by moving the pose.
    *
    * @param {{body?: number, point?: number[], target: number[]} | null} request with a `point` (m, world) the body is taken
-   *   hold of there; the spring draws it to `target`; `null` lets go
+   *   hold of there; it is drawn to `target`; `null` lets go
+   * @param {boolean} [stands] whether time stands still
    */
-  perturb(request) {
+  perturb(request, stands = false) {
     if (request === null) return this.drag.release()
     this.leaveControls()
     if (request.point) {
@@ -379,6 +380,9 @@ export class Lab {
     }
     this.drag.move(request.target)
     this.dirty = true
+    if (!stands || this.diverged !== null) return
+    this.drag.pose()
+    this.settle()
   }
 
   // --- sharing

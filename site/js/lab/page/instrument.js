@@ -7,8 +7,8 @@
  * `progress` stores a reached goal (progress/store.js), or is null.
  */
 
-import { buildControls, buildOverlays, buildReadouts } from './controls.js'
-import { download, h } from './dom.js'
+import { buildControls, buildOverlays, buildReadouts, switchButton } from './controls.js'
+import { download, h, icon } from './dom.js'
 import { fillScript } from './export.js'
 import { GoalView } from './goal.js'
 import { Notices } from './notices.js'
@@ -80,6 +80,8 @@ export class Instrument {
     })
     const { arrows, boxes } = buildOverlays(config, words, (name, isOn) => this.simulation.overlay(name, isOn))
     if (arrows !== null) this.transport.speed.after(arrows)
+    const grab = switchButton(icon('hand'), 'lab-icon', words('lab.live.grab'), false, (isOn) => (this.hands.grabs = isOn))
+    this.transport.speed.after(grab)
     this.readouts = buildReadouts(config.readouts, formatReadout)
     this.panel = new ModelPanel(words, {
       inspect: (on) => this.simulation.inspect(on),

@@ -21,7 +21,8 @@
  *   keyframe {index}                  begin again at a keyframe of the model
  *   overlay {name, on}                one of `OVERLAYS` in core/frame.js
  *   visible {on}                      a lab out of sight makes no steps and sends no frames
- *   perturb {body, point, target}     with `point` (m, world) take hold of the body there; draw it to `target`; `null` lets go
+ *   perturb {body, point, target}     with `point` (m, world) take hold of the body there; draw it to `target`; `null` lets go.
+ *                                     A lab that is paused moves its pose; else a spring pulls
  *   frame {buffer}                    give a frame's buffer back (or `null` if it is lost)
  *   replay {log}                      begin again and play the log (core/lab.js)
  *   state                             ask for the state
@@ -278,8 +279,9 @@ const HANDLERS = {
     if (session.playing) session.post(on ? 'playing' : 'paused', on ? {} : { reason: 'offscreen' })
   },
   perturb(session, { body, point, target }) {
-    session.lab.perturb(target === null || target === undefined ? null : { body, point, target })
+    session.lab.perturb(target === null || target === undefined ? null : { body, point, target }, !session.playing)
     session.stale = true
+    session.report()
   },
   state: (session) => session.post('state', { state: session.lab.state() }),
   restore(session, { state }) {
