@@ -225,6 +225,67 @@ def test_keys_on_the_picture(lesson: Lesson, swing: Locator) -> None:
     expect(swing.locator(".lab-live dd").first).to_contain_text("2.500")
 
 
+def test_time_goes_back_and_on_to_the_last_bit(
+    lesson: Lesson, swing: Locator, course: Site
+) -> None:
+    page = lesson.page
+    bar = swing.get_by_label("Time of the run")
+    expect(bar).to_be_disabled()
+    press(swing, "Play")
+    wait_for_condition(page, lambda: time_of(swing) > 1)
+    press(swing, "Pause")
+    reach(page, SWING, "paused")
+    swing.get_by_label("gravity").fill("15")
+    expect(swing.locator(".lab-value").first).to_contain_text("15.0")
+    press(swing, "One step")
+    last = state_of(page, swing)
+    bar.fill("0.5")
+    expect(swing.locator(".lab-time")).to_have_text("0.50 s")
+    expect(swing.get_by_label("gravity")).to_have_value("9.8")
+    expect(bar).to_have_attribute("aria-valuetext", "0.50 s")
+    press(swing, "One step back")
+    bar.press("ArrowLeft")
+    swing.locator(".lab-view").press(",")
+    swing.locator(".lab-view").press(".")
+    expect(bar).to_have_value(re.compile(r"^0\.49[56]"))
+    earlier = state_of(page, swing)
+    steps = int(str(earlier["n"]))
+    assert steps == 248
+    np.testing.assert_allclose(floats(earlier)[:3], native(course, steps, 2.5), rtol=1e-9)
+    bar.press("End")
+    expect(swing.get_by_label("gravity")).to_have_value("15")
+    assert state_of(page, swing) == last
+    # A control that is used at an earlier time drops what came after.
+    bar.fill("0.5")
+    expect(swing.get_by_label("gravity")).to_have_value("9.8")
+    press(swing, "Push")
+    expect(swing.locator(".lab-time")).to_have_text("0.50 s")
+    bar.press("End")
+    expect(swing.locator(".lab-time")).to_have_text("0.50 s")
+
+
+def test_pointer_on_a_curve_sets_the_time_and_curves_are_downloaded(
+    lesson: Lesson, swing: Locator
+) -> None:
+    page = lesson.page
+    press(swing, "Play")
+    wait_for_condition(page, lambda: time_of(swing) > 1)
+    press(swing, "Pause")
+    reach(page, SWING, "paused")
+    plot = swing.locator(".lab-live .lab-plot")
+    before = wait_until_still(page, plot)
+    plot.hover(position={"x": 60, "y": 60})
+    wait_for_change(page, plot, before)  # values are shown
+    end = time_of(swing)
+    plot.click(position={"x": 60, "y": 60})
+    wait_for_condition(page, lambda: 0 < time_of(swing) < end)
+    with page.expect_download() as download:
+        press(swing, "Curves as CSV")
+    rows = download.value.path().read_text().splitlines()
+    assert rows[:2] == ["time (s),angle: angle (rad)", "0,2.5"]
+    assert float(rows[-1].split(",")[0]) == pytest.approx(end, abs=0.1)
+
+
 def test_body_is_pulled_by_a_spring(lesson: Lesson, swing: Locator) -> None:
     page = lesson.page
     swing.get_by_label("gravity").fill("0")

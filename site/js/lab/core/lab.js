@@ -38,6 +38,7 @@ export class Lab {
     this.code = code
     this.host = host
     this.recorder = null // records each step for the trial
+    this.tape = null // keeps the run, in a page
     this.panel = null // while the reader looks at the model's actuators and sensors
     this.handles = engine.load(source)
     try {
@@ -114,6 +115,7 @@ export class Lab {
     this.log = this.stepping ? null : { values: [...this.values], events: [] }
     this.sampler.clear()
     this.watch.restart()
+    this.tape?.clear()
     this.dirty = true
   }
 
@@ -121,6 +123,7 @@ export class Lab {
   settle() {
     const { engine, model, data } = this
     if (data.time < this.sampler.last) this.forget() // the code has put the time back, which begins a new run
+    this.tape?.event(this.physics.read())
     engine.mj.mj_forward(model, data)
     this.dirty = true
     this.diverged = null
@@ -177,6 +180,7 @@ export class Lab {
     const time = Number(this.time.toFixed(9))
     this.queue = []
     action()
+    this.tape?.mark(event[0])
     if (this.log === null) return
     if (this.log !== log) this.log = { values, events: [[0, ...event]] }
     else if (log.events.length < MOST_EVENTS) log.events.push([time, ...event])
@@ -274,6 +278,7 @@ export class Lab {
   step(n) {
     if (this.stepping) throw new Error('sim.step() within a step is not possible')
     this.interrupted = false
+    this.tape?.cut()
     let steps = 0
     let reason = this.diverged === null ? null : 'diverged'
     while (reason === null && steps < n) {
@@ -291,17 +296,9 @@ export class Lab {
   }
 
   stepOnce() {
-    const { engine, model, data, drag, recorder } = this
-    recorder?.begin()
-    if (this.code.controller) this.watched(() => call(['controller'], () => this.code.controller(this.env)))
-    recorder?.controlled()
+    const { data, tape } = this
     const before = data.time
-    drag.push()
-    engine.mj.mj_step(model, data)
-    drag.pop()
-    recorder?.end()
-    this.steps += 1
-    this.dirty = true
+    const numbers = this.advance()
     const findings = this.watch.look(before)
     if (findings !== null) {
       this.warnings.push(...findings.warnings)
@@ -309,10 +306,34 @@ export class Lab {
     }
     const timestep = this.option.timestep
     if (this.sampler.due(this.steps, timestep)) this.sampler.record(this.sync())
+    tape?.after(numbers)
     const { stopAt } = this.config
     const late = stopAt === null ? Infinity : stopAt - timestep / 2
     if (before < late && data.time >= late) return 'stopAt'
     return this.interrupted ? 'code' : null
+  }
+
+  /** Make a step; returns the numbers before it if the tape wants them. */
+  advance() {
+    const { engine, model, data, drag, recorder, tape } = this
+    recorder?.begin()
+    if (this.code.controller) this.watched(() => call(['controller'], () => this.code.controller(this.env)))
+    recorder?.controlled()
+    drag.push()
+    const numbers = tape?.before() ?? null
+    engine.mj.mj_step(model, data)
+    drag.pop()
+    recorder?.end()
+    this.steps += 1
+    this.dirty = true
+    return numbers
+  }
+
+  /** After the tape has put the lab elsewhere. */
+  arrive() {
+    this.diverged = null
+    this.watch.restart()
+    this.dirty = true
   }
 
   /** Bring `displayData` up to date; returns the environment of code that only looks. */
@@ -372,11 +393,16 @@ export class Lab {
    * @param {boolean} [stands] whether time stands still
    */
   perturb(request, stands = false) {
-    if (request === null) return this.drag.release()
+    if (request === null) {
+      if (!this.drag.active) return
+      this.drag.release()
+      return this.settle()
+    }
     this.leaveControls()
     if (request.point) {
       this.engine.mj.mj_forward(this.model, this.data)
       this.drag.grab(request.body, request.point)
+      if (this.drag.active) this.settle()
     }
     this.drag.move(request.target)
     this.dirty = true

@@ -8,6 +8,7 @@
  */
 
 import { buildControls, buildOverlays, buildReadouts, switchButton } from './controls.js'
+import { curvesText } from './csv.js'
 import { download, h, icon } from './dom.js'
 import { fillScript } from './export.js'
 import { GoalView } from './goal.js'
@@ -20,6 +21,7 @@ import { copyLink, writeLink, writeLog } from './share.js'
 import { watchSight } from './sight.js'
 import { Simulation } from './simulation.js'
 import { prefersStillness } from './support.js'
+import { buildTape } from './tape.js'
 import { buildTransport } from './transport.js'
 import { View } from './view.js'
 
@@ -65,15 +67,17 @@ export class Instrument {
     })
     this.hands = new Hands(this.view, {
       pull: (request) => this.simulation.pull(request),
-      keys: { ' ': () => this.togglePlay(), '.': () => this.step(), r: () => this.reset() },
+      keys: { ' ': () => this.togglePlay(), '.': () => this.step(1), ',': () => this.step(-1), r: () => this.reset() },
     })
     this.transport = buildTransport(words, {
       play: () => this.togglePlay(),
-      step: () => this.step(),
+      step: null,
       reset: () => this.reset(),
       speed: (factor) => this.simulation.speed(factor),
       full: document.fullscreenEnabled ? () => this.toggleFull() : null,
     })
+    const seek = (time) => this.simulation.seek(time)
+    this.tape = buildTape(words, config.stopAt, { seek, step: (count) => this.step(count) })
     this.controls = buildControls(config.controls, {
       set: (index, value) => this.simulation.set(index, value, !this.hasStarted),
       press: (index) => this.simulation.press(index, config.controls[index].play),
@@ -89,7 +93,7 @@ export class Instrument {
       startAt: (index) => this.simulation.startAt(index),
       look: (camera) => this.view.look(camera),
     })
-    this.plots = config.plots.map((plot) => new Plot(plot, words))
+    this.plots = config.plots.map((plot) => new Plot(plot, words, seek))
     const goal = config.goal && element.querySelector('.lab-goal')
     this.goal = goal
       ? new GoalView(goal, config.goal, words, {
@@ -102,7 +106,7 @@ export class Instrument {
     this.body = h(
       'div',
       { class: 'lab-live' },
-      h('div', { class: 'lab-stage' }, h('div', { class: 'lab-screen' }, this.view.element, this.transport.full), this.transport.element, this.makeReason()),
+      h('div', { class: 'lab-stage' }, h('div', { class: 'lab-screen' }, this.view.element, this.transport.full), this.transport.element, this.tape.element, this.makeReason()),
       h(
         'div',
         { class: 'lab-side' },
@@ -137,6 +141,7 @@ export class Instrument {
       'div',
       { class: 'lab-foot' },
       act(...this.shareAction()),
+      this.plots.length > 0 ? act('csv', () => this.exportCurves()) : null,
       config.exportPython ? act('export', () => this.export()) : null,
       document.querySelector('script[data-state]') && !config.kind ? this.makeLogButton() : null,
       this.panel.element,
@@ -181,7 +186,9 @@ export class Instrument {
     this.element.dataset.state = state
     this.textAt = this.plotAt = -Infinity // so that the next refresh shows the numbers of the last picture
     this.showPlay(state === 'playing')
-    this.transport.setEnabled(state !== 'loading' && state !== 'ended')
+    const isReady = state !== 'loading' && state !== 'ended'
+    this.transport.setEnabled(isReady)
+    this.tape.setEnabled(isReady)
     this.controls.setEnabled(state !== 'ended')
     if (state === 'playing') {
       this.hasStarted = true
@@ -197,8 +204,11 @@ export class Instrument {
     this.notices.say(this.words(`lab.live.${key}`, { t: `${formatTime(this.simulation.latest?.time ?? 0)} s` }))
   }
 
-  collect({ times, values }, fresh) {
-    if (fresh) this.plots.forEach((plot) => plot.clear())
+  collect({ times, values, from }, fresh) {
+    for (const plot of this.plots) {
+      if (fresh) plot.clear()
+      else if (from < Infinity) plot.cut(from)
+    }
     const width = times.length > 0 ? values.length / times.length : 0
     let offset = 0
     for (const plot of this.plots) {
@@ -208,7 +218,7 @@ export class Instrument {
   }
 
   /** Update numbers and plots, less often than the picture. */
-  refresh({ time, readouts, realtime, goal, panel }, now) {
+  refresh({ time, readouts, realtime, goal, panel, tape }, now) {
     const resting = this.state !== 'playing'
     if (resting || now - this.textAt >= TEXT_EVERY) {
       this.goal?.show(goal)
@@ -216,12 +226,14 @@ export class Instrument {
       if (readouts !== null) this.readouts.show(readouts)
       this.panel.show(panel)
       this.transport.setTime(time)
+      this.tape.show(tape, time)
       this.showPlay(!resting)
       this.transport.setRatio(resting ? 1 : realtime)
     }
     if (resting || now - this.plotAt >= PLOT_EVERY) {
       this.plotAt = now
-      this.plots.forEach((plot) => plot.draw())
+      const marks = tape.marks.map(([at, i]) => ({ time: at, label: this.config.controls[i].label }))
+      this.plots.forEach((plot) => plot.draw({ time, resting, marks }))
     }
   }
 
@@ -258,9 +270,9 @@ export class Instrument {
     this.transport.setPlaying(isPlaying, this.starter >= 0 && this.isAtStart ? this.config.start : undefined)
   }
 
-  step() {
+  step(count) {
     this.hasStarted = true
-    this.simulation.step()
+    this.simulation.step(count)
   }
 
   reset() {
@@ -338,6 +350,15 @@ export class Instrument {
   export() {
     const { name, text } = this.config.exportPython
     download(name, fillScript(text, this.values), 'text/x-python')
+  }
+
+  exportCurves() {
+    const curves = this.plots.map(({ config, whole }) => ({
+      ylabel: config.ylabel,
+      labels: config.traces.map(({ label }) => label),
+      columns: whole.table(),
+    }))
+    download(`${this.config.id}.csv`, curvesText(curves), 'text/csv')
   }
 
   dispose() {

@@ -8,8 +8,8 @@
  *
  *   state(state, reason)   'asleep' (nothing is loaded before something is asked of it), 'loading', 'paused', 'playing', 'ended' (it will not run again)
  *   ready({scene, values, time, version})
- *   samples({epoch, times, values}, fresh)   `fresh`: a new run began, earlier samples belong to another
- *   refresh(frame, now)    once for each picture at most: {time, readouts, realtime, contacts, goal, panel}
+ *   samples({epoch, from, times, values}, fresh)   `fresh`: a new run began, earlier samples belong to another
+ *   refresh(frame, now)    once for each picture at most: {time, readouts, realtime, contacts, goal, panel, tape}
  *   model(model)           what the model offers (core/panel.js), after `inspect(true)`
  *   controls(values)       lab code may have changed them
  *   diverged({time, kind, message}), warning({time, kind, message}), error({message, entry, kind, fatal}), saved(state)
@@ -94,6 +94,11 @@ export class Simulation {
 
   step(n = 1) {
     this.send({ type: 'step', n })
+  }
+
+  /** Go to another time (s) of the run. */
+  seek(time) {
+    this.send({ type: 'seek', time })
   }
 
   reset() {

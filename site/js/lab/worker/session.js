@@ -12,7 +12,8 @@
  *                                     `config.xml` replaces `mjb`
  *   ping                              answered by `pong`, unless something takes all the worker's time
  *   play, pause, reset
- *   step {n}                          pause and make `n` steps
+ *   step {n}                          pause and make `n` steps, or go back by as many if it is negative
+ *   seek {time}                       pause and go to another time of the run (core/tape.js)
  *   speed {factor}                    simulated seconds for each real one
  *   control {index, value, play}      set a number or an option; with `play` the lab then runs, unless its code pauses
  *   press {index, play}               press a button; `play` likewise
@@ -33,7 +34,7 @@
  *
  *   ready {version, scene, values, time}  `scene` of core/scene.js; `values` of the controls, `null` for none yet
  *   model {model}                     what the model offers, or `null`: the answer to `inspect`
- *   frame {time, buffer, readouts, samples, realtime, contacts, goal, panel}
+ *   frame {time, buffer, readouts, samples, realtime, contacts, goal, panel, tape}
  *   playing
  *   paused {reason}                   `user`, `stopAt`, `code`, `diverged`, `error`, `offscreen`
  *   controls {values}                 after anything that lab code may have changed
@@ -44,8 +45,9 @@
  *   state {state}                     `{values, steps, time, physics, log}`
  *
  * Of a frame: `buffer` is laid out as core/frame.js says, and transferred, not copied. `readouts` has a number, a text or `null` (no
- * value) each; it is `null` as a whole if one of them failed. `samples` is `{epoch, times, values}` since the last frame: for each
- * time one number for each trace of all plots in turn, NaN for a gap; a new `epoch` means that the run began again. `realtime` is how
+ * value) each; it is `null` as a whole if one of them failed. `samples` is `{epoch, from, times, values}` since the last frame: for each
+ * time one number for each trace of all plots in turn, NaN for a gap; a new `epoch` means that the run began again, and what lies after
+ * `from` no longer belongs to it. `tape` is the `range` of core/tape.js. `realtime` is how
  * much of the time due in the last second was simulated: 1 unless the model is too slow. `goal` is `null` or `{held, reached,
  * counts}`: for how long its condition has held (s), when it was reached (s or `null`), and whether the reader has used the controls
  * alone. `panel` is `null` or, of a lab that is inspected, `{ctrl, sensors, driven}`.
@@ -53,6 +55,7 @@
 
 import { Clock } from '../core/clock.js'
 import { Lab } from '../core/lab.js'
+import { Tape } from '../core/tape.js'
 
 const CHUNK = 2 // ms of stepping between two looks at the clock
 const LEAST = 4 // ms between two frames of a running lab
@@ -82,6 +85,7 @@ export class Session {
     this.guard(() => {
       const host = { play: () => this.play(), pause: () => this.stop('code') }
       this.lab = new Lab(engine, source, config, code, host)
+      this.lab.tape = new Tape(this.lab)
       this.lab.start()
     })
     if (this.lab === null) return
@@ -234,7 +238,7 @@ export class Session {
     const samples = lab.sampler.take()
     const realtime = this.playing ? this.clock.ratio() : 1
     const panel = lab.panel?.read() ?? null
-    const rest = { time: lab.time, buffer: frame.buffer, readouts, samples, realtime, contacts: lab.data.ncon, goal: lab.goal, panel }
+    const rest = { time: lab.time, buffer: frame.buffer, readouts, samples, realtime, contacts: lab.data.ncon, goal: lab.goal, panel, tape: lab.tape.range }
     this.post('frame', rest, [frame.buffer, samples.times.buffer, samples.values.buffer])
   }
 }
@@ -245,10 +249,20 @@ const HANDLERS = {
   pause: (session) => session.stop('user'),
   step(session, { n }) {
     session.stop('user')
-    const { stopped: reason } = session.advance(n ?? 1)
+    const { tape, steps } = session.lab
+    if (n < 0 || tape.isPast) {
+      tape.go(Math.max(0, steps + n))
+      return session.afterChange()
+    }
+    const { stopped: reason } = session.advance(n)
     session.stale = true
     session.report()
     if (reason === 'stopAt') session.post('paused', { reason: 'stopAt' })
+  },
+  seek(session, { time }) {
+    session.stop('user')
+    session.lab.tape.seek(time)
+    session.afterChange()
   },
   reset(session) {
     session.lab.reset()
