@@ -8,7 +8,7 @@ import { mountCustom } from './lab/page/custom.js'
 import { Instrument } from './lab/page/instrument.js'
 import { mount } from './lab/page/mount.js'
 import { missingFeature } from './lab/page/support.js'
-import { Workbench } from './lab/page/workbench.js'
+import { Workbench, openEditor } from './lab/page/workbench.js'
 
 /**
  * Put a live instrument in place of a lab's static form.
@@ -20,6 +20,6 @@ import { Workbench } from './lab/page/workbench.js'
 export function mountLab(element, texts, progress = null) {
   return mount(element, texts, missingFeature, (config, base, words) => {
     const Kind = { simlab: Instrument, mjcf: Workbench }[config.kind ?? 'simlab']
-    return Kind ? new Kind(element, config, base, words, progress) : mountCustom(element, config, base, words)
+    return Kind ? new Kind(element, config, base, words, progress, openEditor) : mountCustom(element, config, base, words)
   })
 }

@@ -12,6 +12,7 @@ from support.axe import violations
 from support.lab_page import (
     EDITED_LAB,
     PAGE,
+    SWING,
     lab,
     press,
     until,
@@ -143,6 +144,35 @@ def test_link_carries_the_edited_model(page: Page, base: str) -> None:
     text.fill("".join(str(i**0.5) for i in range(3000)))
     press(lab_element, "Copy link to this model")
     expect(lab_element.get_by_role("alert").filter(has_text="too long for a link")).to_be_visible()
+
+
+def test_every_lab_opens_its_model_in_the_editor(page: Page) -> None:
+    swing = lab(page, SWING)
+    press(swing, "Open in the editor")
+    text = swing.get_by_label("The model, as MJCF")
+    expect(text).to_be_focused()
+    lesson = text.input_value()
+    assert '<body name="arm"' in lesson
+    expect(swing.get_by_role("button", name="Push")).to_be_hidden()
+    mine = lesson.replace("</worldbody>", '<geom name="mine" size="0.1"/></worldbody>')
+    text.fill(mine)
+    text.press("Control+Enter")
+    expect(swing).to_have_attribute("data-state", "playing")
+    assert violations(page, ".lab") == []
+    press(swing, "Copy link to this model")
+    expect(page).to_have_url(re.compile("#lab=1.1-lab-1&z="))
+    second_page = page.context.new_page()
+    second_page.goto(page.url)
+    linked = lab(second_page, SWING, None)
+    expect(linked.get_by_label("The model, as MJCF")).to_have_value(mine)
+    second_page.close()
+    press(swing, "Back to the lab")
+    expect(text).to_have_count(0)
+    expect(swing).to_have_attribute("data-state", "paused")
+    press(swing, "Push")
+    press(swing, "Play")
+    expect(swing).to_have_attribute("data-state", "playing")
+    press(swing, "Pause")
 
 
 def test_model_that_never_comes_to_an_end_holds_nothing_up(page: Page) -> None:

@@ -284,6 +284,14 @@ def test_pointer_on_a_curve_sets_the_time_and_curves_are_downloaded(
     rows = download.value.path().read_text().splitlines()
     assert rows[:2] == ["time (s),angle: angle (rad)", "0,2.5"]
     assert float(rows[-1].split(",")[0]) == pytest.approx(end, abs=0.1)
+    press(swing, "Keep this run")
+    press(swing, "Reset")
+    expect(swing.locator(".lab-time")).to_have_text("0.00 s")
+    page.mouse.move(0, 0)
+    kept = wait_until_still(page, plot)
+    press(swing, "Drop the kept run")
+    wait_for_change(page, plot, kept)
+    expect(swing.get_by_role("button", name="Keep this run")).to_be_visible()
 
 
 def test_body_is_pulled_by_a_spring(lesson: Lesson, swing: Locator) -> None:

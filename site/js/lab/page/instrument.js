@@ -1,10 +1,10 @@
 /**
  * A `simlab` as an instrument: picture, transport, controls, readouts and plots.
  *
- *   const instrument = new Instrument(element, config, base, words, progress)
+ *   const instrument = new Instrument(element, config, base, words, progress, openEditor)
  *
  * `element` is the lab's place in the page, `config` its JSON, `base` the address of that JSON, to which its addresses are relative;
- * `progress` stores a reached goal (progress/store.js), or is null.
+ * `progress` stores a reached goal (progress/store.js), or is null; `openEditor` is that of workbench.js, which needs this module.
  */
 
 import { buildControls, buildOverlays, buildReadouts, switchButton } from './controls.js'
@@ -32,10 +32,13 @@ const HEIGHT = 300 // CSS pixels, of a view that is 480 wide
 const HELP = ['keys_mouse', 'keys_touch', 'keys_camera', 'keys_run']
 
 export class Instrument {
-  constructor(element, config, base, words, progress = null) {
+  constructor(element, config, base, words, progress = null, openEditor = null) {
     this.element = element
     this.config = config
+    this.base = base
     this.words = words
+    this.openEditor = openEditor
+    this.bench = null // in which the reader edits the model, in place of this
     this.progress = progress
     this.values = this.initial = config.controls.map(({ value }) => value ?? null)
     this.textAt = this.plotAt = -Infinity
@@ -141,12 +144,28 @@ export class Instrument {
       'div',
       { class: 'lab-foot' },
       act(...this.shareAction()),
-      this.plots.length > 0 ? act('csv', () => this.exportCurves()) : null,
+      ...(this.plots.length > 0 ? [this.makeKeepButton(), act('csv', () => this.exportCurves())] : []),
       config.exportPython ? act('export', () => this.export()) : null,
       document.querySelector('script[data-state]') && !config.kind ? this.makeLogButton() : null,
+      config.source && this.openEditor ? act('edit', () => this.edit()) : null,
       this.panel.element,
       help,
     )
+  }
+
+  /** A button that keeps the curves of the run behind those of the next ones, and then one that drops them. */
+  makeKeepButton() {
+    let isKept = false
+    const button = h('button', { type: 'button', class: 'lab-text' }, this.words('lab.live.keep'))
+    button.addEventListener('click', () => {
+      isKept = !isKept
+      button.textContent = this.words(isKept ? 'lab.live.drop' : 'lab.live.keep')
+      this.plots.forEach((plot) => {
+        plot.keep(isKept)
+        plot.draw(plot.now)
+      })
+    })
+    return button
   }
 
   // --- events of the simulation
@@ -289,6 +308,7 @@ export class Instrument {
   /** Go to the state of a link, now or when the lab is ready, and offer a button that replays the motion that led to it. */
   restore(state) {
     const { log } = state
+    if (state.text !== undefined && this.config.source && this.openEditor) return void this.edit(state)
     const replay = () => this.simulation.replay(log)
     const button = h('button', { type: 'button', class: 'lab-button', onclick: replay }, this.words('lab.live.motion'))
     this.motion.replaceChildren(button)
@@ -310,7 +330,34 @@ export class Instrument {
     })
   }
 
+  /** Let the reader edit the model, in place of this lab. @param {Record<string, any> | null} [state] of a link to an edited model */
+  async edit(state = null) {
+    try {
+      const response = await fetch(new URL(this.config.source, this.base))
+      if (!response.ok) throw new Error(this.words('lab.live.not_found', { status: response.status }))
+      const text = await response.text()
+      if (this.state === 'playing') this.simulation.pause()
+      this.body.hidden = true
+      this.bench = this.openEditor(this, text.trimEnd(), () => this.leaveEditor())
+      if (state !== null) this.bench.restore(state)
+    } catch (error) {
+      this.notices.show(error.message, 'warning')
+    }
+  }
+
+  leaveEditor() {
+    if (this.bench === null) return
+    this.bench.dispose()
+    this.bench = null
+    this.body.hidden = false
+    this.element.classList.add('lab-on')
+    this.element.dataset.state = this.state
+    this.view.invalidate()
+    this.view.element.focus({ preventScroll: true })
+  }
+
   whenReady(act) {
+    this.leaveEditor()
     if (this.state !== 'loading' && this.state !== 'asleep') return act()
     this.pendingAction = act
     this.simulation.wake()
@@ -362,6 +409,7 @@ export class Instrument {
   }
 
   dispose() {
+    this.leaveEditor()
     this.unwatch()
     clearTimeout(this.sayTimer)
     this.hands.dispose()

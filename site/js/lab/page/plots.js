@@ -23,6 +23,7 @@ const MOST_POWERS = 6 // labels of a logarithmic axis
 const FIGURES = 4 // of a value under the pointer
 const SLOP = 4 // pixels that a pointer moves before it sets the time
 const TICK = 5 // pixels, of the mark of a change
+const NO_SPAN = [Infinity, -Infinity]
 const PLAYING = { time: 0, resting: false, marks: [] }
 
 export class Plot {
@@ -39,6 +40,9 @@ export class Plot {
     this.now = PLAYING
     /** @type {number | null} the time under the pointer (s) */
     this.pointed = null
+    /** @type {Float64Array[] | null} the samples of an earlier run */
+    this.kept = null
+    this.keptSpan = NO_SPAN
     this.caption = words('lab.plot', { ylabel: config.ylabel || words('lab.value'), xlabel: config.xlabel || words('lab.time') })
     this.element = h('figure', { class: 'lab-plot', role: 'img', 'aria-label': `${this.caption}: ${names(config)}` })
     this.chart = null
@@ -69,6 +73,14 @@ export class Plot {
     const { recent, whole, config } = this
     whole.cut(time)
     if (recent !== whole) recent.refill(whole, time - config.window)
+    this.dirty = true
+  }
+
+  /** Keep the run, so that its lines stay behind those of the next; or keep none. */
+  keep(on) {
+    this.kept = on && this.whole.length > 0 ? this.whole.table().map((column) => column.slice()) : null
+    const values = (this.kept ?? []).slice(1).flatMap((column) => [...column].filter(Number.isFinite))
+    this.keptSpan = values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], NO_SPAN)
     this.dirty = true
   }
 
@@ -162,7 +174,11 @@ export class Plot {
         x: { time: false, range: () => this.timeRange() },
         y: {
           distr: config.log ? LOGARITHMIC : LINEAR,
-          range: (_, min, max) => (config.log ? decades(config, min, max) : spanOf(config, min, max)),
+          range: (_, min, max) => {
+            const low = Math.min(min ?? Infinity, this.keptSpan[0])
+            const high = Math.max(max ?? -Infinity, this.keptSpan[1])
+            return config.log ? decades(config, low, high) : spanOf(config, low, high)
+          },
         },
       },
       axes: [
@@ -179,7 +195,7 @@ export class Plot {
         })),
       ],
       hooks: {
-        drawAxes: [(chart) => this.drawTitle(chart, font), (chart) => this.drawReferences(chart, font)],
+        drawAxes: [(chart) => this.drawTitle(chart, font), (chart) => this.drawReferences(chart, font), (chart) => this.drawKept(chart)],
         draw: [(chart) => this.drawLabels(chart, font), (chart) => this.drawTime(chart, font)],
       },
     }
@@ -188,7 +204,7 @@ export class Plot {
   timeRange() {
     const { window } = this.config
     const { last } = this.history
-    if (window === null || this.now.resting) return [0, Math.max(window ?? 1, last)]
+    if (window === null || this.now.resting) return [0, Math.max(window ?? 1, last, this.kept?.[0].at(-1) ?? 0)]
     return last <= window ? [0, window] : [last - window, last]
   }
 
@@ -199,7 +215,7 @@ export class Plot {
     const { last } = this.history
     const from = time - (this.config.window ?? Infinity)
     if (!resting || (time >= last && from <= 0)) return ink
-    const pale = ink.replace('rgb(', 'rgba(').replace(')', ', 0.35)')
+    const pale = faint(ink)
     const { left, width } = bbox
     const part = (at) => Math.min(1, Math.max(0, (valToPos(Math.max(0, at), 'x', true) - left) / width))
     const gradient = ctx.createLinearGradient(left, 0, left + width, 0)
@@ -257,6 +273,29 @@ export class Plot {
       const left = bbox.left + (end > width + 2 * GAP * ratio ? GAP * ratio : bbox.width - width)
       ctx.clearRect(left, places[i] - (FONT / 2) * ratio, width, FONT * ratio) // no other line crosses it
       ctx.fillText(label, left, places[i])
+    })
+    ctx.restore()
+  }
+
+  /** Draw the lines of the run that was kept. */
+  drawKept({ ctx, bbox, scales, valToPos }) {
+    if (this.kept === null) return
+    const [times, ...columns] = this.kept
+    ctx.save()
+    ctx.beginPath()
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height)
+    ctx.clip()
+    ctx.lineWidth = uPlot.pxRatio
+    columns.forEach((column, i) => {
+      ctx.strokeStyle = faint(this.colours.traces[i % this.colours.traces.length])
+      ctx.beginPath()
+      let isDrawing = false
+      times.forEach((time, j) => {
+        const isShown = time >= scales.x.min && Number.isFinite(column[j])
+        if (isShown) ctx[isDrawing ? 'lineTo' : 'moveTo'](valToPos(time, 'x', true), valToPos(column[j], 'y', true))
+        isDrawing = isShown
+      })
+      ctx.stroke()
     })
     ctx.restore()
   }
@@ -351,6 +390,8 @@ export class Plot {
     this.chart?.destroy()
   }
 }
+
+const faint = (colour) => colour.replace('rgb(', 'rgba(').replace(')', ', 0.35)')
 
 const names = ({ traces }) => traces.map(({ label }) => label).join(', ')
 

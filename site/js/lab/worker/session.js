@@ -9,7 +9,8 @@
  *
  *   warm {wasm}                       start to fetch and compile the engine (an address)
  *   load {config, module, mjb, wasm}  fetch what is missing and start the lab; the last three are absolute addresses. A model in
- *                                     `config.xml` replaces `mjb`
+ *                                     `config.xml` replaces `mjb`; without a `module` the lab has no code but a start from the
+ *                                     first keyframe
  *   ping                              answered by `pong`, unless something takes all the worker's time
  *   play, pause, reset
  *   step {n}                          pause and make `n` steps, or go back by as many if it is negative
