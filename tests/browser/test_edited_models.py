@@ -117,11 +117,11 @@ def test_panel_of_a_model_has_its_actuators_sensors_cameras_and_keyframes(page: 
     lab_element.get_by_label("Camera", exact=True).select_option(label="behind")
     wait_for_change(page, view, free)
     view.press("ArrowLeft")  # which shows the focus, too
-    behind = wait_until_still(page, view)
+    rear_view = wait_until_still(page, view)
     view.press("ArrowLeft")
-    assert wait_until_still(page, view) == behind, "no hand turns a camera of the model"
+    assert wait_until_still(page, view) == rear_view, "no hand turns a camera of the model"
     lab_element.get_by_label("Camera", exact=True).select_option(label="free")
-    wait_for_change(page, view, behind)
+    wait_for_change(page, view, rear_view)
     text.fill("<mujoco/>")
     press(lab_element, "Compile and run")
     expect(lab_element.locator(".lab-model")).to_have_text(re.compile("no actuators, sensors"))
@@ -163,8 +163,8 @@ def test_every_lab_opens_its_model_in_the_editor(page: Page) -> None:
     expect(page).to_have_url(re.compile("#lab=1.1-lab-1&z="))
     second_page = page.context.new_page()
     second_page.goto(page.url)
-    linked = lab(second_page, SWING, None)
-    expect(linked.get_by_label("The model, as MJCF")).to_have_value(mine)
+    linked_lab = lab(second_page, SWING, None)
+    expect(linked_lab.get_by_label("The model, as MJCF")).to_have_value(mine)
     second_page.close()
     press(swing, "Back to the lab")
     expect(text).to_have_count(0)

@@ -288,9 +288,9 @@ def test_pointer_on_a_curve_sets_the_time_and_curves_are_downloaded(
     press(swing, "Reset")
     expect(swing.locator(".lab-time")).to_have_text("0.00 s")
     page.mouse.move(0, 0)
-    kept = wait_until_still(page, plot)
+    kept_picture = wait_until_still(page, plot)
     press(swing, "Drop the kept run")
-    wait_for_change(page, plot, kept)
+    wait_for_change(page, plot, kept_picture)
     expect(swing.get_by_role("button", name="Keep this run")).to_be_visible()
 
 

@@ -36,7 +36,7 @@ from coursebuild.core.model import Limits
 from coursebuild.core.model.results import TrialLine
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.run.child import LIMITS
-from coursebuild.core.run.mjcf import existing_files, model_files, model_key
+from coursebuild.core.run.mjcf import model_files, model_key
 from coursebuild.core.run.sandbox import Sandbox
 from coursebuild.core.text.source import key_of
 from coursebuild.core.values import fingerprint
@@ -59,15 +59,13 @@ from coursebuild.features.lab.equations.equation_trial import (
 )
 from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
-from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size
+from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size, editable_source
 from coursebuild.features.lab.reply import LabOutput, MainRun, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 
 _PARITY_SECONDS = 1.0
 """Simulated time over which the size of a difference counts, unless a lab says how much is allowed.
 """
-_LONGEST_SOURCE = 100_000
-"""Characters of a model in the editor, as site/js/lab/page/share.js has it."""
 _TRANSIENT = ("timeout", "engine")
 """Kinds of failure that may not happen again: a trial that ends in one is not stored."""
 
@@ -324,20 +322,10 @@ class _LabTrial(Struct, frozen=True):
             cached=cached_evaluation is not None,
             unexported=export.reason,
         )
-        output = replace(
-            evaluation.output,
-            mjb=mjb,
-            script=export.script,
-            parity=comparison,
-            source=self._editable_source(),
-        )
+        source = editable_source(lab, self.context.root, self.model)
+        parts = {"mjb": mjb, "script": export.script, "parity": comparison, "source": source}
+        output = replace(evaluation.output, **parts)
         return TrialResult(lab.span, line, output), [*failures, *evaluation.remarks]
-
-    def _editable_source(self) -> str:
-        model = self.model
-        if self.lab.kind == MJCF or len(model.text) > _LONGEST_SOURCE:
-            return ""
-        return "" if existing_files(self.context.root, model.path, model.text) else model.text
 
     def _export(self, main: MainRun) -> LabExport:
         root, model = self.context.root, self.model
