@@ -9,7 +9,7 @@ import { mountCustom } from './lab/page/custom.js'
 import { Instrument } from './lab/page/instrument.js'
 import { mount } from './lab/page/mount.js'
 import { missingFeature } from './lab/page/support.js'
-import { Workbench } from './lab/page/workbench.js'
+import { Workbench, openEditor } from './lab/page/workbench.js'
 
 /**
  * Put a live instrument in place of a lab's static form.
@@ -23,6 +23,6 @@ export function mountLab(element, texts, progress = null) {
     const { exercise } = element.dataset
     if (exercise) return new Exercise(element, { ...config, exercise: JSON.parse(exercise) }, base, words, progress)
     const Kind = { simlab: Instrument, mjcf: Workbench }[config.kind ?? 'simlab']
-    return Kind ? new Kind(element, config, base, words, progress) : mountCustom(element, config, base, words)
+    return Kind ? new Kind(element, config, base, words, progress, openEditor) : mountCustom(element, config, base, words)
   })
 }

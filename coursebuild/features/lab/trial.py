@@ -59,7 +59,7 @@ from coursebuild.features.lab.equations.equation_trial import (
 )
 from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
-from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size
+from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size, editable_source
 from coursebuild.features.lab.reply import LabOutput, MainRun, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 
@@ -324,7 +324,9 @@ class _LabTrial(Struct, frozen=True):
             cached=cached_evaluation is not None,
             unexported=export.reason,
         )
-        output = replace(evaluation.output, mjb=mjb, script=export.script, parity=comparison)
+        source = editable_source(lab, self.context.root, self.model)
+        parts = {"mjb": mjb, "script": export.script, "parity": comparison, "source": source}
+        output = replace(evaluation.output, **parts)
         return TrialResult(lab.span, line, output), [*failures, *evaluation.remarks]
 
     def _export(self, main: MainRun) -> LabExport:

@@ -11,6 +11,16 @@ import { Session } from './session.js'
 const BUDGET = 12 // ms of stepping before messages are looked at
 const LONGEST = 8 // ms between two ticks
 
+/** The code of a lab that has none: of a model that the reader edits. It starts from the first keyframe, if any. */
+const PLAIN = {
+  setup: ({ model, data, mj }) => {
+    if (model.nkey > 0) mj.mj_resetDataKeyframe(model, data, 0)
+  },
+  controls: [],
+  readouts: [],
+  plots: [],
+}
+
 export class Host {
   /**
    * @param {object} services
@@ -67,7 +77,7 @@ export class Host {
     this.queues.set(id, queue)
     try {
       const model = config.xml ?? fetchBytes(mjb)
-      const [engine, source, code] = await Promise.all([this.start(wasm), model, importModule(module)])
+      const [engine, source, code] = await Promise.all([this.start(wasm), model, module === '' ? PLAIN : importModule(module)])
       if (this.queues.get(id) !== queue) return // disposed of, or loaded again
       const session = new Session(id, post, now)
       this.sessions.set(id, session)
